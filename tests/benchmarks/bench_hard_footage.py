@@ -13,6 +13,7 @@ by 30 mm: every figure must then be bad.
 from __future__ import annotations
 
 import argparse
+import csv
 import json
 import shutil
 import subprocess
@@ -30,8 +31,10 @@ from tests.benchmarks.hard_files import (
     EXCHANGED,
     FROZEN,
     KINDS,
+    LOST,
     REWRITTEN,
     exchanged,
+    forget_lost,
     held_still,
 )
 from tests.benchmarks.hard_kinds import PAINTED, Paint, unspoilt
@@ -71,6 +74,10 @@ def make(kind: str, source: Path, folder: Path, frames: int, seed: int) -> None:
         repaint(folder, PAINTED.get(kind) or held_still(FROZEN[kind]), seed)
     if kind in EXCHANGED:
         repaint(folder, unspoilt, seed, taken=EXCHANGED[kind])
+    if kind in LOST:
+        kept = LOST[kind](len((folder / "frames.csv").read_text("utf-8").splitlines()) - 1, random)
+        repaint(folder, unspoilt, seed, taken=dict(enumerate(kept)))
+        forget_lost(folder, kept)
     if kind in CODED:
         repaint(folder, unspoilt, seed, "libx265", CODED[kind])
     if kind in REWRITTEN:
@@ -144,10 +151,18 @@ def line(name: str, score: dict[str, dict[str, float]], run: Path) -> str:
         f"{name:28s} random {wall['radius_mad_sigma_mm']:.3f} bias {wall['radius_bias_mm']:+.3f} mm, "
         f"inside 95 % {100 * wall['within_1.96_sigma']:.1f}, "
         f"axial {score['trajectory']['axial_end_error_percent']:+.2f} %, "
+        f"that is {_axial_sigmas(score, run):+.1f} σ, "
         f"missed {defects['missed']}, false {defects['unmatched']}, unconfirmed {len(apart)}, "
         f"registration {score['texture']['registration_median_mm']:.3f} mm, "
         f"warned by {', '.join(sorted({w.split(':')[0] for w in warned})) or 'none'}"
     )
+
+
+def _axial_sigmas(score: dict[str, dict[str, float]], run: Path) -> float:
+    """Return the distance's error at the end over the σ that the run states there."""
+    with (run / "trajectory.csv").open(encoding="utf-8", newline="") as file:
+        last = list(csv.DictReader(file))[-1]
+    return score["trajectory"]["axial_end_error_mm"] / float(last["sigma_z_mm"])
 
 
 def main() -> None:

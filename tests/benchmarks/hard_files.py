@@ -1,17 +1,22 @@
-"""Kinds of hard footage: pictures held, exchanged or coded hastily, and other files of a recording changed.
+"""Kinds of hard footage: pictures held, exchanged, lost or coded hastily, and other files changed.
 
-`FROZEN` are frames that all show the picture before them, `EXCHANGED` pictures in another's place, `CODED`
-options of HEVC; one of `REWRITTEN` changes other files of the recording, one of `DAMAGED` the video's bytes.
+`FROZEN` are frames that all show the picture before them, `EXCHANGED` pictures in another's place, `LOST`
+which pictures are left when some are lost and the table of frames does not know, `CODED` options of HEVC; one
+of `REWRITTEN` changes other files of the recording, one of `DAMAGED` the video's bytes.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+import csv
+import json
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from functools import partial
 from pathlib import Path
 from typing import TypeVar
 
 import numpy as np
 import yaml
+from numpy.typing import NDArray
 
 from tests.benchmarks.hard_kinds import PAINTED, Image, Paint
 
@@ -80,9 +85,60 @@ def clock_jump(folder: Path, random: np.random.Generator) -> None:
     (folder / "frames.csv").write_text("\n".join([head, *lines]) + "\n", "utf-8")
 
 
+def kept_pictures(lost: int, together: bool, count: int, random: np.random.Generator) -> NDArray[np.int_]:
+    """Return the pictures that are left of ``count`` when some are lost, one after the other or anywhere."""
+    inner = np.arange(10, count - 10 - lost)
+    gone = random.choice(inner) + np.arange(lost) if together else random.choice(inner, lost, replace=False)
+    return np.setdiff1d(np.arange(count), gone)
+
+
+def forget_lost(folder: Path, kept: NDArray[np.int_]) -> None:
+    """Give the pictures that are left the first rows of the table, and their own true poses."""
+    table = folder / "frames.csv"
+    table.write_text("\n".join(table.read_text("utf-8").splitlines()[: len(kept) + 1]) + "\n", "utf-8")
+    truth = json.loads((folder / "truth.json").read_text("utf-8"))
+    truth["camera_pose_in_pipe"] = [truth["camera_pose_in_pipe"][k] for k in kept]
+    (folder / "truth.json").write_text(json.dumps(truth), "utf-8")
+
+
+def labels_swapped(folder: Path, random: np.random.Generator) -> None:
+    """From a frame in the middle third on, the table says laser of lit pictures and led of the laser's."""
+    _relabel(folder, lambda count: np.arange(count) >= random.integers(count // 3, 2 * count // 3))
+
+
+def labels_wrong(folder: Path, random: np.random.Generator) -> None:
+    """One label in ten, anywhere, is the other one."""
+    _relabel(
+        folder, lambda count: np.isin(np.arange(count), random.choice(count, count // 10, replace=False))
+    )
+
+
+def _relabel(folder: Path, wrong_of: Callable[[int], NDArray[np.bool_]]) -> None:
+    """Exchange laser and led in the rows of the table that ``wrong_of`` their number says."""
+    with (folder / "frames.csv").open(encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    if {row["illumination"] for row in rows} != {"laser", "led"}:
+        raise SystemExit("labels can be exchanged only where laser and led alternate")
+    for row, wrong in zip(rows, wrong_of(len(rows)), strict=True):
+        if wrong:
+            row["illumination"] = "led" if row["illumination"] == "laser" else "laser"
+    with (folder / "frames.csv").open("w", encoding="utf-8", newline="") as file:
+        writer = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(rows)
+
+
 # Frames whose pictures all are the one before the first of them.
 FROZEN = {"frozen-picture": range(90, 99), "frozen-second": range(60, 90)}
-REWRITTEN = {"half-size": half_size_probe, "late-stamps": late_stamps, "clock-jump": clock_jump}
+REWRITTEN = {
+    "half-size": half_size_probe, "late-stamps": late_stamps, "clock-jump": clock_jump,
+    "labels-swapped": labels_swapped, "labels-wrong": labels_wrong,
+}  # fmt: skip
+LOST = {
+    "lost-1": partial(kept_pictures, 1, True),
+    "lost-5": partial(kept_pictures, 5, False),
+    "lost-5-together": partial(kept_pictures, 5, True),
+}
 DAMAGED = {"damaged-stream": damaged_stream}
 # Stored as HEVC, from careful to hasty: what is held over from picture to picture differs.
 CODED = {
@@ -102,4 +158,4 @@ _PAIRS = {
     "lit-exchanged": [(k, k + 2) for k in (41, 77, 113)],
 }
 EXCHANGED = {n: {a: b for p in pairs for a, b in (p, p[::-1])} for n, pairs in _PAIRS.items()}
-KINDS = sorted({*PAINTED, *FROZEN, *EXCHANGED, *REWRITTEN, *DAMAGED, *CODED})
+KINDS = sorted({*PAINTED, *FROZEN, *EXCHANGED, *LOST, *REWRITTEN, *DAMAGED, *CODED})
