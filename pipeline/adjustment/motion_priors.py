@@ -61,7 +61,9 @@ def third_difference_sigma(T_pc: Float, known: Int) -> Float:
     if len(known) < _FEWEST_FRAMES:
         return LOOSE
     growth = third_difference_growth(float(np.median(np.diff(known))))
-    return np.asarray(np.maximum(_third_difference_spread(T_pc, known, 1) / growth, _SMOOTHEST))
+    return np.asarray(
+        np.maximum(robust_spreads(_third_difference_of_poses(T_pc, known, 1), axis=0) / growth, _SMOOTHEST)
+    )
 
 
 def trembling(T_pc: Float, known: Int) -> Float:
@@ -78,20 +80,33 @@ def trembling(T_pc: Float, known: Int) -> Float:
     known : (K,) int
         Frames whose poses are measured; the median of their gaps counts as their stride.
     """
+    near, far = (_third_difference_of_poses(T_pc, known, n) for n in (1, 2))
+    return _trembling(near, far, known)
+
+
+def trembling_of_places(place: Float, known: Int) -> Float:
+    """Return the 1 σ (D,) of what places (K, D) in frames ``known`` (K,) tremble by; see `trembling`."""
+    near, far = (
+        place[3 * n :] - 3 * place[2 * n : -n] + 3 * place[n : -2 * n] - place[: -3 * n] for n in (1, 2)
+    )
+    return _trembling(near, far, known)
+
+
+def _trembling(near: Float, far: Float, known: Int) -> Float:
+    """Return the 1 σ (D,) of trembling by third differences (M, D) over one and over two gaps."""
     if len(known) < 2 * _FEWEST_FRAMES:
-        return np.zeros(6)
-    near, far = (_third_difference_spread(T_pc, known, n) ** 2 for n in (1, 2))
+        return np.zeros(near.shape[1])
+    variance = [robust_spreads(third, axis=0) ** 2 for third in (near, far)]
     gap = float(np.median(np.diff(known)))
     growth = [third_difference_growth(n * gap) ** 2 for n in (1, 2)]
-    jerk = np.maximum(far - near, 0) / (growth[1] - growth[0])
-    return np.asarray(np.sqrt(np.maximum(near - growth[0] * jerk, 0) / TREMBLING_GROWTH**2))
+    jerk = np.maximum(variance[1] - variance[0], 0) / (growth[1] - growth[0])
+    return np.asarray(np.sqrt(np.maximum(variance[0] - growth[0] * jerk, 0) / TREMBLING_GROWTH**2))
 
 
-def _third_difference_spread(T_pc: Float, known: Int, gaps: int) -> Float:
-    """Return the robust 1 σ (6,) of third differences over so many gaps between known frames."""
-    window = known[np.arange(len(known) - 3 * gaps)[:, None] + gaps * np.arange(4)]
-    third = np.einsum("k,nki->ni", np.array([-1.0, 3, -3, 1]), _position_and_turn(T_pc[window]))
-    return robust_spreads(third, axis=0)
+def _third_difference_of_poses(T_pc: Float, known: Int, gaps: int) -> Float:
+    """Return third differences (M, 6) over so many gaps between known frames."""
+    window = known[np.arange(max(len(known) - 3 * gaps, 0))[:, None] + gaps * np.arange(4)]
+    return np.asarray(np.einsum("k,nki->ni", np.array([-1.0, 3, -3, 1]), _position_and_turn(T_pc[window])))
 
 
 def smooth_motion_rows(T_pc: Float, time_s: Float, sigma: Float, border: int) -> Rows:

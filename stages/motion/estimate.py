@@ -32,6 +32,7 @@ from stages.motion.rings import circles_in_rings, looking_at_wall
 from stages.motion.route.laying import lay_route
 from stages.motion.tracking.strips import WallView
 from stages.motion.trajectory import (
+    SeenCentres,
     doubting_texture,
     report_instrument,
     report_motion,
@@ -87,7 +88,9 @@ def estimate_motion(
     trajectory = trajectory_of(joined, recording.frames, probe, has_encoder)
     trajectory = lay_route(trajectory, joined.turn_variance, recording, probe, context)
     events = find_events(recording.frames, trajectory, run.texture.poses, joined.slip, has_encoder)
-    report_motion(context, estimate, run.texture, trajectory, wider)
+    circles = circles_in_rings(points)
+    seen = SeenCentres(places_of(recording, circles.frame), circles.centre_c, probe.laser.baseline_mm)
+    report_motion(context, estimate, run.texture, trajectory, seen, wider)
     require_along_pipe(trajectory)
     loops.report(context)
     report_instrument(probe, trajectory, context)

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pipeline.adjustment.motion_priors import trembling
-from pipeline.arrays import Float
+from pipeline.adjustment.motion_priors import trembling, trembling_of_places
+from pipeline.arrays import Float, Int
 from pipeline.artefacts.measured import Trajectory
 from pipeline.geometry.axis import PipeAxis, distance_along, frames_at, to_pipe
 from pipeline.geometry.rigid import from_parts, inverse, transform
@@ -28,10 +28,35 @@ _TOO_FAR = 5.0
 """A right probe moves farther than so many σ along one of its ten or so directions once in 10⁵ recordings."""
 _MOST_LOST = 0.05
 """Share of the lit frames without enough texture that is told; good recordings have none. Not measured."""
+_FEWEST_CENTRES = 16
+"""Rings of which the trembling of their centres is known, as that of poses is."""
 _MOST_LASTING = 0.57
 """Reprojection error, in σ of matching, shared by a landmark's neighbouring matches, that is told: .44 to
 .51 in open-1, open-2, at half their size, shaken, and in a scene of ours; .18 in open-3, of much noise;
 .63 in open-1 as HEVC of crf 32, .69 at crf 30, .85 with glints, dust and blur besides."""
+
+
+@dataclass(frozen=True)
+class SeenCentres:
+    """Where the rings of some frames (F,) have the pipe's axis in the laser's plane (F, 2), mm in C.
+
+    ``ahead_mm`` is that plane's distance from the camera.
+    """
+
+    frame: Int
+    centre_c: Float
+    ahead_mm: float
+
+    def deny_trembling(self, trajectory: Trajectory, lit: Int) -> bool:
+        """Return whether the centres tremble by less than half of what the poses of ``lit`` frames say."""
+        known = np.isfinite(self.centre_c).all(1)
+        if known.sum() < _FEWEST_CENTRES:
+            return False
+        T_pc = trajectory.T_pc[lit]
+        ahead = distance_along(trajectory.axis, T_pc) + self.ahead_mm
+        by_poses = transform(inverse(T_pc), frames_at(trajectory.axis, ahead)[0])[:, :2]
+        seen = trembling_of_places(self.centre_c[known], self.frame[known])
+        return bool(np.linalg.norm(seen) < 0.5 * np.linalg.norm(trembling_of_places(by_poses, lit)))
 
 
 def trajectory_of(run: JoinedRun, frames: FrameTable, probe: Probe, has_encoder: bool) -> Trajectory:
@@ -113,11 +138,12 @@ def report_motion(
     estimate: RunEstimate,
     texture: TrackedTexture,
     trajectory: Trajectory,
+    seen: SeenCentres,
     wider: float,
 ) -> None:
     """Report the figures of a motion, and warn where it may be off by more than its σ.
 
-    The pipe comes out ``wider`` than nominal by that share.
+    The rings' centres are those ``seen``. The pipe comes out ``wider`` than nominal by that share.
     """
     report_steps(context, estimate.trials, estimate.unsettled)
     context.report("landmarks", texture.store.landmarks, "")
@@ -127,7 +153,7 @@ def report_motion(
     context.report("reprojection error against the σ of matching", estimate.excess, "times")
     context.report("part of it that lasts from picture to picture", estimate.lasting, "times")
     _warn_of_texture(estimate.lasting, texture.poses, texture.store.spool.count, context)
-    _warn_of_trembling(trembling(trajectory.T_pc, texture.poses.frames), context)
+    _warn_of_trembling(trajectory, texture.poses, seen, context)
     context.report("pipe radius", trajectory.radius_mm, "mm")
     context.report("encoder scale", trajectory.encoder_scale, "")
     estimate.encoder.warn(context, wider)
@@ -174,14 +200,31 @@ def _warn_of_texture(lasting: float, tracked: TrackedPoses, observations: int, c
         )
 
 
-def _warn_of_trembling(shaken: Float, context: Context) -> None:
-    """Warn where the camera's turn differs from frame to frame by more than poses err by: ``shaken`` (6,)."""
+def _warn_of_trembling(
+    trajectory: Trajectory, texture: TrackedPoses, seen: SeenCentres, context: Context
+) -> None:
+    """Warn where the camera's turn differs from picture to picture by more than poses err by.
+
+    A camera that trembles moves the ring as well. Where the ring stays, matches tremble, as by glints.
+    """
+    shaken = trembling(trajectory.T_pc, texture.frames)
     turn = float(shaken[3:5].max())
     context.report("trembling of the camera, 1 σ", 1e3 * turn, "mrad")
-    if trembles(shaken):
+    if not trembles(shaken):
+        return
+    moves = (
+        f"from picture to picture it turns by {np.degrees(turn):.2g}° and moves by {shaken[:2].max():.2g} mm"
+    )
+    if seen.deny_trembling(trajectory, texture.frames):
         context.warn(
-            f"the camera trembles: from one frame to the next it turns by {np.degrees(turn):.2g}° and moves "
-            f"by {shaken[:2].max():.2g} mm (1 σ). If the whole probe trembles, the measurements hold. If the "
+            f"by its texture the camera trembles: {moves} (1 σ). The laser's ring does not, so the camera "
+            "stands firm and texture is matched wrongly: glints, reflections, blur or compression. Radii "
+            "hold; distance and roll may be off by more than their σ. What to do: shade reflections, record "
+            "with less compression"
+        )
+    else:
+        context.warn(
+            f"the camera trembles: {moves} (1 σ). If the whole probe trembles, the measurements hold. If the "
             "camera is loose on its mount, or the pictures were stabilised afterwards, radii and distances "
             "may be off by more than their σ; the recording cannot tell which. What to do: look whether the "
             "camera sits tight, switch stabilisation off, and compare a diameter with one that is known"

@@ -64,7 +64,7 @@ class Pictures:
     partner : (F,) int
         The latest picture before in like light, −1 without one.
     change : (F,)
-        Mean difference to it, grey levels.
+        Mean difference to it, grey levels, whatever the exposures.
     step : (F,)
         Motion along the pipe since the partner was taken, in pipe radii; NaN without partner and where
         the wall does not tell it.
@@ -200,7 +200,7 @@ class _AxialMotion:
         self._kept.append(strip)
         if before is None:
             return -1, np.nan, np.nan
-        change = float(np.abs(strip.grey - before.grey).mean())
+        change = change_between(before.grey, strip.grey)
         rows = slice(max(strip.first, before.first), min(strip.end, before.end))
         if rows.stop - rows.start < _LEAST_ROWS:
             return before.place, change, np.nan
@@ -248,6 +248,17 @@ class _AxialMotion:
         edges = np.concatenate([[-1], covered, [_ROWS]])
         longest = int(np.argmax(np.diff(edges)))
         return int(edges[longest]) + 1, int(edges[longest + 1])
+
+
+def change_between(one: Float32, other: Float32) -> float:
+    """Return the mean difference of two pictures, grey levels, whatever their exposures.
+
+    Where exposure flickers, two pictures in a row that happen to be exposed alike differed by far less than
+    is usual, and one was taken for the other once more.
+    """
+    power = float(np.vdot(one, one))
+    gain = float(np.vdot(one, other)) / power if power > 0 else 1.0
+    return float(np.abs(other - np.float32(gain) * one).mean())
 
 
 def _in_like_light(one: _Strip, other: _Strip) -> bool:

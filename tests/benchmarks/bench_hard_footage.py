@@ -151,14 +151,14 @@ def line(name: str, score: dict[str, dict[str, float]], run: Path) -> str:
         f"{name:28s} random {wall['radius_mad_sigma_mm']:.3f} bias {wall['radius_bias_mm']:+.3f} mm, "
         f"inside 95 % {100 * wall['within_1.96_sigma']:.1f}, "
         f"axial {score['trajectory']['axial_end_error_percent']:+.2f} %, "
-        f"that is {_axial_sigmas(score, run):+.1f} σ, "
+        f"that is {axial_sigmas(score, run):+.1f} σ, "
         f"missed {defects['missed']}, false {defects['unmatched']}, unconfirmed {len(apart)}, "
         f"registration {score['texture']['registration_median_mm']:.3f} mm, "
         f"warned by {', '.join(sorted({w.split(':')[0] for w in warned})) or 'none'}"
     )
 
 
-def _axial_sigmas(score: dict[str, dict[str, float]], run: Path) -> float:
+def axial_sigmas(score: dict[str, dict[str, float]], run: Path) -> float:
     """Return the distance's error at the end over the σ that the run states there."""
     with (run / "trajectory.csv").open(encoding="utf-8", newline="") as file:
         last = list(csv.DictReader(file))[-1]

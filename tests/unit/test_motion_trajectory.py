@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from pipeline.artefacts.measured import Trajectory
-from pipeline.geometry.axis import PipeAxis
+from pipeline.geometry.axis import PipeAxis, straight_axis
 from pipeline.instrument.camera.fisheye import KannalaBrandt
 from pipeline.instrument.laser import LaserSheet
 from pipeline.instrument.probe import Probe
-from stages.motion.trajectory import report_instrument
+from stages.motion.trajectory import SeenCentres, report_instrument
 from tests.quiet import quiet_context
 
 COUNT = 20
@@ -80,3 +80,18 @@ def test_nothing_is_said_of_a_probe_left_as_stated() -> None:
     assert told(probe(np.zeros((COUNT, COUNT))), np.zeros(COUNT)) == {
         "instrument moved by the adjustment, at most": 0.0
     }
+
+
+@pytest.mark.parametrize(("ring_trembles", "denied"), [(0.0, True), (0.3, True), (1.0, False), (6.0, False)])
+def test_a_ring_that_does_not_tremble_denies_that_the_camera_does(ring_trembles: float, denied: bool) -> None:
+    """1: the whole probe trembles; 6: the camera does, on its mount, which moves the picture of the ring."""
+    number, random = np.arange(200), np.random.default_rng(3)
+    shaken = np.zeros((200, 2))
+    shaken[:, 1] = 0.05 * random.standard_normal(200)
+    sway = np.stack([np.sin(number / 30), np.cos(number / 40)], -1)
+    T_pc = np.tile(np.eye(4), (200, 1, 1))
+    T_pc[:, :2, 3], T_pc[:, 2, 3] = sway + shaken, 0.6 * number
+    axis = straight_axis(-50, 300)
+    run = Trajectory(number, number / 30, T_pc, np.zeros((200, 6, 6)), axis, 50.0, 1.0, 0.0, 0.0, ())
+    rings = SeenCentres(number[::2], -(sway + ring_trembles * shaken)[::2], 22.0)
+    assert rings.deny_trembling(run, number[1::2]) is denied
