@@ -18,6 +18,7 @@ from pipeline.recording.base import Illumination, Recording
 from pipeline.recording.checks import CheckedFrames
 from stages.twin.causes import causes
 from stages.twin.compare import Comparison, block_ratios, block_textures
+from stages.twin.fixed_pattern import pattern_figures
 from stages.twin.glints import told_apart
 from stages.twin.lamp_power import lamp_power
 from stages.twin.lamps import flicker_of_measured
@@ -212,7 +213,8 @@ def compared_with(
     _report(comparison, found, context)
     return Twin(
         np.array([v.frame for v in comparison.views]), frames.withheld is not None,
-        noise_figures(state.noise), (*state_figures(state), *lamp_power(samples), *unnamed_map),
+        (*noise_figures(state.noise), *pattern_figures(state.pattern)),
+        (*state_figures(state), *lamp_power(samples), *unnamed_map),
         comparison.regions(), found,
         comparison.psnr_db(False), comparison.psnr_db(True), comparison.chi2_camera, comparison.stray_share,
         comparison.seen / max(comparison.view, 1.0), cannot_tell(state), tuple(comparison.views),
@@ -262,7 +264,7 @@ def _report(comparison: Comparison, found: tuple[Mismatch, ...], context: Contex
 
 PHOTOMETRY = Stage(
     "photometry",
-    "10",
+    "11",
     PhotometryParameters,
     measure_photometry,
     "camera noise, lamps, laser line, blur and dirt on the window, from the frames of a run",

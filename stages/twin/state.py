@@ -13,6 +13,7 @@ from pipeline.arrays import Bool, Byte, Float, Float32, Int
 from pipeline.artefacts.measured import RingSamples
 from pipeline.machine.stage import Context
 from pipeline.recording.base import Illumination, Recording
+from stages.twin.fixed_pattern import FixedPattern, fixed_pattern
 from stages.twin.lamp_light import LampLight, LampSamples
 from stages.twin.line_light import LineLight, LineSamples
 from stages.twin.noise import CameraNoise, black_and_white, photon_transfer, windows_of
@@ -55,6 +56,8 @@ class PhotometricState:
         What the window lets through, where dirt was found on it.
     aside : (2, H, W) float32 or None
         By how much, px to the right and down, the window draws aside what is behind it.
+    pattern : FixedPattern or None
+        The pixels' own offsets and gains; None where too few frames tell.
     """
 
     noise: CameraNoise
@@ -69,6 +72,7 @@ class PhotometricState:
     power: float = 1.0
     gain_map: Float32 | None = None
     aside: Float32 | None = None
+    pattern: FixedPattern | None = None
 
     @property
     def shows_wall(self) -> tuple[Illumination, ...]:
@@ -134,7 +138,8 @@ def estimate_state(
     place_px = _place_error(left, noise)
     if line is not None:
         line = lines.with_speckle(line, noise.variance)
-    return PhotometricState(noise, lamp, line, at, sharpness, place_px, outside, edge)
+    pattern = fixed_pattern([(f.rest, f.level, f.use) for f in left])
+    return PhotometricState(noise, lamp, line, at, sharpness, place_px, outside, edge, pattern=pattern)
 
 
 def clipped_line(scene: Scene, frames: Iterable[tuple[int, Byte | None]]) -> float:

@@ -94,7 +94,7 @@ CASES = (
     Case("defective_pixels", (2e-4, 0.5), ("defective_pixels",), 4e-4, changes=_EXACT),
     Case("read_noise", (60.0,), figure=("read_e", math.hypot(15.0, 60.0)), changes=_EXACT),
     Case("full_well", (3000.0,), figure=("gain_e_per_dn", 3000 / 255), changes=_EXACT),
-    Case("fixed_pattern", (0.03,), figure=("non_uniformity", 0.03), changes=_EXACT),
+    Case("fixed_pattern", (0.03,), figure=("gain_pattern", 0.03), changes=_EXACT),
     Case("dark_pattern", (0.02,), figure=("dark_pattern_dn", 0.02 * 255), changes=_EXACT),
     Case("interreflection", (1.0,), ("interreflection", "ambient_light")),
     Case("ambient_light", (0.2,), ("ambient_light", "interreflection")),

@@ -1,0 +1,91 @@
+"""The sensor's fixed pattern: what each pixel adds and multiplies by itself, the same in all frames.
+
+EMVA 1288's DSNU and PRNU. The wall moves and noise changes between frames; what two frames leave over alike
+at one pixel is the pixel's own. Its covariance is D² + G² · level₁ · level₂, D the spread of the dark signals
+and G that of the gains. Lenses, lamps and dirt are broad, and are taken off with the mean of five by five.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import cv2
+import numpy as np
+from scipy.optimize import nnls
+
+from pipeline.arrays import Bool, Float, Float32
+from pipeline.artefacts.twin import NamedFigure
+from stages.twin.lamp_light import Figure
+
+_AROUND_PX, _EVERY, _BINS, _FEWEST_PIXELS = 5, 2, 8, 5000
+"""Side of what is taken off; every how many pixels are looked at; bins of brightness; fewest pixels that two
+frames must share."""
+_LARGEST = 6.0
+"""Robust σ beyond which what is left over is no pattern but a hot pixel or an edge of the photo."""
+
+
+@dataclass(frozen=True)
+class FixedPattern:
+    """1 σ of the pixels' dark signals, grey levels, and of their gains, relative."""
+
+    dark: Figure
+    gain: Figure
+
+
+def fixed_pattern(frames: Sequence[tuple[Float32, Float32, Bool]]) -> FixedPattern | None:
+    """Return what lit frames show alike at each pixel; None where too few share enough pixels.
+
+    Each frame is recorded less predicted, predicted above black, and which pixels count, (H, W) each.
+    """
+    few = (slice(None, None, _EVERY),) * 2
+    fine = [(_detail(rest, use)[few], level[few]) for rest, level, use in frames]
+    told = [t for (a, x), (b, y) in combinations(fine, 2) if (t := _covariance(a * b, x * y)) is not None]
+    if len(told) < 3:
+        return None
+    each = np.array(told)
+    mean = each.mean(0)
+    # A frame takes part in several pairs: there are as many independent ones as frames.
+    sd = each.std(0, ddof=1) / np.sqrt(len(frames))
+    dark, gain = (
+        Figure(float(np.sqrt(m)), float(s / (2 * np.sqrt(max(m, s))))) for m, s in zip(mean, sd, strict=True)
+    )
+    return FixedPattern(dark, gain)
+
+
+def pattern_figures(pattern: FixedPattern | None) -> tuple[NamedFigure, ...]:
+    """Return what a twin states of the fixed pattern; a lossy codec takes most of it away."""
+    if pattern is None:
+        return ()
+    return (
+        NamedFigure("dark_pattern_dn", pattern.dark.value, pattern.dark.sd, "grey levels"),
+        NamedFigure("gain_pattern", pattern.gain.value, pattern.gain.sd, "relative"),
+    )
+
+
+def _detail(rest: Float32, use: Bool) -> Float32:
+    """Return what is left over (H, W) less its mean about each pixel, NaN where that is not all in use."""
+    size = (_AROUND_PX, _AROUND_PX)
+    whole = cv2.erode(use.astype(np.uint8), np.ones(size, np.uint8)) > 0
+    filled = np.where(use, np.nan_to_num(rest), np.float32(0))
+    fine = filled - cv2.blur(filled, size)
+    if whole.any():
+        whole &= np.abs(fine) < _LARGEST * 1.4826 * np.median(np.abs(fine[whole])) + 1e-6
+    kept = np.float32(1 / np.sqrt(1 - 1 / _AROUND_PX**2))
+    return np.asarray(np.where(whole, kept * fine, np.float32(np.nan)), np.float32)
+
+
+def _covariance(product: Float32, levels: Float32) -> Float | None:
+    """Return D² and G² that products (H, W) of two frames follow over products of their levels."""
+    known = np.isfinite(product)
+    if known.sum() < _FEWEST_PIXELS:
+        return None
+    p, x = product[known].astype(float), levels[known].astype(float)
+    edges = np.quantile(x, np.linspace(0, 1, _BINS + 1)[1:-1])
+    cell = np.searchsorted(edges, x)
+    count, spread = np.bincount(cell, minlength=_BINS), np.bincount(cell, p**2, _BINS)
+    weight = count / np.sqrt(np.maximum(spread, 1e-12))
+    mean = np.stack([np.bincount(cell, v, _BINS) / np.maximum(count, 1) for v in (x, p)])
+    design = np.stack([np.ones(_BINS), mean[0]], 1) * weight[:, None]
+    return np.asarray(nnls(design, mean[1] * weight)[0])
