@@ -16,7 +16,6 @@ Face = NDArray[np.int32]
 Index = NDArray[np.int64]
 # Decimation that removes less than a tenth of the triangles is not worth its time.
 _WORTHWHILE = 0.9
-_SHORTEST = 1e-300  # of a vertex whose triangles have no area
 _AGGRESSIVENESS = 5.0  # growth of the allowed collapse error: 7 errs 7 % more, 3 does not reach its goal
 
 
@@ -54,15 +53,12 @@ def weld(pieces: Sequence[Surface]) -> Surface:
 
 
 def vertex_normals(surface: Surface) -> Float:
-    """Return unit normals (V, 3) of the vertices, toward the inside of the pipe.
-
-    Large triangles count for more: of each, twice its area along its normal is added up.
-    """
-    face, vertices = surface.face, len(surface.vertex_p)
-    a, b, c = (surface.vertex_p[face[:, k]] for k in range(3))
-    across = np.cross(b - a, c - a)
-    total = np.stack([np.bincount(face.ravel(), np.repeat(along, 3), vertices) for along in across.T], axis=1)
-    return np.asarray(total / np.maximum(np.linalg.norm(total, axis=1, keepdims=True), _SHORTEST))
+    """Return unit normals (V, 3) of the vertices, toward the inside of the pipe (by open3d)."""
+    o3d = open3d()
+    mesh = o3d.geometry.TriangleMesh(
+        o3d.utility.Vector3dVector(surface.vertex_p), o3d.utility.Vector3iVector(surface.face)
+    )
+    return np.asarray(mesh.compute_vertex_normals().vertex_normals)
 
 
 def with_normals(pieces: Iterable[Surface]) -> Iterator[tuple[Surface, Float]]:
