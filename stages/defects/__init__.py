@@ -52,6 +52,7 @@ from stages.defects.parallax import LitPictures
 from stages.defects.parameters import DefectParameters
 from stages.defects.relief import smooth_shape_removed
 from stages.defects.segment import Region, regions_of
+from stages.defects.steps import IS_STEP, is_step
 from stages.defects.surface import MeasuredWall, Surface
 
 __all__ = ["DEFECTS", "DefectParameters", "find_defects"]
@@ -112,11 +113,15 @@ def _numbered(found: Sequence[Defect], first: int) -> tuple[Defect, ...]:
 
 @dataclass(frozen=True)
 class _Found:
-    """A region that is deep enough to be reported, described as if it were surely there."""
+    """A region that is deep enough to be reported, described as if it were surely there.
+
+    It may be a ``step`` of the bore.
+    """
 
     region: Region
     defect: Defect
     evidence: Evidence
+    step: bool
 
 
 def _credibility(found: Sequence[_Found], tail: NoiseTail, wall: MeasuredWall) -> Credibility:
@@ -150,7 +155,8 @@ def _measured(
             if region.sign * depth.depth_mm >= parameters.min_depth_mm:
                 top = float(region.cut(score.astype(float))[region.mask].max())
                 evidence = evidence_for(here, depth, surface, scene.seen_by, _fixed_in(region, fixed), top)
-                yield _Found(region, describe(here, depth, surface, scene), evidence)
+                step = is_step(region, depth.depth_mm, wall.relief.radius_map)
+                yield _Found(region, describe(here, depth, surface, scene), evidence, step)
                 break
         context.progress(len(regions) + done, 2 * len(regions))
 
@@ -173,12 +179,13 @@ def _judged(
         deep = chance_of_depth(f.defect, min_depth_mm)
         real = deep if f.region.all_round else deep * credibility.chance_against_clutter(f.evidence)
         real = min(real, MOST_SURE) * (1.0 if f.evidence.on_wall else _WALL_OR_NOT)
-        counts = f.evidence.corroborated and real >= COUNTED and is_depth_known(f.defect)
+        counts = not f.step and f.evidence.corroborated and real >= COUNTED and is_depth_known(f.defect)
         defect = replace(f.defect, probability=real, confidence=f.defect.confidence * real)
         if counts:
             confirmed.append(defect)
         else:
             doubt = f.evidence.doubt if is_depth_known(defect) or not f.evidence.corroborated else _UNSURE
+            doubt = IS_STEP if f.step else doubt
             words = f"{defect.statement} Not confirmed. {doubt}."
             unconfirmed.append(replace(defect, statement=words))
     return confirmed, unconfirmed
@@ -252,5 +259,5 @@ def _defects_of_run(
 
 
 DEFECTS = Stage(
-    "defects", "21", DefectParameters, _defects_of_run, "defects as instances with depth, clock and kind"
+    "defects", "22", DefectParameters, _defects_of_run, "defects as instances with depth, clock and kind"
 )

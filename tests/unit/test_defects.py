@@ -100,6 +100,15 @@ def test_a_weld_is_one_finding_all_round_with_a_pit_beside_it_apart():
     assert (second.kind, second.pof_class) == ("pit", "pinhole")
 
 
+@pytest.mark.parametrize("step_mm", [-8.0, 3.0])
+def test_a_step_of_the_bore_is_no_bead_and_no_groove(step_mm):
+    """In a gauge's run steps of 8.8 and 7 mm were a weld and a gouge, both at .98."""
+    step = step_mm / (1 + np.exp(-(DISTANCE - 60) / 1.0))[:, None]
+    found = search(noisy(np.random.default_rng(5), step))
+    assert not any(d.clock_to == 12.0 for d in found.items)
+    assert any("it is a step" in d.statement for d in found.unconfirmed)
+
+
 def test_a_groove_all_round_is_no_pit():
     """The gap of a joint, 70 times as long as wide, was called a pit: no kind is as long."""
     rng = np.random.default_rng(3)
