@@ -20,6 +20,9 @@ from stages.calibrate.gauge.state import GaugeParameters
 STAGE = "calibrate"
 _LOOKED_AT = 6
 _SIZE_TOLERANCE = 0.05
+# What else a gauge seen elsewhere than it is may come from: of pictures scaled by 3 % the bores were blamed,
+# of cut ones 24 fiducials.
+_PICTURES = "see whether the recorder scales, stretches, cuts or frames the pictures"
 _WRONG_BORE_MM = 4.0
 _WRONG_SHARE = 0.2
 _OTHERS = ("DICT_4X4_1000", "DICT_5X5_1000", "DICT_6X6_1000", "DICT_7X7_1000", "DICT_ARUCO_ORIGINAL")
@@ -79,14 +82,15 @@ def require_poses(
             f"in {looked - len(posed.index)} of {looked} frames no pose of the camera brings half of the "
             "fiducials to where they are seen: they are mirrored, swapped or placed otherwise than stated",
             limit=f"{parameters.least_posed_frames} frames, and half of those with fiducials",
-            hint="check columns_along, rows_along and the distance and azimuth of each id",
+            hint=f"check columns_along, rows_along and the distance and azimuth of each id; {_PICTURES}",
         )
     ratio = _size_ratio(posed, gauge, camera)
     if abs(ratio - 1) > _SIZE_TOLERANCE:
         size = gauge.fiducials.size_mm
         raise UnusableError(
             STAGE, f"the fiducials measure {ratio * size:.2f} mm where recording.yaml says {size:g} mm",
-            limit=f"{100 * _SIZE_TOLERANCE:.0f} %", hint="size_mm is the edge of the black square",
+            limit=f"{100 * _SIZE_TOLERANCE:.0f} %",
+            hint=f"size_mm is the edge of the black square; {_PICTURES}",
         )  # fmt: skip
 
 
@@ -96,7 +100,8 @@ def outvoted_fiducials(posed: PosedFrames, gauge: Gauge) -> Int:
     if wrong.sum() > max(_WRONG_SHARE * (seen > 0).sum(), 1):
         raise UnusableError(
             STAGE, f"fiducials {', '.join(map(str, gauge.ids[wrong]))} are not where recording.yaml says",
-            limit=f"{100 * _WRONG_SHARE:.0f} % of those seen", hint="check id, distance and azimuth of each",
+            limit=f"{100 * _WRONG_SHARE:.0f} % of those seen",
+            hint=f"check id, distance and azimuth of each; {_PICTURES}",
         )  # fmt: skip
     return np.flatnonzero(wrong)
 
@@ -112,8 +117,7 @@ def require_bores(gauge: Gauge, section: Int, radius_error_mm: Float) -> None:
                 f"in section {k + 1} from {gauge.start_mm[k]:g} mm on, the bore measures "
                 f"{2 * (radius + error):.1f} mm where recording.yaml says {2 * radius:g} mm",
                 limit=f"{2 * _WRONG_BORE_MM:g} mm in diameter",
-                hint="are the bores listed in the order in which the probe passes them, and does the "
-                "recorder leave the pictures as they are (not scaled, stretched or cut)?",
+                hint=f"are the bores listed in the order in which the probe passes them? If so, {_PICTURES}",
             )
 
 
