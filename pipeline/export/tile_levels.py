@@ -76,10 +76,12 @@ def shrunk(flat: Flat, width_px: int, height_px: int, step: int) -> Flat:
     both[..., 3] /= 255
     both[..., :3] *= both[..., 3:]
     small = cv2.resize(both, (max(width_px, 1), max(height_px, 1)), interpolation=cv2.INTER_AREA)
-    colour = small[..., :3] / np.maximum(small[..., 3:], 1e-6)
-    out = np.dstack([colour, np.where(small[..., 3:] > 0.5, 255, 0)])
+    covered = small[..., 3:]
+    small[..., :3] /= np.maximum(covered, 1e-6)
+    covered[:] = np.where(covered > 0.5, np.float32(255), np.float32(0))
+    np.rint(np.clip(small, 0, 255, out=small), out=small)
     levels = tuple(level[::step, ::step] for level in flat.levels)
-    return Flat(np.rint(np.clip(out, 0, 255)).astype(np.uint8), levels)
+    return Flat(small.astype(np.uint8), levels)
 
 
 def coarse_tile(

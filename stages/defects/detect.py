@@ -112,7 +112,10 @@ class Filter:
 
     def standardised(self, wall: Weighed) -> Float:
         """Return the response (S, A) in σ."""
-        response, power = _response(wall, self.kernel)
+        return self.score(*_response(wall, self.kernel))
+
+    def score(self, response: Float, power: Float) -> Float:
+        """Return a response (S, A) in σ; 0 where too little of the wall was seen."""
         return np.where(power > self.least_power, response / self.scale, 0.0)
 
 
@@ -154,17 +157,27 @@ def detect(relief: WallRelief, false_alarms: float, scratch: Scratch, progress: 
     """Find cells that stand out of noise and roughness, some rows after the others."""
     bank = templates()
     threshold = _threshold(seen_mm2(relief), bank, false_alarms)
-    filters = _fitted(relief, [template.kernel(relief.cell_mm) for template in bank])
     into, inward = (scratch.zeros(relief.shape, bool) for _ in range(2))
     best = scratch.zeros(relief.shape, np.float32)
-    overlap = max(len(f.kernel) for f in filters) // 2
+
+    def note(rows: slice, score: Float) -> None:
+        into[rows] |= score > threshold
+        inward[rows] |= score < -threshold
+        best[rows] = np.maximum(best[rows], np.abs(score))
+
+    kernels, filters = [template.kernel(relief.cell_mm) for template in bank], []
+    overlap = max(map(len, kernels)) // 2
     parts = stretches(relief.shape[0], overlap)
+    fitted_to_all = [part.own for part in parts] == list(relief.sampled)
+    for used, score in _fitted(relief, kernels, overlap):
+        filters.append(used)
+        if fitted_to_all:
+            note(parts[0].own, score)
     for done, part in enumerate(parts, 1):
-        near = weighed(relief.rows(part.wide), overlap)
-        for score in (s[part.inner] for s in scores(filters, near)):
-            into[part.own] |= score > threshold
-            inward[part.own] |= score < -threshold
-            best[part.own] = np.maximum(best[part.own], np.abs(score))
+        if not fitted_to_all:
+            near = weighed(relief.rows(part.wide), overlap)
+            for score in scores(filters, near):
+                note(part.own, score[part.inner])
         progress(done, 2 * len(parts))
     return Detection(into, inward, threshold, filters[_SMALL].height_sigma_mm, best, tuple(filters))
 
@@ -202,27 +215,27 @@ def weighed(relief: Relief, reach: int) -> Weighed:
     return Weighed(weight * np.nan_to_num(relief.local_mm), weight, relief.seen, reach)
 
 
-def _fitted(relief: WallRelief, kernels: list[Float]) -> list[Filter]:
-    """Return the filters for this wall.
+def _fitted(relief: WallRelief, kernels: list[Float], overlap: int) -> Iterator[tuple[Filter, Float]]:
+    """Yield the filters for this wall, each with its response to the sampled rows, in σ.
 
     The response to white noise is known; noise and roughness are correlated, so that the field's own robust
     scatter sets the unit.
     """
-    overlap = max(map(len, kernels)) // 2
     parts = [widened(rows, relief.shape[0], overlap) for rows in relief.sampled]
     walls = [weighed(relief.rows(part.wide), overlap) for part in parts]
     seen = np.concatenate([w.seen[part.inner] for w, part in zip(walls, parts, strict=True)])
 
-    def fitted(kernel: Float) -> Filter:
+    def fitted(kernel: Float) -> tuple[Filter, Float]:
         found = [[f[part.inner] for f in _response(w, kernel)] for w, part in zip(walls, parts, strict=True)]
         response, power = (np.concatenate(f) for f in zip(*found, strict=True))
         least = 0.4 * float(np.median(power[seen]))
         enough = power > least
         size = np.abs(response[enough])
         scale = max(robust_spread(size), float(np.quantile(size, 0.9)) / 1.645, 1e-9)
-        return Filter(kernel, scale, least, scale / float(np.sqrt(np.median(power[enough]))))
+        used = Filter(kernel, scale, least, scale / float(np.sqrt(np.median(power[enough]))))
+        return used, used.score(response, power)
 
-    return list(in_threads(fitted, kernels, _THREADS))
+    return in_threads(fitted, kernels, _THREADS)
 
 
 def _response(wall: Weighed, kernel: Float) -> tuple[Float, Float]:
