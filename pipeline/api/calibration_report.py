@@ -17,7 +17,7 @@ from pipeline.files.provenance import MadeBy
 from pipeline.instrument.laser import LaserSheet
 from pipeline.instrument.probe import Probe
 from pipeline.pages import page_template, rendered
-from stages.calibrate.gauge.result import GaugeCalibration, WeakDirection
+from stages.calibrate.gauge.result import GaugeCalibration, RadiusError, WeakDirection
 
 _UNDETERMINED = 0.7
 _SHOWN = 6
@@ -52,24 +52,8 @@ def report_document(result: GaugeCalibration) -> dict[str, Any]:
             {"stated_radius_mm": r.radius_mm, "correction_mm": float(c), "sigma_mm": float(s)}
             for r, c, s in zip(result.radii, result.bore_mm, result.bore_sigma_mm, strict=True)
         ],
-        "radius_error": [
-            {
-                "radius_mm": r.radius_mm,
-                "before_mean_mm": float(r.before_mm.mean()),
-                "before_largest_mm": float(np.abs(r.before_mm).max()),
-                "stated_sigma_mm": float(r.stated_sigma_mm.max()),
-                "sigma_mm": float(r.sigma_mm.max()),
-            }
-            for r in result.radii
-        ],
-        "residuals": {
-            "edge_rms_px": _robust(result.edge_residual_px),
-            "edges": len(result.edge_residual_px),
-            "edge_spread_sigma": result.edge_spread,
-            "ring_rms_mm": _robust(result.ring_residual_mm),
-            "ring_bins": len(result.ring_residual_mm),
-            "ring_spread_sigma": result.ring_spread,
-        },
+        "radius_error": [_radius_error(error) for error in result.radii],
+        "residuals": _residuals(result),
         "outvoted": {"fiducials": result.wrong_fiducials.tolist(), "rings": result.wrong_rings.tolist()},
         "left_out": result.left_out,
         "weak_directions": [_weak(w) for w in result.weak[:_SHOWN]],
@@ -111,6 +95,27 @@ def _parameter(result: GaugeCalibration, k: int) -> dict[str, Any]:
         "stated_sigma": stated,
         "change": change,
         "change_in_stated_sigma": change / stated if stated > 0 else None,
+    }
+
+
+def _radius_error(error: RadiusError) -> dict[str, float]:
+    return {
+        "radius_mm": error.radius_mm,
+        "before_mean_mm": float(error.before_mm.mean()),
+        "before_largest_mm": float(np.abs(error.before_mm).max()),
+        "stated_sigma_mm": float(error.stated_sigma_mm.max()),
+        "sigma_mm": float(error.sigma_mm.max()),
+    }
+
+
+def _residuals(result: GaugeCalibration) -> dict[str, float]:
+    return {
+        "edge_rms_px": _robust(result.edge_residual_px),
+        "edges": len(result.edge_residual_px),
+        "edge_spread_sigma": result.edge_spread,
+        "ring_rms_mm": _robust(result.ring_residual_mm),
+        "ring_bins": len(result.ring_residual_mm),
+        "ring_spread_sigma": result.ring_spread,
     }
 
 

@@ -1,4 +1,4 @@
-"""What a twin found on window or lens, as parameters of a run that keep it out of photo and rings."""
+"""Parameters of a run that leave dirt and drops, which a twin found, out of photo and rings."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _LINE_PX, _MOVED_PX = 1.2, 0.03
 
 
 def dirt_of(twin: Path | str | None) -> tuple[str, ...]:
-    """Return the settings that keep out of photo and rings what a twin found on window or lens.
+    """Return the settings that leave out of photo and rings what a twin found on window or lens.
 
     A speck that dims the line alike on both its flanks leaves it where it is, and stays in the rings.
 

@@ -1,4 +1,4 @@
-"""Many recordings: each a run of its own, on local workers or a cluster, one failing stopping nothing."""
+"""Many recordings, each a run of its own, on local workers or a cluster; none that fails stops the others."""
 
 from __future__ import annotations
 

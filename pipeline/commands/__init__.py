@@ -9,8 +9,7 @@ ConfigFile = Annotated[
     Path | None, typer.Option("--config", metavar="FILE", help="parameters (YAML); see: boresight config")
 ]
 Assignments = Annotated[
-    list[str] | None,
-    typer.Option("--set", metavar="STAGE.NAME=VALUE", help="one parameter; may be repeated"),
+    list[str] | None, typer.Option("--set", metavar="STAGE.NAME=VALUE", help="one parameter; may be repeated")
 ]
 ResultFolder = Annotated[Path, typer.Option("--output", "-o", metavar="DIR", help="folder for the results")]
 StatedProbe = Annotated[

@@ -21,7 +21,7 @@ from pipeline.adjustment.robust import root_mean_square
 from pipeline.arrays import Float
 from pipeline.errors import InputError
 from pipeline.files.disk import written_together
-from pipeline.instrument.budget import Budget
+from pipeline.instrument.budget import Budget, Row
 from pipeline.instrument.budget import error_budget as analytic_budget
 from pipeline.instrument.budget.design import (
     BaselineStudy,
@@ -36,7 +36,7 @@ from pipeline.instrument.budget.sources import NOT_IN_RADIUS, Kind, typical_prob
 from pipeline.instrument.probe_file import read_probe
 from pipeline.pages import page_template, rendered
 
-# Wished accuracies where none are given: the seed paper's 0.1 mm, and what a calibrated probe may reach.
+# Required accuracies where none are given: the seed paper's 0.1 mm, and what a calibrated probe may reach.
 ACCURACIES_MM = (0.1, 0.02)
 _COLOURS = ("#0a5ea8", "#b04a00", "#1d6f42", "#7a3e9d", "#8a6d00")
 _LINES = ("-", "--", "-.", ":", (0, (5, 1, 1, 1, 1, 1)))
@@ -52,22 +52,7 @@ def budget_document(
 ) -> dict[str, Any]:
     """Return everything as plain data; lengths mm, rows by falling share."""
     rows = [
-        {
-            "name": row.source.name,
-            "label": row.source.label,
-            "kind": row.source.kind.value,
-            "table_one": row.source.table_one,
-            "sigma": row.sigma,
-            "unit": row.source.unit,
-            "origin": row.origin,
-            "share": share,
-            **{
-                pose.value: _figures(
-                    row.sigma_mm[pose], None if drawn is None else drawn.rows[row.source.name][pose]
-                )
-                for pose in Pose
-            },
-        }
+        _row(row, share, None if drawn is None else drawn.rows[row.source.name])
         for row, share in dominant_rows(budget)
     ]
     return {
@@ -85,16 +70,30 @@ def budget_document(
             {"accuracy_mm": accuracy, "sources": [asdict(t) for t in allowed]}
             for accuracy, allowed in tolerances.items()
         ],
-        "best_baseline": {
-            "diameter_mm": study.diameter_mm.tolist(),
-            "each_mm": study.best_mm.tolist(),
-            "overall_mm": study.best_overall_mm,
-            "good_from_mm": study.good_from_mm,
-            "baseline_mm": study.baseline_mm.tolist(),
-            "sigma_mm": [[None if math.isnan(s) else s for s in row] for row in study.sigma_mm.tolist()],
-        },
+        "best_baseline": _best_baseline(study),
         "not_included": NOT_IN_RADIUS,
+    }
+
+
+def _row(row: Row, share: float, drawn: Mapping[Pose, Float] | None) -> dict[str, Any]:
+    """Return one source of error, with its figures for the axis as known and as fitted."""
+    figures = {p.value: _figures(row.sigma_mm[p], None if drawn is None else drawn[p]) for p in Pose}
+    source = row.source
+    return {
+        "name": source.name, "label": source.label, "kind": source.kind.value, "table_one": source.table_one,
+        "sigma": row.sigma, "unit": source.unit, "origin": row.origin, "share": share, **figures,
     }  # fmt: skip
+
+
+def _best_baseline(study: BaselineStudy) -> dict[str, Any]:
+    return {
+        "diameter_mm": study.diameter_mm.tolist(),
+        "each_mm": study.best_mm.tolist(),
+        "overall_mm": study.best_overall_mm,
+        "good_from_mm": study.good_from_mm,
+        "baseline_mm": study.baseline_mm.tolist(),
+        "sigma_mm": [[None if math.isnan(s) else s for s in row] for row in study.sigma_mm.tolist()],
+    }
 
 
 def write_budget(document: dict[str, Any], budget: Budget, study: BaselineStudy, folder: Path) -> None:

@@ -14,14 +14,7 @@ from rich.console import Console
 from rich.table import Table
 
 from pipeline.commands import ResultFolder
-from pipeline.commands.prove_cases import (
-    Drawing,
-    NotRenderedError,
-    Worked,
-    draw_case,
-    require_seal,
-    worked,
-)
+from pipeline.commands.prove_cases import Drawing, NotRenderedError, Worked, draw_case, require_seal, worked
 from pipeline.errors import InputError
 from pipeline.files.disk import require_writable, written_together
 from pipeline.files.installed import PRIORS, file_or_shipped

@@ -56,8 +56,7 @@ class NotReproducedError(BoresightError):
 def reproduce(
     run: Annotated[Path, typer.Argument(help="Run folder of a completed run.")],
     output: Annotated[
-        Path | None,
-        typer.Option("-o", "--output", metavar="RUN", help="Keep the run computed again here."),
+        Path | None, typer.Option("-o", "--output", metavar="RUN", help="Keep the run computed again here.")
     ] = None,
 ) -> None:
     """Compute a run again from its recording, probe and parameters; fail when a file differs."""

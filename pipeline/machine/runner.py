@@ -75,10 +75,7 @@ class Runner:
         self._record, self._headline = record, headline
         self._display, self._logger, self._wish, self._workers = display, logger, wish, workers
         self._lent, self._at_once = lent, at_once
-        self._keys = plan.keys() | {
-            Results: plan.key(),
-            MadeBy: made_by.key if made_by is not None else "",
-        }
+        self._keys = plan.keys() | {Results: plan.key(), MadeBy: made_by.key if made_by is not None else ""}
         self._outcomes = {
             s.stage.label: StageOutcome(s.stage.label, s.stage.version, s.key) for s in plan.steps
         }

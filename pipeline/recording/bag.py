@@ -128,31 +128,17 @@ def _open(path: Path, opener: Callable[[Path], Bag]) -> Recording:
         bag = opener(path)
         topics = choose_topics(bag.topics(), section, path)
         recorded_ns, frames, start_ns = frames_of(bag, topics, section)
-        encoder = encoder_of(bag, topics, start_ns)
-        imu = imu_of(bag, topics, start_ns)
+        encoder, imu = encoder_of(bag, topics, start_ns), imu_of(bag, topics, start_ns)
         source = _source(bag, topics, recorded_ns)
     except BAG_ERRORS as error:
-        raise InputError(
-            path,
-            f"cannot be read as a bag: {error}",
-            hint="repair it with the tools of its format, or copy again",
-        ) from error
+        hint = "repair it with the tools of its format, or copy again"
+        raise InputError(path, f"cannot be read as a bag: {error}", hint=hint) from error
+    warnings = (*described.warnings, *encoder_warnings(encoder, frames))
     return Recording(
-        name=described.name,
-        kind=described.kind,
-        path=path,
-        frames=frames,
-        encoder=encoder,
-        pipe=described.pipe,
-        frame_rate=described.frame_rate or _rate(frames),
-        source=source,
-        probe_file=described.probe_file,
-        content_key=content_key(files),
-        warnings=(*described.warnings, *encoder_warnings(encoder, frames)),
-        files=files,
-        inspection=described.inspection,
-        imu=imu,
-    )
+        described.name, described.kind, path, frames, encoder, described.pipe,
+        described.frame_rate or _rate(frames), source, described.probe_file, content_key(files), warnings,
+        files, inspection=described.inspection, imu=imu,
+    )  # fmt: skip
 
 
 def _sidecar(path: Path) -> Path:

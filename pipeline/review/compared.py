@@ -1,4 +1,4 @@
-"""A review's run beside an earlier run: what its comparison is given, and what the page asks of it."""
+"""A review's run compared with an earlier one: the comparison's inputs, and what the page shows of it."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ class RunPair:
         return versions[0], versions[1], revisions[0], revisions[1]
 
     def walls(self) -> WallPair:
-        """Return both walls, and the welds that the earlier run's review left."""
+        """Return both walls, and the welds that the earlier run's review kept."""
         welds = [f for f in _standing(self.earlier.state()) if f.kind == DefectKind.WELD]
         middles = [(f.size.distance_from_mm + f.size.distance_to_mm) / 2 for f in welds]
         return WallPair(
@@ -80,7 +80,7 @@ class RunPair:
 
     @property
     def is_one_calibration(self) -> bool:
-        """Whether both were measured with the same numbers; a run that moved them has its own."""
+        """Whether both runs used one calibration; a run that corrected its probe has one of its own."""
         both = (self.now, self.earlier)
         probes = {r.files.record()["input_sha256"]["probe"] for r in both}
         return len(probes) == 1 and all(r.files.artefact(Trajectory).instrument is None for r in both)
@@ -105,17 +105,17 @@ class Compared:
 
     @property
     def walls(self) -> RegisteredWalls:
-        """How the walls lie on each other, and their difference."""
+        """Registration of the two walls, and their difference."""
         return _result(self, self.pair.state)[0]
 
     @property
     def changes(self) -> tuple[Change, ...]:
-        """What became of every finding of either run as it stands."""
+        """How every finding of either run changed, as the reviews left it."""
         return _result(self, self.pair.state)[1].changes
 
     @property
     def line(self) -> str:
-        """How the runs lie, in a line."""
+        """The registration, in one line of text."""
         found = self.walls.registration
         low, high = found.overlap_mm
         return (

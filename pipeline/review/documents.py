@@ -111,12 +111,12 @@ def _named(numbers: list[dict[str, Any]]) -> list[dict[str, Any]]:
 
 
 def seal_document(seal: Seal, files: RunFiles) -> dict[str, Any]:
-    """Return by what the page sees that something has changed, and whether it is signed."""
+    """Return what tells the page that something has changed, and whether the review is signed."""
     return asdict(seal) | {"signed": seal.signed, "run_version": files.version}
 
 
 def state_document(state: State, files: RunFiles) -> dict[str, Any]:
-    """Return the findings as they stand."""
+    """Return the current findings."""
     standing, called = [f for f in state.findings if f.status != GONE], labels(state.findings)
     bore_mm = 2 * files.artefact(Overlays).nominal_radius_mm  # once: a long run has thousands of findings
     return {
@@ -248,7 +248,7 @@ def _value_layers(files: RunFiles, overlays: Overlays) -> Iterator[dict[str, Any
 
 
 def _diagnosis(files: RunFiles) -> dict[str, Any] | None:
-    """Return what a diagnosis laid into the run folder says, None without one."""
+    """Return what a diagnosis in the run folder says, None without one."""
     file = files.file("diagnosis.json")
     if not file.is_file():
         return None

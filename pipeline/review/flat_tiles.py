@@ -96,7 +96,7 @@ def values_of(files: RunFiles, layer: str) -> Values:
 
 
 def overlay_of(overlays: Overlays, layer: str) -> Overlay:
-    """Return the overlay whose colours a layer wears: wall loss those of what only grows."""
+    """Return the overlay whose colours a layer uses; wall loss uses those of quantities from 0 up."""
     return overlays.uncertainty if layer == WALL_LOSS else overlays.of_variant(layer)
 
 

@@ -1,4 +1,4 @@
-"""Measuring on a run's wall: outlines, and what tools read off it, with 1 σ; what is doubtful of findings."""
+"""Measuring on a run's wall: outlines, readings of the page's tools with 1 σ, and doubts about findings."""
 
 from __future__ import annotations
 
@@ -97,7 +97,7 @@ _NEEDED: dict[Tool, int] = {"point": 1, "distance": 2, "area": 3, "depth": 3, "d
 
 
 class NotSeenError(BoresightError):
-    """A measurement leads over wall that was not seen."""
+    """A measurement crosses wall that was not seen."""
 
 
 @dataclass(frozen=True)
@@ -203,7 +203,7 @@ def cautions(files: RunFiles, finding: Finding) -> tuple[str, ...]:
 
 
 def contradiction(finding: Finding) -> str:
-    """Return where the kind says one way and the measured depth the other, at 2 σ."""
+    """Return a sentence if kind and measured depth differ in direction by more than 2 σ, else nothing."""
     size, is_loss = finding.size, DefectKind(finding.kind).is_metal_loss
     into_wall = size.depth_mm if is_loss else -size.depth_mm
     if not into_wall < -_SURE_SIGMA * size.depth_sigma_mm:

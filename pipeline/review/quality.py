@@ -1,4 +1,4 @@
-"""How good a run is, along the pipe and by reason: what the quality page draws."""
+"""The content of the quality page: how good a run is along the pipe, and reasons for unused samples."""
 
 from __future__ import annotations
 

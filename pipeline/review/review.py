@@ -1,4 +1,4 @@
-"""The review of a run: findings as they stand, whether it is signed; decisions carried to new findings."""
+"""The review of a run: its current findings and signature; decisions are carried to new findings."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _APART_MM = 5.0
 
 @dataclass(frozen=True)
 class State:
-    """A review as it stands.
+    """The current state of a review.
 
     Attributes
     ----------
@@ -113,7 +113,7 @@ class Review:
         )
 
     def _described(self, done: tuple[Entry, ...]) -> do.Describe:
-        """Return what the recording says of the inspection, with what the inspector said last over it."""
+        """Return what is known of the inspection: the inspector's last entries, else the recording's."""
         said = [e.action for e in done if isinstance(e.action, do.Describe)]
         own = {name: text for name, text in said[-1].model_dump().items() if text} if said else {}
         return do.Describe(**(self.files.record()["recording"].get("inspection", {}) | own))

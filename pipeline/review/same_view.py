@@ -1,4 +1,4 @@
-"""A recorded frame and the model seen alike: same place, same lens, same light."""
+"""The same view of a recorded frame and of the model: from one place, with one lens and one light."""
 
 from __future__ import annotations
 

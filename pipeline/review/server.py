@@ -1,4 +1,4 @@
-"""The review's local web server: what may be asked of it, at which address, and what it answers."""
+"""The review's local web server: its addresses, and the answer of each."""
 
 from __future__ import annotations
 
@@ -37,8 +37,8 @@ _Name = Annotated[str, Field(min_length=1, max_length=200, pattern=r"^[^\x00-\x1
 _Revision = Annotated[int, Field(ge=0, le=2**53)]
 
 
-class Deed(BaseModel):
-    """An action, by whom, and the number of the last one that its author saw."""
+class PostedAction(BaseModel):
+    """An action, its author, and the number of the last action that the author saw."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -47,7 +47,7 @@ class Deed(BaseModel):
     revision: _Revision
 
 
-class Signing(BaseModel):
+class PostedSignature(BaseModel):
     """A signature of the state at a revision."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -58,7 +58,7 @@ class Signing(BaseModel):
     revision: _Revision
 
 
-class Measuring(BaseModel):
+class PostedPoints(BaseModel):
     """A tool at points of the wall."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -171,17 +171,17 @@ class ReviewApp:
         return JSONResponse(documents.seal_document(seal, self.review.files))
 
     def _act(self, _: Request, body: bytes) -> Response:
-        deed = parsed(Deed, body)
-        state = self.review.act(action_of(json.dumps(deed.action)), deed.who, deed.revision)
+        posted = parsed(PostedAction, body)
+        state = self.review.act(action_of(json.dumps(posted.action)), posted.who, posted.revision)
         return JSONResponse(documents.state_document(state, self.review.files))
 
     def _sign(self, _: Request, body: bytes) -> Response:
-        wish = parsed(Signing, body)
+        wish = parsed(PostedSignature, body)
         state = self.review.sign(wish.name, wish.standard, wish.remarks, wish.revision)
         return JSONResponse(documents.state_document(state, self.review.files))
 
     def _measure(self, _: Request, body: bytes) -> Response:
-        wish = parsed(Measuring, body)
+        wish = parsed(PostedPoints, body)
         found = readings(self.review.wall(), wish.tool, wish.points)
         return JSONResponse(documents.cleaned({"readings": [vars(r) for r in found]}))
 

@@ -13,13 +13,7 @@ from pydantic import Field
 from pipeline.adjustment.held_over import HeldOver, held_over
 from pipeline.arrays import Float, Int
 from pipeline.artefacts.findings import clock_of_azimuth
-from pipeline.artefacts.measured import (
-    RingPoints,
-    RingSamples,
-    RingValidity,
-    Trajectory,
-    Wall,
-)
+from pipeline.artefacts.measured import RingPoints, RingSamples, RingValidity, Trajectory, Wall
 from pipeline.artefacts.wall_map import FixedPlace, FixedToProbe
 from pipeline.errors import UnusableError
 from pipeline.geometry.axis import frames_at
@@ -186,22 +180,22 @@ def accumulate_wall(
 
 
 def _held_in(rings: RingSamples, survey: RingSurvey, radius_mm: float) -> HeldOver:
-    """Return what a codec held over of the line: its height, its width and its place tell it together."""
+    """Return how much of the line a codec repeated, estimated from its height, width and place together."""
     lines = (np.log(np.maximum(rings.amplitude, 1.0)), rings.width_px, rings.radius_px)
     known = [np.where(rings.valid, line, np.nan).astype(float) for line in lines]
     return held_over(known, survey.middle_mm, 2 * np.pi * radius_mm / len(rings.azimuth_rad))
 
 
 def warn_of_held(held: HeldOver, context: Context) -> None:
-    """Report how alike neighbouring rings are in what is finest, and warn where a codec makes them alike."""
+    """Report how alike the finest structure of neighbouring rings is, and warn of a codec that repeats it."""
     alike = float(held.likeness[1:2].sum())
-    context.report("likeness of neighbouring rings in what is finest", alike, "")
+    context.report("likeness of neighbouring rings in their finest structure", alike, "")
     if alike > _MOST_ALIKE:
         context.warn(
             f"neighbouring rings share {100 * alike:.0f} % of the line's finest structure, where good "
-            "recordings share 16 % at most: the codec shows old light again. σ of the radius holds it, but "
-            "findings are less sure than stated: single ones may be false, and depths of small pits too "
-            "shallow. What to do: look at the picture of every finding, record with less compression"
+            "recordings share 16 % at most: the codec repeats light of earlier pictures. The σ of radii "
+            "includes this, but findings are less sure than stated: single ones may be false, and small pits "
+            "too shallow. What to do: look at the picture of every finding, record with less compression"
         )
 
 
@@ -227,15 +221,15 @@ def _fixed_in_words(place: FixedPlace) -> str:
             "do: clean the window, look for scratches and reflections, record again"
         )
     return (
-        f"something on the window or fixed to the probe, or a groove or ridge along the pipe: {seen}. They "
-        "cannot be told apart, since the probe does not roll enough. The departure is added to σ there, and "
+        f"something on the window or fixed to the probe, or a groove or ridge along the pipe: {seen}. The "
+        "probe does not roll enough to tell which. The departure is added to σ there, and "
         "findings there are not counted. What to do: clean the window and record once more with the probe "
         "rolled by 30° or more"
     )
 
 
 def _judge_radii(wall: Wall, trajectory: Trajectory, context: Context) -> None:
-    """Warn where some of the wall lies off the motion's radius by half of it; end the run where half does."""
+    """Warn if part of the wall is off the pipe's radius by half of it; end the run if half of the wall is."""
     rows = slice(None, None, max(len(wall.radius_map.distance_mm) // _REPORTED_ROWS, 1))
     radius = wall.radius_map.radius_mm[rows]
     known = radius[np.isfinite(radius)]
@@ -245,7 +239,7 @@ def _judge_radii(wall: Wall, trajectory: Trajectory, context: Context) -> None:
             f"{100 * impossible.mean():.1f} % of the wall lies more than {100 * _IMPOSSIBLE:.0f} % off the "
             f"pipe's radius of {trajectory.radius_mm:.4g} mm, from {known.min():.4g} to {known.max():.4g} "
             "mm: a branch, a joint that stands open, or rings that were measured wrongly. What to do: look "
-            "at the pictures there, and do not use their findings unseen"
+            "at the pictures there, and do not use their findings unchecked"
         )
     if known.size and impossible.mean() > _MOST_IMPOSSIBLE:
         raise UnusableError(

@@ -1,4 +1,4 @@
-"""What stays at one place of the image while the wall goes by: it is on the window or on the probe.
+"""Departures that stay at one place of the image while the wall moves: on the window or the probe.
 
 A droplet, a scratch, a reflection or a wave of the laser sheet moves the line at one azimuth of the image,
 whatever wall is there. Ring by ring it looks like a groove or a ridge along the pipe. Therefore every ring's
@@ -59,7 +59,7 @@ class _Blocks:
 def fixed_to_probe(
     survey: RingSurvey, frame: Int, radius_mm: float, grid: MapGrid, scratch: Scratch
 ) -> FixedToProbe | None:
-    """Return what stays at one place of the image, None where nothing does or the pass is too short.
+    """Return departures that stay in the image; None without any, or where the pass is too short.
 
     ``frame`` (F,) are the frames of the rings, ``radius_mm`` is that of the pipe.
     """
@@ -134,7 +134,7 @@ def _where_it_shows(row: Int, sector: Int, steady: Float, blocks: _Blocks) -> tu
 
 
 def _is_on_probe(row: Int, sector: Int, steady: Float, blocks: _Blocks) -> bool | None:
-    """Tell whether a place stays in the image while the probe rolls; None where that cannot be told."""
+    """Return whether a place stays in the image while the probe rolls; None where this is not known."""
     each, index = np.unique(row, return_inverse=True)
     weight = np.abs(steady[row, sector])
     step = 2 * np.pi / steady.shape[1]

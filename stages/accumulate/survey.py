@@ -1,4 +1,4 @@
-"""Ring samples in pipe coordinates, and a first pass over them that takes out each ring's shift."""
+"""Ring samples in pipe coordinates, and a first pass that removes each ring's shift."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Along the pipe: a long map some rows at a time, a sample of it, and the smooth course of its rings."""
+"""A long map in stretches along the pipe, a sample of it, and its smooth course along the pipe."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _SAMPLED_ROWS, _BLOCKS = 2048, 16
 
 @dataclass(frozen=True)
 class Stretch:
-    """Some rows of a map: its ``own``, and the ``wide`` rows that have a say in them."""
+    """Some rows of a map: its ``own``, and the ``wide`` rows that influence them."""
 
     own: slice
     wide: slice
@@ -39,7 +39,7 @@ def widened(own: slice, rows: int, overlap: int) -> Stretch:
 
 
 def sample(usable: Bool) -> tuple[slice, ...]:
-    """Return what medians are taken of: a short map, or blocks spread over its ``usable`` rows (S,)."""
+    """Return the rows for medians: all of a short map, or blocks spread over its ``usable`` rows (S,)."""
     rows, at = len(usable), np.flatnonzero(usable)
     size = _SAMPLED_ROWS // _BLOCKS
     if rows <= _SAMPLED_ROWS or not at.size:

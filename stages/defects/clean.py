@@ -1,4 +1,4 @@
-"""The wall away from all defects: what noise alone looks like on it."""
+"""The wall away from all defects: a sample of noise alone."""
 
 from __future__ import annotations
 

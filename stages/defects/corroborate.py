@@ -1,4 +1,4 @@
-"""What speaks for a defect besides the ring that shows it: a second ring, or the photo of the wall.
+"""Evidence for a defect besides the ring that shows it: a second ring, or the photo of the wall.
 
 A glint, a splash or a piece of texture taken for the line shows in one ring. A place of the wall shows in
 every ring that crosses it, whichever pass of the probe that ring is of, and often in the photo, which is
@@ -42,7 +42,7 @@ _EDGE_MM, _EDGE_SHARE = 1.0, 0.5
 
 @dataclass(frozen=True)
 class Evidence:
-    """What speaks for and against a finding.
+    """Evidence for and against a finding.
 
     Attributes
     ----------
@@ -118,7 +118,7 @@ class Evidence:
 
 @dataclass(frozen=True)
 class Witnesses:
-    """What findings are held against: the wall's photo, and rings and lit pictures, where they are known."""
+    """What findings are compared with: the wall's photo, and rings and lit pictures where they are known."""
 
     texture: WallTexture
     rings: RingSamples | None = None
@@ -128,7 +128,7 @@ class Witnesses:
 def evidence_for(
     region: Region, depth: Depth, surface: Surface, seen_by: Witnesses, fixed_mm: Float, score: float
 ) -> Evidence:
-    """Return what rings and photo say of a finding, and whether it is ``fixed_mm`` (H, W) to the image.
+    """Return the evidence of rings and photo, and whether a finding is ``fixed_mm`` (H, W) to the image.
 
     The photo is laid on the wall as it was measured: where the depth itself shifts the picture by more than
     the finding's size, the picture differs there because of the depth and is no second witness.
@@ -204,7 +204,7 @@ def _is_fixed(region: Region, surface: Surface, fixed_mm: Float) -> bool:
 
 
 def rings_behind(region: Region, depth_mm: float, surface: Surface) -> int:
-    """Return how many rings whose samples are sure of themselves show a defect of this depth."""
+    """Return how many rings show a defect of this depth by samples that are sure."""
     relief, points = surface.relief, surface.near
     i, j, inside = cells_of(points, relief, region)
     inside &= sure_of_themselves(points)

@@ -1,17 +1,17 @@
-"""The probability that a finding is there: what the same recording shows where nothing is.
+"""The probability that a finding is real, from what the same recording shows where there is no defect.
 
-Two things imitate defects, and of both the recording itself tells how often. Noise, compression and texture
-that draws the line aside make peaks of the wall: how their number falls off with height is counted over the
-wall without its findings (`stages.defects.noise_tail`). A glint or a splash stands in one ring at a
-place of its own; that neighbouring rings show some in one place is a meeting by chance, and its frequency
-follows from how many findings one ring alone shows, and how wide they are. Where the codec hands it on to
-other pictures, several rings show it; it is brighter than the line, as a defect is by chance only, and how
-many are brighter tells how many are glints.
+Two things imitate defects, and the recording itself shows how frequent both are. Noise, compression and
+texture that displaces the line make peaks of the wall: how their number falls with height is counted over
+the wall without its findings (`stages.defects.noise_tail`). A glint or a splash is seen in a single ring.
+Neighbouring rings show glints at the same place by chance only, and how often follows from the number and
+the width of the findings that one ring alone shows. Where a codec repeats a glint in other pictures, several
+rings show it. A glint is brighter than the line, a defect only by chance, so that the number of bright
+findings tells the number of glints.
 
-A finding is real or false in the ratio of the numbers that are expected of its kind: of its height against
-the noise, and of so many rings against the meetings (local false discovery rate: B. Efron, Large-Scale
-Inference, 2010, ch. 5). The photo, taken under another light, speaks for it where it stands out there, and a
-little against it where it does not. Independent of that, a depth within its own σ of nothing may be nothing.
+The probability is the ratio of the expected numbers of real and of false findings of that kind: of its height
+against noise, and of its number of rings against chance (local false discovery rate: B. Efron, Large-Scale
+Inference, 2010, ch. 5). The photo, taken under another light, raises it where it differs at that place, and
+lowers it a little where it does not. Apart from that, a depth within its own σ of zero may be zero.
 """
 
 from __future__ import annotations
@@ -27,22 +27,23 @@ from pipeline.artefacts.findings import Defect
 from stages.defects.corroborate import LEAST_RINGS, Evidence
 from stages.defects.noise_tail import NoiseTail
 
-# Real findings are as frequent at any score up to so many times the least, on a logarithmic scale.
+# Scores of real findings are taken to be log-uniform, from the least score to so many times it.
 _SCORES = 20.0
-# Of the real ones, at least this share is taken to be shown by any number of rings.
+# Least share of the real findings that is taken to be shown by each number of rings.
 _LEAST_SHARE = 0.1
-# Noise has fewer peaks than this above the score of a finding that is counted as surely real.
+# A finding counts as surely real if noise is expected to have fewer peaks than this above its score.
 _SURE = 0.05
 # The photo stands out at a place by chance once in 41 times for darker and for brighter; it does at 6 of the
 # 11 defects of open-1, 2 and 3: deposits and dents often have the wall's own colour.
 _PHOTO_BY_CHANCE, _PHOTO_OF_REAL = 2 / 41, 6 / 11
-# A defect lies at one of the tenth of all places at which the line is brightest, and one more may.
+# A tenth of all places count as bright, and so does a tenth of the defects, by chance. Beyond what follows
+# from the dark ones, half a bright real finding is allowed for.
 _BRIGHT_BY_CHANCE, _UNTOLD = 0.1, 0.5
 # A codec hands a glint on to a picture or two after it and before it: up to four or five rings show it.
 _MANY_RINGS = 6
-# From here on a finding that is corroborated counts as one: rather real than not.
+# A corroborated finding counts from this probability on: it is more likely real than not.
 COUNTED = 0.5
-# No finding is told to be surer than was counted: of 319 painted ones with .95 and more, .975 were real
+# Largest probability that is stated, as counted: of 319 painted findings with .95 and more, .975 were real
 # [.951, .989] (`python -m tests.benchmarks.bench_painted_findings`).
 MOST_SURE = 0.98
 # A depth is known to be one from 1.96 σ: nothing lies outside its 95 % interval.
@@ -71,35 +72,35 @@ class Credibility:
     dark: int
 
     def chance_against_clutter(self, evidence: Evidence) -> float:
-        """Return the probability that a finding is none of what imitates defects here."""
+        """Return the probability that a finding is neither noise nor a glint."""
         wrong = self._noise(evidence) + self._clutter(evidence)
         return 1 / (1 + wrong * _odds_by_photo(evidence.photo) + self._glints(evidence))
 
     def meetings(self, rings: int) -> float:
-        """Return how many places to expect in which so many neighbouring rings show clutter by chance."""
+        """Return the expected number of places where so many neighbouring rings show glints by chance."""
         return float(self._alone * self.meets ** (rings - 1))
 
     def _noise(self, evidence: Evidence) -> float:
-        """Return how many peaks of noise there are to one real finding of such a score."""
+        """Return the expected number of noise peaks per real finding of such a score."""
         real = self._real / (max(evidence.score, 1.0) * np.log(_SCORES))
         return float(self.tail.density(evidence.score) / real)
 
     def _clutter(self, evidence: Evidence) -> float:
-        """Return how much clutter there is to one real finding of so many rings."""
+        """Return the expected number of glints that meet by chance per real finding of so many rings."""
         if evidence.rings < LEAST_RINGS:
             return float(self._alone / max(self.sure[1] - self._alone, self._few))
         false = self.meetings(evidence.rings)
         return float(false / max(self.sure[evidence.rings] - false, self._few))
 
     def _glints(self, evidence: Evidence) -> float:
-        """Return how many glints there are to one real finding at which the line is as bright."""
+        """Return the expected number of repeated glints per real finding at which the line is as bright."""
         real = self.dark * _BRIGHT_BY_CHANCE / (1 - _BRIGHT_BY_CHANCE) + _UNTOLD
         few = evidence.bright and evidence.rings < _MANY_RINGS
         return max(self.bright - real, 0.0) / real if few else 0.0
 
     @property
     def _alone(self) -> float:
-        """What one ring shows beyond as many real findings as two rings show."""
+        """Findings of one ring, less as many real ones as two rings show."""
         return max(self.sure[1] - max(self.sure[2], self._few), 0.0)
 
     @property
@@ -114,7 +115,7 @@ class Credibility:
 
 
 def _odds_by_photo(stands_out: bool | None) -> float:
-    """Return how many times likelier such a photo is where nothing is than at a defect."""
+    """Return the likelihood ratio of such a photo without and with a defect."""
     if stands_out is None:
         return 1.0
     if stands_out:
@@ -128,19 +129,20 @@ def chance_of_depth(defect: Defect, min_depth_mm: float) -> float:
 
 
 def is_depth_known(defect: Defect) -> bool:
-    """Return whether a depth lies outside its own 95 % interval about nothing."""
+    """Return whether a depth differs from zero by more than its 95 % interval."""
     return abs(defect.depth_mm) >= _KNOWN * defect.depth_sigma_mm
 
 
 def credibility_of(
     found: Sequence[Evidence], width_rad: Sequence[float], rings: int, tail: NoiseTail
 ) -> Credibility:
-    """Return what to expect of so many rings with these findings, of each of which the width is known."""
+    """Return what to expect in a recording of so many rings, from its findings and their widths."""
     certain = [e for e in found if tail.above(e.score) < _SURE]
     sure = Counter(max(e.rings, 1) for e in certain)
     bright = Counter(e.bright for e in certain if e.rings < _MANY_RINGS)
     alone = [w for e, w in zip(found, width_rad, strict=True) if e.rings < LEAST_RINGS]
-    # Two meet where they overlap, each reaching half of its width to either side; half are on the same side.
+    # Two findings meet if they overlap: each reaches half its width to either side. Half of them have the
+    # same sign.
     overlap = 2 * float(np.mean(alone)) / (2 * np.pi) / 2 if alone else 0.0
     meets = min(overlap * len(alone) / max(rings, 1), 1.0)
     return Credibility(tail, sure, meets, bright[True], bright[False])

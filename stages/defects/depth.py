@@ -92,7 +92,7 @@ def _noise_gain(region: Region, relief: Relief) -> Float:
 
 
 def allowed_by_neighbours(depth: Depth, region: Region, surface: Surface) -> Depth:
-    """Return the depth, no deeper than the rings beside the deepest one allow, and then as unsure as that.
+    """Return the depth, limited by what the rings beside the deepest one allow, with a larger σ if it is.
 
     A wall seen along a line of sight falls off from ring to ring by no more than their distance (45°, the
     mean flank of a hemisphere): what one ring shows beyond that is no part of the wall that the next one
@@ -111,7 +111,7 @@ def allowed_by_neighbours(depth: Depth, region: Region, surface: Surface) -> Dep
 
 
 def _tops_of_rings(depth: Depth, region: Region, surface: Surface) -> tuple[Float, Float]:
-    """Return how far every ring about a region departs to the finding's side, and where along the pipe."""
+    """Return how far each ring departs to the finding's side, and its place along the pipe."""
     relief, points = surface.relief, surface.near
     margin = int(np.ceil(2 * surface.points.spacing_mm / relief.cell_mm[0]))
     columns = np.broadcast_to(region.mask.any(0), (len(region.mask) + 2 * margin, region.mask.shape[1]))
@@ -125,7 +125,7 @@ def _tops_of_rings(depth: Depth, region: Region, surface: Surface) -> tuple[Floa
 
 
 def _is_small(relief: Relief, region: Region, points: DeviationPoints) -> bool:
-    """Tell whether so few rings cross a defect that its deepest place may lie between them.
+    """Return whether so few rings cross a defect that its deepest place may lie between them.
 
     Beside a weld the points' deviation is the weld's too, so that no bell is fitted there.
     """
@@ -158,7 +158,7 @@ class Noise:
 def _between_rings(
     relief: Relief, region: Region, points: DeviationPoints, noise: Noise, depth_mm: float, sigma_mm: float
 ) -> tuple[float, float]:
-    """Return depth and 1 σ by a bell, where a bell describes the defect, else what is there already."""
+    """Return depth and 1 σ by a bell if a bell describes the defect; else those given."""
     bell = fit_bell(relief, region, points, noise)
     if bell is None or bell.residual_mm > _BELL_MISFIT * bell.height_mm:
         return depth_mm, sigma_mm

@@ -1,4 +1,4 @@
-"""From a measured region to a `Defect`: its kind by a few features that can be named, place, words."""
+"""From a measured region to a `Defect`: kind by a few named features, place and description."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ from stages.defects.relief import Relief
 from stages.defects.segment import Region
 from stages.defects.surface import Surface, cells_of
 
-# In words only: beside longer and shorter in one sentence, a quarter more is still nearly round.
+# Elongation up to which the description calls a defect nearly round (chosen).
 _NEARLY_ROUND = 1.25
-# Another kind is told from the probability that is usually taken for more than chance.
+# Least probability of another kind that the description mentions (chosen).
 _WORTH_TELLING = 0.05
 _SMALL_MM2 = 60.0  # below this a quartic surface follows everything
 _UNKNOWN_ROUGHNESS = 0.08, 0.08
@@ -72,7 +72,7 @@ def _roughness(relief: Relief, region: Region, depth: Depth) -> tuple[float, flo
 
 @dataclass(frozen=True)
 class Scene:
-    """What every defect is described against."""
+    """What all defects of a run are described with."""
 
     seen_by: Witnesses
     wall_thickness_mm: float | None
@@ -80,7 +80,7 @@ class Scene:
 
 
 def describe(region: Region, depth: Depth, surface: Surface, scene: Scene) -> Defect:
-    """Return the defect of a region as if it were surely there; it has no number yet."""
+    """Return the defect of a region with probability 1 and without a number; both are set later."""
     relief = surface.relief
     features = features_of(relief, region, depth)
     likely = probabilities(features, region, relief.radius_mm)
@@ -171,7 +171,7 @@ def _polygon(mask: Byte) -> Float:
     polygon = cv2.approxPolyDP(_contour(mask), 0.7, True)
     if cv2.contourArea(polygon) > 0:
         return np.asarray(polygon[:, 0], float)
-    # the contour through the middles of cells in one line encloses nothing: it goes through their quarters
+    # The contour through the centres of cells in one line has no area: it goes through their quarters.
     return (_contour(np.repeat(np.repeat(mask, 2, 0), 2, 1))[:, 0] - 0.5) / 2
 
 

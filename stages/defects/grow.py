@@ -1,4 +1,4 @@
-"""From cells that stand out to the whole of what they belong to: hysteresis over a long map."""
+"""Regions grown from cells that stand out, by hysteresis over a long map."""
 
 from __future__ import annotations
 

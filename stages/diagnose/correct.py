@@ -60,7 +60,7 @@ def with_true_readings(recording: Recording, effects: Sequence[EffectFound]) -> 
 
 def _shift(encoder: Encoder, true_mm: Float, effects: Sequence[EffectFound]) -> Float:
     """Return by how much effects falsify readings (N,) of a way (N,)."""
-    travel = Travel(encoder.time_s, true_mm, np.gradient(true_mm, encoder.time_s), encoder.distance_mm)
+    travel = Travel(encoder.time_s, true_mm, np.gradient(true_mm, encoder.time_s))
     shift = np.zeros(len(true_mm))
     for e in effects:
         size = np.array([e.parameters[_OF_ENCODER[e.name]].value])

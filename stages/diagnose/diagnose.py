@@ -27,13 +27,7 @@ from stages.diagnose.channels import (
 )
 from stages.diagnose.compared import OnImage, compared, image_of, with_pictures, with_readings
 from stages.diagnose.compose import composed
-from stages.diagnose.correct import (
-    CORRECTED_MOTION,
-    CORRECTION,
-    Corrected,
-    CorrectedMotion,
-    Correction,
-)
+from stages.diagnose.correct import CORRECTED_MOTION, CORRECTION, Corrected, CorrectedMotion, Correction
 from stages.diagnose.effects.library import without as library_without
 from stages.diagnose.field.answer import with_field
 from stages.diagnose.field.evidence import travel_of_run
@@ -254,9 +248,7 @@ def held_against_rings(seen: Seen, sheet: SheetByRings) -> Seen:
         f"and the rings say {told.confirmation.prediction.partition(': ')[2]}."
     )
     return replace(
-        seen,
-        profile=seen.profile.with_finding(withdrawn),
-        shortcomings=(*seen.shortcomings, words),
+        seen, profile=seen.profile.with_finding(withdrawn), shortcomings=(*seen.shortcomings, words)
     )
 
 

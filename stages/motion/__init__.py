@@ -10,12 +10,7 @@ from stages.motion.bundle_adjustment.equations import MATCH_BIASES, Equations, M
 from stages.motion.bundle_adjustment.laser_knock import KnockTest
 from stages.motion.bundle_adjustment.unknowns import State
 from stages.motion.encoder import EncoderReadings, encoder_at_frames
-from stages.motion.estimate import (
-    MOTION,
-    JointEstimate,
-    adjust_at_once,
-    estimate_motion,
-)
+from stages.motion.estimate import MOTION, JointEstimate, adjust_at_once, estimate_motion
 from stages.motion.measuring import measure_run, places_of
 from stages.motion.parameters import MotionParameters
 from stages.motion.rings import RingBins, circles_in_rings, ring_bins

@@ -1,4 +1,4 @@
-"""The encoder at the frames' times, whether it is used at all, and where it says that the probe goes next."""
+"""The encoder at the frames' times, whether it is used, and the pose it predicts for the next frame."""
 
 from __future__ import annotations
 
@@ -108,9 +108,9 @@ def contradicted(encoder: EncoderReadings, tracked: TrackedPoses, context: Conte
 
 
 def _without_held(time_s: Float, distance_mm: Float) -> tuple[Float, Float]:
-    """Return times and readings (M,) without those at which the encoder hung and then caught up.
+    """Return times and readings (M,) without those at which the encoder stood still and then caught up.
 
-    It hung where its reading rests and then jumps by about what the probe usually goes in such a time.
+    That is where readings do not change and then jump by about the probe's usual advance in that time.
     """
     step, usual = np.diff(distance_mm), _usual(np.diff(distance_mm))
     kept = np.ones(len(time_s), bool)
@@ -124,14 +124,14 @@ def _without_held(time_s: Float, distance_mm: Float) -> tuple[Float, Float]:
 
 
 def _going_on(time_s: Float, distance_mm: Float, by_s: float) -> tuple[Float, Float]:
-    """Return times and readings (M + 2,) that go on as they began and ended: a frame may lie just outside."""
+    """Return times and readings (M + 2,) extrapolated at both ends: a frame may lie just outside."""
     inner = np.interp([time_s[0] + by_s, time_s[-1] - by_s], time_s, distance_mm)
     before, behind = 2 * distance_mm[[0, -1]] - inner
     return np.r_[time_s[0] - by_s, time_s, time_s[-1] + by_s], np.r_[before, distance_mm, behind]
 
 
 def _in_gaps(time_s: Float, read_s: Float, read_mm: Float, frame_s: float) -> Bool:
-    """Return which frames (N,) lie where nothing was read for a while, though the probe went on."""
+    """Return which frames (N,) lie in gaps of the readings during which the probe moved on."""
     usual_s = float(np.median(np.diff(read_s)))
     gap = np.diff(read_s) > max(_JUMP_TIMES * usual_s, 2 * frame_s)
     gap &= np.abs(np.diff(read_mm)) > _DIFFERENCE_MM

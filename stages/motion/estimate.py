@@ -151,7 +151,7 @@ def adjust_at_once(
 
 
 def _require_convergence(radius_mm: float, estimate: Estimate) -> None:
-    """Refuse an estimate that ran away from the pipe that the rings show."""
+    """Refuse an estimate whose radius differs too much from that of the rings."""
     found = float(estimate.state.globals[0])
     if not abs(found - radius_mm) < _LARGEST_CHANGE * radius_mm:
         raise UnusableError(
@@ -172,7 +172,7 @@ def _motion_of_run(
     parameters: MotionParameters,
     context: Context,
 ) -> Trajectory:
-    """Estimate the motion from frames and encoder as the pictures bear them out."""
+    """Estimate the motion from the frames and encoder as corrected by the stage premises."""
     return estimate_motion(frames.applied_to(recording), probe, rings, points, parameters, context)
 
 

@@ -1,4 +1,4 @@
-"""What the motion showed: stops, reversals, slip, dropped and duplicated frames, lost texture."""
+"""Events of the motion: stops, reversals, slip, dropped and duplicated frames, lost texture."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""When the frames were taken, where their stamps scatter: a camera of even rhythm stamped on arrival."""
+"""Times of frames whose stamps scatter, because pictures of a regular camera were stamped on arrival."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _FEWEST = 10
 
 
 def believed_times(recording: Recording, tracked: TrackedPoses, context: Context) -> Float:
-    """Return the frames' times (N,): an even rhythm where encoder and texture agree better with it."""
+    """Return the frames' times (N,): equal intervals where encoder and texture agree better with them."""
     stamps = recording.frames.time_s
     even = even_rhythm(stamps)
     if even is None or recording.encoder is None:
@@ -38,15 +38,15 @@ def believed_times(recording: Recording, tracked: TrackedPoses, context: Context
     if apart[1] > _BETTER * apart[0]:
         return stamps
     context.warn(
-        f"the times in frames.csv scatter by {1e3 * root_mean_square(stamps - even):.1f} ms (1 σ) about an "
-        "even rhythm, which encoder and pictures bear out: it is used in their place. What to do: let the "
-        "camera stamp its pictures, not the computer that receives them"
+        f"the times in frames.csv scatter by {1e3 * root_mean_square(stamps - even):.1f} ms (1 σ) about "
+        "equal intervals. Encoder and pictures agree better with equal intervals, which are used instead. "
+        "What to do: let the camera stamp its pictures, not the computer that receives them"
     )
     return even
 
 
 def even_rhythm(stamps: Float) -> Float | None:
-    """Return the even times (N,) that scattered stamps (N,) are about; None where they scatter about none."""
+    """Return times (N,) of equal intervals that stamps (N,) scatter about; None where there are none."""
     if len(stamps) < _FEWEST:
         return None
     k = np.arange(len(stamps))

@@ -160,12 +160,12 @@ def _in_reducer(
 
 
 def _warn_of_reducer(bore: Bore, encoder: EncoderReadings | None, context: Context) -> None:
-    by = "what other reducers showed" if encoder is None else "how much texture and encoder differ"
+    by = "the errors that other reducers had" if encoder is None else "how much texture and encoder differ"
     context.warn(
         f"the pipe's width changes by {2 * np.ptp(bore.rings_wider_mm):.1f} mm over a length (a reducer or "
-        f"taper): texture is matched less well there. σ of distances holds {by}; radii may be off by more "
-        "than their σ, most of all on the slope. What to do: compare distance and diameters with known "
-        "ones, or process the pipe before and behind the reducer as recordings of their own"
+        f"taper): texture is matched less well there. The σ of distances includes {by}; radii may be off by "
+        "more than their σ, most of all on the slope. What to do: compare distance and diameters with known "
+        "ones, or process the pipe before and behind the reducer as separate recordings"
     )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,10 +22,11 @@ from stages.premises.changes import (
     refuse_or_warn_of_interlacing,
     warn_of_frames,
 )
-from stages.premises.clock import clock_jumps, warn_of_clock, without_jumps
+from stages.premises.clock import ClockJump, clock_jumps, warn_of_clock, without_jumps
 from stages.premises.cuts import cuts, warn_of_cuts
 from stages.premises.light import (
     Light,
+    Steps,
     alike,
     light_seen,
     pattern_breaks,
@@ -55,8 +56,7 @@ class PremisesParameters(Parameters):
     """Parameters of the premises."""
 
     mend: bool = Field(
-        True,
-        description="mend lights and times of frames that the pictures contradict; false: stop instead",
+        True, description="mend lights and times of frames that the pictures contradict; false: stop instead"
     )
     withhold: int = Field(
         0,
@@ -85,41 +85,90 @@ def check_premises(
         When what is stated cannot be right and cannot be mended, or is not to be.
     """
     recording, pictures, combed = _progressive(recording, probe, parameters, context)
-    table, seen_light = _table(recording), _light(recording.frames, pictures)
-    outside = off_the_pipe(pictures)
-    astray = out_of_order(pictures, np.where(outside, Light.UNKNOWN, seen_light))
-    light = np.where(astray | outside, Light.UNKNOWN, seen_light)
-    shown = light if np.any(light == Light.WALL) else _lights_of(recording.frames.illumination)
+    seen = _seen(recording, probe, pictures, context)
+    found = _matched(recording, probe, seen)
+    changes, left_out = found.changes, found.left_out.any
+    _refuse_unmended(changes, parameters)
+    factor = _compared(recording, probe, seen, found, context)
+    keep = np.concatenate([[True], np.diff(changes.row) > 0]) & ~left_out
+    withheld = withheld_frames(changes.label[keep], parameters.withhold)
+    context.report("frames withheld from measurement", int(withheld.sum()), "frames")
+    return CheckedFrames(
+        recording.frames.frame[keep], changes.time_s[keep], changes.label[keep], factor,
+        int(changes.relabelled.sum()), int(changes.retimed.sum()),
+        withheld if withheld.any() else None, seen.stays, combed,
+    )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class _Seen:
+    """What the pictures of a recording show.
+
+    ``light`` (F,) is the `Light` of every picture. ``in_order`` (F,) is the same, but unknown for pictures
+    outside the pipe or out of order, and ``shown`` (F,) is that, or the stated lights where pictures do not
+    tell lights apart. ``outside`` and ``astray`` (F,) are as in `LeftOut`; something ``stays`` (h, w) in the
+    picture while the wall moves.
+    """
+
+    pictures: Pictures
+    light: Int
+    in_order: Int
+    shown: Int
+    outside: Bool
+    astray: Bool
+    stays: Bool | None
+
+
+@dataclass(frozen=True)
+class _Matched:
+    """Rows, lights and times of the pictures as corrected, and what they were corrected by."""
+
+    changes: Changes
+    left_out: LeftOut
+    jumps: list[ClockJump]
+    steps: Steps
+    radius_mm: float
+
+
+def _seen(recording: Recording, probe: Probe, pictures: Pictures, context: Context) -> _Seen:
+    light, outside = _light(recording.frames, pictures), off_the_pipe(pictures)
+    astray = out_of_order(pictures, np.where(outside, Light.UNKNOWN, light))
+    in_order = np.where(astray | outside, Light.UNKNOWN, light)
+    shown = in_order if np.any(in_order == Light.WALL) else _lights_of(recording.frames.illumination)
     stays = places_that_stay(recording, probe, recording.frames.frame[shown == Light.WALL], context)
     if stays is not None:
         pictures = look_at_pictures(recording, probe, context, stays)
+    return _Seen(pictures, light, in_order, shown, outside, astray, stays)
+
+
+def _matched(recording: Recording, probe: Probe, seen: _Seen) -> _Matched:
+    """Find the row of every picture by the lights, then by the motion of the wall, then the clock's jumps."""
+    table, pictures, light, encoder = _table(recording), seen.pictures, seen.in_order, recording.encoder
     alignment = _aligned(recording.frames, table, pictures, light)
     copy = _copies(recording, table, pictures, light, alignment)
     label = np.where(copy, _stated(table, alignment.row), _labels(table, alignment, light, pictures))
-    steps, sway = steps_of_wall(pictures, shown, copy), sway_of_line(pictures, light)
+    steps, sway = steps_of_wall(pictures, seen.shown, copy), sway_of_line(pictures, light)
     radius_mm = radius_seen_mm(pictures, probe)
-    row = rows_by_motion(alignment.row, steps, rhythm_of(light), table, recording.encoder, sway, radius_mm)
+    row = rows_by_motion(alignment.row, steps, rhythm_of(light), table, encoder, sway, radius_mm)
     stated_s = row_times(table, row)
-    jumps = clock_jumps(stated_s, steps, recording.encoder)
+    jumps = clock_jumps(stated_s, steps, encoder)
     changes = Changes(recording.frames, label, row, without_jumps(stated_s, jumps))
-    left_out = LeftOut(outside, astray, copy)
-    _refuse_unmended(changes, parameters)
-    warn_of_frames(changes, pictures, np.where(outside, Light.WALL, seen_light), table, context)
-    left_out.warn(recording.frames.frame, context)
-    cut = cuts(pictures, shown, left_out.any, changes.time_s)
-    warn_of_cuts(cut, pictures, recording.frames.frame, context)
-    check_diameter(radius_mm, recording.pipe, probe.lighting.radius_mm, context)
-    factor = encoder_factor(recording, changes.time_s, steps, radius_mm, context)
-    warn_of_clock(jumps, changes.time_s, recording, context)
-    _report(pictures, radius_mm, changes, context)
-    keep = np.concatenate([[True], np.diff(row) > 0]) & ~left_out.any
-    withheld = withheld_frames(label[keep], parameters.withhold)
-    context.report("frames withheld from measurement", int(withheld.sum()), "frames")
-    return CheckedFrames(
-        recording.frames.frame[keep], changes.time_s[keep], label[keep], factor,
-        int(changes.relabelled.sum()), int(changes.retimed.sum()),
-        withheld if withheld.any() else None, stays, combed,
-    )  # fmt: skip
+    return _Matched(changes, LeftOut(seen.outside, seen.astray, copy), jumps, steps, radius_mm)
+
+
+def _compared(recording: Recording, probe: Probe, seen: _Seen, found: _Matched, context: Context) -> float:
+    """Warn of all that is not as stated; return the factor that the encoder's readings are to be given."""
+    frame, pictures, changes = recording.frames.frame, seen.pictures, found.changes
+    warn_of_frames(
+        changes, pictures, np.where(seen.outside, Light.WALL, seen.light), _table(recording), context
+    )
+    found.left_out.warn(frame, context)
+    warn_of_cuts(cuts(pictures, seen.shown, found.left_out.any, changes.time_s), pictures, frame, context)
+    check_diameter(found.radius_mm, recording.pipe, probe.lighting.radius_mm, context)
+    factor = encoder_factor(recording, changes.time_s, found.steps, found.radius_mm, context)
+    warn_of_clock(found.jumps, changes.time_s, recording, context)
+    _report(pictures, found.radius_mm, changes, context)
+    return factor
 
 
 def _progressive(

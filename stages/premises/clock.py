@@ -1,4 +1,4 @@
-"""The camera's clock: its rate, and jumps of it while wall and encoder went on."""
+"""The camera's clock: its rate, and jumps in its times that neither wall nor encoder shows."""
 
 from __future__ import annotations
 

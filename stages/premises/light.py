@@ -1,4 +1,4 @@
-"""Which light each picture was taken in, and pictures whose loss leaves the rhythm of the lights whole."""
+"""Which light each picture was taken in, and lost pictures that the rhythm of the lights does not show."""
 
 from __future__ import annotations
 
@@ -13,44 +13,46 @@ from pipeline.arrays import Bool, Float, Int
 from pipeline.recording.base import Encoder, FrameTable
 from stages.premises.pictures import CLOSED, Pictures
 
-# A picture between the two lights, in the middle third of the way, is called neither.
+# A picture whose brightness lies in the middle third between the two lights belongs to neither.
 _MIDDLE = 1 / 3
-# Two lights are told apart where they lie further apart than this many of their own spreads, and where hardly
-# any picture lies between them: a single light that slowly changes fills the middle.
+# Two lights are told apart where they differ by more than this many of their own spreads, and where hardly
+# any picture lies between them: a single light that changes slowly would fill the middle.
 _APART, _MOST_BETWEEN = 3.0, 0.05
-# Nor are they two that differ by less than this part of their brightness (chosen): two runs of open-3 joined,
+# Two lights differ by at least this part of their brightness (chosen): two runs of open-3 that were joined,
 # with one light, differ by 0.01.
 _LEAST_APART = 0.05
 # Dark pictures are those of the laser only where more than this part of them shows its line.
 _MOST_DARK = 0.5
-# Of fewer pictures in one light the spread is not known.
+# With fewer pictures in one light, its spread is not known.
 _FEWEST_ALIKE = 3
-# The brightness of either light is followed over so many frames on both sides, as lamps warm up.
+# Brightness of each light is compared within so many frames on both sides, since lamps warm up.
 _AROUND = 8
-# Least distance within these frames, as a part of that in the whole run, at which both lights are among them.
+# Both lights are among these frames if their brightness spans at least this part of that in the whole run.
 _BOTH_THERE = 0.4
-# Lights that are remembered to foretell the next, and surprises by which a memory may be worse than the best.
+# Longest context (preceding lights) that predicts the next one; share of more errors that a shorter one may
+# make.
 _LONGEST_MEMORY, _NEARLY = 6, 0.05
 # A step of the wall stands out when it is so many robust σ above the steps around it: by noise alone once in
 # 10^9 steps, were they normal; matching errs worse than that, and six is what outliers need everywhere here.
 _SIGMAS = 6.0
-# Where the table has rows too many, some pictures were lost: the likeliest places are as good as any.
+# Where the table has too many rows, pictures were surely lost, and less evidence is needed for where.
 _SIGMAS_LOST = 3.5
-# Nine in ten of normal errors are smaller than so many σ; from them, since matching's are not normal.
+# 0.9 quantile of normal errors in σ. It gives σ here, because errors of matching are not normal.
 _NINE_IN_TEN = 1.645
 # Steps on either side from which the usual speed is taken.
 _AROUND_STEP = 9
 _LEAST_STEPS = 12
-# A step that took so many times as long as is usual counts no lost pictures: over 32 frames, 30 of them left
-# out, phase correlation erred by the way of 6 (open-1-field at half its size).
+# Steps that took more than so many usual times tell nothing of lost pictures: over 32 frames, of which 30
+# were left out, phase correlation erred by the advance of 6 frames (open-1-field at half its size).
 _LONGEST_STEP = 4.0
 # The laser line leaps where it moves across so many times as far as it usually does, of at least half a
 # pixel, in the time that would have passed. In open-1 to open-3, a01 and a09 it moves up to 3
 # times as far, twice in a run more than 2.5; where all pictures of open-1 were moved by 4 px, 5.4 times.
 _LINE_LEAPS, _LEAST_SWAY_PX = 2.5, 0.5
-# Ways agree where they differ by less: steps of the wall err by a tenth, a loss makes one 1.5 times as long.
+# Two advances agree within this part: steps of the wall err by a tenth, a lost picture makes one 1.5 times as
+# long.
 _AGREES = 0.25
-# The encoder is asked within so many frames whether the probe itself leapt.
+# The encoder is looked at over so many frames on either side of a leap.
 _NEARBY = 10
 
 
@@ -65,8 +67,8 @@ class Light(IntEnum):
 def light_seen(pictures: Pictures) -> Int:
     """Return the `Light` (F,) of every picture; all unknown where the recording has only one light.
 
-    So they are where its dark pictures show no line. A picture that cannot be decoded, that lies between the
-    lights, or that is dark without a closed line (a covered lens, a lamp that failed) is unknown.
+    It has only one where its dark pictures show no line. A picture is unknown that cannot be decoded, lies
+    between the lights, or is dark without a closed line (a covered lens, a lamp that failed).
     """
     out = np.full(len(pictures.brightness), Light.UNKNOWN, np.int64)
     seen = np.flatnonzero(pictures.seen)
@@ -84,8 +86,8 @@ def light_seen(pictures: Pictures) -> Int:
 def alike(pictures: Pictures, one: Bool, other: Bool) -> bool:
     """Return whether two sets (F,) of pictures that the table tells apart look the same.
 
-    They do when neither brightness nor the closed line differs between them by more than it varies within
-    one of them; too few pictures do not show that.
+    They do if neither brightness nor the share of a closed line differs between the sets by more than it
+    varies within one of them. With too few pictures they are taken to differ.
     """
     measures = (pictures.brightness, pictures.closed)
     if min((one & pictures.seen).sum(), (other & pictures.seen).sum()) < _FEWEST_ALIKE:
@@ -101,7 +103,7 @@ def _differ(one: Float, other: Float) -> bool:
 
 
 def _two_lights(brightness: Float) -> tuple[float, float] | None:
-    """Return the medians of the dark and the bright pictures, None where they are no two kinds."""
+    """Return the median brightness of dark and of bright pictures; None where there is only one kind."""
     bright = brightness > _otsu(brightness)
     if bright.all() or not bright.any():
         return None
@@ -114,7 +116,7 @@ def _two_lights(brightness: Float) -> tuple[float, float] | None:
 
 
 def _otsu(value: Float) -> float:
-    """Return the threshold that parts values best (Otsu 1979), without a histogram."""
+    """Return the threshold that separates values best (Otsu 1979), without a histogram."""
     ordered = np.sort(value)
     count = np.arange(1, len(ordered))
     below = np.cumsum(ordered)[:-1] / count
@@ -139,9 +141,9 @@ def _height(brightness: Float, low: float, high: float) -> Float:
 def pattern_breaks(light: Int) -> Bool:
     """Return (F,) true where a picture's light is not the one that the lights before it lead to expect.
 
-    Expected is what most often follows the same lights elsewhere in the recording; so laser, led, ... and
-    laser, laser, led, ... need no rule of their own. The memory is the shortest
-    that predicts nearly as well as the best: a longer one knows fewer cases of each kind.
+    Expected is the light that most often follows the same preceding lights (the context) in the recording, so
+    that laser, led, ... and laser, laser, led, ... need no rules of their own. The context is the shortest
+    that predicts nearly as well as the best one: a longer one has fewer cases to learn from.
     """
     found = [_unexpected(light, memory) for memory in range(1, _LONGEST_MEMORY + 1)]
     fewest = min(int(f.sum()) for f in found)
@@ -191,7 +193,7 @@ def row_times(table: FrameTable, row: Int) -> Float:
 
 
 def sway_of_line(pictures: Pictures, light: Int) -> Float:
-    """Return how far (F,) the laser line moves across to its next picture, over how far it usually does."""
+    """Return how far (F,) the laser line moves sideways to its next picture, in multiples of the usual."""
     out, line = np.zeros(len(light)), np.flatnonzero((light == Light.LINE) & (pictures.closed > CLOSED))
     if len(line) < _LEAST_STEPS:
         return out
@@ -215,11 +217,11 @@ def rows_by_motion(
 ) -> Int:
     """Return ``row`` (F,) with more or fewer rows skipped where the wall moves by more or less than usual.
 
-    The lights fix the number of lost pictures but for whole rhythms of theirs; the motion of the wall, at the
-    usual speed of the steps around, counts these. A leap that the encoder shows too is the probe's own.
-    Over pictures that were left out it tells nothing: the speed is not known so long. Nor where the line's
-    ``sway`` (F,) leaps: the camera was knocked there. Nor where the encoder goes as far as the
-    wall, with the pipe's ``radius_mm``: the usual steps are wrong then, since blocks of a codec stand.
+    The lights give the number of lost pictures only up to whole periods of their rhythm. How far the wall
+    moved, compared with the steps around, gives the number of periods. Steps tell nothing where the encoder
+    shows the same leap (the probe moved faster), over pictures that were left out (the speed is not known for
+    so long), where the line's ``sway`` (F,) leaps (the camera was knocked), or where the encoder agrees with
+    the wall, by the pipe's ``radius_mm``: then the usual steps are wrong, because a codec repeated blocks.
     """
     if len(steps.end) < _LEAST_STEPS:
         return row
@@ -239,7 +241,7 @@ def rows_by_motion(
 
 
 def _leaps(steps: Steps, time_s: Float, rhythm: int, sigmas: float) -> list[tuple[int, int, int, float]]:
-    """Return (start, end, pictures lost in whole rhythms, size) of steps that stand out, clearest first."""
+    """Return (start, end, lost pictures in whole periods, size) of steps that stand out, clearest first."""
     period_s = float(np.median(np.diff(time_s)))
     passed = np.maximum(time_s[steps.end] - time_s[steps.start], 1e-9)
     speed = median_filter(steps.size / passed, _AROUND_STEP, mode="nearest")
@@ -254,7 +256,7 @@ def _leaps(steps: Steps, time_s: Float, rhythm: int, sigmas: float) -> list[tupl
 
 
 def _encoder_agrees(encoder: Encoder | None, time_s: Float, way_mm: float) -> bool:
-    """Return whether the encoder goes a way between two times; False without one, or beyond its ends."""
+    """Return whether the encoder advances by ``way_mm`` between two times; False where it is not known."""
     if encoder is None or time_s[0] < encoder.time_s[0] or time_s[1] > encoder.time_s[-1]:
         return False
     shown_mm = float(np.diff(np.interp(time_s, encoder.time_s, encoder.distance_mm))[0])
@@ -262,7 +264,7 @@ def _encoder_agrees(encoder: Encoder | None, time_s: Float, way_mm: float) -> bo
 
 
 def _encoder_was_steady(encoder: Encoder | None, time_s: float, period_s: float) -> bool:
-    """Return whether the encoder goes on evenly about a time; False without one."""
+    """Return whether the encoder advances evenly around a time; False where it is not known."""
     if encoder is None or not encoder.time_s[0] < time_s < encoder.time_s[-1]:
         return False
     at = time_s + period_s * np.arange(-_NEARBY, _NEARBY + 1)
@@ -271,9 +273,9 @@ def _encoder_was_steady(encoder: Encoder | None, time_s: float, period_s: float)
 
 
 def rhythm_of(light: Int) -> int:
-    """Return after how many pictures the lights repeat, 1 where they are not told apart."""
+    """Return the period of the lights in pictures, 1 where they are not told apart."""
     if not np.any(light != Light.UNKNOWN):
         return 1
     agree = [float((light[p:] == light[:-p]).mean()) for p in range(1, min(13, len(light)))]
-    # A rhythm of twice the length agrees as well: the shortest within 0.05 (chosen) of the best is taken.
+    # Twice the period agrees as well: the shortest one within 0.05 (chosen) of the best is taken.
     return 1 + next((k for k, a in enumerate(agree) if a >= max(agree) - 0.05), 0)

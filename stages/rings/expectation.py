@@ -1,4 +1,4 @@
-"""What the rings of a good recording look like, and what is said of one whose rings do not."""
+"""Warnings about a recording whose rings do not look like those of good recordings."""
 
 from __future__ import annotations
 
@@ -58,9 +58,9 @@ def warn_of_rings(samples: RingSamples, wander_px: float, stepped: bool, context
             _warn_of_shares(validity[:, missing <= _HIDDEN], context)
     if wander_px > _MOST_WANDER * width:
         context.warn(
-            f"the line wanders by {wander_px:.2f} px beyond its noise, {wander_px / width:.2f} of its width, "
-            "where good recordings have 0.1 at most: strong compression, interlacing or coarse speckle. σ "
-            "holds it; small defects may be missed. What to do: record with less compression"
+            f"the line wanders by {wander_px:.2f} px beyond its noise, {wander_px / width:.2f} of its width "
+            "(good recordings: 0.1 at most): strong compression, interlacing or coarse speckle. σ includes "
+            "this; small defects may be missed. What to do: record with less compression"
         )
 
 
@@ -86,8 +86,8 @@ def _warn_of_shares(validity: Byte, context: Context) -> None:
     if validity.size and other.mean() > _MOST_NOT_THE_LINE:
         context.warn(
             f"{100 * other.mean():.1f} % of the ring samples show light that is not the line: glints, "
-            "ghosts, splashes or compression, where good recordings have 0.1 % at most. They are left out; "
-            "what looks like a line may pass for a finding of one or two rings. What to do: clean the "
+            "ghosts, splashes or compression (good recordings: 0.1 % at most). They are left out, but some "
+            "may remain as false findings of one or two rings. What to do: clean the "
             "window, shade reflections, expose the laser frames less; look at the findings' pictures"
         )
 

@@ -1,4 +1,4 @@
-"""What only one ring shows: runs of samples that leave the wall which the rings before and after agree on.
+"""Runs of samples off the wall that only one ring shows, while the rings before and after agree.
 
 A defect is there when the next ring comes by; a glint has moved on. Rings are laid on one another by what
 varies slowly around them, the median of five rings in a row is the wall, and a run of neighbouring samples

@@ -84,11 +84,7 @@ class ProfileFit(NamedTuple):
 
 
 def fit_line(
-    image: Byte | Float32,
-    sectors: Sectors,
-    seed_px: Float,
-    width_px: float,
-    response: Response,
+    image: Byte | Float32, sectors: Sectors, seed_px: Float, width_px: float, response: Response
 ) -> ProfileFit:
     """Fit the line near ``seed_px`` (A,) in every sector of ``image`` (H, W); NaN seeds are left out."""
     known = np.isfinite(seed_px)

@@ -1,4 +1,4 @@
-"""A seam of the picture: two parts of it, by sensor or recorder, that do not lie where they should."""
+"""A seam of the picture: two parts of it that sensor or recorder displaced against each other."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def seam_of(samples: RingSamples) -> Seam | None:
 
 
 def warn_of_seam(seam: Seam | None, context: Context) -> None:
-    """Say where the picture has a seam."""
+    """Warn of a seam of the picture."""
     if seam is not None:
         context.warn(
             f"at both ends of the picture's {seam.along} {seam.at_px:.0f} the line steps by "

@@ -1,4 +1,4 @@
-"""Where the line is, to a pixel: in a band about the ring seen last, or anywhere when there is none."""
+"""Search for the line, to a pixel: in a band about the ring seen last, or in the whole image."""
 
 from __future__ import annotations
 
@@ -178,7 +178,7 @@ def find_ring(image: Image, sectors: Sectors, noise: float) -> tuple[Float, floa
 
 
 def _credit(score: Float) -> Float32:
-    """Return what a score speaks for the line: itself up to a limit, from there on its logarithm.
+    """Return the evidence of a score for the line: the score up to a limit, its logarithm beyond it.
 
     Any light of a score at the limit is no noise. Beyond it, brighter is likelier, but slowly: a line ten
     times as bright as its halo keeps the path over many rays, a glint ten times as bright as the line does

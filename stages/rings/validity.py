@@ -1,4 +1,4 @@
-"""What only neighbours tell: samples off the ring."""
+"""Samples that their neighbours show to be off the ring."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _MAJORITY = 0.5
 
 
 def contradicted(rings: RingSamples) -> tuple[Byte, Float32]:
-    """Return validity and σ (F, A) of rings when every sample has been held against its neighbours."""
+    """Return validity and σ (F, A) of rings after every sample was compared with its neighbours."""
     validity = mark_outliers(rings.radius_px, rings.sigma_px, rings.validity)
     radius = np.where(validity == RingValidity.VALID, rings.radius_px, np.float32(np.nan))
     glint, sigma = lone_runs(radius, rings.sigma_px, rings.width_px, rings.amplitude)

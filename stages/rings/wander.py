@@ -1,4 +1,4 @@
-"""How far a line wanders beyond its noise: speckle, texture of the wall, other light, compression."""
+"""Scatter of the line beyond its noise, by speckle, texture of the wall, other light or compression."""
 
 from __future__ import annotations
 

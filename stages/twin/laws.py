@@ -29,8 +29,7 @@ def lit_laws(cells: Cells, lighting: Lighting, ring: Ring) -> tuple[Float, list[
     steps, first = steps_of(frames)
     columns = np.log1p(-0.999 * share)[:, None, None] * steps[None, ..., :1]
     places = np.stack(
-        [np.repeat(azimuth, len(first)), np.tile(first, LED_AZIMUTHS), np.repeat(share.max(1), len(first))],
-        1,
+        [np.repeat(azimuth, len(first)), np.tile(first, LED_AZIMUTHS), np.repeat(share.max(1), len(first))], 1
     )
     return base, [
         Law("step", steps, first[:, None]),

@@ -42,7 +42,7 @@ class LineLight:
         Grey levels of the middle of a line as wide as its sheet on white wall.
     colour, colour_sd : (3,)
         Shares of blue, green and red in the grey of the line, and their 1 σ.
-    log_power, power_sd : (36,)
+    log_power : (36,)
         Logarithm of the power over image azimuth, sectors uniform from −π, mean 0.
     course : Course
         Power over time.
@@ -64,7 +64,6 @@ class LineLight:
     colour: Float
     colour_sd: Float
     log_power: Float
-    power_sd: Float
     course: Course
     sheet_mm: Figure
     blur_px: Figure
@@ -127,10 +126,10 @@ class LineSamples:
         """Return the light with its power around the image and over time."""
         even = replace(light, level=1.0, log_power=np.zeros(_SECTORS))
         ratio = np.stack([self._sector_ratios(even, s, grey) for _, s, grey in self._kept])
-        level, power, power_sd, course, course_sd = _two_way(np.log(np.where(ratio > 0, ratio, np.nan)))
+        level, power, course, course_sd = _two_way(np.log(np.where(ratio > 0, ratio, np.nan)))
         frames = np.array([f for f, _, _ in self._kept])
         known = Course(frames, course, course_sd)
-        return replace(light, level=float(np.exp(level)), log_power=power, power_sd=power_sd, course=known)
+        return replace(light, level=float(np.exp(level)), log_power=power, course=known)
 
     def _with_colour(self, light: LineLight) -> LineLight:
         """Return the light with the shares of the photo's colours that the line's brightness follows."""
@@ -218,8 +217,7 @@ class LineSamples:
         sd = 1.25 * np.std(rows, 0) / np.sqrt(max(len(rows), 1))
         bell = np.abs(middle) < _BELL_WIDTHS
         halo = Figure(
-            float(profile[~bell].sum() / profile.sum()),
-            float(np.linalg.norm(sd[~bell]) / profile.sum()),
+            float(profile[~bell].sum() / profile.sum()), float(np.linalg.norm(sd[~bell]) / profile.sum())
         )
         weight = np.where(bell, profile, 0.0) / profile[bell].sum()
         first = float(weight @ middle)
@@ -240,19 +238,17 @@ def _plain_line(sheet_mm: float, blur_px: float) -> LineLight:
     x = np.linspace(-PROFILE_WIDTHS, PROFILE_WIDTHS, 193)
     nothing, unknown = np.zeros(0), Figure(0.0, 0.0)
     return LineLight(
-        1.0, np.full(3, 1 / 3), np.full(3, np.inf), np.zeros(_SECTORS), np.zeros(_SECTORS),
+        1.0, np.full(3, 1 / 3), np.full(3, np.inf), np.zeros(_SECTORS),
         Course(nothing.astype(np.int64), nothing, nothing),
         Figure(sheet_mm, 0.1 * sheet_mm), Figure(blur_px, 0.1 * blur_px), x, np.exp(-0.5 * x**2), unknown,
         unknown, unknown, np.zeros_like(x),
     )  # fmt: skip
 
 
-def _two_way(table: Float) -> tuple[float, Float, Float, Float, Float]:
-    """Split a table (F, S) with gaps into level, columns and rows by medians (Tukey's median polish).
+def _two_way(table: Float) -> tuple[float, Float, Float, Float]:
+    """Split a table (F, S) with gaps into level, columns (S,), rows (F,) and the rows' 1 σ (F,).
 
-    Returns
-    -------
-    level, columns (S,), their 1 σ (S,), rows (F,), their 1 σ (F,)
+    By medians: J. W. Tukey's median polish.
     """
     rest = table.copy()
     rows, columns = np.zeros(table.shape[0]), np.zeros(table.shape[1])
@@ -263,9 +259,8 @@ def _two_way(table: Float) -> tuple[float, Float, Float, Float, Float]:
         rest, columns = rest - by_column, columns + by_column
     level = float(rows.mean() + columns.mean())
     spread = robust_spread(rest[np.isfinite(rest)]) if np.isfinite(rest).any() else 0.0
-    seen = np.isfinite(table)
-    column_sd, row_sd = (1.25 * spread / np.sqrt(np.maximum(seen.sum(axis), 1)) for axis in (0, 1))
-    return level, columns - columns.mean(), column_sd, rows - rows.mean(), row_sd
+    row_sd = 1.25 * spread / np.sqrt(np.maximum(np.isfinite(table).sum(1), 1))
+    return level, columns - columns.mean(), rows - rows.mean(), row_sd
 
 
 def _median(table: Float, axis: int) -> Float:

@@ -24,15 +24,7 @@ from stages.twin.locate import FALSE_ALARM
 from stages.twin.render import Region, TwinFrame
 from stages.twin.scene import Scene
 from stages.twin.second_ring import ring_profile, second_ring
-from stages.twin.switched import (
-    STEP,
-    TILE,
-    bloom,
-    bounced,
-    leaked,
-    motion_blur,
-    stray,
-)
+from stages.twin.switched import STEP, TILE, bloom, bounced, leaked, motion_blur, stray
 
 _SURE, FEWEST_FRAMES = 3.0, 6
 """σ by which laws are told apart; frames."""

@@ -24,7 +24,7 @@ from pipeline.recording.video import open_video
 from pipeline.review.decisions import action_of
 from pipeline.review.model_stretches import read_model
 from pipeline.review.run_files import RunFiles, measured_findings
-from pipeline.review.server import Deed, Measuring, Signing, parsed
+from pipeline.review.server import PostedAction, PostedPoints, PostedSignature, parsed
 from pipeline.simulator.prior import read_prior
 from pipeline.simulator.scene import read_scene
 from stages.catalogue import PIPELINE
@@ -156,7 +156,7 @@ def _stored(file: Path) -> object:
 
 
 def _request(data: bytes) -> None:
-    for kind in (Deed, Signing, Measuring):
+    for kind in (PostedAction, PostedSignature, PostedPoints):
         with suppress(InputError):
             parsed(kind, data)
 

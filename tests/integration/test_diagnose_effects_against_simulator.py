@@ -128,7 +128,7 @@ def test_the_simulators_odometer_reads_too_much_by_what_is_predicted(name):
     to_and_fro = Motion(Signal(np.zeros(1), np.zeros(1), (Wave(20.0, 0.15),)))
     true, read = (meter.readings(to_and_fro, 10.0) for meter in (Odometer(quantum_mm=0.0), odometer))
     time, way = true.time_s, true.distance_mm
-    travel = Travel(time, way, np.gradient(way, time), way)
+    travel = Travel(time, way, np.gradient(way, time))
     predicted = LIBRARY[name].reading_shift_mm(travel, shape, np.array(amplitude))
     excess = read.distance_mm - way
     # Readings count from their first; a delay reaches back before it, where the way is not known.

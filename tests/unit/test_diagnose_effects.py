@@ -53,7 +53,7 @@ def texture():
 def travel():
     time = np.linspace(0, 8, 241)
     distance = 20 * np.sin(2 * np.pi * time / 8)
-    return Travel(time, distance, 5 * np.pi * np.cos(2 * np.pi * time / 8), distance)
+    return Travel(time, distance, 5 * np.pi * np.cos(2 * np.pi * time / 8))
 
 
 def shape_of(model):

@@ -24,7 +24,7 @@ from pipeline.review import guard, model_stretches, quality
 from pipeline.review.decisions import action_of
 from pipeline.review.model_stretches import read_model
 from pipeline.review.run_files import RunFiles, measured_findings
-from pipeline.review.server import Deed, Measuring, Signing, parsed
+from pipeline.review.server import PostedAction, PostedPoints, PostedSignature, parsed
 from stages.compare import reference
 from stages.compare.reference import read_wall_map
 from tests.fuzz.targets import TARGETS
@@ -144,11 +144,11 @@ def test_an_action_is_no_longer_than_stated(name: str, most: int) -> None:
 @pytest.mark.parametrize(
     ("kind", "most", "over"),
     [
-        (Deed, {"action": {}, "who": "x" * 200, "revision": 2**53}, {"who": "x" * 201}),
-        (Deed, {"action": {}, "who": "x", "revision": 2**53}, {"revision": 2**53 + 1}),
-        (Signing, SIGNING, {"standard": "x" * 201}),
-        (Signing, SIGNING, {"remarks": "x" * 4001}),
-        (Measuring, {"tool": "area", "points": [[0, 0]] * 2000}, {"points": [[0, 0]] * 2001}),
+        (PostedAction, {"action": {}, "who": "x" * 200, "revision": 2**53}, {"who": "x" * 201}),
+        (PostedAction, {"action": {}, "who": "x", "revision": 2**53}, {"revision": 2**53 + 1}),
+        (PostedSignature, SIGNING, {"standard": "x" * 201}),
+        (PostedSignature, SIGNING, {"remarks": "x" * 4001}),
+        (PostedPoints, {"tool": "area", "points": [[0, 0]] * 2000}, {"points": [[0, 0]] * 2001}),
     ],
 )  # fmt: skip
 def test_a_request_is_no_longer_than_stated(

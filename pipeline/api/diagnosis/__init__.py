@@ -1,1 +1,1 @@
-"""What physics was left out: the diagnosis, its report, and the inspection with what was found put in."""
+"""The diagnosis of left-out physics: its report, and the inspection corrected by what was found."""

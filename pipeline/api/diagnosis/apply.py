@@ -116,7 +116,7 @@ def _job(recording: Recording, probe_file: Path, configuration: Configuration, f
 
 
 def _true_field(effects: Sequence[EffectFound], field: Recording) -> Recording:
-    """Return the field with its encoder's readings put right."""
+    """Return the field with its encoder's readings corrected."""
     of_encoder = encoder_effects(effects)
     if not of_encoder:
         return field

@@ -1,4 +1,4 @@
-"""What a diagnosis found, switched on in the simulator, and tried on its own gauge run.
+"""The effects that a diagnosis found are simulated and compared with pictures of its gauge run.
 
 A name is kept only if the line, rendered again with it, fits the pictures of the gauge run better.
 """

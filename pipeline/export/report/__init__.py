@@ -135,7 +135,7 @@ def _wall_loss(defect: Defect) -> str:
 
 
 def _probability(probability: float) -> str:
-    """Return a probability no finer than it was held against drawn recordings."""
+    """Return a probability in words, no finer than its calibration on drawn recordings allows."""
     return "above 90 %" if probability > _TOLD_APART else f"about {100 * probability:.0f} %"
 
 

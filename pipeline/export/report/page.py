@@ -58,7 +58,7 @@ class Plot:
 
 
 def plot(title: str, unit: str, x: Float, curves: Sequence[Curve]) -> Plot | None:
-    """Lay curves over ``x`` (N,) out; None when there is nothing to draw."""
+    """Return a plot of curves over ``x`` (N,); None when there is nothing to draw."""
     edges = [c.y + k * (c.sigma if c.sigma is not None else 0) for c in curves for k in (-1, 1)]
     values = np.concatenate(edges)
     if not np.isfinite(values).any() or len(x) < 2:
@@ -110,7 +110,7 @@ _MOST_NUMBERED = 40
 
 @dataclass(frozen=True)
 class Card:
-    """One of the first screen's answers: a question's name, the number, and what stands behind it."""
+    """One answer on the first screen: the question's name, the number, and what it rests on."""
 
     name: str
     value: str

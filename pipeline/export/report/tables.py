@@ -1,4 +1,4 @@
-"""What the report says of a run in words and numbers: its verdict, its first screen and its tables."""
+"""Texts and numbers of the report: the verdict, the first screen and the tables."""
 
 from __future__ import annotations
 
@@ -150,11 +150,11 @@ def _found(summary: RunSummary) -> Card:
     lines = [
         f"nine of ten defects of 3 mm × 3 mm are found if they are {defects.smallest_depth_mm:.2f} mm deep",
         f"{defects.false_alarm_rate:.2g} false findings are expected in such a recording, from the wall's "
-        "texture and from glints that two rings show in one place",
+        "texture and from glints that two rings show at the same place",
     ]
     if defects.unconfirmed:
         lines.append(
-            f"{len(defects.unconfirmed)} more places are seen in one ring alone or are rather false than "
+            f"{len(defects.unconfirmed)} more places were seen in one ring or are more likely false than "
             "real: they are listed as unconfirmed and not counted"
         )
     if not defects.items:

@@ -217,12 +217,7 @@ def _stated_row(
 
 
 def _systematic_row(
-    scan: RingScan,
-    source: Source,
-    sigma: float,
-    origin: str,
-    block: Float,
-    jacobian: Mapping[Pose, Float],
+    scan: RingScan, source: Source, sigma: float, origin: str, block: Float, jacobian: Mapping[Pose, Float]
 ) -> Row:
     names = parameter_names(scan.probe)
     index = [names.index(p) for p in source.parameters]

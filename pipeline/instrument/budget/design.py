@@ -97,9 +97,7 @@ def tolerances(budget: Budget, accuracy_mm: float) -> tuple[Tolerance, ...]:
 
 
 def baseline_study(
-    scan: RingScan,
-    given: Mapping[str, float] | None = None,
-    baselines_mm: Iterable[float] = _BASELINES_MM,
+    scan: RingScan, given: Mapping[str, float] | None = None, baselines_mm: Iterable[float] = _BASELINES_MM
 ) -> BaselineStudy:
     """Return the total σ of the radius over baselines, in 2 to 4 inch, the instrument as stated."""
     at = np.array(list(baselines_mm), float)

@@ -137,8 +137,8 @@ class Redo(_Action):
     do: Literal["redo"] = "redo"
 
 
-Deed = Accept | Reject | Reopen | Reclassify | Redraw | Merge | Split | Add | Comment | Assume | Describe
-Action = Deed | Undo | Redo
+Decision = Accept | Reject | Reopen | Reclassify | Redraw | Merge | Split | Add | Comment | Assume | Describe
+Action = Decision | Undo | Redo
 _ACTION: TypeAdapter[Action] = TypeAdapter(Annotated[Action, Field(discriminator="do")])
 
 

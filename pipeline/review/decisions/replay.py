@@ -1,4 +1,4 @@
-"""What the actions amount to: the findings as they stand, each beside what was measured."""
+"""The findings after all actions were applied, each with what the run measured of it."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _ID = re.compile(r"([ma]?)(\d+)(.*)")
 
 
 class ImpossibleError(BoresightError):
-    """An action that does not fit the findings as they stand."""
+    """An action that does not fit the current findings."""
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ class Remark:
 
 @dataclass(frozen=True)
 class Finding:
-    """A finding as it stands.
+    """A finding after all actions.
 
     Attributes
     ----------

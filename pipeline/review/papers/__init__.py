@@ -1,4 +1,4 @@
-"""What an inspector takes away: the report as PDF and HTML, tables and pictures, all from one content."""
+"""The files of a review to save: the report as PDF and HTML, tables and pictures, all from one content."""
 
 from __future__ import annotations
 
@@ -101,7 +101,7 @@ def _with_pictures(review: Review, state: State) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class Paper:
-    """A file to take away; ``shown`` when a browser is to show rather than to save it."""
+    """A file of a review; ``shown`` when a browser is to display rather than to save it."""
 
     name: str
     media_type: str

@@ -1,4 +1,4 @@
-"""What all papers tell, worked out once from the run and the decisions; every paper prints these words."""
+"""The content of all reports, made once from the run and the decisions, so that all print the same words."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _METRICS = ("inspected length", "wall seen", "median 1 sigma of the radius", "mo
 
 
 def report_content(review: Review, state: State) -> dict[str, Any]:
-    """Return all that the papers tell: ``findings`` as rows of numbers with their words beside, and texts."""
+    """Return the content of all reports: ``findings`` as rows of numbers and words, and texts."""
     run, seal, rows = run_document(review.files), review.seal(state), findings_table(review, state)
     record = review.files.record()
     edited = {row["id"] for row in rows if row["edited"]}
@@ -88,7 +88,7 @@ def _summary(rows: list[dict[str, Any]]) -> list[list[str]]:
 
 
 def _told(row: dict[str, Any]) -> dict[str, str]:
-    """Return the words in which every paper tells of a finding."""
+    """Return the words that every report uses of a finding."""
     size = f"{row['length_mm']} mm along × {row['width_mm']} mm around"
     pressure = ""
     if row["b31g_mpa"] is not None:
@@ -143,10 +143,10 @@ def _diagnosis(diagnosis: dict[str, Any] | None) -> str:
 
 def _decisions(state: State, labels: dict[str, str]) -> list[list[str]]:
     """Return when, who and what of every decision that counts, in order."""
-    return [[notation.moment(e.at), e.who, _deed(e, labels)] for e in state.entries]
+    return [[notation.moment(e.at), e.who, _in_words(e, labels)] for e in state.entries]
 
 
-_DEEDS = {
+_WORDS_OF_ACTIONS = {
     "accept": "accepted finding {name}", "reject": "rejected finding {name}: {reason}",
     "reopen": "opened finding {name} again", "reclassify": "classed finding {name} as {kind}",
     "redraw": "drew the outline of finding {name} again", "split": "split finding {name}",
@@ -156,8 +156,8 @@ _DEEDS = {
 }  # fmt: skip
 
 
-def _deed(entry: Entry, labels: dict[str, str]) -> str:
-    """Return in words what an action did."""
+def _in_words(entry: Entry, labels: dict[str, str]) -> str:
+    """Return a sentence about what an action did."""
     said = entry.action.model_dump(mode="json")
     told = {k: v for k, v in said.items() if isinstance(v, str)}
     told["name"] = labels.get(str(said.get("finding")), str(said.get("finding")))
@@ -165,7 +165,7 @@ def _deed(entry: Entry, labels: dict[str, str]) -> str:
     told["names"] = ", ".join(labels.get(f, f) for f in said.get("findings", ()))
     units = {"wall_thickness_mm": "mm wall thickness", "yield_mpa": "MPa yield strength"}
     told["pipe"] = ", ".join(_given(said[k], unit) for k, unit in units.items() if said.get(k)) or "none"
-    return _DEEDS[entry.action.do].format(**told)
+    return _WORDS_OF_ACTIONS[entry.action.do].format(**told)
 
 
 def _revision(seal: Seal) -> str:

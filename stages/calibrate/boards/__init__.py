@@ -30,13 +30,7 @@ from stages.calibrate.boards.fit import (
     refuse_one_plane,
     refuse_too_few,
 )
-from stages.calibrate.boards.pictures import (
-    FoundBoards,
-    Pictures,
-    Target,
-    find_boards,
-    list_pictures,
-)
+from stages.calibrate.boards.pictures import FoundBoards, Pictures, Target, find_boards, list_pictures
 from stages.calibrate.boards.start import start
 
 __all__ = ["BOARDS", "CAMERA", "CameraFile", "FoundBoards", "Pictures", "Target", "list_pictures"]

@@ -15,16 +15,7 @@ from pipeline.instrument.camera import Camera
 from pipeline.instrument.camera.calibration import BoardView, CameraCalibration
 from pipeline.instrument.camera.scaramuzza import Scaramuzza
 from pipeline.machine.stage import Parameters
-from stages.calibrate.boards.bundle import (
-    BENT,
-    FLAT,
-    POSES_ONLY,
-    Corners,
-    Estimate,
-    Free,
-    covariance,
-    solve,
-)
+from stages.calibrate.boards.bundle import BENT, FLAT, POSES_ONLY, Corners, Estimate, Free, covariance, solve
 from stages.calibrate.boards.start import model_start, pose
 
 NAME = "calibrate-camera"
@@ -57,19 +48,13 @@ class BoardCalibrationParameters(Parameters):
     )
     least_views: int = Field(default=4, ge=3, le=1000, description="fewer views than this are refused")
     least_tilt_deg: float = Field(
-        default=8.0,
-        ge=0,
-        le=90,
-        description="boards whose directions differ by less are refused, deg",
+        default=8.0, ge=0, le=90, description="boards whose directions differ by less are refused, deg"
     )
     outlier_view_factor: float = Field(
         default=4.0, gt=1, le=100, description="views whose rms is this many times the median are left out"
     )
     largest_scale_sigma: float = Field(
-        default=0.02,
-        gt=0,
-        le=1,
-        description="a larger relative 1 σ of the image scale is refused",
+        default=0.02, gt=0, le=1, description="a larger relative 1 σ of the image scale is refused"
     )
 
 

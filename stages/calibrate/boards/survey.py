@@ -18,16 +18,7 @@ from pipeline.arrays import Float, Int
 from pipeline.geometry.rigid import rotation_from_vector
 from pipeline.instrument.camera import Camera
 from pipeline.instrument.camera.calibration import BoardSurvey, BoardView
-from stages.calibrate.boards.bundle import (
-    FLAT,
-    POSES_ONLY,
-    Corners,
-    Estimate,
-    Free,
-    cost,
-    solve,
-    weights,
-)
+from stages.calibrate.boards.bundle import FLAT, POSES_ONLY, Corners, Estimate, Free, cost, solve, weights
 from stages.calibrate.boards.fit import BoardCalibrationParameters
 from stages.calibrate.boards.start import model_start, pose
 

@@ -120,19 +120,18 @@ class ImagePoints:
 
 @dataclass(frozen=True)
 class Travel:
-    """What the camera did against what the encoder read, at the frames' times.
+    """How the camera moved along the pipe, at the frames' times.
 
     Attributes
     ----------
     time_s : (N,)
         Since the first frame.
-    distance_mm, speed_mm_s, reading_mm : (N,)
+    distance_mm, speed_mm_s : (N,)
     """
 
     time_s: Float
     distance_mm: Float
     speed_mm_s: Float
-    reading_mm: Float
 
 
 @dataclass(frozen=True)

@@ -163,7 +163,7 @@ def _encoder_rows(
     reading, creep = residuals.encoder_rows(steady, encoder, run.parameters.encoder_slip_sigma_mm)
     named = np.zeros((len(reading.residual), size))
     named[:, scale_at] = encoder.distance_mm
-    travel = Travel(run.measured.time_s, distance_mm(run), speed_mm_s(run), encoder.distance_mm)
+    travel = Travel(run.measured.time_s, distance_mm(run), speed_mm_s(run))
     first = scale_at + 1
     for model, shape in asked:
         count = len(model.amplitudes)

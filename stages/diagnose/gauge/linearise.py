@@ -96,7 +96,7 @@ def _ask(
 ) -> None:  # fmt: skip
     """Write the derivatives of the residuals by the effects' amplitudes into ``out`` (M, Q)."""
     edges, rings = len(at.edges.uv), len(at.edges.uv) + len(at.rings.uv)
-    travel = travel_of(run, run.encoder, state) if run.encoder is not None else None
+    travel = travel_of(run, state) if run.encoder is not None else None
     first = 0
     for model, shape in asked:
         own = slice(first, first + len(model.amplitudes))
@@ -112,10 +112,9 @@ def _across(shift: Float, edges: Edges) -> Float:
     return np.asarray(np.einsum("mi...,mi->m...", shift, edges.normal))
 
 
-def travel_of(run: GaugeRun, encoder: Encoder, state: Unknowns) -> Travel:
-    """Return the camera's way and the readings at the frames' times."""
-    reading = np.interp(run.time_s, encoder.time_s, encoder.distance_mm)
-    return Travel(run.time_s, state.T_pc[:, 2, 3], speed_along(state, run.time_s), reading)
+def travel_of(run: GaugeRun, state: Unknowns) -> Travel:
+    """Return the camera's distance and speed along the gauge at the frames' times."""
+    return Travel(run.time_s, state.T_pc[:, 2, 3], speed_along(state, run.time_s))
 
 
 def _baseline(run: GaugeRun, at: Linearised, mm_per_px: Float) -> Float:
@@ -226,7 +225,7 @@ def _term_slope(term: Term, shift_of: Callable[[Float], Float]) -> Float:
 def _encoder_part(run: GaugeRun, encoder: Encoder, state: Unknowns, terms: Sequence[Term]) -> Equations:
     count = len(run.time_s)
     scale, offset, delay = state.encoder
-    travel = travel_of(run, encoder, state)
+    travel = travel_of(run, state)
     reading = np.interp(run.time_s - delay, encoder.time_s, encoder.distance_mm)
     for t in terms:
         reading = reading - t.model.reading_shift_mm(travel, *t.at(t.amplitude))

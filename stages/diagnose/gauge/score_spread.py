@@ -40,23 +40,7 @@ def score_inflation(
     large effect would hide itself. −1 is the instrument's, which follows effects as far as its information
     ``known`` (I, I) lets it: an effect's score is that of what the instrument cannot take up.
     """
-    pose_by_kept = reduced.pose_by_global @ left.follow
-    # An effect's column is gone through again and again, so that it lies in one piece.
-    follow, step = np.zeros((left.follow.shape[1], len(equations.frame))), np.zeros(len(equations.frame))
-    place = equations.place
-    stays, goes = np.flatnonzero(np.isin(place, out, invert=True)), np.flatnonzero(np.isin(place, out))
-    for rows, used in by_kind(equations):
-        gone = np.intersect1d(used, goes)
-        by_gone = equations.by_global[rows][:, gone]
-        # What is kept follows itself alone.
-        follow[:, rows] = (equations.by_global[rows][:, stays] + by_gone @ left.follow[place[gone]]).T
-        step[rows] = by_gone @ left.step[place[gone]]
-    at = np.flatnonzero(equations.edge >= 0)
-    follow[:, at] += left.follow[equations.edge[at]].T * equations.by_edge[at]
-    step[at] += left.step[equations.edge[at]] * equations.by_edge[at]
-    for k, (own, by_pose) in enumerate(by_frame(equations, len(pose_by_kept))):
-        follow[:, own] -= (by_pose @ pose_by_kept[k]).T
-        step[own] += by_pose @ (reduced.pose_step[k] - reduced.pose_by_global[k] @ left.step)
+    follow, step = _with_eliminated(equations, reduced, left, out)
     free, asked = np.flatnonzero(group < 0), np.flatnonzero(group >= 0)
     taken_up = left.information[np.ix_(free, free)] + known
     follow[asked] -= np.linalg.solve(taken_up, left.information[np.ix_(free, asked)]).T @ follow[free]
@@ -75,6 +59,32 @@ def score_inflation(
     )
     ratio = robust / np.maximum(plain, 1e-300)
     return np.sqrt(np.maximum(ratio, 1.0)), np.where(ratio > 1, degrees_of(by_row, equations.cell), np.inf)
+
+
+def _with_eliminated(equations: Equations, reduced: Reduced, left: Marginal, out: Int) -> tuple[Float, Float]:
+    """Return how residuals (M,) change with the K kept globals, and by what is eliminated at its best.
+
+    The derivatives (K, M) include what poses, edges and the globals ``out`` (O,) do to follow the kept ones;
+    the second, (M,), is added to the residuals.
+    """
+    pose_by_kept = reduced.pose_by_global @ left.follow
+    # An effect's column is gone through again and again, so that it lies in one piece.
+    follow, step = np.zeros((left.follow.shape[1], len(equations.frame))), np.zeros(len(equations.frame))
+    place = equations.place
+    stays, goes = np.flatnonzero(np.isin(place, out, invert=True)), np.flatnonzero(np.isin(place, out))
+    for rows, used in by_kind(equations):
+        gone = np.intersect1d(used, goes)
+        by_gone = equations.by_global[rows][:, gone]
+        # What is kept follows itself alone.
+        follow[:, rows] = (equations.by_global[rows][:, stays] + by_gone @ left.follow[place[gone]]).T
+        step[rows] = by_gone @ left.step[place[gone]]
+    at = np.flatnonzero(equations.edge >= 0)
+    follow[:, at] += left.follow[equations.edge[at]].T * equations.by_edge[at]
+    step[at] += left.step[equations.edge[at]] * equations.by_edge[at]
+    for k, (own, by_pose) in enumerate(by_frame(equations, len(pose_by_kept))):
+        follow[:, own] -= (by_pose @ pose_by_kept[k]).T
+        step[own] += by_pose @ (reduced.pose_step[k] - reduced.pose_by_global[k] @ left.step)
+    return follow, step
 
 
 def _lost(equations: Equations, taken: Float) -> Float:

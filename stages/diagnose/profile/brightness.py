@@ -12,15 +12,7 @@ from pipeline.artefacts.measured import RingSamples
 from pipeline.instrument.probe import Probe
 from pipeline.recording.base import Illumination, Recording
 from stages.diagnose.profile.cells import Cells, LineGeometry
-from stages.diagnose.profile.finding import (
-    Finding,
-    Regression,
-    Size,
-    finding,
-    regress,
-    tested,
-    untestable,
-)
+from stages.diagnose.profile.finding import Finding, Regression, Size, finding, regress, tested, untestable
 from stages.diagnose.profile.measure import LineProfiles
 from stages.texture.light import irradiance
 

@@ -57,12 +57,7 @@ class LineGeometry:
 
 
 def line_geometry(
-    rings: RingSamples,
-    rows: Int,
-    time_s: Float,
-    azimuth_rad: Float,
-    clipped: Float,
-    probe: Probe,
+    rings: RingSamples, rows: Int, time_s: Float, azimuth_rad: Float, clipped: Float, probe: Probe
 ) -> LineGeometry:
     """Return the geometry of the ring samples in ``rows``; ``clipped`` (F, S) is the share that clips."""
     sectors = len(azimuth_rad)

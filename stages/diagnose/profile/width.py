@@ -9,15 +9,7 @@ from pipeline.arrays import Bool, Float, Int
 from pipeline.artefacts.measured import RingSamples
 from pipeline.instrument.probe import Probe
 from stages.diagnose.profile.cells import Cells, LineGeometry
-from stages.diagnose.profile.finding import (
-    Finding,
-    Regression,
-    Size,
-    finding,
-    regress,
-    tested,
-    untestable,
-)
+from stages.diagnose.profile.finding import Finding, Regression, Size, finding, regress, tested, untestable
 from stages.diagnose.profile.measure import LineProfiles
 
 # Changes of (line σ / stated)² and of exposure², s², that compression and clipped neighbours may cause.

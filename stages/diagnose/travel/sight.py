@@ -156,6 +156,6 @@ def lag_mm(sight: Sight, turns: Turns, play_mm: float) -> Float:
     """Return (N,) by how much readings are ahead for play of that size."""
     way = np.insert(sight.distance_mm, turns.place, turns.distance_mm)
     same = np.zeros(len(way))
-    travel = Travel(same, way, same, way)
+    travel = Travel(same, way, same)
     lag = LIBRARY["encoder_backlash"].reading_shift_mm(travel, (), np.array([play_mm]))
     return np.asarray(np.delete(lag, turns.place + np.arange(len(turns.place))))

@@ -1,4 +1,4 @@
-"""By how much the encoder's clock is late against the pictures', from the motion that it is compared with.
+"""The delay of the encoder's clock against the pictures' clock, estimated from the motion.
 
 The reading is the distance, scaled, at a shifted time; what is left is rounding, and a random walk that holds
 slips of the wheel and drifts of the estimate. Whitened by both, the difference is fitted robustly at every
@@ -68,13 +68,13 @@ class EncoderDelay:
         return EncoderReadings(at_frames - at_frames[0], encoder.sigma_mm, shown)
 
     def warn(self, context: Context) -> None:
-        """Tell of clocks that differ."""
+        """Warn of clocks that differ."""
         if not self.matters:
             return
         way = "late" if self.delay_s > 0 else "early"
         context.warn(
             f"the times in encoder.csv are {abs(self.delay_s):.3f} ± {self.sigma_s:.3f} s {way} against the "
-            "motion in the pictures; this is taken out. What to do: set both clocks by one, or correct time_s"
+            "motion in the pictures; this is corrected. What to do: synchronise the clocks, or correct time_s"
         )
 
 
@@ -109,7 +109,7 @@ def find_delay(time_s: Float, distance_mm: Float, encoder: EncoderReadings) -> E
 
 
 def _moved_mm(before: Float, after: Float) -> float:
-    """Return by how much readings (M,) differ, rms, beside shift and scale."""
+    """Return the rms difference of readings (M,) after a shift and a scale between them."""
     by = np.column_stack([before, np.ones_like(before)])
     return float(np.std(after - by @ np.linalg.lstsq(by, after, rcond=None)[0]))
 

@@ -1,4 +1,4 @@
-"""The encoder's scale as rings and texture have it, held against what was stated of it."""
+"""The encoder's scale by rings and texture, compared with the stated one."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ much, 3.0 at 65°, and ways by about as much as radii: 2.6 and 2.0 % for 1 % of 
 
 @dataclass(frozen=True)
 class EncoderScale:
-    """Distance per reading, 1 where the encoder is right, by all but what was stated of it.
+    """Distance per reading, 1 where the encoder is right, by rings and texture without the stated scale.
 
     Attributes
     ----------
@@ -44,15 +44,15 @@ class EncoderScale:
 
     @property
     def contradicted(self) -> bool:
-        """Whether pictures and encoder cannot both be as stated."""
+        """Whether the pictures contradict the stated scale."""
         return self.in_sigma > _TOO_FAR
 
     def without_trust_in_texture(self) -> EncoderScale:
-        """Return the scale with texture as unsure as it and the encoder differ."""
+        """Return the scale with a σ as large as the difference between texture and encoder."""
         return replace(self, sigma=float(np.hypot(self.sigma, abs(self.scale - 1))))
 
     def warn(self, context: Context, wider: float) -> None:
-        """Tell of an encoder that the pictures contradict, in a pipe ``wider`` than nominal by that share."""
+        """Warn of an encoder that the pictures contradict, in a pipe ``wider`` than nominal by that share."""
         if not self.contradicted:
             return
         more = "more" if self.scale < 1 else "less"
@@ -65,28 +65,29 @@ class EncoderScale:
         )
 
     def doubt_of_probe(self, wider: float) -> float:
-        """Return the relative 1 σ that radii and distances have beside the probe's own; 0 without doubt.
+        """Return the relative 1 σ to add to radii and distances for a probe that may be wrong; 0 for none.
 
-        A wrong probe makes pipe and way larger or smaller alike. Where they do, in a pipe ``wider`` than
-        nominal by that share, the encoder may be right and lengths wrong by all of the difference.
+        A wrong probe scales the pipe's diameter and the distance by the same factor. Where the pipe comes out
+        ``wider`` than nominal, as a share, by what the encoder is off, the encoder may be the one that is
+        right.
         """
         alike = self.contradicted and 1 / _ALIKE < wider / (self.scale - 1) < _ALIKE
         return abs(self.scale - 1) if alike else 0.0
 
     def _witness(self, wider: float) -> str:
-        """Return what the stated diameter says."""
+        """Return what the stated diameter adds to the question whether probe or encoder is wrong."""
         if not self.doubt_of_probe(wider):
             return "; this recording cannot tell"
         larger = "wider" if wider > 0 else "narrower"
         return (
             f". The pipe comes out {100 * abs(wider):.1f} % {larger} than its stated diameter as well, which "
-            "speaks against the probe: another camera, laser, or pictures that were scaled or cropped. σ of "
-            "radii and distances holds this"
+            "suggests that the probe is wrong: another camera or laser, or scaled or cropped pictures. The σ "
+            "of radii and distances includes this"
         )
 
 
 def scale_of_encoder(estimate: Estimate, measured: Measurements, unsure: float) -> EncoderScale | None:
-    """Return the encoder's scale as the rest of an estimate has it; None without encoder.
+    """Return the encoder's scale by the other measurements of an estimate; None without encoder.
 
     ``unsure`` is the relative 1 σ of distances by texture that its residuals do not show.
     """

@@ -44,20 +44,20 @@ texture too, by a tenth as much, which is below the σ of texture."""
 
 @dataclass(frozen=True)
 class ScaleDrift:
-    """Course of the image scale over a window, its mean taken as the probe's.
+    """How the image scale changes over a window; its mean is taken to be the probe's.
 
     Attributes
     ----------
     at_frames : (N,)
-        By how much pictures are larger than on average, relative; all that was taken out so far.
+        By how much pictures are larger than on average, relative, including what was corrected so far.
     sigma : (N,)
         Its 1 σ.
     p_steady : float
-        Chance of such equations if the scale was steady.
+        Probability of a scale that changes so much if it was steady.
     p_even : float
-        Chance of such equations if the pipe was of one width.
+        Probability of a width that changes so much if the pipe has one width.
     p_neither : float
-        Chance of rings that change so much if neither did.
+        Probability of rings that change so much if neither scale nor width did.
     alone : (N,)
         The course if the pipe is of one width.
     ring_mm : float
@@ -82,7 +82,7 @@ class ScaleDrift:
         return self.p_steady < _SURE_P and one_way
 
     def not_told(self) -> ScaleDrift:
-        """Return the course where nothing can be told of it."""
+        """Return the course as one that is neither told nor ambiguous."""
         return replace(self, p_steady=1.0, p_neither=1.0)
 
     @property
@@ -114,15 +114,15 @@ class ScaleDrift:
         return np.abs(self.alone) if self.ambiguous else np.zeros_like(self.alone)
 
     def warn(self, context: Context, taken_out: bool) -> None:
-        """Tell of a scale that drifts, or of a pipe of which that cannot be told."""
+        """Warn of a scale that drifts, or of rings that may change because of it."""
         if self.told:
             context.warn(self._words(taken_out))
         elif self.ambiguous and (widest := float(np.ptp(self.alone) * abs(self.ring_mm))) > self.stated_mm:
             context.warn(
-                f"the rings change by {widest:.2f} mm of radius over the run. Whether the pipe does, or "
-                f"the picture's scale by {100 * np.ptp(self.alone):.2f} % (a lens that warms up), texture is "
-                "too weak to tell; σ of the radii includes it. What to do: let the probe warm up, record "
-                "back and forth, give an encoder, or measure both ends' diameters"
+                f"the rings change by {widest:.2f} mm of radius over the run. Either the pipe does, or the "
+                f"picture's scale drifts by {100 * np.ptp(self.alone):.2f} % (a lens that warms up): there "
+                "is too little texture to tell which. σ of the radii includes it. What to do: let the probe "
+                "warm up, record back and forth, give an encoder, or measure both ends' diameters"
             )
 
     def _words(self, taken_out: bool) -> str:
@@ -140,9 +140,9 @@ class ScaleDrift:
                 "pictures and the probe file, run boresight diagnose"
             )
         outcome = (
-            "This is taken out of motion and radii, and what is left of it is in their σ"
+            "This is corrected in motion and radii, and their σ includes what remains"
             if taken_out
-            else "So long a run is not corrected: radii and distances may be off by more than their σ"
+            else "Runs of this length are not corrected: radii and distances may be off by more than their σ"
         )
         return (
             f"{what}. The lens warms up or is loose, the laser moves against the camera, or zoom or "

@@ -171,7 +171,7 @@ class KnockTest:
         return not self.told and self.better > -_SURE
 
     def warn(self, context: Context) -> None:
-        """Tell of a knocked laser, or of a jump of which that cannot be told."""
+        """Warn of a knocked laser, or of a jump that may be due to one."""
         x, y, radius = self.jump.jump_mm
         where = f"at {self.time_s:.2f} s (frame {self.jump.frame}, at {self.jump.at_mm:.0f} mm)"
         jump = f"{where} the rings jump by {np.hypot(x, y):.2f} mm across and {radius:+.2f} mm of radius"
@@ -181,17 +181,17 @@ class KnockTest:
             zoomed = " (or the picture's scale changed)" if abs(radius) > np.hypot(x, y) else ""
             by = f"{tilt_deg:.2f} ± {np.degrees(sigma[1:].max()):.2f}°"
             context.warn(
-                f"{jump}, all round at once and for good, and the texture does not follow: laser and "
+                f"{jump}, all round at once and permanently, while the texture does not: laser and "
                 f"camera were knocked against each other, by {by} and "
-                f"{baseline_mm:+.3f} ± {sigma[0]:.3f} mm of the baseline{zoomed}. This is taken out from "
-                "there on, what is left of it is in the σ. What to do: fix laser and camera, calibrate anew"
+                f"{baseline_mm:+.3f} ± {sigma[0]:.3f} mm of the baseline{zoomed}. This is corrected from "
+                "there on, and σ includes what remains. What to do: fix laser and camera, calibrate anew"
             )
         elif self.ambiguous:
             context.warn(
                 f"{jump}. This recording does not tell for sure whether laser and camera were knocked "
                 "against each other or the pipe steps there: nothing is corrected, and radii and distances "
-                "may be off by more than their σ on one side. What to do: pass the place once more: the "
-                "pipe's step stays where it is"
+                "may be off by more than their σ on one side of it. What to do: pass the place again; a "
+                "step of the pipe is found at the same place"
             )
 
 

@@ -98,7 +98,7 @@ def estimate_state(
 def scale_between_halves(
     estimate: Estimate, measured: Measurements, parameters: MotionParameters, watch: Watch = unwatched
 ) -> float:
-    """Return the 1 σ of distances, relative, by what near and far matches alone say of the way.
+    """Return the 1 σ of distances, relative, from adjustments to near and to far matches alone.
 
     Compression and light shift matches alike that are seen under one polar angle. The residuals do not show
     it, but the halves then differ from the whole (by chance as much as the whole's own σ): the farther one
@@ -155,7 +155,7 @@ def _looser(sigma: Float, T_pc: Float, known: Int) -> Float:
 
 
 def trembles(shaken: Float) -> bool:
-    """Tell whether trembling (6,) is more than poses err by: the turns across the pipe say it."""
+    """Return whether trembling (6,) exceeds the error of poses, judged by turns across the pipe."""
     return float(shaken[3:5].max()) > _TREMBLES_RAD
 
 

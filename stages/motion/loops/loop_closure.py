@@ -20,13 +20,7 @@ from pipeline.machine.stage import Context
 from stages.motion.loops.loop_geometry import LoopEnds, PipeFrames
 from stages.motion.loops.pose_graph import Closures, conditioned, contradicted_places, corrected
 from stages.motion.loops.revisits import Passage, Revisit, WallFeatures, choose_revisits, widened
-from stages.motion.loops.strip_registration import (
-    ExpectedShift,
-    Registration,
-    StoredStrip,
-    Verdict,
-    register,
-)
+from stages.motion.loops.strip_registration import ExpectedShift, Registration, StoredStrip, Verdict, register
 from stages.motion.parameters import MotionParameters
 from stages.motion.rings import CORRELATED_FRAMES
 from stages.motion.tracking.strips import Strip, StripGrid
@@ -44,7 +38,7 @@ _ACROSS = (0, 1, 3, 4)
 
 
 class View(Protocol):
-    """What shows the wall, unrolled."""
+    """How frames are unrolled to show the wall."""
 
     @property
     def grid(self) -> StripGrid:
@@ -56,7 +50,7 @@ class View(Protocol):
 
 @dataclass(frozen=True)
 class LoopReport:
-    """How closing loops went.
+    """Outcome of closing loops.
 
     Attributes
     ----------
@@ -97,7 +91,7 @@ def close_loops(
     parameters: MotionParameters,
     scratch: Scratch,
 ) -> tuple[JoinedRun, LoopReport]:
-    """Return the run with its loops closed, and how that went; the run as it was where none is closed.
+    """Return the run with its loops closed, unchanged where none is, and a report.
 
     Parameters
     ----------
@@ -226,7 +220,7 @@ def _closures(
     grid: StripGrid,
     parameters: MotionParameters,
 ) -> Closures:
-    """Return what all revisits show that have the same wall in both frames."""
+    """Return the closures of all revisits whose two frames show the same wall."""
     residual, sigma = ends.axis_difference(), np.tile(_axis_sigma(parameters), (len(registered), 1))
     along = [_DISTANCE, _ROLL]
     residual[:, along] = [r.shift for r in registered] * _per_sample(grid)

@@ -1,4 +1,4 @@
-"""The pose graph: what closed loops tell of the errors of a joined run, and the run corrected by it.
+"""The pose graph: errors of a joined run estimated from closed loops, and the corrected run.
 
 A closure measures a difference of errors between two far ends of the chain of windows. Conditioning the chain
 on all closures is the least-squares solution of the graph. D. Simon, "Optimal state estimation", 2006, § 3.1.
@@ -26,7 +26,7 @@ the axis (30 mm). Not measured."""
 
 @dataclass(frozen=True)
 class Closures:
-    """What C measured differences show of the chain's errors.
+    """C measured differences between errors of the chain.
 
     Attributes
     ----------
@@ -56,7 +56,7 @@ class Closures:
 
 @dataclass(frozen=True)
 class Conditioned:
-    """Errors (K, 6) that closures show, and by how much the errors' covariances (K, 6, 6) fall."""
+    """Estimated errors (K, 6), and by how much the closures reduce their covariances (K, 6, 6)."""
 
     error: Float
     gained: Float
@@ -75,7 +75,7 @@ def conditioned(chain: ErrorChain, closures: Closures) -> Conditioned:
 
 
 def contradicted_places(covariance: Float, closures: Closures, least_probability: float) -> set[int]:
-    """Return the revisits whose closures the motion and all other revisits together contradict.
+    """Return the revisits whose closures contradict the motion and all other revisits.
 
     The worst is removed first, then the rest is judged anew. Where two contradict each other and no third
     tells which is wrong, both are removed. ``covariance`` (C, C) is `Closures.residual_covariance`.

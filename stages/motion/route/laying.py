@@ -1,4 +1,4 @@
-"""Laying the route: lengths and bends of the pipe, and the run turned as these, a plan and an IMU say."""
+"""Laying the route: lengths and bends of the pipe; the run is turned to agree with these, a plan, an IMU."""
 
 from __future__ import annotations
 
@@ -106,7 +106,7 @@ def _length_of(distance_mm: np.ndarray, pieces: tuple[PipePiece, ...]) -> Int:
 def _planned_turns(
     pieces: tuple[PipePiece, ...], plan: tuple[PlannedPiece, ...], context: Context
 ) -> tuple[PlannedTurn, ...]:
-    """Return the plan's angles between straight lengths; none, with a warning, where the pipe is another."""
+    """Return the plan's angles between straight lengths; none, with a warning, for another pipe."""
     planned, bends = [p for p in plan if p.bend_deg], [p for p in pieces if p.kind == "bend"]
     if not plan:
         return ()
@@ -168,7 +168,7 @@ def _believed(
 
 
 def _is_told(rotations: Rotations, context: Context) -> bool:
-    """Report what gravity says of 12 o'clock and slope; return whether it tells a 12 o'clock."""
+    """Report 12 o'clock and slope by gravity; return whether gravity determines 12 o'clock."""
     up_p = rotations.up_p
     assert up_p is not None
     across = float(np.hypot(up_p[0], up_p[1]))

@@ -1,4 +1,4 @@
-"""The first window of a run, which shows what the others rest on: errors of matches, the encoder's faults."""
+"""The first window of a run: it shows the errors of matches and the encoder's faults for all others."""
 
 from __future__ import annotations
 
@@ -19,6 +19,8 @@ from stages.motion.bundle_adjustment.solver import (
     lasting_excess,
     scale_between_halves,
 )
+from stages.motion.bundle_adjustment.unknowns import State
+from stages.motion.encoder import EncoderReadings
 from stages.motion.parameters import MotionParameters
 from stages.motion.tracking.strips import StripGrid
 from stages.motion.windows.measured_run import MeasuredRun
@@ -51,7 +53,7 @@ class EncoderCheck:
     scale: EncoderScale | None
 
     def doubt_of_probe(self, wider: float) -> float:
-        """Return the relative 1 σ of lengths by a probe that encoder and diameter contradict: see there."""
+        """Return `EncoderScale.doubt_of_probe`, 0 without a scale."""
         return 0.0 if self.scale is None else self.scale.doubt_of_probe(wider)
 
     def warn(self, context: Context, wider: float) -> None:
@@ -98,6 +100,28 @@ class FirstWindow:
         return float(np.hypot(self.unsure, self.steady.distance_sigma))
 
 
+@dataclass(frozen=True)
+class _Adjusted:
+    """The first window as adjusted with some run and parameters."""
+
+    run: MeasuredRun
+    window: Window
+    parameters: MotionParameters
+    measured: Measurements
+    estimate: Estimate
+    watch: Watch
+
+    def with_encoder(self, encoder: EncoderReadings) -> _Adjusted:
+        """Return it with other readings, not adjusted to them yet."""
+        run = replace(self.run, encoder=encoder)
+        return replace(self, run=run, measured=run.measured(self.window, self.parameters))
+
+    def again(self, start: State) -> _Adjusted:
+        """Return it adjusted again, from a state on."""
+        estimate = estimate_state(start, self.measured, self.parameters, self.watch)
+        return replace(self, estimate=estimate)
+
+
 def adjust_first(run: MeasuredRun, window: Window, parameters: MotionParameters, watch: Watch) -> FirstWindow:
     """Adjust the first window of a run, and again where it shows that something was not as stated.
 
@@ -109,47 +133,69 @@ def adjust_first(run: MeasuredRun, window: Window, parameters: MotionParameters,
     run, knock = with_steady_laser(run, parameters, watch)
     measured = run.measured(window, parameters)
     estimate = estimate_state(run.start(window, measured, parameters), measured, parameters, watch)
-    noisy, unsure = with_shared_error(parameters, estimate.adjusted.equations.reprojection_px), 0.0
-    if noisy is not parameters:
-        parameters, estimate = noisy, estimate_state(estimate.state, measured, noisy, watch)
-        residual = estimate.adjusted.equations.texture.residual
-        lag_px = _LAG * lasting_excess(residual, measured.tracks.landmark)
-        halves = scale_between_halves(estimate, measured, parameters, watch)
-        unsure = float(np.hypot(halves, scale_by_lag(lag_px, run.texture.grid, run.probe.camera)))
-    delay = delay_of_encoder(estimate, measured)
-    if delay is not None and run.encoder is not None and delay.matters:
-        free = _without_encoder(estimate, measured, parameters, watch)
-        delay = delay_of_encoder(free, measured)
-        if delay is not None and delay.matters:
-            run = replace(run, encoder=delay.taken_out(run.encoder, run.time_s))
-            measured = run.measured(window, parameters)
-        estimate = estimate_state(free.state, measured, parameters, watch)
+    first, unsure = _with_shared_error(_Adjusted(run, window, parameters, measured, estimate, watch))
+    first, delay = _without_delay(first)
+    first, scale, unsure = _with_scale(_with_noise(first), unsure)
+    steady = with_steady_scale(first.run, window, first.estimate, first.measured, first.parameters, watch)
+    check = EncoderCheck(delay, scale)
+    return FirstWindow(
+        steady.run, first.parameters, steady.estimate, steady.measured, unsure, check, steady, knock
+    )
+
+
+def _with_shared_error(first: _Adjusted) -> tuple[_Adjusted, float]:
+    """Allow matches the error that they share; return the relative 1 σ of distances by it as well."""
+    noisy = with_shared_error(first.parameters, first.estimate.adjusted.equations.reprojection_px)
+    if noisy is first.parameters:
+        return first, 0.0
+    first = replace(first, parameters=noisy).again(first.estimate.state)
+    residual = first.estimate.adjusted.equations.texture.residual
+    lag_px = _LAG * lasting_excess(residual, first.measured.tracks.landmark)
+    halves = scale_between_halves(first.estimate, first.measured, noisy, first.watch)
+    return first, float(
+        np.hypot(halves, scale_by_lag(lag_px, first.run.texture.grid, first.run.probe.camera))
+    )
+
+
+def _without_delay(first: _Adjusted) -> tuple[_Adjusted, EncoderDelay | None]:
+    """Correct a delay of the encoder, measured against the motion that pictures alone show."""
+    delay, encoder = delay_of_encoder(first.estimate, first.measured), first.run.encoder
+    if delay is None or encoder is None or not delay.matters:
+        return first, delay
+    free = _without_encoder(first)
+    delay = delay_of_encoder(free, first.measured)
+    if delay is not None and delay.matters:
+        first = first.with_encoder(delay.taken_out(encoder, first.run.time_s))
+    return first.again(free.state), delay
+
+
+def _with_noise(first: _Adjusted) -> _Adjusted:
+    """Give the encoder's readings the noise that they show, where it is more than what is taken."""
     for _ in range(_ROUNDS):
-        noise_mm = noise_of_encoder(estimate, measured)
-        if run.encoder is None or noise_mm < _NOISIER * run.encoder.sigma_mm:
+        encoder, noise_mm = first.run.encoder, noise_of_encoder(first.estimate, first.measured)
+        if encoder is None or noise_mm < _NOISIER * encoder.sigma_mm:
             break
-        run = replace(run, encoder=replace(run.encoder, sigma_mm=noise_mm))
-        measured = run.measured(window, parameters)
-        estimate = estimate_state(estimate.state, measured, parameters, watch)
-    scale = scale_of_encoder(estimate, measured, unsure)
-    if run.bore.reduces:
+        first = first.with_encoder(replace(encoder, sigma_mm=noise_mm)).again(first.estimate.state)
+    return first
+
+
+def _with_scale(first: _Adjusted, unsure: float) -> tuple[_Adjusted, EncoderScale | None, float]:
+    """Make the encoder's scale as unsure as the pictures contradict it; return it and texture's 1 σ."""
+    scale = scale_of_encoder(first.estimate, first.measured, unsure)
+    if first.run.bore.reduces:
         scale = None if scale is None else scale.without_trust_in_texture()
         unsure = float(np.hypot(unsure, _IN_REDUCER)) if scale is None else scale.sigma
     if scale is not None and scale.contradicted:
-        run = replace(run, probe=replace(run.probe, encoder_scale_sigma=abs(scale.scale - 1)))
-        measured = replace(measured, probe=run.probe)
-        estimate = estimate_state(estimate.state, measured, parameters, watch)
-    steady = with_steady_scale(run, window, estimate, measured, parameters, watch)
-    check = EncoderCheck(delay, scale)
-    return FirstWindow(steady.run, parameters, steady.estimate, steady.measured, unsure, check, steady, knock)
+        probe = replace(first.run.probe, encoder_scale_sigma=abs(scale.scale - 1))
+        run, measured = replace(first.run, probe=probe), replace(first.measured, probe=probe)
+        first = replace(first, run=run, measured=measured).again(first.estimate.state)
+    return first, scale, unsure
 
 
-def _without_encoder(
-    estimate: Estimate, measured: Measurements, parameters: MotionParameters, watch: Watch
-) -> Estimate:
-    """Return the motion that rings and texture alone show: a late encoder draws it along."""
-    start = replace(estimate.state, slip=0 * estimate.state.slip)
-    return estimate_state(start, replace(measured, encoder=None), parameters, watch)
+def _without_encoder(first: _Adjusted) -> Estimate:
+    """Return the motion by rings and texture alone: a late encoder would shift it."""
+    start = replace(first.estimate.state, slip=0 * first.estimate.state.slip)
+    return estimate_state(start, replace(first.measured, encoder=None), first.parameters, first.watch)
 
 
 def with_shared_error(parameters: MotionParameters, reprojection_px: float) -> MotionParameters:

@@ -1,4 +1,4 @@
-"""A run whose laser was knocked: what it did is estimated, and taken out of the rings behind it."""
+"""A run whose laser was knocked: the change is estimated, and later rings are corrected."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ class _Fitted:
 def with_steady_laser(
     run: MeasuredRun, parameters: MotionParameters, watch: Watch
 ) -> tuple[MeasuredRun, KnockTest | None]:
-    """Return the run with what a knock did to the laser, if it was knocked; None where no rings jump.
+    """Return the run with the change of its laser, and the test for a knock; None where no rings jump.
 
     A knock, a joint of the pipe and neither are each adjusted with the rings' jump and compared by their
     marginal likelihoods. Both at once are not tried: at a weld (open-2) their freedom explains it best.

@@ -1,4 +1,4 @@
-"""A run's image scale made steady where it drifts, and the run adjusted again."""
+"""Correction of an image scale that drifts over a run, and the run adjusted again."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _ROUNDS = 2
 
 @dataclass(frozen=True)
 class SteadyRun:
-    """A run, its estimate, what its image scale did, and whether that was ``taken_out``."""
+    """A run, its estimate, its image scale, and whether a drift of that was ``taken_out``."""
 
     run: MeasuredRun
     estimate: Estimate
@@ -29,7 +29,7 @@ class SteadyRun:
     taken_out: bool
 
     def warn(self, context: Context) -> None:
-        """Tell of a scale that drifted."""
+        """Warn of a scale that drifted."""
         self.drift.warn(context, self.taken_out)
 
     @property
@@ -64,7 +64,7 @@ def with_steady_scale(
     parameters: MotionParameters,
     watch: Watch,
 ) -> SteadyRun:
-    """Look whether the image scale drifts over a window, and take it out where the window is the whole run.
+    """Test the image scale for drift in a window, and correct it where the window is the whole run.
 
     A large drift is told and not taken out. In a reducer nothing is told: rings and texture depart there as
     they do where the image scale drifts.
