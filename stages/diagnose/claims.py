@@ -93,6 +93,11 @@ class Claim:
         return self._chance > SURE
 
     @property
+    def may_go_otherwise(self) -> bool:
+        """Whether the name would be sure but for what it leaves, or for other courses in its place."""
+        return not self.sure and replace(self, fits_p=1.0, otherwise=0.0).sure
+
+    @property
     def _chance(self) -> float:
         doubts = len(self.rivals) + (not self.counted)
         return chance_of_name(self.p_value, doubts, self.agreements, self.fits_p, self.otherwise)

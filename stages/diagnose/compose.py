@@ -30,6 +30,7 @@ from stages.diagnose.result import (
 _SAME_FREQUENCY_HZ = 0.15
 _IN_PROFILE, _IN_MOTION = (Location(str(c), None, None) for c in (Channel.PROFILE, Channel.MOTION))
 _UNKNOWN = "a cause that the library does not have, such as {}"
+_OF_ENCODER = "one between motion and encoder that goes otherwise with the way or the speed"
 _AGAIN = (
     "To see what the pattern goes with, record the gauge again: rolled by 90° (probe or gauge), at another "
     "speed (time), after warming up (drift)."
@@ -53,7 +54,8 @@ def composed(
     asked = said.members if said.members else [e.name for e in said.effects]
     nameless = _IN_PROFILE if of_profile else _IN_MOTION if of_travel else None
     location = _location(examined, every, asked) or nameless
-    identifiable = " ".join(s for s in (_identifiable(said, examined), *of_profile, *of_travel) if s)
+    words = _identifiable(said, examined, any(c.may_go_otherwise for c in known))
+    identifiable = " ".join(s for s in (words, *of_profile, *of_travel) if s)
     partly = said.verdict is Verdict.PARTLY
     found = Diagnosis(
         recording=field.name if field is not None else "",
@@ -154,10 +156,14 @@ def _next(said: _Said, asked: Sequence[str]) -> str:
     return record_next(asked) if said.verdict in (Verdict.CLASS, Verdict.PARTLY) and asked else ""
 
 
-def _identifiable(said: _Said, examined: Examined | None) -> str:
-    """Return what is determined all the same: the size each cause would have, or an empirical formula."""
+def _identifiable(said: _Said, examined: Examined | None, encoder_otherwise: bool) -> str:
+    """Return what is determined all the same: the size each cause would have, or an empirical formula.
+
+    ``encoder_otherwise`` is whether something with another course may be in the place of an encoder's effect.
+    """
     if said.verdict is Verdict.CLASS:
         unknown = _unknown(examined) if examined is not None else ()
+        unknown += (_OF_ENCODER,) * encoder_otherwise
         told = [*(e.statement for e in said.effects), *(_UNKNOWN.format(f) for f in unknown)]
         return "; or ".join(dict.fromkeys(words.rstrip(".") for words in told)) + "."
     nameless = said.verdict in (Verdict.UNEXPLAINED, Verdict.PARTLY) and not said.members
