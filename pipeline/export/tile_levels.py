@@ -75,7 +75,8 @@ def shrunk(flat: Flat, width_px: int, height_px: int, step: int) -> Flat:
     both = flat.bgra.astype(np.float32)
     both[..., 3] /= 255
     both[..., :3] *= both[..., 3:]
-    small = cv2.resize(both, (max(width_px, 1), max(height_px, 1)), interpolation=cv2.INTER_AREA)
+    size = max(width_px, 1), max(height_px, 1)
+    small = np.asarray(cv2.resize(both, size, interpolation=cv2.INTER_AREA), np.float32)
     covered = small[..., 3:]
     small[..., :3] /= np.maximum(covered, 1e-6)
     covered[:] = np.where(covered > 0.5, np.float32(255), np.float32(0))
