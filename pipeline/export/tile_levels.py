@@ -78,7 +78,7 @@ def shrunk(flat: Flat, width_px: int, height_px: int, step: int) -> Flat:
     size = max(width_px, 1), max(height_px, 1)
     small = np.asarray(cv2.resize(both, size, interpolation=cv2.INTER_AREA), np.float32)
     covered = small[..., 3:]
-    small[..., :3] /= np.maximum(covered, 1e-6)
+    np.divide(small[..., :3], np.maximum(covered, 1e-6), out=small[..., :3])
     covered[:] = np.where(covered > 0.5, np.float32(255), np.float32(0))
     np.rint(np.clip(small, 0, 255, out=small), out=small)
     levels = tuple(level[::step, ::step] for level in flat.levels)
