@@ -54,10 +54,10 @@ def uneven_lamps(lamp: LampLight | None, scene: Scene, frame: Int) -> tuple[Susp
             "lost", lost, float(np.hypot(spread, sd / abs(first))) * lost, "share of the light"
         )
         said = f"In all frames the LED at image azimuth {at.value:.0f}° sends {100 * lost:.0f} % less light"
-        name, said = "led_dead", said + "."
+        name = "led_dead"
         if abs(foretold) < allowed:  # lamps that lean give the first harmonic alone
-            name, said = "led_dead or uneven_lamps", said + ", or the lamps lean or shine unevenly."
-        found = Mismatch(name, "intensity", "image", (at,), (size,), nan, nan, nan, said, look)
+            name, said = "led_dead or uneven_lamps", said + ", or the lamps lean or shine unevenly"
+        found = Mismatch(name, "intensity", "image", (at,), (size,), nan, nan, nan, f"{said}.", look)
         return (Suspected(found, dim_led, frame, told),)
     size = NamedFigure("amplitude", abs(first), sd, "relative")
     said = (
