@@ -22,6 +22,8 @@ from stages.twin.lamp_light import Figure
 _AROUND_PX, _EVERY, _BINS, _FEWEST_PIXELS = 5, 2, 8, 5000
 """Side of what is taken off; every how many pixels are looked at; bins of brightness; fewest pixels that two
 frames must share."""
+_OF_PHOTO = 0.04
+"""Relative 1 σ: the wall's photo was made from these very frames, and takes up their share of its views."""
 _LARGEST = 6.0
 """Robust σ beyond which what is left over is no pattern but a hot pixel or an edge of the photo."""
 
@@ -48,9 +50,9 @@ def fixed_pattern(frames: Sequence[tuple[Float32, Float32, Bool]]) -> FixedPatte
     mean = each.mean(0)
     # A frame takes part in several pairs: there are as many independent ones as frames.
     sd = each.std(0, ddof=1) / np.sqrt(len(frames))
-    dark, gain = (
-        Figure(float(np.sqrt(m)), float(s / (2 * np.sqrt(max(m, s))))) for m, s in zip(mean, sd, strict=True)
-    )
+    one = np.sqrt(mean)
+    each_sd = np.hypot(sd / (2 * np.sqrt(np.maximum(mean, sd))), _OF_PHOTO * one)
+    dark, gain = (Figure(float(v), float(s)) for v, s in zip(one, each_sd, strict=True))
     return FixedPattern(dark, gain)
 
 

@@ -16,8 +16,9 @@ from stages.twin.compare import BLOCK_PX
 from stages.twin.locate import ImagePlace
 from stages.twin.reference import BlockSamples
 
-_MIDDLE, _CLEAR, _FEWEST_FRAMES = 0.5, 2.0, 3
-"""Of a place's radius: its middle; from where it takes nothing. Fewest frames that show that wall there."""
+_MIDDLE, _CLEAR, _FEWEST_FRAMES = 0.5, 1.3, 3
+"""Of a place's radius, where a spot's change falls to 3 %: its middle, and from where it takes under 1 %.
+Fewest frames that show the same wall there."""
 _OF_LIGHT = 0.01
 """Relative 1 σ of the brightness of wall beside a spot: what lamps and photo leave over without any."""
 

@@ -41,10 +41,10 @@ _STAGES = (*PIPELINE[: PIPELINE.index(TEXTURE) + 1], PHOTOMETRY, TWIN)
 _WITHHOLD, _SHRINK = 4, 2
 _NEAR_PX, _NEAR_DEG = 24.0, 20.0
 _PEAK, _LEVEL = 0.6, 0.35
-"""Of the line and of lit wall: as the scenes have them, speckle and pale wall clip, and one wall is glossy, which
-the twin rightly tells. Nulls are dull and fit into the range."""
+"""Of the line and of lit wall: as the scenes have them, speckle and pale wall clip, and one wall is glossy,
+which the twin rightly tells. Nulls are dull and fit into the range."""
 _OTHER, _CLOSE = 3, 0.2
-"""A case is also scored by the answer of the third one after it. Relative error within which a figure tells."""
+"""A case is also scored by the third one's answer after it. Relative error within which a figure tells."""
 _NULLS = ("straight-4-inch", "oval-3-inch", "welded-4-inch", "corroded-4-inch", "vibrating-3-inch")
 
 
