@@ -23,8 +23,8 @@ _MOST_KEPT, _LARGE = 1 << 26, 1 << 25
 def keep_freed_memory() -> None:
     """Let the GNU C library keep what is freed, up to 64 MiB, for the next array below 32 MiB.
 
-    By itself it gives most of it back at once, and the system clears every page anew: stages that make and
-    drop arrays of some MiB meet three times as many new pages, a fifteenth of a run's processor time.
+    By itself it gives most of it back at once, and the system clears every page anew: the texture stage,
+    which makes and drops arrays of some MiB, meets three times as many new pages (open-1-field).
     """
     options = getattr(ctypes.CDLL(None), "mallopt", None) if sys.platform == "linux" else None
     if options is not None:
