@@ -15,23 +15,6 @@ import libusb_package
 _NOTEBOOKS = ("dash", "plotly", "plotly.graph_objects")
 
 
-# Parameters of `mallopt`, from the GNU C library's malloc.h, and what they are set to, bytes.
-_KEPT_AT_THE_END, _ASKED_FOR_APART = -1, -3
-_MOST_KEPT, _LARGE = 1 << 26, 1 << 25
-
-
-def keep_freed_memory() -> None:
-    """Let the GNU C library keep what is freed, up to 64 MiB, for the next array below 32 MiB.
-
-    By itself it gives most of it back at once, and the system clears every page anew: the texture stage,
-    which makes and drops arrays of some MiB, meets three times as many new pages (open-1-field).
-    """
-    options = getattr(ctypes.CDLL(None), "mallopt", None) if sys.platform == "linux" else None
-    if options is not None:
-        options(_KEPT_AT_THE_END, _MOST_KEPT)
-        options(_ASKED_FOR_APART, _LARGE)
-
-
 def give_back_memory() -> None:
     """Return freed memory to the system; the GNU C library would keep it, for each thread apart."""
     trim = getattr(ctypes.CDLL(None), "malloc_trim", None) if sys.platform == "linux" else None
