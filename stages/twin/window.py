@@ -17,13 +17,16 @@ from scipy.stats import t
 from pipeline.arrays import Bool, Float, Float32, Int
 from pipeline.artefacts.twin import Look, Mismatch, NamedFigure
 from stages.twin.cells import sigmas
-from stages.twin.locate import FALSE_ALARM, LEAST_ASIDE_PX, ImagePlace
+from stages.twin.locate import FALSE_ALARM, ImagePlace
 from stages.twin.photo_behind import without_photo
 from stages.twin.reference import BlockSamples
 from stages.twin.render import Region, TwinFrame
 
 _POWER_STEP, _ASIDE_PX = 0.4, 0.5
 """Steps of bending that are tried; 1 σ of a displacement, since blocks of 24 px blunt its peak. Chosen."""
+_SURELY_ASIDE = 2.0
+"""σ by which texture must be drawn aside before that alone makes a drop: radii that err by an unstated
+tilt of the laser had made two drops of .4 ± .5 px."""
 _DROPS = tuple((power, size) for power in (0.6, 1.0, 1.4, 1.8) for size in (1.0, 1.2, 1.4, 1.7, 2.0))
 """Bending and radius, in radii of the place, of the drops that are tried."""
 _LEAST_REACH_PX = 48.0
@@ -130,7 +133,7 @@ class WindowPlace:
     @property
     def bends(self) -> bool:
         """Whether frames tell that texture is drawn aside."""
-        return self.aside_px > LEAST_ASIDE_PX
+        return self.aside_px > _SURELY_ASIDE * _ASIDE_PX
 
     @property
     def _step(self) -> int:
@@ -176,7 +179,7 @@ class WindowPlace:
         tried = {
             "window_dirt": _fall_of_spot(spots[:, 0], start, 0.0),
             "window_scatter": _fall_of_spot(spots[:, 1], start, _OF_CONTRAST),
-            "droplet": _fall_of_drop(np.stack(self.drops), self.aside_px),
+            "droplet": _fall_of_drop(self._drops_tried(), self.aside_px),
         }
         bends = self.bends and tried["droplet"].chance < FALSE_ALARM
         # Dirt may lie there, too, but draws nothing aside.
@@ -191,6 +194,11 @@ class WindowPlace:
         if name == "window_dirt":
             law = replace(law, size=without_photo(law.size, self.place, samples))
         return self._mismatch([name, *rivals], fixed_to or "image", law, chance)
+
+    def _drops_tried(self) -> Float:
+        """Return (F, 2, L) the sums of drops, and of displacements that frames tell if they are sure."""
+        sums = np.stack(self.drops)
+        return sums if self.bends else sums[:, :, : len(_DROPS)]
 
     def _mismatch(self, names: list[str], fixed_to: str, law: _Fitted, chance: float) -> Mismatch:
         place, size = self.place, law.size

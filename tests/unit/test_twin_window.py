@@ -101,6 +101,21 @@ def test_a_weak_drop_is_found_by_where_texture_lies_and_named(drawn_px):
     assert 1 < named.parameters[0].value < 4
 
 
+@pytest.mark.parametrize(("aside_px", "bends"), [(0.46, False), (1.5, True)])
+def test_texture_aside_by_less_than_its_own_error_is_no_drop(aside_px, bends):
+    """Radii that err, by a laser sheet whose tilt nobody states, displace texture by .4 px in places."""
+    random, aside = np.random.default_rng(7), np.zeros((2, 200, 240), np.float32)
+    aside[0, 110:150, 50:90] = aside_px
+    place = WindowPlace(ImagePlace(70.0, 130.0, 20.0, 0.0, 0.1, 1e-4), aside_px=aside_px)
+    for frame in range(6):
+        level = _textured(random)
+        drawn = _frame(level).drawn_aside(aside).level
+        recorded = (drawn + random.standard_normal(level.shape)).astype(np.float32)
+        place.add(frame, recorded, _frame(level), np.ones(level.shape, bool), drawn)
+    named = place.judged("image")
+    assert (named is not None and named.name == "droplet") == bends
+
+
 def test_faint_texture_is_found_where_brightness_is_even():
     random = np.random.default_rng(3)
     shares = []
