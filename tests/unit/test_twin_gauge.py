@@ -103,7 +103,7 @@ def test_a_point_is_seen_where_the_viewing_ray_behind_glass_passes_through_it():
 
 
 def _diagnosis(folder, effects):
-    document = {"verdict": "named", "effects": effects}
+    document = {"verdict": "named", "global_p": 1e-9, "effects": effects}
     (folder / "diagnosis.json").write_text(json.dumps(document), "utf-8")
     record = {"probe": {"path": str(folder / "stated.yaml")}}
     (folder / "run.json").write_text(json.dumps(record), "utf-8")
@@ -124,6 +124,7 @@ def test_what_a_diagnosis_found_is_switched_on_with_its_size_and_course(tmp_path
     assert [s.text for s in said.found] == ["laser_tilt~step=0.35@25.0/4.6s", "encoder_slip=3.0/4.0s"]
     assert [s.name for s in said.of_line] == ["laser_tilt"]
     assert len(said.unsaid) == 2
+    assert said.by_chance == 1e-9, "the probability of a name is none of a mismatch by chance"
 
 
 def test_without_a_gauge_run_pictures_decide_nothing_and_that_is_said(tmp_path):

@@ -46,11 +46,14 @@ class Switches:
         The same as diagnosis.json has them.
     unsaid : tuple of str
         Sentences about the others.
+    by_chance : float
+        Probability that chance alone shows as much when nothing was left out; nan where it is not told.
     """
 
     found: tuple[Switch, ...]
     effects: tuple[NamedEffect, ...]
     unsaid: tuple[str, ...]
+    by_chance: float = math.nan
 
     @property
     def of_line(self) -> tuple[Switch, ...]:
@@ -72,14 +75,16 @@ def switches_of(file: Path) -> Switches:
         When the file cannot be read.
     """
     found, effects, unsaid = [], [], []
-    for said in read_answer(file).effects:
+    answer = read_answer(file)
+    for said in answer.effects:
         switch = _switch(said) if said.probability >= _SURE or math.isnan(said.probability) else None
         if switch is None:
             unsaid.append(f"The simulator is not told of {said.name.replace('_', ' ')}: {_why(said)}.")
         else:
             found.append(switch)
             effects.append(said)
-    return Switches(tuple(found), tuple(effects), tuple(unsaid))
+    by_chance = math.nan if answer.global_p is None else answer.global_p
+    return Switches(tuple(found), tuple(effects), tuple(unsaid), by_chance)
 
 
 def _why(said: NamedEffect) -> str:
@@ -174,7 +179,7 @@ def try_diagnosis(diagnosis: Path, folder: Path, display: Display) -> DiagnosisT
 
 def _judged(said: Switches, found: GaugeTwin, still: tuple[str, ...]) -> DiagnosisTried:
     named = [e for s, e in zip(said.found, said.effects, strict=True) if moves_line(s.name)]
-    each = [_mismatch(e, kept, found) for e, kept in zip(named, found.kept, strict=True)]
+    each = [_mismatch(e, kept, found, said.by_chance) for e, kept in zip(named, found.kept, strict=True)]
     power = (
         f"A line displaced by less than about {found.told_px:.2f} px raises χ² in the gauge's pictures by "
         "less than a tenth: instruments that differ by less cannot be told apart."
@@ -185,7 +190,7 @@ def _judged(said: Switches, found: GaugeTwin, still: tuple[str, ...]) -> Diagnos
     return DiagnosisTried(found, kept, withdrawn, (*said.unsaid, *still, power))
 
 
-def _mismatch(named: NamedEffect, kept: bool, found: GaugeTwin) -> Mismatch:
+def _mismatch(named: NamedEffect, kept: bool, found: GaugeTwin, by_chance: float) -> Mismatch:
     """Return an effect as a mismatch of the line in the gauge run's pictures."""
     words = named.name.replace("_", " ")
     verdict = "fit better with it" if kept else "do not fit better with it, so that the name is withdrawn"
@@ -195,7 +200,7 @@ def _mismatch(named: NamedEffect, kept: bool, found: GaugeTwin) -> Mismatch:
         for name, value in named.parameters.items()
     )
     return Mismatch(
-        named.name, "line", str(effect(named.name).fixed_to), (), figures, named.probability,
+        named.name, "line", str(effect(named.name).fixed_to), (), figures, by_chance,
         found.chi2_stated, found.chi2_diagnosed,
         f"{words.capitalize()}, named by the diagnosis: pictures of the gauge run {verdict}.",
     )  # fmt: skip
