@@ -64,7 +64,8 @@ def _show(found: Twin, output: Path) -> None:
             continue
         typer.echo(f"{r.name:<14}{r.pixels:>12}{r.chi2_before:>12.2f}{r.chi2_after:>10.2f}")
     typer.echo(f"lit wall by the camera's noise alone: χ² per pixel {found.chi2_camera:.2f}")
-    typer.echo(f"lit wall: {found.psnr_db:.1f} dB, without the noise {found.psnr_noise_free_db:.1f} dB")
+    beyond = f"{found.psnr_noise_free_db:.1f} dB" if math.isfinite(found.psnr_noise_free_db) else "beyond it"
+    typer.echo(f"lit wall: {found.psnr_db:.1f} dB, without the noise {beyond}")
     for mismatch in found.found:
         typer.echo(f"found: {mismatch.name or 'without a name'}: {mismatch.statement}")
     typer.echo(f"Page: {output / 'twin.html'}")

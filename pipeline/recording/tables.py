@@ -164,7 +164,7 @@ def _column(file: Path, header: list[str], name: str) -> int:
     near = difflib.get_close_matches(name, header, 1)
     first = ",".join(header)
     parted_by = next((word for mark, word in _OTHER_SEPARATORS.items() if mark in first), "")
-    hint = f"is {near[0]} meant?" if near else f"the first line is {first[:80]!r}"
+    hint = f"is {near[0]} meant?" if near else f"add the column; the first line is {first[:80]!r}"
     if parted_by:
         hint = f"columns are parted by {parted_by}: save the file with commas between, and points in decimals"
     raise InputError(

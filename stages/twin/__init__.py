@@ -271,7 +271,7 @@ PHOTOMETRY = Stage(
 )
 TWIN = Stage(
     "twin",
-    "20",
+    "21",
     TwinParameters,
     compare_with_twin,
     "recorded frames beside the same frames, re-rendered from what the run has measured",

@@ -15,6 +15,7 @@ import cv2
 import numpy as np
 from scipy.optimize import nnls
 
+from pipeline.adjustment.robust import robust_spread
 from pipeline.arrays import Bool, Float, Float32
 from pipeline.artefacts.twin import NamedFigure
 from stages.twin.lamp_light import Figure
@@ -73,7 +74,7 @@ def _detail(rest: Float32, use: Bool) -> Float32:
     filled = np.where(use, np.nan_to_num(rest), np.float32(0))
     fine = filled - cv2.blur(filled, size)
     if whole.any():
-        whole &= np.abs(fine) < _LARGEST * 1.4826 * np.median(np.abs(fine[whole])) + 1e-6
+        whole &= np.abs(fine) < _LARGEST * robust_spread(fine[whole].astype(float)) + 1e-6
     kept = np.float32(1 / np.sqrt(1 - 1 / _AROUND_PX**2))
     return np.asarray(np.where(whole, kept * fine, np.float32(np.nan)), np.float32)
 

@@ -106,13 +106,14 @@ def _borne_out(fall: Float, foretold: Float) -> tuple[float, float]:
 
     An effect that some frames show ten times as strongly as others makes their falls as unequal, which looks
     like chance. Falls over what the effect should make them, where it acts, are alike: of both the surer one
-    counts.
+    counts, at the chance of that in two tries.
     """
     each = [_over_frames(fall)]
     acts = foretold > _LEAST_FALL * np.median(foretold) if len(foretold) else foretold > 0
     if acts.sum() >= _FEWEST:
         each.append(_over_frames(fall[acts] / foretold[acts]))
-    return min(each, key=lambda e: e[1])
+    told, chance = min(each, key=lambda e: e[1])
+    return told, min(len(each) * chance, 1.0)
 
 
 def _over_frames(fall: Float) -> tuple[float, float]:

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import map_coordinates
 
-from pipeline.adjustment.robust import robust_spread
+from pipeline.adjustment.robust import robust_spread, spread_about_median
 from pipeline.arrays import Float, Float32, Int
 from stages.twin.scene import LitSight, Scene
 
@@ -56,8 +56,8 @@ class Course:
 
     @property
     def spread(self) -> float:
-        """Robust 1 σ of the steps from frame to frame, over √2: a drift does not count."""
-        return robust_spread(np.diff(self.log_value)) / np.sqrt(2) if len(self.frame) > 2 else 0.0
+        """Robust 1 σ of steps between samples about their median, over √2: an even drift does not count."""
+        return spread_about_median(np.diff(self.log_value)) / np.sqrt(2) if len(self.frame) > 2 else 0.0
 
 
 @dataclass(frozen=True)

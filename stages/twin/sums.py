@@ -70,7 +70,7 @@ class Sums:
             exposed = after if gain is None and aside is None else before.brighter(exposure, noise)
             drawn = None if aside is None else np.float32(exposure) * bent.level
             for place in self.window:
-                place.add(frame, above, exposed, free, drawn if place.bends else None)
+                place.add(frame, above, exposed, free, drawn)
             self.whole.add_lit(frame, above, after, free)
             self.spots[0].add(frame, above, exposed)
         if kind != Illumination.LED:
@@ -86,7 +86,7 @@ class Sums:
     def on_window(self, samples: BlockSamples | None) -> tuple[Mismatch, ...]:
         """Return what is on the window or the lens; places that frames do not bear out are withdrawn."""
         fixed_to = in_image(samples, tuple(w.place for w in self.window))
-        judged = [w.judged(to, samples) for w, to in zip(self.window, fixed_to, strict=True)]
+        judged = [w.judged(to) for w, to in zip(self.window, fixed_to, strict=True)]
         return told_once([m for m in judged if m is not None])
 
     def glints(self) -> tuple[Mismatch, ...]:

@@ -18,8 +18,6 @@ from pipeline.arrays import Bool, Float, Float32, Int
 from pipeline.artefacts.twin import Look, Mismatch, NamedFigure
 from stages.twin.cells import sigmas
 from stages.twin.locate import FALSE_ALARM, ImagePlace
-from stages.twin.photo_behind import without_photo
-from stages.twin.reference import BlockSamples
 from stages.twin.render import Region, TwinFrame
 
 _POWER_STEP, _ASIDE_PX = 0.4, 0.5
@@ -103,7 +101,7 @@ class WindowPlace:
     ) -> None:
         """Take a lit frame (H, W) whose twin has its exposure; pixels in ``free`` are not clipped.
 
-        ``drawn`` is the twin's level where other frames tell that the window draws texture aside.
+        ``drawn`` is the twin's level with texture drawn aside as other frames tell, used where that is sure.
         """
         box, v, u = self._box(above.shape)
         level, part = twin.level[box], twin.region[box] == Region.WALL
@@ -122,7 +120,7 @@ class WindowPlace:
         spots = np.stack([whole * (rest * weight_of), whole**2 * weight_of], 1)
         self.spots.append(spots[..., near[0], near[1]])
         rest, weight = rest[use], weight[use]
-        drops = self._drops(filled, u, v) + ([] if drawn is None else [drawn[box]])
+        drops = self._drops(filled, u, v) + ([drawn[box]] if drawn is not None and self.bends else [])
         changes = np.stack([(made - level)[use] for made in drops])
         sums = [(changes * (rest * weight)).sum(1), (changes**2 * weight).sum(1)]
         self.drops.append(np.asarray(np.stack(sums), float))
@@ -165,11 +163,8 @@ class WindowPlace:
             made.append(np.asarray(drop, np.float32))
         return made
 
-    def judged(self, fixed_to: str, samples: BlockSamples | None = None) -> Mismatch | None:
-        """Return what is at the place; None where other frames fit no better with any law.
-
-        ``samples`` tell what of it is in the photo, too.
-        """
+    def judged(self, fixed_to: str) -> Mismatch | None:
+        """Return what is at the place; None where other frames fit no better with any law."""
         if len(self.frame) < _FEWEST_FRAMES:
             return None
         spots = np.stack(self.spots)
@@ -179,7 +174,7 @@ class WindowPlace:
         tried = {
             "window_dirt": _fall_of_spot(spots[:, 0], start, 0.0),
             "window_scatter": _fall_of_spot(spots[:, 1], start, _OF_CONTRAST),
-            "droplet": _fall_of_drop(self._drops_tried(), self.aside_px),
+            "droplet": _fall_of_drop(np.stack(self.drops), self.aside_px),
         }
         bends = self.bends and tried["droplet"].chance < FALSE_ALARM
         # Dirt may lie there, too, but draws nothing aside.
@@ -192,13 +187,8 @@ class WindowPlace:
         rivals = [n for n, by in more.items() if by < _SURE and not bends]
         law = tried[name]
         if name == "window_dirt":
-            law = replace(law, size=without_photo(law.size, self.place, samples))
+            law = replace(law, size=_with_photo(law.size))
         return self._mismatch([name, *rivals], fixed_to or "image", law, chance)
-
-    def _drops_tried(self) -> Float:
-        """Return (F, 2, L) the sums of drops, and of displacements that frames tell if they are sure."""
-        sums = np.stack(self.drops)
-        return sums if self.bends else sums[:, :, : len(_DROPS)]
 
     def _mismatch(self, names: list[str], fixed_to: str, law: _Fitted, chance: float) -> Mismatch:
         place, size = self.place, law.size
@@ -220,6 +210,7 @@ class WindowPlace:
         if names[0] == "window_dirt" and size < 0:
             return f"{at} the image is {100 * -size:.0f} % brighter in all frames."
         share = "the light" if names[0] == "droplet" else f"{100 * min(size, 1.0):.0f} % of the light"
+        share = f"at least {share}" if names[0] == "window_dirt" else share
         others = "".join(f", or {_STATED[n]} it" for n in names[1:])
         return f"{at}, in all frames, {_STATED[names[0]]} {share}{others}."
 
@@ -237,6 +228,16 @@ def beside_blur(
     said = "{} But whole frames are blurred, which looks alike: it cannot be told."
     withdrawn = tuple(replace(m, statement=said.format(m.statement)) for m in unsure)
     return tuple(m for m in found if m not in unsure), withdrawn
+
+
+def _with_photo(share: NamedFigure) -> NamedFigure:
+    """Return the share s of light that dirt takes, with the σ of what of the dirt may be in the wall's photo.
+
+    The photo was made through the same window. It may hold nothing of the dirt, or as much as makes twin and
+    recording alike: a part f of it, uniform from 0 to 1, whose σ is 1 / √12, moves the share by s (1 − s).
+    """
+    sd = float(np.hypot(share.sd, share.value * (1 - share.value) / np.sqrt(12)))
+    return replace(share, sd=sd)
 
 
 def _fall_of_drop(sums: Float, aside_px: float) -> _Fitted:

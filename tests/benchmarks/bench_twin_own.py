@@ -162,7 +162,7 @@ def score(case: Case, told: dict[str, Any], spot: tuple[float, float]) -> Any:
     sizes = [(p, case.size) for m in right[:1] for p in m["parameters"][:1] if case.size is not None]
     figure = [f for f in told["figures"] if case.figure and f["name"] == case.figure[0]]
     seen = [f for f in figure if case.figure and abs(f["value"] - case.figure[1]) < _CLOSE * case.figure[1]]
-    sizes += [(f, case.figure[1]) for f in seen if case.figure and np.isfinite(f["sd"])]
+    sizes += [(f, case.figure[1]) for f in figure if case.figure and np.isfinite(f["sd"])]
     inside = sum(abs(p["value"] - true) < 2 * p["sd"] for p, true in sizes)
     named = bool(right or seen)
     false = [m for m in told["found"] if m not in placed and not _named(case, m)]

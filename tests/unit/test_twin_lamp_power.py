@@ -7,7 +7,7 @@ import pytest
 
 from stages.twin.compare import BLOCK_PX
 from stages.twin.gate import judged
-from stages.twin.lamp_power import power_of_lamps
+from stages.twin.lamp_power import lamp_power, power_of_lamps
 from stages.twin.locate import full_size
 from stages.twin.reference import BlockSamples
 from stages.twin.render import Region, TwinFrame
@@ -49,8 +49,9 @@ def test_light_as_the_lamps_throw_it_or_a_little_of_it_bounced_is_no_response(po
     assert power_of_lamps(_samples(power), RING) == ()
 
 
-def test_a_probe_that_keeps_to_its_place_tells_nothing():
-    assert power_of_lamps(_samples(0.45, wandering=0.0), RING) == ()
+@pytest.mark.parametrize("wandering", [0.0, 1e-6])
+def test_a_probe_that_keeps_to_its_place_tells_nothing(wandering):
+    assert lamp_power(_samples(0.45, wandering=wandering)) == ()
 
 
 def test_few_frames_tell_nothing():

@@ -219,3 +219,10 @@ def test_an_effect_that_frames_show_unequally_is_borne_out_where_it_acts():
     by_chance = foretold * (-1 + 0.8 * random.standard_normal(7))
     assert _borne_out(by_chance, foretold)[0] < 3
     assert _borne_out(np.zeros(0), np.zeros(0)) == (0.0, 1.0)
+
+
+def test_two_looks_at_falls_alarm_no_more_often_than_their_chance_says():
+    random = np.random.default_rng(9)
+    foretold = np.exp(0.8 * random.standard_normal((2000, 8)))
+    chance = [_borne_out(f * random.standard_normal(8), f)[1] for f in foretold]
+    assert np.mean(np.array(chance) < 0.05) < 0.06

@@ -144,8 +144,9 @@ def test_a_dim_led_is_told_from_lamps_that_shine_unevenly():
 def test_lights_that_flicker_in_step_with_the_compared_frames_are_told_by_the_measured_ones():
     random = np.random.default_rng(2)
 
-    def told(spread, found=()):
-        course = Course(np.arange(12), spread * random.standard_normal(12), np.full(12, 1e-3))
+    def told(spread, found=(), drift=0.0):
+        log = spread * random.standard_normal(12) + np.linspace(0, drift, 12)
+        course = Course(np.arange(12), log, np.full(12, 1e-3))
         state = SimpleNamespace(lamp=replace(_lamp(np.zeros(36)), gain=course), line=None)
         return flicker_of_measured(state, found, RING)
 
@@ -153,3 +154,6 @@ def test_lights_that_flicker_in_step_with_the_compared_frames_are_told_by_the_me
     assert flicker.parameters[0].value == pytest.approx(0.06, abs=2 * flicker.parameters[0].sd)
     assert not told(0.004)
     assert not told(0.06, (flicker,))
+    assert not told(0.002, drift=0.5), "a slow change is no flicker"
+    sizes = [p for _ in range(300) for m in told(0.06) for p in m.parameters]
+    assert np.mean([abs(p.value - 0.06) < 2 * p.sd for p in sizes]) > 0.88
