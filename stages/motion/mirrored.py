@@ -22,8 +22,8 @@ _WHOLLY = 0.01
 def mirrored_way(probe: Probe, trajectory: Trajectory) -> str:
     """Return how the pictures of a run are mirrored, empty where they are not or nothing tells it.
 
-    A mirrored probe has its principal point, and the tilt and the source of its laser, on the other side. The
-    run's estimate of the instrument, freed of what was stated, is compared with either.
+    A mirrored probe has its principal point, and what its lens and laser lack in symmetry, on the other side.
+    The run's estimate of the instrument, freed of what was stated, is compared with either.
     """
     if trajectory.instrument is None or trajectory.instrument_covariance is None:
         return ""
@@ -42,11 +42,21 @@ def _mirrored(probe: Probe, axes: str) -> Float:
     """Return the parameters (P,) of a probe that sees the world as ``probe`` does in mirrored pictures."""
     names, out = probe.parameter_names, probe.parameters.copy()
     for axis in axes:
-        size = probe.camera.image_size["xy".index(axis)]
-        for name, sum_of_both in ((f"c{axis}", size - 1), (f"tilt_{axis}", 0), (f"decentre_{axis}_mm", 0)):
-            if name in names:
-                out[names.index(name)] = sum_of_both - out[names.index(name)]
+        for name in set(_turning_sign(axis)) & set(names):
+            out[names.index(name)] *= -1
+        k = names.index(f"c{axis}")
+        out[k] = probe.camera.image_size["xy".index(axis)] - 1 - out[k]
     return out
+
+
+def _turning_sign(axis: str) -> tuple[str, ...]:
+    """Return the parameters that have the other sign in an image mirrored along ``axis``.
+
+    Azimuth ψ becomes π − ψ along x, and −ψ along y. Tangential distortion is that of Brown, with OpenCV's
+    names, the affine part of the image Scaramuzza's.
+    """
+    waves = tuple(f"wave{m}_{'cos' if axis == 'x' and m % 2 else 'sin'}" for m in (2, 3, 4))
+    return (f"tilt_{axis}", f"decentre_{axis}_mm", {"x": "p2", "y": "p1"}[axis], "d", "e", *waves)
 
 
 def _can_be(probe: Probe, change: Float) -> bool:

@@ -127,7 +127,7 @@ def _remedy(probe: Probe, trajectory: Trajectory) -> str:
     """Return what to do about a probe that does not fit."""
     if way := mirrored_way(probe, trajectory):
         return (
-            f"It does fit pictures that are {way}: clock positions are then, too. What to do: switch "
+            f"It fits pictures that are {way}; clock positions are then {way} as well. What to do: switch "
             "this off in camera and recorder, or turn the pictures back, and run again"
         )
     return "Run boresight diagnose, or calibrate the probe anew"
