@@ -16,6 +16,9 @@ _ON, _BACK, _ASTRAY = 1.5, -0.5, 0.5
 # on by 1 in place of 1.5 times the usual way at least.
 _NO_LOSS = 1.25
 _AROUND = 9
+# A wall that moves by less than this part of its usual step stands: what is left are errors of matching, a
+# tenth of a usual step (see ``_AGREES`` in light.py), and steps over such a step are noise. Chosen.
+_MOVES = 0.25
 _FEWEST = 12
 # The rhythm is looked at as far behind an exchange as its memory reaches.
 _BEHIND = 8
@@ -38,12 +41,19 @@ def out_of_order(pictures: Pictures, light: Int) -> Bool:
     if len(place) < _FEWEST:
         return out
     size = pictures.step[place]
-    out[place] = _off_their_place(size / median_filter(size, _AROUND, mode="nearest"))
+    out[place] = _off_their_place(_in_usual_steps(size))
     return out | _lights_exchanged(light, place, size)
 
 
+def _in_usual_steps(size: Float) -> Float:
+    """Return steps (K,) of the wall over those around them; 1 where it stands, which tells no order."""
+    usual = median_filter(size, _AROUND, mode="nearest")
+    moves = np.abs(usual) > _MOVES * np.median(np.abs(size))
+    return np.where(moves, size / np.where(moves, usual, 1.0), 1.0)
+
+
 def _off_their_place(step: Float) -> Bool:
-    """Return which pictures (K,) lie off the way that those before and behind make, by steps in usual ones.
+    """Return which pictures (K,) do not lie where their neighbours' motion puts them, by steps in usual ones.
 
     The wall leaps on, goes back, and comes to where it would have been at its usual speed: no probe moves so,
     nor do lost pictures, behind which it stays ahead.

@@ -9,6 +9,7 @@ import pytest
 
 from pipeline.recording.base import Encoder, FrameTable
 from stages.premises.light import Light, Steps, rows_by_motion, sway_of_line
+from stages.premises.order import _in_usual_steps, _off_their_place
 from stages.premises.pictures import Pictures, look_at_pictures
 from tests.drawn_run import drawn_run
 from tests.premises_run import COUNT, STEP_MM, checked, with_rings
@@ -183,6 +184,17 @@ def test_pictures_from_outside_the_pipe_are_left_out(outside, good, run):
     np.testing.assert_allclose(found.time_s, good.frames.time_s[found.frame])
     assert len(told) == 1
     assert "before the first laser line or behind the last" in told[0]
+
+
+@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("noise", [0.0, 0.05])
+def test_a_probe_that_stands_hides_no_exchange_and_makes_none(noise, seed):
+    """A step over the usual one is there noise over noise, or 0 / 0, which hid all exchanges behind it."""
+    random = np.random.default_rng(seed)
+    way = np.cumsum(np.where((np.arange(80) > 9) & (np.arange(80) < 30), 0.0, 2.0))
+    way[[50, 53]] = way[[53, 50]]
+    size = np.diff(way, prepend=-2.0) + noise * random.standard_normal(80)
+    assert np.flatnonzero(_off_their_place(_in_usual_steps(size))).tolist() == [50, 53]
 
 
 @pytest.fixture(scope="module")
