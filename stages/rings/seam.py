@@ -42,7 +42,7 @@ class Seam:
 
 
 def seam_of(samples: RingSamples) -> Seam | None:
-    """Return the seam at which most rings step, None where they step nowhere, or at one place only."""
+    """Return the seam at which most rings step, None where no two steps lie on one row or column."""
     ring = np.flatnonzero(samples.valid.any(1))
     if len(ring) < _FEWEST:
         return None
@@ -50,11 +50,16 @@ def seam_of(samples: RingSamples) -> Seam | None:
     step = _median(_steps(radius, samples.azimuth_rad))
     known = np.isfinite(step)
     ends = _ends(np.abs(np.where(known, step, 0.0)), _STANDS_OUT * robust_spread(step[known]), samples)
-    place = _median(samples.pixels()[ring].reshape(len(ring), -1)).reshape(-1, 2)[ends]
-    for axis, along in enumerate(("column", "row")):
-        near = _ONE_LINE * 2 * float(np.nanmedian(radius))
-        if len(ends) == 2 and abs(place[0, axis] - place[1, axis]) < near:
-            return Seam(along, float(place[:, axis].mean()), float(np.abs(step[ends]).max()))
+    if len(ends) < 2:
+        return None
+    place = _median(samples.pixels()[ring][:, ends].reshape(len(ring), -1)).reshape(-1, 2)
+    near = _ONE_LINE * 2 * float(np.nanmedian(radius))
+    # Ends are in the order of their steps: the first pair on one line is the clearest.
+    for later, earlier in ((j, i) for j in range(1, len(ends)) for i in range(j)):
+        for axis, along in enumerate(("column", "row")):
+            both = place[[earlier, later], axis]
+            if abs(both[0] - both[1]) < near:
+                return Seam(along, float(both.mean()), float(np.abs(step[ends[earlier]])))
     return None
 
 

@@ -59,6 +59,16 @@ def test_parts_of_the_picture_that_lie_aside_are_told_with_place_and_size(
     assert "the picture has a seam" in said[0]
 
 
+def test_a_seam_is_told_beside_other_steps() -> None:
+    """Burnt-in text or a ledge of the wall makes steps of its own."""
+    seamed = rings((0.0, 2.0))
+    ledge = seamed.radius_px + 3.0 * (np.abs(AZIMUTH - 0.4) < 0.25).astype(np.float32)
+    seam = seam_of(replace(seamed, radius_px=ledge))
+    assert seam is not None
+    assert (seam.along, seam.at_px) == ("column", pytest.approx(400, abs=4))
+    assert seam.step_px == pytest.approx(2.0, abs=0.25)
+
+
 def test_whole_pictures_and_walls_that_step_on_one_side_have_no_seam() -> None:
     sound = rings()
     assert seam_of(sound) is None
