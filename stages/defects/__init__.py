@@ -125,8 +125,8 @@ class _Found:
 
 
 def _credibility(found: Sequence[_Found], tail: NoiseTail, wall: MeasuredWall) -> Credibility:
-    """Return what is to be expected by the findings, welds and what is not on the wall left out."""
-    used = [f for f in found if f.evidence.on_wall and not f.region.all_round]
+    """Return what is to be expected by the findings on the wall; welds and steps are left out."""
+    used = [f for f in found if f.evidence.on_wall and not (f.region.all_round or f.step)]
     column = 2 * np.pi / wall.relief.shape[1]
     widths = [f.region.mask.shape[1] * column for f in used]
     rings = len(np.unique(wall.cloud.cloud.frame))
@@ -179,7 +179,8 @@ def _judged(
         deep = chance_of_depth(f.defect, min_depth_mm)
         real = deep if f.region.all_round else deep * credibility.chance_against_clutter(f.evidence)
         real = min(real, MOST_SURE) * (1.0 if f.evidence.on_wall else _WALL_OR_NOT)
-        counts = not f.step and f.evidence.corroborated and real >= COUNTED and is_depth_known(f.defect)
+        real = 0.0 if f.step else real
+        counts = f.evidence.corroborated and real >= COUNTED and is_depth_known(f.defect)
         defect = replace(f.defect, probability=real, confidence=f.defect.confidence * real)
         if counts:
             confirmed.append(defect)
@@ -259,5 +260,5 @@ def _defects_of_run(
 
 
 DEFECTS = Stage(
-    "defects", "22", DefectParameters, _defects_of_run, "defects as instances with depth, clock and kind"
+    "defects", "23", DefectParameters, _defects_of_run, "defects as instances with depth, clock and kind"
 )

@@ -30,7 +30,7 @@ from stages.diagnose.result import (
 _SAME_FREQUENCY_HZ = 0.15
 _IN_PROFILE, _IN_MOTION = (Location(str(c), None, None) for c in (Channel.PROFILE, Channel.MOTION))
 _UNKNOWN = "a cause that the library does not have, such as {}"
-_OF_ENCODER = "one between motion and encoder that goes otherwise with the way or the speed"
+_OF_ENCODER = "an error of the encoder that depends on distance or speed in another way"
 _AGAIN = (
     "To see what the pattern goes with, record the gauge again: rolled by 90° (probe or gauge), at another "
     "speed (time), after warming up (drift)."

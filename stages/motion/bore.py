@@ -131,9 +131,9 @@ def warn_of_steps(bore: Bore, context: Context) -> None:
     steps = ", ".join(f"by {by:+.1f} mm at {at:.0f} mm" for at, by in zip(bore.at_mm, change, strict=True))
     context.warn(
         f"the pipe's diameter steps {steps} (a joint of two sizes, a socket, a gauge). The edge is smeared "
-        "over about a tenth of the diameter: radii there are wrong by more than their σ, and what is found "
-        "all around it is the step itself. Texture near it is hidden or matched less well, so that roll may "
-        "be off, too. What to do: process the lengths of one bore as recordings of their own"
+        "over about a tenth of the diameter: radii there may be wrong by more than their σ, and what is "
+        "found all around it is the step itself. Texture near it is hidden or matched less well, so that "
+        "roll may be off, too. What to do: process the lengths of one bore as recordings of their own"
     )
 
 

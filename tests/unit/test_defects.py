@@ -106,7 +106,9 @@ def test_a_step_of_the_bore_is_no_bead_and_no_groove(step_mm):
     step = step_mm / (1 + np.exp(-(DISTANCE - 60) / 1.0))[:, None]
     found = search(noisy(np.random.default_rng(5), step))
     assert not any(d.clock_to == 12.0 for d in found.items)
-    assert any("it is a step" in d.statement for d in found.unconfirmed)
+    steps = [d for d in found.unconfirmed if "it is a step" in d.statement]
+    assert steps
+    assert all(d.probability == d.confidence == 0 for d in steps)
 
 
 def test_a_groove_all_round_is_no_pit():

@@ -135,10 +135,10 @@ def warn_of_misfit(result: GaugeCalibration, context: Context) -> None:
         if times > _MOST_SPREAD:
             context.warn(
                 f"{name} lie {off} (1 σ) from where the calibrated probe sees them, {times:.0f} times their "
-                "noise: no camera and laser of this kind saw this gauge so, and the calibration may be wrong "
-                "by more than its σ. What to do: look whether the recorder scales, stretches, cuts or "
-                "stabilises the pictures, whether the camera sits tight, and whether gauge and fiducials are "
-                "as described; boresight diagnose may name the cause"
+                "noise: a camera and laser as modelled cannot have seen this gauge like that. The "
+                "calibration may be wrong by more than its σ. What to do: look whether the recorder scales, "
+                "stretches, cuts or stabilises the pictures, whether the camera sits tight, and whether "
+                "gauge and fiducials are as described; boresight diagnose may name the cause"
             )
 
 

@@ -221,7 +221,7 @@ def _estimates(
         out.append(
             TravelEstimate(
                 name, quantity.name, value, sigma, allowed, p, _DETECTED * total, alike, again,
-                _where(fit.columns[:, k]), _goes_otherwise(fit, int(k)) if told else 0.0,
+                _where(fit.columns[:, k]), _goes_otherwise(fit, int(k)) if told and p < _REPORTED else 0.0,
             )
         )  # fmt: skip
     return tuple(out)

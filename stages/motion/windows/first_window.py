@@ -164,9 +164,9 @@ def _without_delay(first: _Adjusted) -> tuple[_Adjusted, EncoderDelay | None]:
         return first, delay
     free = _without_encoder(first)
     delay = delay_of_encoder(free, first.measured)
-    if delay is not None and delay.matters:
-        first = first.with_encoder(delay.taken_out(encoder, first.run.time_s))
-    return first.again(free.state), delay
+    if delay is None or not delay.matters:
+        return first, delay
+    return first.with_encoder(delay.taken_out(encoder, first.run.time_s)).again(free.state), delay
 
 
 def _with_noise(first: _Adjusted) -> _Adjusted:
