@@ -74,6 +74,36 @@ def lost(count: int, *, together: bool = False, table_cut: bool = False) -> Spoi
     return spoil
 
 
+def lost_often(which: Callable[[Int, np.random.Generator], Int], *, spread: bool) -> Spoiler:
+    """Return a spoiler: of pictures 0 … N−1 those ``which`` says are lost, and a table was made afterwards.
+
+    Its times count the pictures that are left from the start, or ``spread`` them evenly to the true end.
+    """
+
+    def spoil(recording: Recording, random: np.random.Generator) -> Spoiled:
+        whole = recording.frames
+        kept = np.setdiff1d(np.arange(len(whole.frame)), which(np.arange(1, len(whole.frame) - 1), random))
+        right = replace(_rows(whole, kept), frame=np.arange(len(kept)))
+        last_s = right.time_s[-1] if spread else whole.time_s[len(kept) - 1]
+        table = replace(right, time_s=np.linspace(whole.time_s[0], last_s, len(kept)))
+        source = KeptFrames(recording.source, kept)
+        return Spoiled(replace(recording, frames=table, listed=table, source=source), right)
+
+    return spoil
+
+
+def _pairs(frame: Int, random: np.random.Generator) -> Int:
+    return frame[frame // 2 % 6 == 3]
+
+
+def _one_in_five(frame: Int, random: np.random.Generator) -> Int:
+    return frame[frame % 5 == 4]
+
+
+def _at_random(frame: Int, random: np.random.Generator) -> Int:
+    return frame[random.random(len(frame)) < 0.1]
+
+
 def repeated(recording: Recording, random: np.random.Generator) -> Spoiled:
     """One picture comes twice and the table does not know it."""
     frames = len(recording.frames.frame)
@@ -138,4 +168,9 @@ SPOILERS: dict[str, Spoiler] = {
     "10 % wrong and 1 frame lost": wrong_and_lost,
     "1 frame twice": repeated,
     "a quarter left": cut_short,
+    "pairs lost evenly, times counted": lost_often(_pairs, spread=False),
+    "pairs lost evenly, times spread": lost_often(_pairs, spread=True),
+    "one in five lost, times spread": lost_often(_one_in_five, spread=True),
+    "10 % lost, times counted": lost_often(_at_random, spread=False),
+    "10 % lost, times spread": lost_often(_at_random, spread=True),
 }

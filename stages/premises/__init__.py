@@ -22,20 +22,16 @@ from stages.premises.changes import (
     refuse_or_warn_of_interlacing,
     warn_of_frames,
 )
-from stages.premises.clock import ClockJump, clock_jumps, warn_of_clock, without_jumps
+from stages.premises.clock import ClockJump, clock_jumps, warn_of_clock, without_jumps, without_stretch
 from stages.premises.cuts import cuts, warn_of_cuts
 from stages.premises.light import (
     Light,
-    Steps,
     alike,
     light_seen,
     pattern_breaks,
     rhythm_of,
-    row_times,
-    rows_by_motion,
-    steps_of_wall,
-    sway_of_line,
 )
+from stages.premises.losses import Steps, row_times, rows_by_motion, steps_of_wall, sway_of_line
 from stages.premises.order import off_the_pipe, out_of_order
 from stages.premises.pictures import Pictures, look_at_pictures
 from stages.premises.repeats import copies, repeated, rows_of_repeats
@@ -150,7 +146,7 @@ def _matched(recording: Recording, probe: Probe, seen: _Seen) -> _Matched:
     steps, sway = steps_of_wall(pictures, seen.shown, copy), sway_of_line(pictures, light)
     radius_mm = radius_seen_mm(pictures, probe)
     row = rows_by_motion(alignment.row, steps, rhythm_of(light), table, encoder, sway, radius_mm)
-    stated_s = row_times(table, row)
+    stated_s = without_stretch(row_times(table, row), row, table, recording.frame_rate)
     jumps = clock_jumps(stated_s, steps, encoder)
     changes = Changes(recording.frames, label, row, without_jumps(stated_s, jumps))
     return _Matched(changes, LeftOut(seen.outside, seen.astray, copy), jumps, steps, radius_mm)
@@ -290,7 +286,7 @@ def _report(pictures: Pictures, radius_mm: float, changes: Changes, context: Con
 
 PREMISES = Stage(
     "premises",
-    "14",
+    "15",
     PremisesParameters,
     check_premises,
     "lights, times, encoder and diameter as stated, held against the pictures and mended",

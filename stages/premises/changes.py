@@ -54,7 +54,7 @@ def warn_of_frames(
     frame, lost = changes.frames.frame, changes.lost()
     if lost:
         context.warn(
-            f"{_pictures(sum(n for _, n in lost))} lost although frames.csv lists them: before "
+            f"{_pictures(sum(n for _, n in lost))} lost that the times in frames.csv do not show: before "
             f"{_listed([f'frame {f} ({n})' for f, n in lost])}. The {changes.retimed.sum()} frames after "
             "them now have the times and lights of the rows that belong to them. What to do: nothing, if the "
             "recorder is known to drop frames; else correct frames.csv"

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.arrays import Float
+from pipeline.arrays import Float, Int
 from pipeline.machine.stage import Context
-from pipeline.recording.base import Encoder, Recording
-from stages.premises.light import Steps
+from pipeline.recording.base import Encoder, FrameTable, Recording
+from stages.premises.losses import Steps
 
 # Frame times from which a gap in the times is looked at: lost pictures that the table knows of are fewer.
 _GAP = 4.0
@@ -19,6 +19,8 @@ _LIKE = 2.0
 # Frame rates that differ by more are told: recorders round 29.97 to 30 (chosen).
 _OTHER_RATE = 1.2
 _FEWEST = 8
+# Times are even whose steps differ by less than this part: tables round to a thousandth of a second or finer.
+_EVEN = 0.1
 
 
 @dataclass(frozen=True)
@@ -49,6 +51,22 @@ def without_jumps(time_s: Float, jumps: list[ClockJump]) -> Float:
     for jump in jumps:
         out[jump.place :] -= jump.by_s
     return out
+
+
+def without_stretch(time_s: Float, row: Int, table: FrameTable, frame_rate: float) -> Float:
+    """Return times (F,) of pictures of which some were lost, in a table that spreads the others evenly.
+
+    Such a table begins and ends with the video, at the mean rate of the pictures that are left. One that only
+    counts them has the camera's own ``frame_rate``, and ends too early.
+    """
+    step_s, last = np.diff(table.time_s), int(row[-1])
+    if last < len(table.time_s) or len(step_s) == 0 or np.ptp(step_s) > _EVEN * np.median(step_s):
+        return time_s
+    span_s = float(table.time_s[-1] - table.time_s[0])
+    rates = np.array([len(step_s), last]) / span_s
+    if abs(np.log(rates[1] / frame_rate)) > abs(np.log(rates[0] / frame_rate)):
+        return time_s
+    return np.asarray(table.time_s[0] + span_s / last * row)
 
 
 def _jumped(jump: ClockJump, time_s: Float, steps: Steps, encoder: Encoder) -> bool:

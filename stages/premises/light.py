@@ -1,16 +1,14 @@
-"""Which light each picture was taken in, and lost pictures that the rhythm of the lights does not show."""
+"""Which light each picture was taken in, and what the rhythm of the lights leads to expect."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from enum import IntEnum
 
 import numpy as np
-from scipy.ndimage import maximum_filter1d, median_filter, minimum_filter1d
+from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
 from pipeline.adjustment.robust import spread_about_median
 from pipeline.arrays import Bool, Float, Int
-from pipeline.recording.base import Encoder, FrameTable
 from stages.premises.pictures import CLOSED, Pictures
 
 # A picture whose brightness lies in the middle third between the two lights belongs to neither.
@@ -32,28 +30,6 @@ _BOTH_THERE = 0.4
 # Longest context (preceding lights) that predicts the next one; share of more errors that a shorter one may
 # make.
 _LONGEST_MEMORY, _NEARLY = 6, 0.05
-# A step of the wall stands out when it is so many robust σ above the steps around it: by noise alone once in
-# 10^9 steps, were they normal; matching errs worse than that, and six is what outliers need everywhere here.
-_SIGMAS = 6.0
-# Where the table has too many rows, pictures were surely lost, and less evidence is needed for where.
-_SIGMAS_LOST = 3.5
-# 0.9 quantile of normal errors in σ. It gives σ here, because errors of matching are not normal.
-_NINE_IN_TEN = 1.645
-# Steps on either side from which the usual speed is taken.
-_AROUND_STEP = 9
-_LEAST_STEPS = 12
-# Steps that took more than so many usual times tell nothing of lost pictures: over 32 frames, of which 30
-# were left out, phase correlation erred by the advance of 6 frames (open-1-field at half its size).
-_LONGEST_STEP = 4.0
-# The laser line leaps where it moves across so many times as far as it usually does, of at least half a
-# pixel, in the time that would have passed. In open-1 to open-3, a01 and a09 it moves up to 3
-# times as far, twice in a run more than 2.5; where all pictures of open-1 were moved by 4 px, 5.4 times.
-_LINE_LEAPS, _LEAST_SWAY_PX = 2.5, 0.5
-# Two advances agree within this part: steps of the wall err by a tenth, a lost picture makes one 1.5 times as
-# long.
-_AGREES = 0.25
-# The encoder is looked at over so many frames on either side of a leap.
-_NEARBY = 10
 
 
 class Light(IntEnum):
@@ -161,115 +137,6 @@ def _unexpected(light: Int, memory: int) -> Bool:
         if max(walls, 1 - walls) > 2 / 3:
             out[places] = light[places] != round(walls)
     return out
-
-
-@dataclass(frozen=True)
-class Steps:
-    """Motion of the lit wall from picture ``start`` to ``end`` (K,): ``size`` in pipe radii."""
-
-    start: Int
-    end: Int
-    size: Float
-
-
-def steps_of_wall(pictures: Pictures, shown: Int, copy: Bool) -> Steps:
-    """Return the steps between pictures that are ``shown`` (F,) to be of the lit wall, or are stated to be.
-
-    A picture that is a ``copy`` (F,) has the place of the one that it repeats.
-    """
-    end = np.flatnonzero((pictures.partner >= 0) & ~copy)
-    start = pictures.partner[end]
-    while np.any(copy[start]):
-        start = np.where(copy[start], pictures.partner[start], start)
-    use = (shown[end] == Light.WALL) & (shown[start] == Light.WALL) & np.isfinite(pictures.step[end])
-    return Steps(start[use], end[use], pictures.step[end[use]])
-
-
-def row_times(table: FrameTable, row: Int) -> Float:
-    """Return the time of each row; rows beyond the table go on at its usual pace."""
-    usual = float(np.median(np.diff(table.time_s))) if len(table.time_s) > 1 else 0.0
-    beyond = np.maximum(row - (len(table.time_s) - 1), 0)
-    return np.asarray(table.time_s[np.minimum(row, len(table.time_s) - 1)] + beyond * usual)
-
-
-def sway_of_line(pictures: Pictures, light: Int) -> Float:
-    """Return how far (F,) the laser line moves sideways to its next picture, in multiples of the usual."""
-    out, line = np.zeros(len(light)), np.flatnonzero((light == Light.LINE) & (pictures.closed > CLOSED))
-    if len(line) < _LEAST_STEPS:
-        return out
-    moved, azimuth = np.diff(pictures.line_px[line], axis=0), pictures.azimuth_rad
-    ahead = [[np.cos(azimuth - turn) > np.sqrt(0.5) for turn in (a, a + np.pi)] for a in (0, np.pi / 2)]
-    across = [[np.median(moved[:, side], axis=1) for side in sides] for sides in ahead]
-    way = np.hypot(*((one - other) / 2 for one, other in across))
-    way /= max(float(np.median(way)), _LEAST_SWAY_PX)
-    out[line[0] + 1 : line[-1] + 1] = np.repeat(way, np.diff(line))
-    return out
-
-
-def rows_by_motion(
-    row: Int,
-    steps: Steps,
-    rhythm: int,
-    table: FrameTable,
-    encoder: Encoder | None,
-    sway: Float,
-    radius_mm: float = np.nan,
-) -> Int:
-    """Return ``row`` (F,) with more or fewer rows skipped where the wall moves by more or less than usual.
-
-    The lights give the number of lost pictures only up to whole periods of their rhythm. How far the wall
-    moved, compared with the steps around, gives the number of periods. Steps tell nothing where the encoder
-    shows the same leap (the probe moved faster), over pictures that were left out (the speed is not known for
-    so long), where the line's ``sway`` (F,) leaps (the camera was knocked), or where the encoder agrees with
-    the wall, by the pipe's ``radius_mm``: then the usual steps are wrong, because a codec repeated blocks.
-    """
-    if len(steps.end) < _LEAST_STEPS:
-        return row
-    time = row_times(table, row)
-    period = float(np.median(np.diff(time)))
-    out, left = row.copy(), len(table.frame) - 1 - int(row[-1])
-    for start, end, lost, size in _leaps(steps, time, rhythm, _SIGMAS_LOST if left > 0 else _SIGMAS):
-        skips = np.diff(row[start : end + 1]) - 1
-        believed = left >= lost or _encoder_was_steady(encoder, float(time[end]), period)
-        believed &= not _encoder_agrees(encoder, time[[start, end]], size * radius_mm)
-        believed &= sway[start + 1 : end + 1].max() < _LINE_LEAPS * (1 + abs(lost) / rhythm)
-        if (lost > 0 and believed) or (lost < 0 and skips.max() + lost >= 0):
-            first = int(np.argmax(skips)) + start + 1 if skips.max() > 0 else (start + end + 1) // 2
-            out[first:] += lost
-            left -= lost
-    return out
-
-
-def _leaps(steps: Steps, time_s: Float, rhythm: int, sigmas: float) -> list[tuple[int, int, int, float]]:
-    """Return (start, end, lost pictures in whole periods, size) of steps that stand out, clearest first."""
-    period_s = float(np.median(np.diff(time_s)))
-    passed = np.maximum(time_s[steps.end] - time_s[steps.start], 1e-9)
-    speed = median_filter(steps.size / passed, _AROUND_STEP, mode="nearest")
-    excess = (steps.size - speed * passed) * np.sign(speed)
-    sigma = float(np.quantile(np.abs(excess), 0.9)) / _NINE_IN_TEN + 1e-9
-    one = np.maximum(np.abs(speed) * period_s * rhythm, 1e-9)
-    lost = rhythm * np.rint(excess / one).astype(np.int64)
-    stand_out = (np.abs(excess) > sigmas * sigma) & (lost != 0) & (one > sigmas * sigma / 2)
-    stand_out &= passed < _LONGEST_STEP * np.median(passed)
-    clearest = sorted(np.flatnonzero(stand_out), key=lambda k: -abs(float(excess[k])))
-    return [(int(steps.start[k]), int(steps.end[k]), int(lost[k]), float(steps.size[k])) for k in clearest]
-
-
-def _encoder_agrees(encoder: Encoder | None, time_s: Float, way_mm: float) -> bool:
-    """Return whether the encoder advances by ``way_mm`` between two times; False where it is not known."""
-    if encoder is None or time_s[0] < encoder.time_s[0] or time_s[1] > encoder.time_s[-1]:
-        return False
-    shown_mm = float(np.diff(np.interp(time_s, encoder.time_s, encoder.distance_mm))[0])
-    return abs(shown_mm - way_mm) < _AGREES * abs(way_mm)
-
-
-def _encoder_was_steady(encoder: Encoder | None, time_s: float, period_s: float) -> bool:
-    """Return whether the encoder advances evenly around a time; False where it is not known."""
-    if encoder is None or not encoder.time_s[0] < time_s < encoder.time_s[-1]:
-        return False
-    at = time_s + period_s * np.arange(-_NEARBY, _NEARBY + 1)
-    step = np.abs(np.diff(np.interp(at, encoder.time_s, encoder.distance_mm)))
-    return bool(step.max() < 2 * np.median(step))
 
 
 def rhythm_of(light: Int) -> int:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.ndimage import median_filter
+from scipy.ndimage import median_filter, percentile_filter
 
 from pipeline.arrays import Bool, Float, Int
 from stages.premises.light import Light, pattern_breaks
@@ -15,6 +15,8 @@ _ON, _BACK, _ASTRAY = 1.5, -0.5, 0.5
 # Neighbours in two lights that were exchanged look like two losses, of which the wall shows nothing: it goes
 # on by 1 in place of 1.5 times the usual way at least.
 _NO_LOSS = 1.25
+# Percentile of the steps around that is the speed where pictures were lost in up to half of them.
+_LOWER = 25
 _AROUND = 9
 # A wall that moves by less than this part of its usual step stands: what is left are errors of matching, a
 # tenth of a usual step (see ``_AGREES`` in light.py), and steps over such a step are noise. Chosen.
@@ -81,7 +83,8 @@ def _lights_exchanged(light: Int, place: Int, size: Float) -> Bool:
     out = np.zeros(len(light), bool)
     breaks = pattern_breaks(light)
     way = np.cumsum(size)
-    speed = median_filter(size / np.diff(place, prepend=place[0] - 1), _AROUND, mode="nearest")
+    # Lost pictures, however many, only make steps longer: the lower ones tell the speed without.
+    speed = percentile_filter(size / np.diff(place, prepend=place[0] - 1), _LOWER, _AROUND, mode="nearest")
     for first in np.flatnonzero(breaks[:-1] & (light[:-1] != light[1:])):
         last = int(np.searchsorted(place, first)) - 1
         after = int(np.searchsorted(place, first + 1, side="right"))

@@ -11,7 +11,7 @@ from pipeline.errors import UnusableError
 from pipeline.instrument.probe import Probe
 from pipeline.machine.stage import Context
 from pipeline.recording.base import Encoder, PipeFacts, Recording
-from stages.premises.light import Steps
+from stages.premises.losses import Steps
 from stages.premises.pictures import CLOSED, Pictures
 
 # Nominal sizes differ from inner diameters by up to a quarter (ASME B36.10: NPS 1/2 has a 15.8 mm bore). From

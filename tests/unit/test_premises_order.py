@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from pipeline.recording.base import Encoder, FrameTable
-from stages.premises.light import Light, Steps, rows_by_motion, sway_of_line
+from stages.premises.light import Light
+from stages.premises.losses import Steps, rows_by_motion, sway_of_line
 from stages.premises.order import _in_usual_steps, _off_their_place
 from stages.premises.pictures import Pictures, look_at_pictures
 from tests.drawn_run import drawn_run
