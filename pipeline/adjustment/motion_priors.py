@@ -92,6 +92,15 @@ def trembling_of_places(place: Float, known: Int) -> Float:
     return _trembling(near, far, known)
 
 
+def most_trembling_of_places(place: Float) -> Float:
+    """Return the largest 1 σ (D,) that places (K, D) can tremble by, if nothing of what they do is motion.
+
+    An estimate of `trembling` is 0 as well where jerks hide it: then it is not known, and this is large.
+    """
+    third = place[3:] - 3 * place[2:-1] + 3 * place[1:-2] - place[:-3]
+    return np.asarray(robust_spreads(third, axis=0) / TREMBLING_GROWTH)
+
+
 def _trembling(near: Float, far: Float, known: Int) -> Float:
     """Return the 1 σ (D,) of trembling by third differences (M, D) over one and over two gaps."""
     if len(known) < 2 * _FEWEST_FRAMES:

@@ -89,7 +89,7 @@ def estimate_motion(
     trajectory = lay_route(trajectory, joined.turn_variance, recording, probe, context)
     events = find_events(recording.frames, trajectory, run.texture.poses, joined.slip, has_encoder)
     circles = circles_in_rings(points)
-    seen = SeenCentres(places_of(recording, circles.frame), circles.centre_c, probe.laser.baseline_mm)
+    seen = SeenCentres(circles.centre_c, probe.laser.baseline_mm)
     report_motion(context, estimate, run.texture, trajectory, seen, wider)
     require_along_pipe(trajectory)
     loops.report(context)
@@ -178,7 +178,7 @@ def _motion_of_run(
 
 MOTION = Stage(
     "motion",
-    "35",
+    "36",
     MotionParameters,
     _motion_of_run,
     "camera pose in every frame and the pipe's axis, from texture, rings and encoder together",

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pipeline.adjustment.motion_priors import trembling, trembling_of_places
+from pipeline.adjustment.motion_priors import most_trembling_of_places, trembling, trembling_of_places
 from pipeline.arrays import Float, Int
 from pipeline.artefacts.measured import Trajectory
 from pipeline.geometry.axis import PipeAxis, distance_along, frames_at, to_pipe
@@ -38,25 +38,24 @@ _MOST_LASTING = 0.57
 
 @dataclass(frozen=True)
 class SeenCentres:
-    """Where the rings of some frames (F,) have the pipe's axis in the laser's plane (F, 2), mm in C.
+    """Where rings, one after the other, have the pipe's axis in the laser's plane (F, 2), mm in C.
 
     ``ahead_mm`` is that plane's distance from the camera.
     """
 
-    frame: Int
     centre_c: Float
     ahead_mm: float
 
     def deny_trembling(self, trajectory: Trajectory, lit: Int) -> bool:
-        """Return whether the centres tremble by less than half of what the poses of ``lit`` frames say."""
+        """Return whether the centres surely tremble by less than half of what poses of ``lit`` frames say."""
         known = np.isfinite(self.centre_c).all(1)
         if known.sum() < _FEWEST_CENTRES:
             return False
         T_pc = trajectory.T_pc[lit]
         ahead = distance_along(trajectory.axis, T_pc) + self.ahead_mm
         by_poses = transform(inverse(T_pc), frames_at(trajectory.axis, ahead)[0])[:, :2]
-        seen = trembling_of_places(self.centre_c[known], self.frame[known])
-        return bool(np.linalg.norm(seen) < 0.5 * np.linalg.norm(trembling_of_places(by_poses, lit)))
+        at_most = np.linalg.norm(most_trembling_of_places(self.centre_c[known]))
+        return bool(at_most < 0.5 * np.linalg.norm(trembling_of_places(by_poses, lit)))
 
 
 def trajectory_of(run: JoinedRun, frames: FrameTable, probe: Probe, has_encoder: bool) -> Trajectory:

@@ -251,14 +251,14 @@ class _AxialMotion:
 
 
 def change_between(one: Float32, other: Float32) -> float:
-    """Return the mean difference of two pictures, grey levels, whatever their exposures.
+    """Return the mean difference of two pictures, grey levels, as if both had the mean of their exposures.
 
     Where exposure flickers, two pictures in a row that happen to be exposed alike differed by far less than
     is usual, and one was taken for the other once more.
     """
-    power = float(np.vdot(one, one))
-    gain = float(np.vdot(one, other)) / power if power > 0 else 1.0
-    return float(np.abs(other - np.float32(gain) * one).mean())
+    power = float(np.vdot(one, one)), float(np.vdot(other, other))
+    brighter = np.float32((power[1] / power[0]) ** 0.25 if min(power) > 0 else 1.0)
+    return float(np.abs(other / brighter - brighter * one).mean())
 
 
 def _in_like_light(one: _Strip, other: _Strip) -> bool:

@@ -247,10 +247,10 @@ def _blocks(
     scene: Scene, state: PhotometricState, sampled: list[Sampled]
 ) -> tuple[list[Float32], list[tuple[Float32, Float32]]]:
     """Return of the sampled lit frames recorded over predicted brightness, and the texture, of blocks."""
-    black, renderer = state.noise.black.value, Renderer(replace(scene, outside=state.outside), state)
+    noise, renderer = state.noise, Renderer(replace(scene, outside=state.outside), state)
     lit = [s for s in sampled if s.light in state.shows_wall]
     twins = [renderer.frame(s.frame, s.light).drawn_aside(state.aside) for s in lit]
-    made = [(s.image - black, t, state.noise.white - black) for s, t in zip(lit, twins, strict=True)]
+    made = [(noise.above_black(s.image), t, noise.full_scale) for s, t in zip(lit, twins, strict=True)]
     return [block_ratios(*m) for m in made], [block_textures(*m) for m in made]
 
 
@@ -271,7 +271,7 @@ PHOTOMETRY = Stage(
 )
 TWIN = Stage(
     "twin",
-    "21",
+    "22",
     TwinParameters,
     compare_with_twin,
     "recorded frames beside the same frames, re-rendered from what the run has measured",

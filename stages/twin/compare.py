@@ -80,7 +80,7 @@ class Comparison:
         """Count a frame, its grey levels (H, W) given above black."""
         z, sums, of_wall, by_level = _differences(
             before.region, above_black, *_pair(before), *_pair(after), np.array(noise.polynomial),
-            np.float32(noise.white - noise.black.value), np.array(_LEVELS, np.float32), _STRAY,
+            np.float32(noise.full_scale), np.array(_LEVELS, np.float32), _STRAY,
         )  # fmt: skip
         size, before_sum, after_sum = sums[:3]
         self.pixels += size

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import nnls
 
-from pipeline.arrays import Bool, Float, Float32, Int
+from pipeline.arrays import Bool, Float, Float32, Image, Int
 from stages.twin.lamp_light import Figure
 
 _WINDOW_PX = 12
@@ -61,6 +61,19 @@ class CameraNoise:
         out *= level
         out += dark
         return out
+
+    @property
+    def full_scale(self) -> float:
+        """Grey levels above black from which pixels are clipped."""
+        return self.white - self.black.value
+
+    def above_black(self, image: Image | Float32) -> Float32:
+        """Return grey levels (H, W) above black.
+
+        A codec leaves clipped pixels a little above full scale, where no twin can be.
+        """
+        above = image.astype(np.float32) - np.float32(self.black.value)
+        return np.asarray(np.minimum(above, np.float32(self.full_scale)), np.float32)
 
     @property
     def polynomial(self) -> tuple[float, float, float]:

@@ -62,7 +62,7 @@ class TwinFrame:
     def brighter(self, factor: float | Float32, noise: CameraNoise) -> TwinFrame:
         """Return the frame with another exposure, or seen through a window that lets pass (H, W)."""
         scale = np.full((1, 1), factor, np.float32) if isinstance(factor, float) else factor
-        white = np.float32(noise.white - noise.black.value)
+        white = np.float32(noise.full_scale)
         level, variance = _brighter(self.level, self.variance, scale, white, *noise.polynomial)
         return replace(self, level=level, variance=variance)
 
@@ -120,7 +120,7 @@ class Renderer:
         if light == Illumination.BOTH and state.line is None:
             near = self.scene.line(self.scene.pose(frame))
             made.region[near.row, near.column] = Region.UNSEEN
-        white = np.float32(state.noise.white - state.noise.black.value)
+        white = np.float32(state.noise.full_scale)
         _finish(
             made.level, made.variance, made.region, state.outside, state.edge, white, *state.noise.polynomial
         )

@@ -50,9 +50,7 @@ class Sums:
     def add(self, frame: int, kind: Illumination, image: Image) -> None:
         """Compare a frame (H, W) with its twin."""
         noise, self._light[frame] = self._state.noise, kind
-        white = noise.white - noise.black.value
-        # A codec leaves clipped pixels a little above full scale, where no twin can be.
-        above = np.minimum(image.astype(np.float32) - np.float32(noise.black.value), np.float32(white))
+        white, above = noise.full_scale, noise.above_black(image)
         before = self._renderer.frame(frame, kind)
         gain, aside = self._state.gain_map, self._state.aside
         bent = before.drawn_aside(aside)
@@ -131,14 +129,14 @@ class Sums:
         for frame, image in recording.read(frames, "grey"):
             if image is None:
                 continue
-            above = image.astype(np.float32) - np.float32(noise.black.value)
+            above = noise.above_black(image)
             twin = self._renderer.frame(frame, self._light[frame])
             twin = twin if gain is None else twin.brighter(gain, noise)
             exposure = float(np.exp(exposure_of(above, twin)))
             yield (
                 frame,
                 Shown(
-                    above, twin.brighter(exposure, noise), above < noise.white - noise.black.value,
+                    above, twin.brighter(exposure, noise), above < noise.full_scale,
                     self._scene, partial(self._again, frame, exposure),
                     partial(self._renderer.frame, frame, Illumination.LED), self.whole.direction(frame),
                     frame,

@@ -93,5 +93,18 @@ def test_a_ring_that_does_not_tremble_denies_that_the_camera_does(ring_trembles:
     T_pc[:, :2, 3], T_pc[:, 2, 3] = sway + shaken, 0.6 * number
     axis = straight_axis(-50, 300)
     run = Trajectory(number, number / 30, T_pc, np.zeros((200, 6, 6)), axis, 50.0, 1.0, 0.0, 0.0, ())
-    rings = SeenCentres(number[::2], -(sway + ring_trembles * shaken)[::2], 22.0)
+    rings = SeenCentres(-(sway + ring_trembles * shaken)[::2], 22.0)
     assert rings.deny_trembling(run, number[1::2]) is denied
+
+
+def test_rings_of_a_probe_that_jerks_deny_nothing() -> None:
+    """Jerks hide what rings tremble by. That it came out as 0 had denied trembling in one of four runs."""
+    number, axis = np.arange(40), straight_axis(-50, 300)
+    for seed in range(20):
+        random = np.random.default_rng(seed)
+        jerks = np.cumsum(np.cumsum(np.cumsum(0.2 * random.standard_normal((40, 2)), 0), 0), 0)
+        T_pc = np.tile(np.eye(4), (40, 1, 1))
+        T_pc[:, :2, 3] = jerks + 0.1 * random.standard_normal((40, 2))
+        T_pc[:, 2, 3] = 0.6 * number
+        run = Trajectory(number, number / 30, T_pc, np.zeros((40, 6, 6)), axis, 50.0, 1.0, 0.0, 0.0, ())
+        assert not SeenCentres(-T_pc[::2, :2, 3], 22.0).deny_trembling(run, number[1::2])

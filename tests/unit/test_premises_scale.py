@@ -10,7 +10,7 @@ import pytest
 
 from pipeline.errors import UnusableError
 from pipeline.recording.base import Encoder, PipeFacts
-from stages.premises.light import Steps
+from stages.premises.losses import Steps
 from stages.premises.scale import encoder_factor
 from tests.drawn_run import BASELINE, RADIUS
 from tests.premises_run import checked

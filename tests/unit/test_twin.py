@@ -155,6 +155,15 @@ def test_exposure_and_blocks_are_relative_to_the_twin():
     assert np.isnan(block_ratios(recorded, _frame(level, Region.UNSEEN), 1e9)).all()
 
 
+def test_pixels_that_a_codec_leaves_above_full_scale_count_as_clipped():
+    """Frames rendered again to judge names had counted what it scatters there as light."""
+    one = Figure(1.0, 0.0)
+    camera = CameraNoise(Figure(16.0, 0.0), 235.0, one, one, one, one)
+    seen = camera.above_black(np.array([[16, 120, 235, 241]], np.uint8))
+    assert seen.tolist() == [[0.0, 104.0, 219.0, 219.0]]
+    assert camera.full_scale == 219.0
+
+
 def test_chi_square_is_one_for_noise_and_more_for_a_difference():
     level, random = _level(), np.random.default_rng(1)
     recorded = (level + 2 * random.standard_normal(level.shape)).astype(np.float32)
