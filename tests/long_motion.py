@@ -13,6 +13,7 @@ from pipeline.machine.scratch import Scratch
 from stages.motion.bore import ONE_BORE
 from stages.motion.encoder import EncoderReadings
 from stages.motion.parameters import MotionParameters
+from stages.motion.rings import RingCircles
 from stages.motion.tracking.landmarks import OBSERVATION, ObservationStore, TrackedPoses
 from stages.motion.tracking.strips import StripGrid
 from stages.motion.tracking.tracker import TrackedTexture
@@ -54,7 +55,9 @@ def long_motion(
     texture = TrackedTexture(store, grid, TrackedPoses(lit, guess[lit], np.zeros(len(lit), bool)))
     distance = step_mm * k / SCALE + ENCODER_SIGMA_MM * random.standard_normal(frames)
     encoder = EncoderReadings(distance - distance[0], ENCODER_SIGMA_MM, np.ones(frames, bool))
-    return LongMotion(MeasuredRun(texture, rings, laser, k / 30, guess, encoder, probe, ONE_BORE), T_pc)
+    circles = RingCircles(laser, np.zeros((len(laser), 2)), np.full(len(laser), RADIUS))
+    run = MeasuredRun(texture, rings, laser, k / 30, guess, encoder, probe, ONE_BORE, circles)
+    return LongMotion(run, T_pc)
 
 
 def _poses(z_mm: Float) -> Float:

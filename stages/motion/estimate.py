@@ -28,7 +28,7 @@ from stages.motion.loops.loop_closure import close_loops
 from stages.motion.loops.revisits import Passage, WallFeatures, bands_in_rings, texture_at
 from stages.motion.measuring import measure_run, places_of
 from stages.motion.parameters import MotionParameters
-from stages.motion.rings import circles_in_rings, looking_at_wall
+from stages.motion.rings import looking_at_wall
 from stages.motion.route.laying import lay_route
 from stages.motion.tracking.strips import WallView
 from stages.motion.trajectory import (
@@ -71,12 +71,12 @@ def estimate_motion(
     check = partial(_require_convergence, run.texture.grid.radius_mm)
     estimate = adjust_run(run, parameters, check, context.progress)
     distance = distance_along(estimate.joined.axis, estimate.joined.T_pc)
-    grid, lit = run.texture.grid, run.texture.poses.frames
+    grid, lit, circles = run.texture.grid, run.texture.poses.frames, run.circles
     passage = Passage.of(lit, distance[lit], grid.near_mm, grid.far_mm)
     at_rings = distance[places_of(recording, points.frame)] + probe.laser.baseline_mm
 
     def features(passage: Passage) -> WallFeatures:
-        bands_mm = bands_in_rings(at_rings, circles_in_rings(points).radius_mm)
+        bands_mm = bands_in_rings(at_rings, circles.radius_mm)
         observations = run.texture.store.spool.parts(_OBSERVATIONS_AT_ONCE)
         return WallFeatures(texture_at(passage.frame, observations), bands_mm)
 
@@ -88,7 +88,6 @@ def estimate_motion(
     trajectory = trajectory_of(joined, recording.frames, probe, has_encoder)
     trajectory = lay_route(trajectory, joined.turn_variance, recording, probe, context)
     events = find_events(recording.frames, trajectory, run.texture.poses, joined.slip, has_encoder)
-    circles = circles_in_rings(points)
     seen = SeenCentres(circles.centre_c, probe.laser.baseline_mm)
     report_motion(context, estimate, run.texture, trajectory, seen, wider)
     require_along_pipe(trajectory)

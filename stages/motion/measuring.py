@@ -77,7 +77,7 @@ def measure_run(
         jump = None
     time_s = recording.frames.time_s
     return MeasuredRun(
-        followed.texture, rings, place, time_s, followed.T_pc, encoder, probe, bore, jump=jump
+        followed.texture, rings, place, time_s, followed.T_pc, encoder, probe, bore, circles, jump=jump
     )  # fmt: skip
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from concurrent.futures import ThreadPoolExecutor
 from typing import TypeVar
 
 import numpy as np
@@ -105,9 +104,7 @@ def photograph_wall(
             grid, surface, probe, views, plan, stretch.tiles, light, parameters.laser_band_mm,
             parameters.left_out, picture,
         )  # fmt: skip
-        with ThreadPoolExecutor(context.workers) as pool:
-            for view, image in images.read(stretch.wanted, read_split):
-                mosaic.add(view, image, pool)
+        mosaic.fill(images.read(stretch.wanted, read_split), context.workers)
     _report_light(lights, context)
     return _flat_picture(picture, grid, parameters.white_quantile, context)
 

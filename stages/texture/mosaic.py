@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Sequence
-from concurrent.futures import Executor
+from collections.abc import Iterator, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
@@ -74,15 +74,23 @@ class Mosaic:
         self._most_views = max((len(plan[tile].views) for tile in tiles), default=0)
         self._picture = picture
 
-    def add(self, view: int, image: SplitImage | None, pool: Executor) -> None:
-        """Sample one view, in order, into every tile that wants it; None when there is no such image."""
-        tiles = self._tiles_of[view]
-        for tile in tiles:
-            self._ensure_open(tile)
-        if image is not None and np.isfinite(self._light.gain[view]):
-            list(pool.map(lambda tile: self._sample(tile, view, image), tiles))
-        done = [tile for tile in tiles if self._plan[tile].views[-1] == view]
-        list(pool.map(self._close, done))
+    def fill(self, images: Iterator[tuple[int, SplitImage | None]], threads: int) -> None:
+        """Sample views, in order, into every tile that wants them; None where there is no such image.
+
+        A tile takes its views one after the other, but does not wait for other tiles: two views at a time are
+        worked on.
+        """
+        latest: dict[int, Future[None]] = {}
+        before: list[Future[None]] = []
+        with ThreadPoolExecutor(threads) as pool:
+            for view, image in images:
+                tiles = self._tiles_of[view]
+                for tile in tiles:
+                    self._ensure_open(tile)
+                    latest[tile] = pool.submit(self._take, tile, view, image, latest.get(tile))
+                _wait(before)
+                before = [latest[tile] for tile in tiles]
+            _wait(before)
 
     def _ensure_open(self, tile: int) -> None:
         if tile not in self._open:
@@ -90,6 +98,15 @@ class Mosaic:
             if not self._spare:
                 self._spare.append(TileStack(self._most_views, self._grid.tile_rows, self._grid.columns))
             self._open[tile] = patch, self._spare.pop()
+
+    def _take(self, tile: int, view: int, image: SplitImage | None, before: Future[None] | None) -> None:
+        """Sample a view into a tile once the view before is in, and blend the tile after its last."""
+        if before is not None:
+            before.result()
+        if image is not None and np.isfinite(self._light.gain[view]):
+            self._sample(tile, view, image)
+        if self._plan[tile].views[-1] == view:
+            self._close(tile)
 
     def _sample(self, tile: int, view: int, image: SplitImage) -> None:
         patch, stack = self._open[tile]
@@ -109,3 +126,8 @@ class Mosaic:
         rows = slice(self._tiles[tile].first_row, self._tiles[tile].last_row)
         inside = rows.stop - rows.start
         self._picture.colour[rows], self._picture.count[rows] = colour[:inside], count[:inside]
+
+
+def _wait(tasks: Sequence[Future[None]]) -> None:
+    for task in tasks:
+        task.result()

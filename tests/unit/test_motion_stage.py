@@ -256,6 +256,7 @@ def test_what_does_not_agree_is_followed_anew() -> None:
     seen = Strip(
         0, strip, np.ones_like(strip, bool), np.zeros((21, 101, 2), np.float32), np.ones(80, np.float32)
     )
-    assert tracker._record(found, seen, 1)[1]
+    tracker._record(found, seen, 1)
+    assert found.lost
     assert tracker._map.retired.all()
-    assert not tracker._record(replace(found, offset=0 * away), seen, 1)[1], "the control: these agree"
+    assert not replace(found, offset=0 * away).lost, "the control: these agree"

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import cached_property
 
 import cv2
 import numpy as np
@@ -93,7 +94,7 @@ class _Matched:
     offset: Float
     sigma: Float
 
-    @property
+    @cached_property
     def agreeing(self) -> float:
         """Return the share of landmarks in view that were found and moved like the next one around the pipe.
 
@@ -103,6 +104,16 @@ class _Matched:
         around = np.argsort(self.at[self.good, 1], kind="stable")
         apart = np.abs(np.diff(self.offset[self.good][around], axis=0)).max(1, initial=0.0)
         return float(np.sum(apart < _AGREEING_PX)) / max(in_view, 1)
+
+    @cached_property
+    def lost(self) -> bool:
+        """Whether too few were found, or too few of them move alike, to tell how the camera moved."""
+        return bool(self.good.sum() < _FEWEST or self.agreeing < _FEWEST_AGREEING)
+
+    @cached_property
+    def drift(self) -> Float:
+        """Common displacement (2,), rows and columns; 0 where they are lost."""
+        return np.zeros(2) if self.lost else np.median(self.offset[self.good], 0)
 
 
 class TextureTracker:
@@ -130,13 +141,12 @@ class TextureTracker:
     def follow(self, frame: int, image: Image, T_pc: Float, aside: Executor) -> Float:
         """Track one frame's softened picture from its predicted pose and return the better pose (4, 4).
 
-        New landmarks are started ``aside``, while the next frame is unrolled.
+        What was found is recorded and new landmarks are started ``aside``, while the next frame is unrolled.
         """
         T_pc, strip, found = self._located(frame, image, T_pc)
-        drift, lost = self._record(found, strip, frame)
-        T_better = self._shifted(T_pc, drift)
-        self._renewal = aside.submit(self._renew, strip, frame, drift)
-        self._poses.append((frame, T_better, lost))
+        T_better = self._shifted(T_pc, found.drift)
+        self._renewal = aside.submit(self._renew, found, strip, frame)
+        self._poses.append((frame, T_better, found.lost))
         self._last = strip
         return T_better
 
@@ -190,29 +200,28 @@ class TextureTracker:
         inside = (row >= 0) & (row < len(whole))
         return np.asarray(inside & whole[np.where(inside, row, 0), np.mod(column, whole.shape[1])])
 
-    def _record(self, found: _Matched, strip: Strip, frame: int) -> tuple[Float, bool]:
-        """Store the pixels of matched landmarks; return their common displacement (2,) and if it is lost."""
+    def _record(self, found: _Matched, strip: Strip, frame: int) -> None:
+        """Store the pixels of matched landmarks, and where they are beside their common displacement."""
         m, good = self._map, found.good
         index = found.landmark[good]
         # A patch hidden under the laser line or outside the picture does not count as missed.
         missing = ~good & np.isfinite(found.at[:, 0])
         m.misses[found.landmark] = np.where(good, 0, m.misses[found.landmark] + missing)
         m.retired[found.landmark] |= m.misses[found.landmark] > _MOST_MISSES
-        if len(index) < _FEWEST or found.agreeing < _FEWEST_AGREEING:
+        if found.lost:
             # They are elsewhere: what is seen now is followed anew, or later frames would not agree either.
             m.retired[index] = True
-            return np.zeros(2), True
+            return
         at = found.at[good]
         sigma = np.maximum(found.sigma[good], _LEAST_SIGMA) * _px_per_sample(strip, at)
         start = np.stack([m.row, m.column], -1)[index]
         self._store.add(m.number[index], frame, strip.pixel(at[:, 0], at[:, 1]), sigma, start)
-        drift = np.median(found.offset[good], 0)
-        m.offset[index] += found.offset[good] - drift
-        return drift, False
+        m.offset[index] += found.offset[good] - found.drift
 
-    def _renew(self, strip: Strip, frame: int, drift: Float) -> None:
-        """Start landmarks in the free cells of a strip, and put those that are no longer seen away."""
-        self._start_landmarks(strip, frame, drift)
+    def _renew(self, found: _Matched, strip: Strip, frame: int) -> None:
+        """Record what was found, start landmarks in free cells, and put those no longer seen away."""
+        self._record(found, strip, frame)
+        self._start_landmarks(strip, frame, found.drift)
         if self._map.has_many_retired:
             self._store.write(self._map.drop_retired())
 

@@ -15,7 +15,7 @@ from stages.motion.bundle_adjustment.laser_knock import RingJump
 from stages.motion.bundle_adjustment.unknowns import State, straight_start
 from stages.motion.encoder import EncoderReadings
 from stages.motion.parameters import MotionParameters
-from stages.motion.rings import RingBins, ring_bins
+from stages.motion.rings import RingBins, RingCircles, ring_bins
 from stages.motion.tracking.landmarks import Tracks
 from stages.motion.tracking.tracker import TrackedTexture
 from stages.motion.windows.submaps import Window
@@ -42,6 +42,8 @@ class MeasuredRun:
         As stated.
     bore : Bore
         Of the straightened pipe.
+    circles : RingCircles
+        Through the rings.
     image_scale : (N,) or None
         By how many times the pictures are larger than the probe's camera has them, where that drifts.
     jump : RingJump or None
@@ -58,6 +60,7 @@ class MeasuredRun:
     encoder: EncoderReadings | None
     probe: Probe
     bore: Bore
+    circles: RingCircles
     image_scale: Float | None = None
     jump: RingJump | None = None
     knock: LaserKnock | None = None
