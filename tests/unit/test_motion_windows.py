@@ -13,7 +13,8 @@ from pipeline.geometry.axis import PipeAxis, straight_axis
 from pipeline.geometry.rigid import from_parts, inverse, rotation_from_vector, transform, vector_from_rotation
 from pipeline.machine.scratch import Scratch
 from stages.motion.parameters import MotionParameters
-from stages.motion.tracking.landmarks import ObservationStore
+from stages.motion.tracking.landmarks import ObservationStore, Tracks
+from stages.motion.tracking.tracker import TrackedTexture
 from stages.motion.windows.error_chain import ErrorChain, Link
 from stages.motion.windows.first_window import with_shared_error
 from stages.motion.windows.sliding_window import RunEstimate, adjust_run
@@ -28,6 +29,7 @@ from stages.motion.windows.submaps import (
     fuse_shared,
     handover,
 )
+from tests.drawn_run import small_probe
 from tests.long_motion import LongMotion, long_motion
 
 FRAMES, SHARED = 240, 3
@@ -220,6 +222,30 @@ def test_matches_share_more_of_their_error_where_they_disagree_by_more() -> None
     assert with_shared_error(usual, 0.14) is usual
     assert with_shared_error(usual, 0.6).match_bias_px == pytest.approx(0.2)
     MotionParameters.model_validate(with_shared_error(usual, 50.0).model_dump())
+
+
+class Lagging(TrackedTexture):
+    """Texture as a hasty codec shows it: noisy, and moved too little where it is far ahead."""
+
+    def between(self, first: int, last: int) -> Tracks:
+        tracks, camera = super().between(first, last), small_probe().camera
+        away = tracks.uv - camera.centre_px
+        lag_px = np.clip((np.radians(45) - tracks.polar_angle(camera)) / np.radians(7), 0, 1)
+        noise = 0.4 * np.random.default_rng(1).standard_normal(away.shape)
+        lag = lag_px[:, None] * away / np.linalg.norm(away, axis=1, keepdims=True)
+        return replace(tracks, uv=tracks.uv - lag + noise)
+
+
+def test_texture_that_lags_far_ahead_does_not_lengthen_the_way(monkeypatch: pytest.MonkeyPatch) -> None:
+    drawn = long_motion(100, 0.6, 4.0)
+    texture = drawn.run.texture
+    run = replace(drawn.run, encoder=None, texture=Lagging(texture.store, texture.grid, texture.poses))
+    off = []
+    for farthest in (np.radians(45), 0.0):
+        monkeypatch.setattr("stages.motion.windows.first_window._FARTHEST_RAD", farthest)
+        found = estimated(replace(drawn, run=run), 100, 20).joined.T_pc
+        off.append(difference(found, drawn.T_pc)[-1, 2] / np.ptp(drawn.T_pc[:, 2, 3]))
+    assert abs(off[0]) < 0.3 * abs(off[1]), off
 
 
 def test_unsure_heading_does_not_become_roll_where_the_way_turns() -> None:

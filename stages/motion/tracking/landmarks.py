@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.arrays import Bool, Float, Int
+from pipeline.instrument.camera import Camera
 from pipeline.machine.scratch import Scratch, Spool
 from stages.motion.tracking.patches import Patches
 
@@ -148,6 +149,10 @@ class Tracks:
         landmark = (np.cumsum(often) - 1)[self.landmark[keep]]
         parts = self.frame[keep], self.uv[keep], self.sigma_px[keep], self.xyz[often], self.poses
         return Tracks(landmark, *parts), often
+
+    def polar_angle(self, camera: Camera) -> Float:
+        """Return the angles (M,), rad, between the rays of the observations and the optical axis."""
+        return np.asarray(np.arccos(np.clip(camera.unproject(self.uv).ray[:, 2], -1, 1)))
 
     def reduced(self, times: Float, centre_px: Float) -> Tracks:
         """Return the tracks seen in pictures that were so many times (N,) too large about their centre."""

@@ -50,6 +50,8 @@ class MeasuredRun:
         Where the rings jump.
     knock : LaserKnock or None
         What the laser did there.
+    farthest_rad : float
+        Smallest polar angle of matches that count.
     """
 
     texture: TrackedTexture
@@ -64,6 +66,7 @@ class MeasuredRun:
     image_scale: Float | None = None
     jump: RingJump | None = None
     knock: LaserKnock | None = None
+    farthest_rad: float = 0.0
 
     @property
     def whole(self) -> Window:
@@ -80,6 +83,8 @@ class MeasuredRun:
         tracks = _behind(self.texture.between(window.first, window.last), self.start_mm(window))
         if self.image_scale is not None:
             tracks = tracks.reduced(self.image_scale[part], self.probe.camera.centre_px)
+        if self.farthest_rad:
+            tracks = tracks.some(tracks.polar_angle(self.probe.camera) >= self.farthest_rad)[0]
         encoder = _since_first(self.encoder, part)
         return Measurements.of(tracks, bins, self.time_s[part], encoder, self.probe)
 
