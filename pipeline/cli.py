@@ -148,6 +148,7 @@ def run(
 ) -> None:
     """Turn a recording into a run folder: model, measurements, defects and report."""
     typer.echo(f"Opening {recording}", err=True)  # at once: what is imported next takes seconds
+    gc.disable()  # what is imported stays: looking for garbage in it takes a fiftieth of a run
     from rich.console import Console
 
     from pipeline.api.dirt import dirt_of
@@ -157,7 +158,8 @@ def run(
     from pipeline.machine.plan import Selection
     from pipeline.system.kernels import compiled_ahead
 
-    gc.freeze()  # what was imported stays: looking for garbage in it takes a fiftieth of a run
+    gc.freeze()
+    gc.enable()
     console = Console(stderr=True)
     parameters = configuration(config, [*dirt_of(twin), *(assignments or ())])
     if follow:

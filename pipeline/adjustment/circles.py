@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.adjustment.robust import robust_spreads
+from pipeline.adjustment.robust import robust_spreads, row_median
 from pipeline.arrays import Bool, Float, Float32
 
 LEAST_COVERED = 0.3
@@ -48,7 +48,7 @@ def _circles(xy: Float) -> tuple[Float, Float]:
     out = np.full((len(xy), 3), np.nan)
     if usable.any():
         distance = np.where(seen, np.linalg.norm(xy, axis=-1), np.nan)[usable]
-        near = distance < _FARTHEST_SAMPLE * np.nanmedian(distance, axis=1)[:, None]
+        near = distance < _FARTHEST_SAMPLE * row_median(distance)[:, None]
         out[usable] = _robust_circles(np.where(seen[..., None], xy, 0.0)[usable], near)
     centre = out[:, :2] / 2
     return centre, np.sqrt(out[:, 2] + np.sum(centre**2, 1))
@@ -75,14 +75,14 @@ def _start(xy: Float, near: Bool) -> tuple[Float, Float]:
     """
     found, azimuths = _fitted(xy, near), near.shape[1]
     most = np.full(len(xy), np.inf)
-    least = _CLEARLY * np.nanmedian(np.abs(_off(xy, found, near)), axis=1)
+    least = _CLEARLY * row_median(np.abs(_off(xy, found, near)))
     for first in range(0, azimuths, max(azimuths // _ARCS, 1)):
         arc = np.zeros(azimuths, bool)
         arc[np.arange(first, first + azimuths // _ARC) % azimuths] = True
         enough = (near & arc).sum(1) > max(azimuths // _ARC / 2, _FEWEST)
         other = _fitted(xy, np.where(enough[:, None], near & arc, near))
         off = _off(xy, other, near)
-        size = np.nanmedian(np.abs(off), axis=1)
+        size = row_median(np.abs(off))
         better = enough & (size < least)
         found[better], least[better] = other[better], size[better]
         most[better] = _AMONG * robust_spreads(off[better][:, arc], axis=1)

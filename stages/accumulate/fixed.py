@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import label
 
-from pipeline.adjustment.robust import robust_spread
+from pipeline.adjustment.robust import robust_spread, row_median
 from pipeline.arrays import Float, Int
 from pipeline.artefacts.wall_map import FixedPlace, FixedToProbe
 from pipeline.machine.scratch import Scratch
@@ -101,7 +101,7 @@ def _blocks_of(survey: RingSurvey, rings: Int, length_mm: float) -> _Blocks:
 def _median(rows: Float) -> Float:
     """Return the medians (K,) of what is known in rows (n, K); NaN where less than half of them is."""
     known = np.isfinite(rows).sum(0)
-    middle = np.nanmedian(np.where(known > 0, rows, 0.0), axis=0)
+    middle = row_median(np.where(known > 0, rows, 0.0).T)
     return np.where(2 * known > len(rows), middle, np.nan)
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.adjustment.robust import robust_spread
+from pipeline.adjustment.robust import robust_spread, row_median
 from pipeline.arrays import Float
 from pipeline.artefacts.measured import RingSamples
 from pipeline.machine.stage import Context
@@ -102,7 +102,7 @@ def _mean_known(values: Float) -> Float:
 def _median(values: Float) -> Float:
     """Return the medians (A,) of known values (F, A); NaN where fewer than half are known."""
     out, known = np.full(values.shape[1], np.nan), np.isfinite(values).mean(0) >= 0.5
-    out[known] = np.nanmedian(values[:, known], axis=0)
+    out[known] = row_median(values[:, known].T)
     return out
 
 
