@@ -35,6 +35,15 @@ def root_mean_square(values: Float) -> float:
     return float(np.sqrt(np.mean(np.square(values))))
 
 
+def left_out_sd(without: Float) -> Float:
+    """Return the 1 σ (...) of a figure by what it is without each of N parts of the data (N, ...).
+
+    The jackknife (B. Efron, "The jackknife, the bootstrap and other resampling plans", 1982).
+    """
+    parts = len(without)
+    return np.asarray(np.sqrt((parts - 1) / parts * ((without - without.mean(0)) ** 2).sum(0)))
+
+
 def cluster_sums(scores: Float, cluster: Int) -> Float:
     """Return the sums (C, K) of scores (M, K) over the clusters, by ascending number of ``cluster`` (M,)."""
     from scipy.sparse import csr_matrix  # loaded where it is needed: a spread alone does without

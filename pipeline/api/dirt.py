@@ -49,7 +49,7 @@ def dirt_of(twin: Path | str | None) -> tuple[str, ...]:
 
 def _moves_line(found: dict[str, Any], radius_px: float) -> bool:
     """Return whether what is on the window moves the line: a drop, or a rim that is steep for its width."""
-    if found["name"] in (None, "glint"):
+    if found["name"] is None or "glint" in found["name"].split(" or "):
         return bool(found["channel"] == "line")  # the LEDs mirrored somewhere do not show in laser frames
     share = found["parameters"].get("share")
     if share is None:

@@ -34,10 +34,8 @@ from stages.twin.name import (
     cannot_tell,
     clipped,
     left_over,
-    maps_of,
     noise_figures,
     state_figures,
-    worst_places,
 )
 from stages.twin.on_wall import unnamed
 from stages.twin.pixels import defective_pixels
@@ -46,6 +44,7 @@ from stages.twin.scene import Scene, scene_of
 from stages.twin.state import PhotometricState, Sampled, clipped_line, estimate_state, sample_frames
 from stages.twin.sums import Sums
 from stages.twin.window import beside_blur
+from stages.twin.worst import maps_of, worst_places
 
 _EVERY = 10
 _COLOURED = 3
@@ -264,7 +263,7 @@ def _report(comparison: Comparison, found: tuple[Mismatch, ...], context: Contex
 
 PHOTOMETRY = Stage(
     "photometry",
-    "11",
+    "12",
     PhotometryParameters,
     measure_photometry,
     "camera noise, lamps, laser line, blur and dirt on the window, from the frames of a run",

@@ -35,6 +35,9 @@ _REACH_PX, _MORE, _FEWEST, _SURE = 16.0, 2, 3, 3.0
 which spots must come back more often on the wall than in the image, or less, to tell to which they are fixed;
 fewest frames; and σ by which other frames must bear it out."""
 
+_OR_DROP = ", or a drop on the window bends light of the line to it"
+"""A drop that is not told by lit wall, which it draws aside, may still show in the dark beside the line."""
+
 
 @dataclass(frozen=True)
 class Spot:
@@ -154,11 +157,13 @@ class SpotsOfFrames:
         )
         brightest = max(group, key=lambda s: s.grey)
         said, place = self._place(order, middle, max(spread, 1.0), radius)
+        or_drop = fixed_to != "wall" and self.light == Illumination.LASER
+        name, drop = ("glint or droplet", _OR_DROP) if or_drop else ("glint", "")
         return Mismatch(
-            "glint", "line" if self.light == Illumination.LASER else "intensity", fixed_to, place, (size,),
+            name, "line" if self.light == Illumination.LASER else "intensity", fixed_to, place, (size,),
             chance, float((value**2 / variance).mean()), float(((value - other) ** 2 / variance).mean()),
             f"{said} a spot is far brighter than foretold, in {_frames_of(group)} of {len(value)} frames "
-            "that show the place: the wall mirrors a lamp there.",
+            f"that show the place: the wall mirrors a lamp there{drop}.",
             Look(brightest.frame, *brightest.image, 4 * brightest.radius_px),
         )  # fmt: skip
 

@@ -89,9 +89,15 @@ class LampLight:
         first, step = self.theta_rad[0], self.theta_rad[1] - self.theta_rad[0]
         index = np.clip((theta_rad - np.float32(first)) / np.float32(step), 0, len(self.theta_rad) - 1)
         log = map_coordinates(self.log_falloff.astype(np.float32), [np.nan_to_num(index)], order=1)
+        log += self.around(phi_rad)
+        return np.asarray(np.float32(self.level) * np.exp(log), np.float32)
+
+    def around(self, phi_rad: Float32) -> Float32:
+        """Return the logarithm (...) of light at image azimuths over its mean around the picture."""
+        log = np.zeros_like(phi_rad)
         for k, (basis, m) in enumerate(_around(_HARMONICS)):
             log += np.float32(self.pattern[k]) * basis(np.float32(m) * phi_rad)
-        return np.asarray(np.float32(self.level) * np.exp(log), np.float32)
+        return log
 
 
 def _around(harmonics: int) -> list[tuple[np.ufunc, int]]:

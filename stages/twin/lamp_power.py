@@ -15,9 +15,9 @@ from functools import partial
 import numpy as np
 from scipy.stats import t
 
+from pipeline.adjustment.robust import left_out_sd
 from pipeline.arrays import Float, Float32, Int
 from pipeline.artefacts.twin import Mismatch, NamedFigure
-from stages.twin.cells import centred
 from stages.twin.gate import Suspected
 from stages.twin.locate import FALSE_ALARM, full_size
 from stages.twin.reference import BlockSamples
@@ -41,11 +41,10 @@ def lamp_power(samples: BlockSamples | None) -> tuple[NamedFigure, ...]:
     told = _products(samples)
     if told[:, 1].sum() < _LEAST_WANDER**2 * len(samples.change):
         return ()
-    without = told.sum(0) - told
-    power, *others = (1 + float(a[0] / max(a[1], 1e-12)) for a in (told.sum(0), *without))
-    n = len(told)
-    spread = (n - 1) / n * float(np.sum((np.array(others) - power) ** 2))
-    return (NamedFigure("lamp_power", power, float(np.hypot(np.sqrt(spread), _OF_LIGHT))),)
+    whole, without = told.sum(0), told.sum(0) - told
+    power = 1 + float(whole[0] / whole[1])
+    spread = float(left_out_sd(without[:, 0] / np.maximum(without[:, 1], 1e-12)))
+    return (NamedFigure("lamp_power", power, float(np.hypot(spread, _OF_LIGHT))),)
 
 
 def power_of_lamps(samples: BlockSamples | None, ring: Ring) -> tuple[Suspected, ...]:
@@ -71,19 +70,9 @@ def power_of_lamps(samples: BlockSamples | None, ring: Ring) -> tuple[Suspected,
     return (Suspected(found, law, samples.number, told, lambda mean: np.array([1 + mean[0] / mean[1]])),)
 
 
-def _centred(samples: BlockSamples) -> tuple[Float, Float]:
-    """Return logarithms (N,) of light and brightness less means over image, wall and frames.
-
-    What is left of the light is by how much a place is lit otherwise than its photo was.
-    """
-    groups = samples.orders["image"], samples.orders["wall"], samples.frame
-    bright = np.log1p(np.maximum(samples.change, -0.99))
-    return centred(samples.log_light, *groups), centred(bright, *groups)
-
-
 def _products(samples: BlockSamples) -> Float:
     """Return of each frame (F, 2) the sums of light times brightness, and of light's square."""
-    light, bright = _centred(samples)
+    light, bright = samples.light_and_brightness
     frames = samples.frame.max() + 1
     return np.stack([np.bincount(samples.frame, light * a, frames) for a in (bright, light)], 1)
 
@@ -91,7 +80,7 @@ def _products(samples: BlockSamples) -> Float:
 def _other_light(samples: BlockSamples) -> Float32:
     """Return the logarithm (F, rows, columns) of the light of blocks over that of their photo."""
     out = np.zeros((samples.frame.max() + 1, samples.row.max() + 1, samples.column.max() + 1), np.float32)
-    out[samples.frame, samples.row, samples.column] = _centred(samples)[0]
+    out[samples.frame, samples.row, samples.column] = samples.light_and_brightness[0]
     return out
 
 

@@ -7,18 +7,22 @@ ratio and at angles that its place and the bore foretell; what gives others has 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
+from pipeline.adjustment.robust import left_out_sd
 from pipeline.arrays import Float, Int
 from pipeline.artefacts.twin import Mismatch, NamedFigure
-from stages.twin.cells import SECTORS, sector_azimuth_rad
+from stages.twin.cells import SECTORS, centred, sector_azimuth_rad
+from stages.twin.compare import BLOCK_PX
 from stages.twin.gate import Suspected
 from stages.twin.lamp_light import LampLight
 from stages.twin.laws import LED_AZIMUTHS, dim_share
+from stages.twin.reference import WALL_COLUMNS, BlockSamples
 from stages.twin.scene import Ring, Scene
 from stages.twin.state import PhotometricState
-from stages.twin.switched import dim_led, lamp_pattern
+from stages.twin.switched import dim_led, lamp_pattern, share_at
 
 _LEAST, _LEFT, _SURE = 0.012, 0.003, 5.0
 """Least amplitude of the first harmonic, relative; what a sound photo leaves of any; least in σ. Recordings
@@ -30,6 +34,11 @@ _OF_SECOND = 2.0
 _VARIES, _FEWEST_FRAMES = {"flicker": 0.02, "laser_flicker": 0.08}, 8
 """Spread of brightness from frame to frame that is named, twice what the compared frames need: the photo
 is made from the measured ones. Fewest of them."""
+_MOSTLY, _SURE_OF_WALL, _PARTS, _OVER_CELLS = 0.5, 3.0, 6, 4.0
+"""Share of an uneven pattern that the same wall must show at several places of the image, more than half;
+that in σ; parts of the frames of which each is left out once for that σ. By which the variance of the pattern
+on the same wall must exceed that within a cell, where wall that is paler on one side varies alike: the share
+is then too large by a quarter at most."""
 _WIDER = 1.8
 """1 σ of a spread by the median size of steps over that of a standard deviation: drawn, 20,000 times for each
 of 6 to 40 normal samples."""
@@ -70,6 +79,67 @@ def uneven_lamps(lamp: LampLight | None, scene: Scene, frame: Int) -> tuple[Susp
     )
     found = Mismatch("", "intensity", "image", (at,), (size,), nan, nan, nan, said, look)
     return (Suspected(found, lamp_pattern, frame, told),)
+
+
+def parted_from_wall(
+    uneven: Sequence[Suspected], lamp: LampLight | None, scene: Scene, samples: BlockSamples | None
+) -> tuple[tuple[Suspected, ...], tuple[Mismatch, ...]]:
+    """Return uneven lamps that wall seen at several places of the image bears out, and those withdrawn.
+
+    The wall's photo was made in the same light. A wall that is paler on one side and lamps that are brighter
+    there are told apart only where the same wall is seen at another azimuth, as when the probe rolls, or at
+    another polar angle, to which an LED sends another share: brightness that stays on the wall is granted.
+    """
+    if lamp is None or samples is None:
+        return (), tuple(_of_wall(one.mismatch, np.nan, np.inf) for one in uneven)
+    kept, withdrawn = [], []
+    for one in uneven:
+        size, sd = _beside_wall(one, lamp, scene, samples)
+        if size > max(_MOSTLY, _SURE_OF_WALL * sd):
+            kept.append(one)
+        else:
+            withdrawn.append(_of_wall(one.mismatch, size, sd))
+    return tuple(kept), tuple(withdrawn)
+
+
+def _of_wall(found: Mismatch, size: float, sd: float) -> Mismatch:
+    """Return uneven lamps that are withdrawn: wall seen twice denies them, or tells nothing."""
+    if size + _SURE_OF_WALL * sd < _MOSTLY:
+        said = (
+            "The wall's photo makes the lamps look uneven around the picture, but wall that is seen at "
+            "several places of the picture does not: the photo is too dark on one side."
+        )
+    else:
+        said = (
+            "The lamps look uneven around the picture, but a wall that is paler on one side looks alike "
+            "while the probe hardly rolls: it cannot be told. What to do: record once more with the probe "
+            "rolled."
+        )
+    return replace(found, statement=said)
+
+
+def _beside_wall(one: Suspected, lamp: LampLight, scene: Scene, samples: BlockSamples) -> tuple[float, float]:
+    """Return which share of uneven lamps the same wall shows at several places of the image, and its 1 σ."""
+    rows, columns = (BLOCK_PX * (a.max() + 1) for a in (samples.row, samples.column))
+    middle = (slice(BLOCK_PX // 2, rows, BLOCK_PX), slice(BLOCK_PX // 2, columns, BLOCK_PX))
+    theta, phi = (np.nan_to_num(a[middle])[samples.row, samples.column] for a in scene.polar[:2])
+    pattern = law = lamp.around(phi)
+    if one.mismatch.name == "led_dead":  # and nothing that sends the same share to every polar angle
+        lost, azimuth = one.told[0]
+        law = np.log1p(-np.float32(min(lost, 0.999)) * share_at(scene, float(azimuth), theta, phi))
+    groups, light = (samples.orders["wall"], samples.frame), samples.light_and_brightness[0]
+    values = (centred(np.asarray(a, float), *groups) for a in (law, samples.log_change + pattern))
+    # What another law of the lamps' distance makes of a probe that wanders is no pattern.
+    made, bright = (a - (a @ light) / max(float(light @ light), 1e-12) * light for a in values)
+    step = np.float32(2 * np.pi / WALL_COLUMNS)
+    within = float(np.mean((lamp.around(phi + step) - pattern) ** 2)) / 12
+    if made @ made < _OVER_CELLS * within * len(made):
+        return float("nan"), float("inf")
+    parts = samples.frame * _PARTS // (samples.frame.max() + 1)
+    sums = np.stack([np.bincount(parts, made * a, _PARTS) for a in (bright, made)], 1)
+    without = sums.sum(0) - sums
+    size, *others = ((a[0] / max(a[1], 1e-12)) for a in (sums.sum(0), *without))
+    return float(size), float(left_out_sd(np.array(others)))
 
 
 def _harmonics(lamp: LampLight, scene: Scene) -> tuple[Float, float]:

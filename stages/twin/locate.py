@@ -2,8 +2,10 @@
 
 The ratio of recorded to re-rendered brightness of blocks, its median over frames and freed of what is broad,
 is 1 but for noise. Its spread is read off the blocks as far from the image's middle, robustly: whatever
-makes them vary, alike neighbours and a photo that is poor far ahead included, is in it. The bound is that
-which the largest of so many normal numbers passes with the stated probability.
+makes them vary, alike neighbours and a photo that is poor far ahead included, is in it. Where a block differs
+more from frame to frame than that explains, as steep or glossy wall that passes by does, its own standard
+error counts. The bound is that which the largest of so many normal numbers passes with the stated
+probability.
 """
 
 from __future__ import annotations
@@ -124,7 +126,15 @@ def _stays(stack: Float32) -> tuple[Float32, Float32, Bool]:
         return middle, middle, known
     middle[known] = np.nanmedian(stack[:, known], axis=0)
     change = np.where(known, middle / _broad(middle, known) - 1, 0).astype(np.float32)
-    return change, _spread_of_rings(change, known), known
+    own = np.zeros(known.shape, np.float32)
+    own[known] = _error_of_median(stack[:, known])
+    return change, np.maximum(_spread_of_rings(change, known), own), known
+
+
+def _error_of_median(values: Float32) -> Float32:
+    """Return the standard error (N,) of the medians of values (F, N), NaN being none: of normal numbers."""
+    variance = np.nanvar(values, axis=0, ddof=1)
+    return np.asarray(np.sqrt(np.pi / 2 * variance / np.isfinite(values).sum(0)), np.float32)
 
 
 def _joined(beyond: Bool) -> list[Bool]:

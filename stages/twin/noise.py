@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import nnls
 
+from pipeline.adjustment.robust import left_out_sd
 from pipeline.arrays import Bool, Float, Float32, Image, Int
 from stages.twin.lamp_light import Figure
 
@@ -148,9 +149,7 @@ def photon_transfer(windows: list[NoiseWindows], black: Figure, white: float) ->
     if len(windows) < 2:
         return _camera_noise(whole, np.full(4, np.inf), black, white)
     without = np.array([_fitted(windows[:k] + windows[k + 1 :]) for k in range(len(windows))])
-    n = len(windows)
-    sd = np.sqrt((n - 1) / n * ((without - without.mean(0)) ** 2).sum(0))
-    return _camera_noise(whole, sd, black, white)
+    return _camera_noise(whole, left_out_sd(without), black, white)
 
 
 def _camera_noise(value: Float, sd: Float, black: Figure, white: float) -> CameraNoise:

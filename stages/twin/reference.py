@@ -17,7 +17,7 @@ import numpy as np
 from pipeline.adjustment.robust import spread_about_median
 from pipeline.arrays import Bool, Float, Float32, Int
 from pipeline.artefacts.twin import Look, Mismatch
-from stages.twin.cells import sigmas
+from stages.twin.cells import centred, sigmas
 from stages.twin.compare import BLOCK_PX, block_ratios, of_blocks
 from stages.twin.locate import ImagePlace
 from stages.twin.render import TwinFrame
@@ -81,6 +81,20 @@ class BlockSamples:
         image = self.row * (self.column.max() + 1) + self.column
         wall = self.along * WALL_COLUMNS + self.around
         return {"image": image, "wall": wall, "rows": self.frame * (self.row.max() + 1) + self.row}
+
+    @cached_property
+    def log_change(self) -> Float:
+        """(N,) logarithm of recorded over re-rendered brightness."""
+        return np.log1p(np.maximum(self.change, -0.99))
+
+    @cached_property
+    def light_and_brightness(self) -> tuple[Float, Float]:
+        """Logarithms (N,) of light and of brightness less their means over image, wall and frames.
+
+        What is left of the light is by how much a place is lit otherwise than its photo was.
+        """
+        groups = self.orders["image"], self.orders["wall"], self.frame
+        return centred(self.log_light, *groups), centred(self.log_change, *groups)
 
     @cached_property
     def _half(self) -> Int:

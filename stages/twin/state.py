@@ -25,6 +25,9 @@ _USUAL_WIDTH_PX = 1.2
 _ZONES = 4
 _FULL_SCALE = 250
 """Grey level of 255 from which a channel counts as clipped: coding moves clipped pixels by a few levels."""
+_MOST_CLIPPED = 0.25
+"""Share of the line's middle: a quarter that is clipped at half its light takes away an eighth, which is half
+of the smallest loss of a sector that is named."""
 _NOISE_FRAMES = 6
 _OUTSIDE_LEVEL, _EDGE_PX = 6.0, 8
 """Pixels that no lit frame shows brighter lie outside the view; the border is what lies this near to it."""
@@ -73,6 +76,11 @@ class PhotometricState:
     gain_map: Float32 | None = None
     aside: Float32 | None = None
     pattern: FixedPattern | None = None
+
+    @property
+    def line_is_clipped(self) -> bool:
+        """Whether so much of the line is clipped that its brightness tells hardly anything of its power."""
+        return self.line_clipped > _MOST_CLIPPED
 
     @property
     def shows_wall(self) -> tuple[Illumination, ...]:

@@ -17,7 +17,7 @@ from stages.twin.compare import Comparison, exposure_of
 from stages.twin.gate import judged
 from stages.twin.glints import SpotsOfFrames
 from stages.twin.lamp_power import power_of_lamps
-from stages.twin.lamps import uneven_lamps
+from stages.twin.lamps import parted_from_wall, uneven_lamps
 from stages.twin.locate import ImagePlace, told_once
 from stages.twin.name import focus_of, response_of
 from stages.twin.picture import WholePictures
@@ -92,8 +92,12 @@ class Sums:
         return tuple(m for spots in self.spots for m in spots.found())
 
     def cells(self) -> tuple[Cells | None, Cells | None]:
-        """Return the sectors of lit frames and of the line, for steady lamps and an even, steady laser."""
-        lit, line, state = self.lit.cells(), self.line.cells(), self._state
+        """Return the sectors of lit frames and of the line, for steady lamps and an even, steady laser.
+
+        A line that is clipped hardly tells how strong the laser is, and has none.
+        """
+        state = self._state
+        lit, line = self.lit.cells(), None if state.line_is_clipped else self.line.cells()
         if lit is not None and state.lamp is not None:
             lit = lit.on(-np.array([[state.lamp.gain.at(f)] for f in lit.frame]))
         if line is not None and state.line is not None:
@@ -108,20 +112,18 @@ class Sums:
 
         An LED that failed during the run leaves the lamps' mean pattern uneven, too, and is not told twice.
         """
-        again = partial(self._shown, recording)
+        again, lamp = partial(self._shown, recording), self._state.lamp
+        uneven = uneven_lamps(lamp, self._scene, self.whole.frames_of("blur"))
+        uneven, of_wall = parted_from_wall(() if led_failed else uneven, lamp, self._scene, samples)
         first = (
             *self.whole.suspected(self._state.sharpness),
             *response_of(samples, self._scene.ring),
             *power_of_lamps(samples, self._scene.ring),
-            *(
-                ()
-                if led_failed
-                else uneven_lamps(self._state.lamp, self._scene, self.whole.frames_of("blur"))
-            ),
+            *uneven,
         )
         kept, withdrawn = judged(first, again)
         focus, not_focus = judged(focus_of(self._state, self.whole, kept), again)
-        return (*kept, *focus), (*withdrawn, *not_focus)
+        return (*kept, *focus), (*withdrawn, *not_focus, *of_wall)
 
     def _shown(self, recording: Recording, frames: Int) -> Iterator[tuple[int, Shown]]:
         """Yield compared frames anew, with what renders them under other assumptions."""

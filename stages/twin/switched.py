@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
+from scipy.ndimage import map_coordinates
 
 from pipeline.arrays import Bool, Float, Float32
 from stages.twin.lamp_light import Figure, LampLight
@@ -243,14 +244,19 @@ def lamp_pattern(shown: Shown, told: Float) -> Pair:
 def dim_led(shown: Shown, told: Float) -> Pair:
     """Return a frame whose LED at an azimuth sends less, beside even light; ``told``: loss, azimuth."""
     even, scene = shown.again(lamp=_even), shown.scene
+    share = share_at(scene, float(told[1]), *scene.polar[:2])
+    return Pair(even, even * (1 - np.float32(told[0]) * share), shown.wall, "scale")
+
+
+def share_at(scene: Scene, azimuth_rad: float, theta_rad: Float32, phi_rad: Float32) -> Float32:
+    """Return the share of the light that an LED at an azimuth sends to polar angles and azimuths, alike."""
     theta = np.linspace(_NEAREST_RAD, np.pi / 2, _THETAS)
-    share = dim_share(scene.probe.lighting, float(told[1]), scene.ring.radius_mm, theta).mean(0)
-    wrapped = np.concatenate([share[:, -1:], share, share[:, :1]], 1).astype(np.float32)
-    column = (scene.polar[1] / (2 * np.pi) + 0.5) * share.shape[1] + 0.5
-    row = (np.nan_to_num(scene.polar[0]) - theta[0]) / (theta[1] - theta[0])
-    at = column.astype(np.float32), row.astype(np.float32)
-    lost = cv2.remap(wrapped, *at, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-    return Pair(even, even * (1 - np.float32(told[0]) * np.asarray(lost, np.float32)), shown.wall, "scale")
+    share = dim_share(scene.probe.lighting, azimuth_rad, scene.ring.radius_mm, theta).mean(0)
+    wrapped = np.concatenate([share[:, -1:], share, share[:, :1]], 1)
+    column = (phi_rad / (2 * np.pi) + 0.5) * share.shape[1] + 0.5
+    row = (np.nan_to_num(theta_rad) - theta[0]) / (theta[1] - theta[0])
+    found = map_coordinates(wrapped.astype(np.float32), [row, column], order=1, mode="nearest")
+    return np.asarray(found, np.float32)
 
 
 def _even(lamp: LampLight) -> LampLight:

@@ -17,14 +17,15 @@ from stages.twin.compare import BLOCK_PX, Comparison, block_ratios, exposure_of
 from stages.twin.lamp_light import Figure
 from stages.twin.line_light import LineSamples
 from stages.twin.locate import ImagePlace
-from stages.twin.name import _not_sharp, clipped, left_over
+from stages.twin.name import _not_sharp, cannot_tell, clipped, left_over
 from stages.twin.noise import CameraNoise, black_and_white, photon_transfer, windows_of
 from stages.twin.on_wall import unnamed
 from stages.twin.rays import wall_seen
 from stages.twin.reference import BlockSamples, in_image
 from stages.twin.render import Region, TwinFrame
 from stages.twin.scene import LineSight
-from stages.twin.state import clipped_line
+from stages.twin.state import PhotometricState, clipped_line
+from stages.twin.sums import Sums
 from tests.synthetic_wall import plain_bore
 
 BLACK = Figure(16.0, 0.1)
@@ -214,6 +215,16 @@ def test_clipping_is_counted_and_a_wide_line_held_against_a_lens_in_focus():
     for blur, told in ((0.8, 0), (2.2, 1)):
         line_light = SimpleNamespace(blur_px=Figure(blur, 0.1 * blur))
         assert len(_not_sharp(line_light, whole)) == told
+
+
+def test_a_line_that_is_clipped_tells_nothing_of_the_laser_and_that_is_said():
+    cells = SimpleNamespace(cells=lambda: "some")
+    for share, seen in ((0.1, "some"), (0.8, None)):
+        state = PhotometricState(
+            None, None, None, np.zeros(1), np.zeros(1), np.zeros(1), np.zeros(1), np.zeros(1), share
+        )
+        assert Sums.cells(SimpleNamespace(_state=state, lit=cells, line=cells)) == ("some", seen)
+        assert any("80 %" in said for said in cannot_tell(state)) == (seen is None)
 
 
 def test_a_line_clips_where_its_strongest_channel_does_whatever_its_grey():

@@ -11,10 +11,10 @@ from pipeline.instrument.probe import Lighting
 from pipeline.recording.base import Illumination
 from stages.twin.glints import SpotsOfFrames
 from stages.twin.lamp_light import Course, LampLight
-from stages.twin.lamps import flicker_of_measured, uneven_lamps
+from stages.twin.lamps import flicker_of_measured, parted_from_wall, uneven_lamps
 from stages.twin.laws import dim_share
 from stages.twin.on_wall import touching, unnamed
-from stages.twin.reference import BlocksOfFrames
+from stages.twin.reference import BlockSamples, BlocksOfFrames
 from stages.twin.render import Region, TwinFrame
 from stages.twin.scene import Ring
 from tests.synthetic_wall import plain_bore
@@ -139,6 +139,33 @@ def test_a_dim_led_is_told_from_lamps_that_shine_unevenly():
     (other,) = uneven_lamps(_lamp(0.2 * np.cos(2 * azimuth) + 0.05 * np.cos(azimuth)), SCENE, frames)
     assert other.mismatch.name == ""
     assert not uneven_lamps(_lamp(0 * azimuth), SCENE, frames)
+
+
+@pytest.mark.parametrize(("rolled_deg", "of", "kept"), [(40, "lamps", 1), (40, "photo", 0), (0, "lamps", 0)])
+def test_lamps_are_uneven_only_where_wall_seen_twice_says_so(rolled_deg, of, kept):
+    lamp, frames = _lamp(0.05 * np.cos(np.linspace(-np.pi, np.pi, 37)[:-1] + np.pi / 36)), 12
+    frame, row, column = (a.ravel() for a in np.mgrid[0:frames, 0:16, 0:24])
+    v, u = np.mgrid[0:128, 0:192].astype(np.float32)
+    phi, theta = np.arctan2(v - 64, u - 96), np.hypot(v - 64, u - 96) / 60
+    scene = SimpleNamespace(probe=SCENE.probe, ring=RING, polar=(theta, phi, None))
+    roll = np.radians(rolled_deg) * np.sin(frame)
+    at = phi[4::8, 4::8][row, column]
+    on_wall = np.mod(at + roll, 2 * np.pi)
+    # Either the lamps are as the twin has them, or its photo holds what they are not.
+    change = 0 * at if of == "lamps" else lamp.around(on_wall.astype(np.float32)) - lamp.around(at)
+    noise = 0.003 * np.random.default_rng(1).standard_normal(len(at))
+    along, around = (
+        (8 * np.hypot(row - 7.5, column - 11.5) + 4 * frame).astype(int),
+        (128 / 2 / np.pi * on_wall).astype(int),
+    )
+    samples = BlockSamples(
+        np.expm1(change + noise), 4 + 0 * at, 32 + 0 * at, frame, row, column, along, around, 0.0, 2.5,
+        np.arange(frames), row / 40, 0 * at,
+    )  # fmt: skip
+    suspected = uneven_lamps(lamp, scene, np.arange(8))
+    told, withdrawn = parted_from_wall(suspected, lamp, scene, samples)
+    assert (len(told), len(withdrawn)) == (kept, 1 - kept)
+    assert all(("too dark" in w.statement) == (of == "photo") for w in withdrawn)
 
 
 def test_lights_that_flicker_in_step_with_the_compared_frames_are_told_by_the_measured_ones():

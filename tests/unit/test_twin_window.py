@@ -184,6 +184,17 @@ def test_dirt_is_found_where_it_lies():
     assert np.median(whole) == 1
 
 
+def test_wall_that_differs_from_frame_to_frame_is_no_dirt():
+    random, ratios = np.random.default_rng(6), _ratios(np.random.default_rng(3))
+    assert len(ratios) < 20
+    wall = np.zeros(ratios[0].shape, np.float32)
+    wall[30:33, 40:43] = 1
+    differs = np.linspace(-0.16, 0.04, len(ratios))  # as corroded wall did that moved past: -6 % in the mean
+    random.shuffle(differs)
+    assert not places_in_image([r + np.float32(d) * wall for r, d in zip(ratios, differs, strict=True)])[0]
+    assert places_in_image([r - np.float32(0.06) * wall for r in ratios])[0]
+
+
 def test_a_photo_that_is_poor_far_ahead_is_no_dirt():
     random = np.random.default_rng(4)
     ratios = _ratios(random, (80, 30, 0.4))

@@ -1,0 +1,95 @@
+"""A spot in the image, fitted to what lit frames show about a place, and judged by other frames."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import least_squares
+from scipy.stats import t
+
+from pipeline.adjustment.robust import left_out_sd
+from pipeline.arrays import Float, Float32, Int
+from pipeline.artefacts.twin import NamedFigure
+from stages.twin.cells import sigmas
+
+WIDEST_PX = 48.0
+"""A place is looked at so far about its middle, or over two radii or this far beyond it if that is more. A
+spot is at most twice as wide."""
+_FLATNESS = (0.7, 5.0)
+"""Bounds of a spot's flatness: 1 is Gaussian, 2 has a flat middle and a steep rim, 5 is a disc."""
+_OF_LIGHT = 0.005
+"""1 σ of a share of the light for want of knowing the light about the spot: half of a photo's error."""
+_LEAST_WIDTH_PX, _MIDDLE = 2.0, 0.25
+"""Narrowest spot, 1 σ; the middle of a spot reaches to where a quarter of its depth is gone."""
+_PARTS = 6
+"""Parts of the frames of which each is left out once, for the σ of a spot: neighbours in time go together."""
+
+
+@dataclass(frozen=True)
+class FittedLaw:
+    """A law's size, and by how much χ² of frames (F,) falls with the size that other frames tell."""
+
+    fall: Float
+    size: NamedFigure
+
+    @property
+    def chance(self) -> float:
+        """The probability that chance makes χ² fall as much."""
+        return float(t.sf(sigmas(self.fall), len(self.fall) - 1))
+
+
+def fall_of_spot(sums: Float32, start: Float, beyond: float) -> FittedLaw:
+    """Return the spot that fits best, its depth as its size.
+
+    ``sums`` is (F, 2, h, w); ``start`` (K, 6) holds spots that the search starts from. Beside the spot the
+    law may act by up to ``beyond``, as where the photo has less texture: the spot's depth is relative to it.
+    The σ holds what leaving out parts of the frames changes, and by how much the spot's middle differs from
+    the fitted shape.
+    """
+    frames, fall = np.arange(len(sums)), np.zeros(len(sums))
+    whole = sums.sum(0)
+    best = _fitted_spot(whole, start, beyond)
+    for half in (frames % 2 == 0, frames % 2 == 1):
+        shape = _spot(_fitted_spot(sums[half].sum(0), best[None], beyond), sums.shape[2:])
+        fall[~half] = (2 * shape * sums[~half, 0] - shape**2 * sums[~half, 1]).sum((1, 2))
+    parts = np.array_split(frames, min(_PARTS, len(frames)))
+    fits = np.array([_fitted_spot(whole - sums[p].sum(0), best[None], beyond) for p in parts])
+    without = fits[:, 0] / (1 - fits[:, 5])
+    spread = float(left_out_sd(without))
+    shape = _spot(best, sums.shape[2:])
+    inside = (shape - best[5]) / (best[0] or 1e-9)
+    middle = np.exp(-0.5 * ((1 - inside) / _MIDDLE) ** 2)
+    weight = max(float((middle * whole[1]).sum()), 1e-9)
+    off = float((middle * (whole[0] - shape * whole[1])).sum()) / weight
+    sd = float(np.hypot(np.hypot(spread, off), _OF_LIGHT))
+    return FittedLaw(fall, NamedFigure("share", float(best[0] / (1 - best[5])), sd))
+
+
+def _spot(place: Float, shape: tuple[int, ...]) -> Float:
+    """Return a spot (h, w): d exp(−½ (r²/w²)^q) + b about a column and row, depth d, width w, flatness q."""
+    return _spot_at(place, *np.mgrid[: shape[0], : shape[1]][::-1])
+
+
+def _spot_at(place: Float, u: Int, v: Int) -> Float:
+    depth, at_u, at_v, width, flat, beside = place
+    square = ((u - at_u) ** 2 + (v - at_v) ** 2) / width**2
+    return np.asarray(depth * np.exp(-0.5 * square**flat) + beside)
+
+
+def _fitted_spot(sums: Float32, start: Float, beyond: float) -> Float:
+    """Return depth, column, row, width, flatness and rest of the spot that fits; ``sums`` is (2, h, w)."""
+    rows, columns = np.nonzero(sums[1] > 0)
+    weight = np.sqrt(sums[1][rows, columns].astype(float))
+    value = sums[0][rows, columns] / weight
+
+    def rest(p: Float) -> Float:
+        return np.asarray(_spot_at(p, columns, rows) * weight - value)
+
+    reach = start[:, 3].max()
+    widest, beside = 2 * max(reach, WIDEST_PX), beyond + 1e-6
+    low = np.array([-3.0, *(start[0, 1:3] - reach), _LEAST_WIDTH_PX, _FLATNESS[0], -beside])
+    high = np.array([3.0, *(start[0, 1:3] + reach), widest, _FLATNESS[1], beside])
+    begin = np.clip(start, low + 1e-3 * (high - low), high - 1e-3 * (high - low))
+    made = [least_squares(rest, s, bounds=(low, high), x_scale=[0.1, 1, 1, 3, 0.3, 0.1]) for s in begin]
+    return np.asarray(min(made, key=lambda r: r.cost).x)
