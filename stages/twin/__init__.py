@@ -41,9 +41,16 @@ from stages.twin.on_wall import unnamed
 from stages.twin.pixels import defective_pixels
 from stages.twin.render import Region, Renderer
 from stages.twin.scene import Scene, scene_of
-from stages.twin.state import PhotometricState, Sampled, clipped_line, estimate_state, sample_frames
+from stages.twin.state import (
+    PhotometricState,
+    Sampled,
+    black_of_photo,
+    clipped_line,
+    estimate_state,
+    sample_frames,
+)
 from stages.twin.sums import Sums
-from stages.twin.window import beside_blur
+from stages.twin.window import beside_blur, through_window
 from stages.twin.worst import maps_of, worst_places
 
 _EVERY = 10
@@ -130,7 +137,8 @@ def photometry_of(
     state = estimate_state(scene, sampled, rings, context)
     lines = [s.frame for s in sampled if s.light == Illumination.LASER]
     few = np.array(lines[:: max(len(lines) // _COLOURED, 1)], np.int64)
-    state = replace(state, line_clipped=clipped_line(scene, recording.read(few, "bgr")))
+    colour = list(recording.read(few, "bgr"))
+    state = replace(state, line_clipped=clipped_line(scene, colour), photo_black=black_of_photo(colour))
     displaced: tuple[ImagePlace, ...] = ()
     for _ in range(_ROUNDS):
         ratios, textures = _blocks(scene, state, sampled)
@@ -203,7 +211,7 @@ def compared_with(
     on_window, unsure = beside_blur(sums.on_window(samples), whole)
     on_window, glints = told_apart(on_window, sums.glints())
     found: tuple[Mismatch, ...] = (
-        *over_time, *on_window, *photometry.pixels,
+        *through_window(over_time, on_window, scene.ring), *on_window, *photometry.pixels,
         *unnamed(samples and samples.clear_of((*on_window, *glints)), scene.surface), *whole, *glints,
         *clipped(rings, state.line_clipped, comparison.clipped_wall / max(comparison.lit, 1.0)),
     )  # fmt: skip

@@ -82,6 +82,7 @@ def places_in_image(
     change, spread, known = _stays(np.stack(ratios))
     if not known.any():
         return (), None
+    spread = np.maximum(spread, _error_of_median(np.stack(ratios), known))
     bound = np.maximum(float(norm.isf(FALSE_ALARM / (2 * known.sum()))) * spread, least)
     gain = np.ones_like(change)
     found = _joined(np.abs(change) > bound)
@@ -126,15 +127,14 @@ def _stays(stack: Float32) -> tuple[Float32, Float32, Bool]:
         return middle, middle, known
     middle[known] = np.nanmedian(stack[:, known], axis=0)
     change = np.where(known, middle / _broad(middle, known) - 1, 0).astype(np.float32)
-    own = np.zeros(known.shape, np.float32)
-    own[known] = _error_of_median(stack[:, known])
-    return change, np.maximum(_spread_of_rings(change, known), own), known
+    return change, _spread_of_rings(change, known), known
 
 
-def _error_of_median(values: Float32) -> Float32:
-    """Return the standard error (N,) of the medians of values (F, N), NaN being none: of normal numbers."""
-    variance = np.nanvar(values, axis=0, ddof=1)
-    return np.asarray(np.sqrt(np.pi / 2 * variance / np.isfinite(values).sum(0)), np.float32)
+def _error_of_median(stack: Float32, known: Bool) -> Float32:
+    """Return the standard error (rows, columns) of the medians of frames (F, rows, columns), if normal."""
+    error, values = np.zeros(known.shape, np.float32), stack[:, known]
+    error[known] = np.sqrt(np.pi / 2 * np.nanvar(values, axis=0, ddof=1) / np.isfinite(values).sum(0))
+    return error
 
 
 def _joined(beyond: Bool) -> list[Bool]:

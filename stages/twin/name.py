@@ -234,6 +234,11 @@ def cannot_tell(state: PhotometricState) -> tuple[str, ...]:
         "Lamps that are uneven in all frames are told from wall that is paler on one side only as far as the "
         "probe rolls.",
     ]
+    if state.black_in_photo:
+        said.append(
+            f"The black level of {state.photo_black:.0f} grey levels is in the wall's photo, too: its "
+            "contrast does not tell the response."
+        )
     if state.line_is_clipped:
         said.append(
             f"The line is clipped in {100 * state.line_clipped:.0f} % of its middle: whether the laser's "

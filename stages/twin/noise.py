@@ -183,7 +183,8 @@ def black_and_white(images: list[Float32]) -> tuple[Figure, float]:
     """Return the level of the darkest tenth of the pixels, and the level at which pixels pile up, if any."""
     # The darkest tenth: in pictures of the laser alone nine tenths see no line.
     dark = [float(np.median(i[i <= np.quantile(i, 0.1)])) for i in images]
-    black = Figure(float(np.median(dark)), float(np.std(dark) / np.sqrt(len(dark))))
+    sd = float(np.sqrt(np.var(dark) / len(dark) + _LEAST_VARIANCE))
+    black = Figure(float(np.median(dark)), sd)
     every = [np.bincount(np.clip(i, 0, 255).astype(np.uint8).ravel(), minlength=256) for i in images]
     return black, _full_scale(np.sum(every, 0))
 

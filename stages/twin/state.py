@@ -28,6 +28,8 @@ _FULL_SCALE = 250
 _MOST_CLIPPED = 0.25
 """Share of the line's middle: a quarter that is clipped at half its light takes away an eighth, which is half
 of the smallest loss of a sector that is named."""
+_MOST_BLACK = 2.0
+"""Grey levels: of wall at thirty they change the contrast by .06, the least that is named a response."""
 _NOISE_FRAMES = 6
 _OUTSIDE_LEVEL, _EDGE_PX = 6.0, 8
 """Pixels that no lit frame shows brighter lie outside the view; the border is what lies this near to it."""
@@ -53,6 +55,8 @@ class PhotometricState:
         Pixels outside the camera's view, and next to its border.
     line_clipped : float
         Share of the line's middle at which its strongest channel is at full scale.
+    photo_black : float
+        Grey level without light in the colours that the wall's photo is made of: it is in the photo, too.
     power : float
         Exponent that frames have the photo's contrast to; another than 1 only when tried.
     gain_map : (H, W) float32 or None
@@ -72,10 +76,16 @@ class PhotometricState:
     outside: Bool
     edge: Bool
     line_clipped: float = 0.0
+    photo_black: float = 0.0
     power: float = 1.0
     gain_map: Float32 | None = None
     aside: Float32 | None = None
     pattern: FixedPattern | None = None
+
+    @property
+    def black_in_photo(self) -> bool:
+        """Whether so much black is in the wall's photo that its contrast tells nothing of the response."""
+        return self.photo_black > _MOST_BLACK
 
     @property
     def line_is_clipped(self) -> bool:
@@ -166,6 +176,12 @@ def clipped_line(scene: Scene, frames: Iterable[tuple[int, Byte | None]]) -> flo
         if len(colour):
             found.append(float((colour[:, int(colour.mean(0).argmax())] >= _FULL_SCALE).mean()))
     return float(np.median(found)) if found else 0.0
+
+
+def black_of_photo(frames: Iterable[tuple[int, Byte | None]]) -> float:
+    """Return the grey level of the darkest tenth of laser frames in colour, whose range the photo has."""
+    grey = [np.asarray(image[::4, ::4].mean(2)) for _, image in frames if image is not None]
+    return float(np.median([np.median(g[g <= np.quantile(g, 0.1)]) for g in grey])) if grey else 0.0
 
 
 def _view(lit: list[Float32], black: float, scene: Scene) -> tuple[Bool, Bool]:

@@ -117,7 +117,7 @@ class Sums:
         uneven, of_wall = parted_from_wall(() if led_failed else uneven, lamp, self._scene, samples)
         first = (
             *self.whole.suspected(self._state.sharpness),
-            *response_of(samples, self._scene.ring),
+            *(() if self._state.black_in_photo else response_of(samples, self._scene.ring)),
             *power_of_lamps(samples, self._scene.ring),
             *uneven,
         )

@@ -14,9 +14,10 @@ import numpy as np
 
 from pipeline.arrays import Bool, Float, Float32
 from pipeline.artefacts.twin import Look, Mismatch, NamedFigure
-from stages.twin.cells import sigmas
+from stages.twin.cells import SECTORS, sigmas
 from stages.twin.locate import FALSE_ALARM, ImagePlace
 from stages.twin.render import Region, TwinFrame
+from stages.twin.scene import Ring
 from stages.twin.spot import WIDEST_PX, FittedLaw, fall_of_spot
 
 _POWER_STEP, _ASIDE_PX = 0.4, 0.5
@@ -32,7 +33,7 @@ _AROUND_PX, _WHOLE, _SURE, _FEWEST_FRAMES = 25.0, 0.7, 3.0, 3
 """1 σ of the mean around; share of a place that must be lit wall; σ by which laws are told apart; frames."""
 _OF_CONTRAST = 0.15
 """Most by which the photo has more or less texture than frames: half a pixel of blur does as much."""
-_BLURS = ("motion_blur", "defocus")
+_BLURS, _AT_LINE = ("motion_blur", "defocus"), ("window_dirt", "window_scatter")
 _STATED = {
     "window_dirt": "dust or dirt on the window or the lens takes away",
     "window_scatter": "something on the window or the lens scatters",
@@ -210,6 +211,34 @@ def beside_blur(
     said = "{} But whole frames are blurred, which looks alike: it cannot be told."
     withdrawn = tuple(replace(m, statement=said.format(m.statement)) for m in unsure)
     return tuple(m for m in found if m not in unsure), withdrawn
+
+
+def through_window(
+    found: Sequence[Mismatch], on_window: Sequence[Mismatch], ring: Ring
+) -> tuple[Mismatch, ...]:
+    """Return what was found, a dim sector of the laser being either that or what is on the window there.
+
+    The wall's photo was made through the same window, mostly where the line is: what lies across the line
+    hides in it, and shows in lit frames at the same azimuth, nearer or farther, as the opposite of itself.
+    """
+    return tuple(
+        m if m.name != "laser_sector" or not any(_same_azimuth(m, w, ring) for w in on_window) else replace(
+            m, name=" or ".join(("laser_sector", *_AT_LINE)),
+            statement=f"{m.statement} Or what is on the window or the lens there takes it away.",
+        )
+        for m in found
+    )  # fmt: skip
+
+
+def _same_azimuth(sector: Mismatch, on_window: Mismatch, ring: Ring) -> bool:
+    """Return whether a place of the window lies at the image azimuth of a sector."""
+    at = {p.name: p.value for p in (*sector.place, *on_window.place)}
+    if "u_px" not in at or on_window.fixed_to != "image":
+        return False
+    u, v = at["u_px"] - ring.centre_px[0], at["v_px"] - ring.centre_px[1]
+    reach = at["width_deg"] / 2 + np.degrees(at["radius_px"] / max(np.hypot(u, v), 1.0)) + 90 / SECTORS
+    apart = (np.degrees(np.arctan2(v, u)) - at["azimuth_deg"] + 180) % 360 - 180
+    return bool(abs(apart) < reach)
 
 
 def _with_photo(share: NamedFigure) -> NamedFigure:

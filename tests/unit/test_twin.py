@@ -24,7 +24,7 @@ from stages.twin.rays import wall_seen
 from stages.twin.reference import BlockSamples, in_image
 from stages.twin.render import Region, TwinFrame
 from stages.twin.scene import LineSight
-from stages.twin.state import PhotometricState, clipped_line
+from stages.twin.state import PhotometricState, black_of_photo, clipped_line
 from stages.twin.sums import Sums
 from tests.synthetic_wall import plain_bore
 
@@ -225,6 +225,16 @@ def test_a_line_that_is_clipped_tells_nothing_of_the_laser_and_that_is_said():
         )
         assert Sums.cells(SimpleNamespace(_state=state, lit=cells, line=cells)) == ("some", seen)
         assert any("80 %" in said for said in cannot_tell(state)) == (seen is None)
+
+
+def test_a_photo_that_holds_the_black_level_tells_no_response():
+    dark = np.full((40, 60, 3), 12, np.uint8)
+    dark[:8] = 90
+    assert black_of_photo([(0, dark), (1, None)]) == 12
+    state = PhotometricState(None, None, None, *(np.zeros(1) for _ in range(5)), photo_black=12.0)
+    assert state.black_in_photo
+    assert any("12 grey levels" in said for said in cannot_tell(state))
+    assert not replace(state, photo_black=0.4).black_in_photo
 
 
 def test_a_line_clips_where_its_strongest_channel_does_whatever_its_grey():

@@ -8,7 +8,8 @@ from pipeline.artefacts.twin import Mismatch, NamedFigure
 from stages.twin.compare import BLOCK_PX, block_textures
 from stages.twin.locate import ImagePlace, full_size, places_displaced, places_in_image, told_once
 from stages.twin.render import Region, TwinFrame
-from stages.twin.window import WindowPlace, beside_blur
+from stages.twin.scene import Ring
+from stages.twin.window import WindowPlace, beside_blur, through_window
 
 
 def _frame(level):
@@ -203,6 +204,23 @@ def test_a_photo_that_is_poor_far_ahead_is_no_dirt():
     poor = np.where(far < 8, 0.1 * np.sin(0.7 * (u + 2 * v)), 0)
     (place,), _ = places_in_image([r + poor.astype(np.float32) for r in ratios])
     assert place.u_px == pytest.approx(80.5 * BLOCK_PX, abs=BLOCK_PX)
+
+
+@pytest.mark.parametrize(("azimuth_deg", "either"), [(-95.0, True), (20.0, False)])
+def test_a_dim_sector_where_the_window_differs_is_either_of_both(azimuth_deg, either):
+    def figures(**values):
+        return tuple(NamedFigure(name, value, 1.0) for name, value in values.items())
+
+    ring, turn = Ring((400.0, 300.0), 200.0, 50.0, 22.0), np.radians(azimuth_deg)
+    place = figures(u_px=400 + 245 * np.cos(turn), v_px=300 + 245 * np.sin(turn), radius_px=8.0)
+    other = np.nan, np.nan, np.nan, "", None
+    sector = Mismatch("laser_sector", "line", "line", figures(azimuth_deg=-100.0, width_deg=16.0), (), *other)
+    step = Mismatch("laser_step", "line", "time", figures(frame_from=9.0), (), *other)
+    stronger = Mismatch("", "intensity", "image", place, (), *other)
+    told = through_window((sector, step), (stronger,), ring)
+    assert [m.name for m in told] == [
+        "laser_sector or window_dirt or window_scatter" if either else "laser_sector", "laser_step",
+    ]  # fmt: skip
 
 
 def test_scatter_is_withdrawn_where_whole_frames_are_blurred():
