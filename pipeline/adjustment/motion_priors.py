@@ -46,7 +46,7 @@ def third_difference_growth(stride: float) -> float:
     return float(np.sqrt((11 * stride**5 + 5 * stride**3 + 4 * stride) / 20))
 
 
-def third_difference_sigma(T_pc: Float, known: Int) -> Float:
+def third_difference_sigma(T_pc: Float, time_s: Float, known: Int) -> Float:
     """Return the robust 1 σ (6,) of the third differences of position, mm, and turn, rad.
 
     With fewer than eight frames of known pose it is `LOOSE`.
@@ -55,6 +55,8 @@ def third_difference_sigma(T_pc: Float, known: Int) -> Float:
     ----------
     T_pc : (N, 4, 4)
         Poses of all frames.
+    time_s : (N,)
+        The differences are divided ones, so that uneven spacing does not matter.
     known : (K,) int
         Frames whose poses are measured; the median of their gaps counts as their stride.
     """
@@ -62,11 +64,13 @@ def third_difference_sigma(T_pc: Float, known: Int) -> Float:
         return LOOSE
     growth = third_difference_growth(float(np.median(np.diff(known))))
     return np.asarray(
-        np.maximum(robust_spreads(_third_difference_of_poses(T_pc, known, 1), axis=0) / growth, _SMOOTHEST)
+        np.maximum(
+            robust_spreads(_third_difference_of_poses(T_pc, time_s, known, 1), axis=0) / growth, _SMOOTHEST
+        )
     )
 
 
-def trembling(T_pc: Float, known: Int) -> Float:
+def trembling(T_pc: Float, time_s: Float, known: Int) -> Float:
     """Return the 1 σ (6,) of position, mm, and turn, rad, that changes independently from frame to frame.
 
     Third differences over one and over two gaps tell it from motion: those of white jerk grow with the gap as
@@ -77,10 +81,12 @@ def trembling(T_pc: Float, known: Int) -> Float:
     ----------
     T_pc : (N, 4, 4)
         Poses of all frames.
+    time_s : (N,)
+        The differences are divided ones, so that uneven spacing does not matter.
     known : (K,) int
         Frames whose poses are measured; the median of their gaps counts as their stride.
     """
-    near, far = (_third_difference_of_poses(T_pc, known, n) for n in (1, 2))
+    near, far = (_third_difference_of_poses(T_pc, time_s, known, n) for n in (1, 2))
     return _trembling(near, far, known)
 
 
@@ -112,10 +118,11 @@ def _trembling(near: Float, far: Float, known: Int) -> Float:
     return np.asarray(np.sqrt(np.maximum(variance[0] - growth[0] * jerk, 0) / TREMBLING_GROWTH**2))
 
 
-def _third_difference_of_poses(T_pc: Float, known: Int, gaps: int) -> Float:
+def _third_difference_of_poses(T_pc: Float, time_s: Float, known: Int, gaps: int) -> Float:
     """Return third differences (M, 6) over so many gaps between known frames."""
     window = known[np.arange(max(len(known) - 3 * gaps, 0))[:, None] + gaps * np.arange(4)]
-    return np.asarray(np.einsum("k,nki->ni", np.array([-1.0, 3, -3, 1]), _position_and_turn(T_pc[window])))
+    coefficient = third_difference_coefficients(time_s[window])
+    return np.asarray(np.einsum("nk,nki->ni", coefficient, _position_and_turn(T_pc[window])))
 
 
 def smooth_motion_rows(T_pc: Float, time_s: Float, sigma: Float, border: int) -> Rows:

@@ -206,7 +206,7 @@ def _warn_of_trembling(
 
     A camera that trembles moves the ring as well. Where the ring stays, matches tremble, as by glints.
     """
-    shaken = trembling(trajectory.T_pc, texture.frames)
+    shaken = trembling(trajectory.T_pc, trajectory.time_s, texture.frames)
     turn = float(shaken[3:5].max())
     context.report("trembling of the camera, 1 σ", 1e3 * turn, "mrad")
     if not trembles(shaken):

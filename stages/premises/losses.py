@@ -98,8 +98,9 @@ def rows_by_motion(
     The lights give the number of lost pictures only up to whole periods of their rhythm. How far the wall
     moved, compared with the steps around, gives the rest. Steps tell nothing where the encoder shows the
     same leap (the probe moved faster), over pictures that were left out (the speed is not known for so long),
-    where the line's ``sway`` (F,) leaps (the camera was knocked), or where the encoder agrees with the wall,
-    by the pipe's ``radius_mm``, but shows more in all: a codec that repeats blocks holds back usual steps.
+    where the line's ``sway`` (F,) leaps and the rhythm goes on (the camera was knocked), or where the encoder
+    agrees with the wall, by the pipe's ``radius_mm``, but shows more in all: a codec that repeats blocks
+    holds back usual steps.
     """
     if len(steps.end) < _LEAST_STEPS:
         return row
@@ -116,7 +117,8 @@ def rows_by_motion(
         if held_back:
             part = 1 - lost / max((time[end] - time[start]) / period + lost, 1.0)
             believed &= not _encoder_agrees(encoder, time[[start, end]], size * radius_mm, part)
-        believed &= sway[start + 1 : end + 1].max() < _LINE_LEAPS * (1 + abs(lost) / rhythm)
+        if lost % rhythm == 0:
+            believed &= sway[start + 1 : end + 1].max() < _LINE_LEAPS * (1 + abs(lost) / rhythm)
         if (lost > 0 and believed) or (lost < 0 and skips.max() + lost >= 0):
             first = int(np.argmax(skips)) + start + 1 if skips.max() > 0 else (start + end + 1) // 2
             out[first:] += lost
@@ -141,7 +143,7 @@ def _leaps(
 
     ``passed`` (K,) is how many pictures they took by their times, to which ``over`` (K,) or a number of whole
     periods more is to be added. The error of matching is what is then left: losses do not widen it, however
-    many there are.
+    many there are. Where the rhythm breaks, a loss has only to fit better than none.
     """
     excess = steps.size / _usual_speed(steps.size / passed, over == 0) - passed
     for _ in range(_ROUNDS):

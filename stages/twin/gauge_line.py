@@ -173,7 +173,7 @@ def scene_with(
     # One unknown that changes nothing: the adjustment is to move poses and fiducials, not the instrument.
     state = replace(start, instrument=np.zeros(1), unsure=np.zeros((len(start.stated.parameters), 1)))
     no_rings = run.measured.rings.select(np.zeros(len(run.measured.rings.frame), bool))
-    smooth = third_difference_sigma(start.T_pc, run.posed)
+    smooth = third_difference_sigma(start.T_pc, run.measured.time_s, run.posed)
     measured = replace(run.measured, rings=no_rings, smooth_sigma=smooth)
     edges = run.measured.edges
     for _ in range(_PLACE_ROUNDS):

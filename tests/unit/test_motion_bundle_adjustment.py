@@ -260,5 +260,5 @@ def test_trembling_loosens_the_motion_across_the_pipe_and_no_other() -> None:
     assert ratio.min() > 2
     assert ratio.max() < 6
     known = steady.measured.tracks.poses.frames
-    assert not trembles(trembling(steady.truth.T_pc, known))
-    assert trembles(trembling(shaken.truth.T_pc, known))
+    assert not trembles(trembling(steady.truth.T_pc, steady.measured.time_s, known))
+    assert trembles(trembling(shaken.truth.T_pc, shaken.measured.time_s, known))

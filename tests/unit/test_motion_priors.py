@@ -28,6 +28,9 @@ def white_jerk(seed: int, frames: int = FRAMES) -> Float:
     return poses(np.cumsum(np.cumsum(np.cumsum(third, 0), 0), 0))
 
 
+TIME_S = np.arange(FRAMES) / 30
+
+
 def poses(path: Float) -> Float:
     return from_parts(rotation_from_vector(path[:, 3:]), path[:, :3])
 
@@ -35,7 +38,7 @@ def poses(path: Float) -> Float:
 def learned(stride: int) -> Float:
     """Return what every ``stride``-th frame shows of the process, relative to what it was made with."""
     T_pc = white_jerk(1)
-    return third_difference_sigma(T_pc, np.arange(0, FRAMES, stride))[:3] / SIGMA[:3]
+    return third_difference_sigma(T_pc, TIME_S, np.arange(0, FRAMES, stride))[:3] / SIGMA[:3]
 
 
 @pytest.mark.parametrize("stride", [1, 2, 3, 5])
@@ -59,25 +62,40 @@ def test_growth_is_the_length_of_the_running_sums_taken_three_times(stride: int)
 
 
 def test_few_frames_show_nothing() -> None:
-    np.testing.assert_array_equal(third_difference_sigma(white_jerk(2, 60), np.arange(0, 35, 5)), LOOSE)
+    np.testing.assert_array_equal(
+        third_difference_sigma(white_jerk(2, 60), TIME_S, np.arange(0, 35, 5)), LOOSE
+    )
 
 
 def test_outliers_do_not_loosen_the_motion() -> None:
     T_pc = white_jerk(3)
     T_pc[::50, :3, 3] += 40.0
-    np.testing.assert_allclose(third_difference_sigma(T_pc, np.arange(FRAMES))[:3] / SIGMA[:3], 1, atol=0.2)
+    np.testing.assert_allclose(
+        third_difference_sigma(T_pc, TIME_S, np.arange(FRAMES))[:3] / SIGMA[:3], 1, atol=0.2
+    )
 
 
 @pytest.mark.parametrize("stride", [1, 2])
 def test_trembling_is_told_from_motion(stride: int) -> None:
     shake = np.array([0.5, 0.4, 0.3, 2e-3, 3e-3, 1e-3])
     T_pc, known = white_jerk(5), np.arange(0, FRAMES, stride)
-    assert trembling(T_pc, known)[:3].max() < 0.05 * shake[:3].max()
+    assert trembling(T_pc, TIME_S, known)[:3].max() < 0.05 * shake[:3].max()
     T_pc[:, :3, 3] += np.random.default_rng(6).standard_normal((FRAMES, 3)) * shake[:3]
     error = 1.2 / np.sqrt(FRAMES / (6 * stride))
-    np.testing.assert_allclose(trembling(T_pc, known)[:3] / shake[:3], 1, atol=4 * error)
+    np.testing.assert_allclose(trembling(T_pc, TIME_S, known)[:3] / shake[:3], 1, atol=4 * error)
     turned = poses(np.random.default_rng(7).standard_normal((FRAMES, 6)) * shake)
-    np.testing.assert_allclose(trembling(turned, known)[3:] / shake[3:], 1, atol=4 * error)
+    np.testing.assert_allclose(trembling(turned, TIME_S, known)[3:] / shake[3:], 1, atol=4 * error)
+
+
+def test_lost_pictures_neither_tremble_nor_loosen_the_motion() -> None:
+    """With one picture in five lost, differences by number alone made a camera tremble that stood firm."""
+    turning = np.zeros((200, 6))
+    turning[:, :] = np.sin(np.arange(200)[:, None] / 25) * [3, 3, 3, 0.02, 0.02, 0.02]
+    kept = np.arange(200)[np.arange(200) % 5 != 3]
+    T_pc, known = poses(turning)[kept], np.arange(len(kept))
+    steady = third_difference_sigma(poses(turning), TIME_S, np.arange(200))
+    assert np.all(third_difference_sigma(T_pc, kept / 30, known) < 3 * steady)
+    assert trembling(T_pc, kept / 30, known)[3:].max() < 1e-5
 
 
 def test_rows_are_third_differences_with_their_derivatives() -> None:

@@ -220,7 +220,8 @@ def solve(
     """
     state = adjust(start, measured, parameters, watch, enough=NEAR_SIGMA).state
     on_bore = source.on_bore(state.T_pc, state.probe, parameters)
-    measured = replace(measured, rings=on_bore, smooth_sigma=third_difference_sigma(state.T_pc, posed))
+    sigma = third_difference_sigma(state.T_pc, measured.time_s, posed)
+    measured = replace(measured, rings=on_bore, smooth_sigma=sigma)
     smooth = adjust(state, measured, parameters, watch)
     rings, fiducials = wrong_rings(smooth, measured), wrong_fiducials(smooth)
     if len(rings) or len(fiducials):

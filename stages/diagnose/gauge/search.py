@@ -68,7 +68,7 @@ def prepare(measured_run: MeasuredRun, watch: Watch = unwatched) -> tuple[GaugeR
     measured = replace(measured, rings=_between(measured.rings, posed))
     loose = adjust(_freed(measured_run.start), measured, _FREE, watch, enough=NEAR_SIGMA).state
     rings = _between(source.on_bore(loose.T_pc, loose.probe, _FREE), posed)
-    sigma = third_difference_sigma(loose.T_pc, posed)
+    sigma = third_difference_sigma(loose.T_pc, measured.time_s, posed)
     held = replace(measured, rings=rings, smooth_sigma=sigma)
     smooth = adjust(loose, held, _FREE, watch, enough=NEAR_SIGMA).state
     rings = _between(source.on_bore(smooth.T_pc, smooth.probe, _FREE), posed)

@@ -84,10 +84,10 @@ def estimate_state(
     with _refusing_undetermined():
         loose = adjust(start, measured, parameters, ROUGHLY, watch).state
         loose = loose.with_bore_in_place(measured.probe.laser.baseline_mm)
-        sigma = _smoothness(loose.T_pc, measured.tracks.poses.known)
+        sigma = _smoothness(loose.T_pc, measured.time_s, measured.tracks.poses.known)
         smooth = adjust(loose, replace(measured, smooth_sigma=sigma), parameters, CLOSELY, watch)
         for _ in range(_ROUNDS):
-            looser = _looser(sigma, smooth.state.T_pc, measured.tracks.poses.known)
+            looser = _looser(sigma, smooth.state.T_pc, measured.time_s, measured.tracks.poses.known)
             if np.all(looser < _MORE * sigma):
                 break
             sigma = looser
@@ -137,9 +137,10 @@ def _way_mm(state: State) -> float:
     return float(np.ptp(distance_along(state.axis, state.T_pc)))
 
 
-def _smoothness(T_pc: Float, known: Int) -> Float:
+def _smoothness(T_pc: Float, time_s: Float, known: Int) -> Float:
     """Return the 1 σ (6,) of third differences, of pictures that tremble with what trembling adds to them."""
-    sigma, shaken = third_difference_sigma(T_pc, known), trembling(T_pc, known)
+    sigma = third_difference_sigma(T_pc, time_s, known)
+    shaken = trembling(T_pc, time_s, known)
     if not trembles(shaken):
         return sigma
     added = np.zeros(6)
@@ -147,11 +148,11 @@ def _smoothness(T_pc: Float, known: Int) -> Float:
     return np.hypot(sigma, added)
 
 
-def _looser(sigma: Float, T_pc: Float, known: Int) -> Float:
+def _looser(sigma: Float, T_pc: Float, time_s: Float, known: Int) -> Float:
     """Return 1 σ (6,) of third differences, grown where poses found with it tremble more."""
-    if not trembles(trembling(T_pc, known)):
+    if not trembles(trembling(T_pc, time_s, known)):
         return sigma
-    return np.maximum(sigma, _smoothness(T_pc, known))
+    return np.maximum(sigma, _smoothness(T_pc, time_s, known))
 
 
 def trembles(shaken: Float) -> bool:
