@@ -24,9 +24,12 @@ from stages.accumulate.survey import RingSurvey
 
 # What stays longer than the pipe is wide is judged, in a short pass half of the pass, but no less than half
 # of the diameter: the longest of the defects of the open recordings, 30 mm in a pipe of 101 mm, is shorter.
+# In a pass that is shorter still, all of it: a defect so long looks like a droplet there, and that is said.
 _LONGEST, _SHORTEST = 1.0, 0.5
-# Blocks of rings in that length. Their medians leave out what is shorter than half of the length.
+# Blocks of rings in that length, of two rings at least. Their medians leave out what is shorter than half of
+# the length.
 _BLOCKS = 8
+_FEWEST_RINGS = 2 * _BLOCKS
 # Of the length itself, so much must be covered: a block at either end may be missed.
 _COVERED = 0.8
 # A place is found by 8 robust σ of what all sectors depart by over such a length, and reaches as far as 3. In
@@ -59,7 +62,7 @@ class _Blocks:
 def fixed_to_probe(
     survey: RingSurvey, frame: Int, radius_mm: float, grid: MapGrid, scratch: Scratch
 ) -> FixedToProbe | None:
-    """Return departures that stay in the image; None without any, or where the pass is too short.
+    """Return departures that stay in the image; None without any, or where there are too few rings.
 
     ``frame`` (F,) are the frames of the rings, ``radius_mm`` is that of the pipe.
     """
@@ -68,7 +71,8 @@ def fixed_to_probe(
         return None
     passed = float(np.ptp(survey.middle_mm[rings]))
     length = float(np.clip(passed / 2, 2 * radius_mm * _SHORTEST, 2 * radius_mm * _LONGEST))
-    if passed < length:
+    length = min(length, passed)
+    if len(rings) < _FEWEST_RINGS or length == 0:
         return None
     blocks = _blocks_of(survey, rings, length / _BLOCKS)
     steady = _running_median(blocks.departure_mm)

@@ -21,11 +21,11 @@ WHERE, WIDTH = 0.8, 0.06  # azimuth and 1 σ, rad, of everything that departs
 DROPLET_PX = 1.5
 
 
-def motion(roll_rad: float) -> Trajectory:
+def motion(roll_rad: float, step_mm: float = STEP_MM) -> Trajectory:
     k = np.arange(RINGS)
     turn = np.stack([0.01 * np.sin(0.2 * k), 0.01 * np.cos(0.15 * k), roll_rad * k / RINGS], -1)
-    origin = np.stack([0.8 * np.sin(0.1 * k), 0.5 * np.cos(0.1 * k), STEP_MM * k], -1)
-    axis = straight_axis(-50.0, STEP_MM * RINGS + 100)
+    origin = np.stack([0.8 * np.sin(0.1 * k), 0.5 * np.cos(0.1 * k), step_mm * k], -1)
+    axis = straight_axis(-50.0, step_mm * RINGS + 100)
     T_pc = from_parts(rotation_from_vector(turn), origin)
     return Trajectory(k, k / 30, T_pc, np.zeros((RINGS, 6, 6)), axis, RADIUS, 1.0, 0.0, 0.0, ())
 
@@ -43,8 +43,10 @@ def gouge(s: Float, psi: Float) -> Float:
     return RADIUS + 0.6 * bump(psi) * (np.abs(s - BASELINE - 60) < 15)
 
 
-def measured(roll_rad: float, wall=round_wall, droplet_px: float = 0.0, from_ring: int = 0) -> Wall:
-    run, probe = motion(roll_rad), replace(small_probe(), covariance=np.zeros((20, 20)))
+def measured(
+    roll_rad: float, wall=round_wall, droplet_px: float = 0.0, from_ring: int = 0, step_mm: float = STEP_MM
+) -> Wall:
+    run, probe = motion(roll_rad, step_mm), replace(small_probe(), covariance=np.zeros((20, 20)))
     rings = rings_on_wall(probe, run.T_pc, run.frame, np.random.default_rng(0), wall, 0.05, 360)
     radius = rings.radius_px.copy()
     radius[from_ring:] += (droplet_px * bump(rings.azimuth_rad)).astype(np.float32)
@@ -69,6 +71,16 @@ def test_without_roll_droplet_and_seam_cannot_be_told_apart() -> None:
         fixed = measured(0.0, wall, droplet_px).fixed
         assert fixed is not None
         assert [place.on_probe for place in fixed.places] == [False]
+
+
+@pytest.mark.parametrize("roll_rad", [0.0, ROLL])
+def test_in_a_pass_of_less_than_half_a_diameter_a_droplet_is_seen_too(roll_rad: float) -> None:
+    """It was a deposit of 3.15 ± .06 mm with confidence .98, as nothing was looked at in so short a pass."""
+    step_mm = 0.8 * RADIUS / RINGS
+    fixed = measured(roll_rad, droplet_px=DROPLET_PX, step_mm=step_mm).fixed
+    assert fixed is not None
+    assert len(fixed.places) == 1
+    assert measured(roll_rad, step_mm=step_mm).fixed is None
 
 
 @pytest.mark.parametrize("wall", [round_wall, gouge])
