@@ -44,7 +44,7 @@ from pipeline.recording.bag_topics import (
     message_image,
 )
 from pipeline.recording.base import FrameTable, Planes, Recording, ascending, complete, decoded_ahead
-from pipeline.recording.checks import encoder_warnings
+from pipeline.recording.checks import checked_encoder
 from pipeline.recording.folder import COMMON_KEYS, describe
 
 _KEYS = (*COMMON_KEYS, "topics", "illumination")
@@ -133,7 +133,8 @@ def _open(path: Path, opener: Callable[[Path], Bag]) -> Recording:
     except BAG_ERRORS as error:
         hint = "repair it with the tools of its format, or copy again"
         raise InputError(path, f"cannot be read as a bag: {error}", hint=hint) from error
-    warnings = (*described.warnings, *encoder_warnings(encoder, frames))
+    encoder, noticed = checked_encoder(encoder, frames)
+    warnings = (*described.warnings, *noticed)
     return Recording(
         described.name, described.kind, path, frames, encoder, described.pipe,
         described.frame_rate or _rate(frames), source, described.probe_file, content_key(files), warnings,

@@ -18,8 +18,8 @@ from pipeline.instrument.probe import Probe
 from pipeline.recording.base import Encoder, FrameTable, Recording
 from pipeline.recording.one_field import OneField
 
-# A step of the encoder counts as a jump when it is this many times the usual largest, and this long.
-_JUMP_FACTOR, _JUMP_MM = 10.0, 1.0
+# A step of the encoder is a jump when it is so many times the usual largest (this quantile), and so long.
+_LARGEST, _JUMP_FACTOR, _JUMP_MM = 0.95, 10.0, 1.0
 
 
 def common_frames(table: FrameTable, count: int) -> tuple[FrameTable, tuple[str, ...]]:
@@ -37,19 +37,20 @@ def common_frames(table: FrameTable, count: int) -> tuple[FrameTable, tuple[str,
     )
 
 
-def encoder_warnings(encoder: Encoder | None, frames: FrameTable) -> tuple[str, ...]:
-    """Return what is suspicious about an encoder: it covers only part of the run, pauses, or jumps."""
+def checked_encoder(encoder: Encoder | None, frames: FrameTable) -> tuple[Encoder | None, tuple[str, ...]]:
+    """Return an encoder that counts on, and what is suspicious: it covers a part only, pauses, or jumps."""
     if encoder is None or frames.frame.size == 0:
-        return ()
+        return encoder, ()
+    encoder, began_anew = counted_on(encoder)
     step_s, slack = np.diff(encoder.time_s), _slack_s(encoder, frames)
-    found = []
+    found = [*began_anew]
     if encoder.time_s[0] > frames.time_s[0] + slack:
         found.append(f"the encoder begins {encoder.time_s[0] - frames.time_s[0]:.2f} s after the first frame")
     if encoder.time_s[-1] < frames.time_s[-1] - slack:
         found.append(f"the encoder ends {frames.time_s[-1] - encoder.time_s[-1]:.2f} s before the last frame")
     if np.any(step_s > 10 * slack):
         found.append(f"the encoder is silent for up to {step_s.max():.2f} s")
-    return (*found, *_jumps(encoder))
+    return encoder, (*found, *_warned_of_jumps(encoder))
 
 
 def _slack_s(encoder: Encoder, frames: FrameTable) -> float:
@@ -58,14 +59,43 @@ def _slack_s(encoder: Encoder, frames: FrameTable) -> float:
     return 2 * float(max(periods))
 
 
-def _jumps(encoder: Encoder) -> tuple[str, ...]:
+def counted_on(encoder: Encoder) -> tuple[Encoder, tuple[str, ...]]:
+    """Return an encoder whose counter began anew on and on as if it had counted on, and what was noticed.
+
+    Such a counter jumps back, always by all that it can count. A wheel that slips goes on from where it is.
+    """
+    jumps = _jumps(encoder)
+    if not jumps.size:
+        return encoder, ()
+    step_mm, by_mm = np.diff(encoder.distance_mm), np.diff(encoder.distance_mm)[jumps]
+    usual_mm = float(np.median(step_mm))
+    whole_mm = float(np.median(by_mm)) - usual_mm
+    near_mm = 2 * float(np.quantile(np.abs(step_mm), _LARGEST))
+    counts = np.ptp(encoder.distance_mm) < abs(whole_mm) + near_mm and whole_mm * usual_mm < 0
+    if not counts or np.any(np.abs(by_mm - usual_mm - whole_mm) > near_mm):
+        return encoder, ()
+    begun = np.zeros(len(encoder.time_s))
+    begun[jumps + 1] = -whole_mm
+    return replace(encoder, distance_mm=encoder.distance_mm + np.cumsum(begun)), (
+        f"the encoder's counter begins anew {jumps.size} times, after {abs(whole_mm):.4g} mm each: taken "
+        "as if it had counted on",
+    )
+
+
+def _jumps(encoder: Encoder) -> Int:
+    """Return the readings (K,) after which the encoder jumps."""
     step_mm = np.abs(np.diff(encoder.distance_mm))
-    usual_mm = float(np.quantile(step_mm, 0.95))
-    jumps = np.flatnonzero((step_mm > _JUMP_FACTOR * usual_mm) & (step_mm > _JUMP_MM))
+    usual_mm = float(np.quantile(step_mm, _LARGEST)) if step_mm.size else 0.0
+    return np.flatnonzero((step_mm > _JUMP_FACTOR * usual_mm) & (step_mm > _JUMP_MM))
+
+
+def _warned_of_jumps(encoder: Encoder) -> tuple[str, ...]:
+    jumps = _jumps(encoder)
     if jumps.size == 0:
         return ()
+    largest_mm = float(np.abs(np.diff(encoder.distance_mm)).max())
     at = ", ".join(f"{encoder.time_s[j]:.2f} s" for j in jumps[:5])
-    return (f"the encoder jumps by up to {step_mm.max():.4g} mm at {at} ({jumps.size} in all)",)
+    return (f"the encoder jumps by up to {largest_mm:.4g} mm at {at} ({jumps.size} in all)",)
 
 
 def refuse_backward(file: Path, values: Sequence[float] | Float, name: str, *, strictly: bool) -> None:

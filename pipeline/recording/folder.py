@@ -22,7 +22,7 @@ from pipeline.recording.base import (
     PlannedPiece,
     Recording,
 )
-from pipeline.recording.checks import common_frames, encoder_warnings
+from pipeline.recording.checks import checked_encoder, common_frames
 from pipeline.recording.images import ImageSequence, is_pattern, open_images
 from pipeline.recording.rounded_stamps import without_rounding
 from pipeline.recording.tables import read_encoder, read_frame_table, read_imu
@@ -232,20 +232,19 @@ def assembled(section: Section, frames_file: Path, parts: FolderParts) -> Record
     rate = section.number("frame_rate", above=0)
     table, rounded = without_rounding(frames_file, parts.table, rate)
     frames, mended = _match(frames_file, table, parts.source)
+    encoder, noticed = checked_encoder(parts.encoder, frames)
     return Recording(
         name=described.name,
         kind=described.kind,
         path=section.file.parent,
         frames=frames,
-        encoder=parts.encoder,
+        encoder=encoder,
         pipe=described.pipe,
         frame_rate=rate,
         source=parts.source,
         probe_file=described.probe_file,
         content_key=content_key(parts.files),
-        warnings=(
-            *described.warnings, *parts.warnings, *rounded, *mended, *encoder_warnings(parts.encoder, frames)
-        ),
+        warnings=(*described.warnings, *parts.warnings, *rounded, *mended, *noticed),
         files=parts.files,
         listed=table,
         inspection=described.inspection,

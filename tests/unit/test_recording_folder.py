@@ -148,6 +148,23 @@ def test_suspicious_encoders_are_named(copy: Path, edit, warning: str) -> None:
     assert any(w.startswith(warning) for w in warnings), warnings
 
 
+@pytest.mark.parametrize("backward", [False, True])
+def test_a_counter_that_begins_anew_counts_on(copy: Path, backward: bool) -> None:
+    """It had moved poses by .8 mm across and 1.2° of roll."""
+    whole = 0.02 + 0.05 * np.arange(400) * (-1 if backward else 1)
+    for distance, counts in ((whole % 4.0, True), (whole + 4.0 * (whole > 10), False)):
+        rows = (f"{0.0025 * k:.4f},{d:.3f}" for k, d in enumerate(distance))
+        (copy / "encoder.csv").write_text("\n".join(["time_s,distance_mm", *rows]) + "\n")
+        recording = open_recording(copy)
+        assert recording.encoder is not None
+        found = recording.encoder.distance_mm
+        told = [w for w in recording.warnings if "times, after 4 mm each" in w]
+        assert len(told) == counts
+        np.testing.assert_allclose(
+            found - found[0], whole - whole[0] if counts else distance - distance[0], atol=2e-3
+        )
+
+
 def test_run_without_encoder_or_probe_file(copy: Path) -> None:
     (copy / "encoder.csv").unlink()
     (copy / "probe.yaml").unlink()
