@@ -24,6 +24,7 @@ from stages.accumulate.fixed import fixed_to_probe
 from stages.accumulate.grid import MapGrid, map_grid
 from stages.accumulate.stretch import cut_stretches, empty_wall, fill, map_of
 from stages.accumulate.survey import RingsOnWall, RingSurvey, in_steady_pictures, survey_of
+from stages.accumulate.unmeasured import warn_of_unmeasured
 
 # Azimuths, 5° apart: the instrument's errors are harmonics up to the fourth, and linear between nodes.
 _AZIMUTHS = 72
@@ -176,6 +177,7 @@ def accumulate_wall(
     _report(context, wall, spread)
     warn_of_held(held, context)
     _warn_of_fixed(fixed, context)
+    warn_of_unmeasured(wall.radius_map, trajectory.radius_mm, gap_mm, context)
     return wall
 
 

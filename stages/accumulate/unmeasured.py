@@ -1,0 +1,95 @@
+"""Places inside the wall that the probe passed and no ring measured: a defect there is not found."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.ndimage import binary_opening, find_objects, label
+
+from pipeline.arrays import Float32
+from pipeline.artefacts.findings import clock_of_azimuth
+from pipeline.artefacts.measured import RadiusMap
+from pipeline.machine.stage import Context
+from pipeline.pages import notation
+
+# Places that are told one by one, the largest first.
+_TOLD = 4
+# Rows that are looked at together; a place that reaches from one lot into the next counts as two.
+_ROWS = 4096
+# Rings lie askew and hidden sectors end anywhere: inside is where nine in ten columns have begun and none of
+# the last tenth has ended.
+_BEGUN = 0.9
+
+
+@dataclass(frozen=True)
+class Unmeasured:
+    """A place without radius: its middle on the wall, its extent along and around, mm, and its area, mm²."""
+
+    distance_mm: float
+    azimuth_rad: float
+    length_mm: float
+    width_mm: float
+    area_mm2: float
+
+
+def warn_of_unmeasured(radius_map: RadiusMap, pipe_radius_mm: float, gap_mm: float, context: Context) -> None:
+    """Warn of places inside the wall that are not measured, larger than gaps that are bridged."""
+    places = unmeasured_places(radius_map, pipe_radius_mm, gap_mm)
+    context.report("places inside the wall that are not measured", len(places), "")
+    if not places:
+        return
+    largest = sorted(places, key=lambda p: -p.area_mm2)[:_TOLD]
+    where = ", ".join(
+        f"at {p.distance_mm:.0f} mm, {notation.clock(float(clock_of_azimuth(p.azimuth_rad)))} "
+        f"({p.length_mm:.0f} mm along, {p.width_mm:.0f} mm around)"
+        for p in largest
+    )
+    area_mm2 = sum(p.area_mm2 for p in places)
+    many = f"{len(places)} place{'s' * (len(places) > 1)} inside the wall, {area_mm2:.0f} mm² in all"
+    context.warn(
+        f"{many}, could not be measured{', the largest' * (len(places) > _TOLD)}: {where}. Defects there are "
+        "not found. What to do: look at these places in the lit pictures; clean window and wall, let water "
+        "off, shade reflections, and record again"
+    )
+
+
+def unmeasured_places(radius_map: RadiusMap, pipe_radius_mm: float, gap_mm: float) -> list[Unmeasured]:
+    """Return the places inside the wall without radius that hold a square of half of ``gap_mm``."""
+    radius, s, azimuth = radius_map.radius_mm, radius_map.distance_mm, radius_map.azimuth_rad
+    along, around = float(np.median(np.diff(s))), 2 * np.pi * pipe_radius_mm / len(azimuth)
+    square = np.ones([max(round(gap_mm / 2 / cell), 1) for cell in (along, around)], bool)
+    first, last, turn = _ends_of(radius)
+    found = []
+    for start in range(first, last, _ROWS):
+        # Cut open at the column that is known best, so that no place is cut in two.
+        hole = np.roll(~np.isfinite(radius[start : min(start + _ROWS, last)]), -turn, axis=1)
+        numbers, _ = label(binary_opening(hole, square))
+        for number, (rows, columns) in enumerate(find_objects(numbers), 1):
+            middle = (turn + (columns.start + columns.stop) // 2) % len(azimuth)
+            found.append(
+                Unmeasured(
+                    float(s[start + (rows.start + rows.stop) // 2]), float(azimuth[middle]),
+                    (rows.stop - rows.start) * along, (columns.stop - columns.start) * around,
+                    int(np.sum(numbers[rows, columns] == number)) * along * around,
+                )
+            )  # fmt: skip
+    return found
+
+
+def _ends_of(radius: Float32) -> tuple[int, int, int]:
+    """Return between which rows (S) the wall is there all round, and the column that is known best."""
+    rows, columns = radius.shape
+    known = np.zeros(columns, np.int64)
+    begun, ended = np.full(columns, rows), np.zeros(columns, np.int64)
+    for start in range(0, rows, _ROWS):
+        there = np.isfinite(radius[start : start + _ROWS])
+        some = there.any(0)
+        known += there.sum(0)
+        begun = np.where(some, np.minimum(begun, start + there.argmax(0)), begun)
+        ended = np.where(some, start + len(there) - there[::-1].argmax(0), ended)
+    seen = known > 0
+    if not seen.any():
+        return 0, 0, 0
+    first, last = np.quantile(begun[seen], _BEGUN), np.quantile(ended[seen], 1 - _BEGUN)
+    return int(np.ceil(first)), int(last), int(np.argmax(known))
