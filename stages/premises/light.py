@@ -63,12 +63,24 @@ def alike(pictures: Pictures, one: Bool, other: Bool) -> bool:
     """Return whether two sets (F,) of pictures that the table tells apart look the same.
 
     They do if neither brightness nor the share of a closed line differs between the sets by more than it
-    varies within one of them. With too few pictures they are taken to differ.
+    varies within one of them, or if it goes on where the table passes from one to the other: over many frames
+    in one light it drifts as well. With too few pictures they are taken to differ.
     """
     measures = (pictures.brightness, pictures.closed)
     if min((one & pictures.seen).sum(), (other & pictures.seen).sum()) < _FEWEST_ALIKE:
         return False
-    return not any(_differ(m[one & pictures.seen], m[other & pictures.seen]) for m in measures)
+    one, other = one & pictures.seen, other & pictures.seen
+    return not any(_differ(m[one], m[other]) and not _goes_on(m, one, other) for m in measures)
+
+
+def _goes_on(value: Float, one: Bool, other: Bool) -> bool:
+    """Return whether values (F,) change no more from one set (F,) to the other than within them."""
+    step = np.abs(np.diff(value))
+    within = (one[:-1] & one[1:]) | (other[:-1] & other[1:])
+    between = (one[:-1] & other[1:]) | (other[:-1] & one[1:])
+    if between.sum() == 0 or within.sum() < _FEWEST_ALIKE * between.sum():
+        return False
+    return bool(step[between].max() <= step[within].max())
 
 
 def _differ(one: Float, other: Float) -> bool:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from pipeline.recording.base import Illumination, Recording
-from stages.premises.light import Light, light_seen
+from stages.premises.light import Light, alike, light_seen
 from stages.premises.pictures import Pictures, look_at_pictures
 from tests.drawn_run import RADIUS, DrawnRun
 from tests.premises_run import STEP_MM
@@ -56,3 +56,16 @@ def test_a_wall_that_leaves_the_picture_is_seen_to_move_as_far(run: DrawnRun, go
     # Pictures step by 4.3 rows of the unrolled wall, and phase correlation errs by up to one of them.
     assert steps == pytest.approx(2 * STEP_MM / RADIUS, rel=0.25)
     assert np.median(steps) == pytest.approx(2 * STEP_MM / RADIUS, rel=0.05)
+
+
+@pytest.mark.parametrize("step", [0.0, 0.4])
+def test_a_light_that_drifts_is_one_light_and_one_that_steps_is_two(step: float) -> None:
+    """A table that turned to the laser half way was believed, as the lamps had warmed up by then."""
+    number, random = np.arange(160), np.random.default_rng(4)
+    brightness = 8.5 + 0.004 * number + 0.01 * random.standard_normal(160) + step * (number >= 80)
+    nothing = np.full(160, np.nan)
+    pictures = Pictures(
+        brightness, np.ones(160), np.ones((160, 4), np.float32), nothing[:4], nothing, number - 1, nothing,
+        nothing,
+    )  # fmt: skip
+    assert alike(pictures, number < 80, number >= 80) is (step == 0)
