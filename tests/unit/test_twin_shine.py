@@ -56,6 +56,11 @@ def test_a_lamp_that_is_mirrored_at_one_place_of_the_image_is_a_glint():
     assert found.chi2_after < found.chi2_before / 2
 
 
+def test_a_spot_of_the_laser_that_stays_in_the_image_may_be_a_drop():
+    (found,) = _spots(lambda n, r: _spot(100 + r.normal(0, 3), 60 + r.normal(0, 3)), Illumination.LASER)
+    assert (found.name, found.fixed_to) == ("glint or droplet", "image")
+
+
 def test_a_glint_that_moves_with_the_wall_is_fixed_to_it():
     (found,) = _spots(lambda n, r: _spot(200, 200 - STEP_PX * n))
     assert (found.name, found.fixed_to) == ("glint", "wall")

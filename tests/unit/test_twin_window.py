@@ -9,6 +9,7 @@ from stages.twin.compare import BLOCK_PX, block_textures
 from stages.twin.locate import ImagePlace, full_size, places_displaced, places_in_image, told_once
 from stages.twin.render import Region, TwinFrame
 from stages.twin.scene import Ring
+from stages.twin.spot import FittedLaw
 from stages.twin.window import WindowPlace, beside_blur, through_window
 
 
@@ -56,6 +57,30 @@ def test_what_is_on_the_window_is_told_by_frames_or_withdrawn(name):
     assert found is not None
     assert found.name == name
     assert found.chi2_after < found.chi2_before
+
+
+def test_texture_that_is_stronger_than_the_photo_has_it_is_no_scatter():
+    random = np.random.default_rng(3)
+    place = WindowPlace(ImagePlace(120.0, 100.0, 18.0, -0.3, 0.02, 1e-6))
+    for frame in range(9):
+        level = _textured(random)
+        recorded = level + 2 * random.standard_normal(level.shape)
+        scattered = _dirty_picture(level, "window_scatter").astype(np.float32)
+        place.add(frame, recorded.astype(np.float32), _frame(scattered), np.ones(level.shape, bool))
+    found = place.judged("image")
+    assert found.name == ""
+    assert "stronger" in found.statement
+
+
+@pytest.mark.parametrize(("sd", "told"), [(0.01, True), (0.05, False)])
+def test_a_share_that_may_be_nothing_is_not_told(sd, told, monkeypatch):
+    law = FittedLaw(np.linspace(9, 11, 9), NamedFigure("share", 0.06, sd))
+    monkeypatch.setattr("stages.twin.window.fall_of_spot", lambda *_: law)
+    random, place = np.random.default_rng(3), WindowPlace(ImagePlace(120.0, 100.0, 18.0, -0.3, 0.02, 1e-6))
+    for frame in range(9):
+        level = _textured(random)
+        place.add(frame, level, _frame(level), np.ones(level.shape, bool))
+    assert (place.judged("image") is not None) == told
 
 
 @pytest.mark.parametrize("texture", [1.0, 0.92, 1.06])
