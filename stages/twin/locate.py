@@ -28,7 +28,7 @@ FALSE_ALARM = 0.01
 _BROAD_BLOCKS, _FEWEST_FRAMES, _FEWEST_BLOCKS = 25, 3, 2
 """What is broader than 25 blocks is light, not dirt. A place is seen in three frames and two blocks or
 more."""
-_LEAST_CHANGE = 0.03
+LEAST_CHANGE = 0.03
 """Smallest relative change that counts as dirt: what the photo leaves over on clean
 recordings stays below it."""
 
@@ -71,7 +71,7 @@ class ImagePlace:
 
 
 def places_in_image(
-    ratios: list[Float32], least: float = _LEAST_CHANGE
+    ratios: list[Float32], least: float = LEAST_CHANGE
 ) -> tuple[tuple[ImagePlace, ...], Float32 | None]:
     """Return the places, and the gain (rows, columns) of the blocks, 1 elsewhere; None without any.
 

@@ -15,7 +15,7 @@ import numpy as np
 from pipeline.arrays import Bool, Float, Float32
 from pipeline.artefacts.twin import Look, Mismatch, NamedFigure
 from stages.twin.cells import SECTORS, sigmas
-from stages.twin.locate import FALSE_ALARM, ImagePlace
+from stages.twin.locate import FALSE_ALARM, LEAST_CHANGE, ImagePlace
 from stages.twin.render import Region, TwinFrame
 from stages.twin.scene import Ring
 from stages.twin.spot import WIDEST_PX, FittedLaw, fall_of_spot
@@ -164,7 +164,9 @@ class WindowPlace:
         more = {n: sigmas(tried[name].fall - fit.fall) for n, fit in tried.items() if n != name}
         rivals = [n for n, by in more.items() if by < _SURE and not bends]
         law = tried[name]
-        if abs(law.size.value) < _SURELY * law.size.sd:
+        # A place that displaced texture has found is no dirt below what counts as such elsewhere.
+        least = LEAST_CHANGE if name == "window_dirt" else 0.0
+        if abs(law.size.value) < max(_SURELY * law.size.sd, least):
             return None
         if name == "window_dirt":
             law = replace(law, size=_with_photo(law.size))

@@ -72,9 +72,11 @@ def test_texture_that_is_stronger_than_the_photo_has_it_is_no_scatter():
     assert "stronger" in found.statement
 
 
-@pytest.mark.parametrize(("sd", "told"), [(0.01, True), (0.05, False)])
-def test_a_share_that_may_be_nothing_is_not_told(sd, told, monkeypatch):
-    law = FittedLaw(np.linspace(9, 11, 9), NamedFigure("share", 0.06, sd))
+@pytest.mark.parametrize(
+    ("share", "sd", "told"), [(0.06, 0.01, True), (0.06, 0.05, False), (0.02, 0.001, False)]
+)
+def test_a_share_that_may_be_nothing_is_not_told(share, sd, told, monkeypatch):
+    law = FittedLaw(np.linspace(9, 11, 9), NamedFigure("share", share, sd))
     monkeypatch.setattr("stages.twin.window.fall_of_spot", lambda *_: law)
     random, place = np.random.default_rng(3), WindowPlace(ImagePlace(120.0, 100.0, 18.0, -0.3, 0.02, 1e-6))
     for frame in range(9):
