@@ -274,16 +274,6 @@ def test_a_wall_of_nothing_is_refused() -> None:
         )
 
 
-def test_normals_are_those_of_open3d() -> None:
-    surface = weld(grid(small_wall(noise_mm=0.05, hole=HOLE), 3))
-    o3d = open3d()
-    mesh = o3d.geometry.TriangleMesh(
-        o3d.utility.Vector3dVector(surface.vertex_p), o3d.utility.Vector3iVector(surface.face)
-    )
-    wanted = np.asarray(mesh.compute_vertex_normals().vertex_normals)
-    np.testing.assert_allclose(vertex_normals(surface), wanted, atol=1e-12)
-
-
 def test_normals_go_on_from_piece_to_piece() -> None:
     pieces = grid(small_wall(noise_mm=0.05, hole=HOLE), 3)
     whole = weld(pieces)

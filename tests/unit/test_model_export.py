@@ -11,10 +11,10 @@ from PIL import Image
 from plyfile import PlyData
 
 from pipeline.artefacts.measured import Wall
-from pipeline.artefacts.model import VARIANTS, Overlay, Overlays, TexturedMesh
+from pipeline.artefacts.model import VARIANTS, TexturedMesh
 from pipeline.export.arrays import write_cloud
 from pipeline.export.glb import write_model
-from pipeline.export.pictures import overlay_picture, write_overlays
+from pipeline.export.pictures import write_overlays
 from stages.mesh import MeshParameters, make_mesh
 from stages.overlays import OverlayParameters, overlays_of
 from tests.model_picture import inside_view, render
@@ -134,22 +134,6 @@ def test_overlay_pictures_are_written(wall: Wall, tmp_path: Path) -> None:
     # The pit goes into the wall: dark red somewhere.
     blue, _, red = picture.reshape(-1, 3).astype(int).T
     assert np.count_nonzero((red - blue > 80) & (red < 200)) > 20
-
-
-def test_an_overlay_shows_a_place_by_its_distance_and_clock_hour() -> None:
-    distance_mm, azimuth_rad = np.arange(0.25, 100, 0.5), np.arange(-np.pi, np.pi, np.pi / 36)
-    level = np.ones((len(distance_mm), len(azimuth_rad)), np.uint8)
-    level[50, 36] = (
-        255  # azimuth 0, 3 o'clock, which is a quarter of the way down; a quarter of the way along
-    )
-    palette = np.zeros((256, 3), np.uint8)
-    palette[255] = 10, 20, 250
-    overlay = Overlay("deviation", "", "", 0.0, 1.0, 0.0, palette, level)
-    overlays = Overlays(distance_mm, azimuth_rad, np.zeros(72), 50.0, *[overlay] * 4)
-    shown = np.asarray(overlay_picture(overlays, overlay))
-    wall = shown[49:527, 91 : shown.shape[1] - 151]
-    y, x = np.nonzero((wall == (250, 20, 10)).all(-1))
-    np.testing.assert_allclose([x.mean() / wall.shape[1], y.mean() / wall.shape[0]], [0.25, 0.25], atol=0.01)
 
 
 def test_picture_from_inside_shows_wall_around_an_opening(mesh: TexturedMesh) -> None:
