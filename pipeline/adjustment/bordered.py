@@ -269,7 +269,8 @@ class Factor:
         rows = (BLOCK * frames[:, None] + np.arange(BLOCK)).ravel()
         unit = np.zeros((len(self.right), len(rows)))
         unit[rows, np.arange(len(rows))] = 1
-        own = self.band.solve(unit)[rows] + self.solved_border[rows] @ border @ self.solved_border[rows].T
+        halfway, follow = self.band.forth(unit), self.solved_border[rows]
+        own = halfway.T @ halfway + follow @ border @ follow.T
         return np.asarray(own.reshape(len(frames), BLOCK, len(frames), BLOCK))
 
     def border_information(self) -> Float:

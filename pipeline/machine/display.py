@@ -12,6 +12,9 @@ from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedCo
 
 from pipeline.machine.outcome import StageOutcome, State, state_word, warnings_of
 
+# Times a second that the bars are drawn anew: drawing takes some milliseconds in which no stage runs Python.
+_DRAWN_PER_SECOND = 4
+
 
 class Display(Protocol):
     """Is told how the stages stand."""
@@ -63,6 +66,8 @@ class ProgressDisplay:
             TimeElapsedColumn(),
             console=console,
             transient=True,
+            disable=not console.is_terminal,
+            refresh_per_second=_DRAWN_PER_SECOND,
         )
         self._console, self._warn_at_once = console, warn_at_once
         self._whole = self._progress.add_task("whole run", total=None, told="starting")

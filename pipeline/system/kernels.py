@@ -7,12 +7,12 @@ in ``configs/kernels/run.yaml``; one that is not listed is compiled when it is c
 
 from __future__ import annotations
 
-import os
 import pickle
 import re
 import subprocess
 import sys
 from collections.abc import Iterator, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from importlib import import_module
 from pathlib import Path
@@ -24,7 +24,8 @@ Kernels = Mapping[str, Mapping[str, str]]
 """By module and function, the types that it is called with, as `type_of` reads them, with ``;`` between."""
 
 _CHILD = """
-import pickle, sys
+import os, pickle, sys
+os.nice(5)
 sys.path[:] = pickle.load(sys.stdin.buffer)
 from pipeline.system.kernels import compile_all
 compile_all(pickle.load(sys.stdin.buffer))
@@ -33,14 +34,18 @@ _TYPE = re.compile(
     r"(?:(?P<times>\d+) \* )?(?P<scalar>\w+)(?:\[(?P<axes>\d)(?P<order>[ACF])(?P<kept> kept)?\])?"
     r"(?: in (?P<names>[\w.]+))?"
 )
-_POLITE = 5
 
 
 @contextmanager
 def compiled_ahead(kernels: Kernels) -> Iterator[None]:
-    """Have kernels that Numba's cache lacks compiled meanwhile; results are the same with and without."""
+    """Have kernels that Numba's cache lacks compiled meanwhile; results are the same with and without.
+
+    Kernels that are all there are read meanwhile, which takes .3 s: stages would wait for them.
+    """
     if all(_is_kept(dispatcher) for dispatcher, _ in _found(kernels)):
-        yield
+        with ThreadPoolExecutor(1, "kernels") as aside:
+            aside.submit(compile_all, kernels)
+            yield
         return
     process = subprocess.Popen(
         [sys.executable, "-c", _CHILD], stdin=subprocess.PIPE, stdout=subprocess.DEVNULL,
@@ -57,8 +62,7 @@ def compiled_ahead(kernels: Kernels) -> Iterator[None]:
 
 
 def compile_all(kernels: Kernels) -> None:
-    """Compile what is not in the cache, one kernel after the other, while others want the processor more."""
-    os.nice(_POLITE)
+    """Read kernels from the cache, and compile those that are not there, one after the other."""
     for dispatcher, types in _found(kernels):
         dispatcher.compile(tuple(type_of(word) for word in types.split("; ")))
 

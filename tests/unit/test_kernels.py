@@ -13,6 +13,7 @@ import pytest
 from numba import types
 
 from pipeline.cli import _kernels
+from pipeline.system import kernels
 from pipeline.system.kernels import compile_all, compiled_ahead, type_of
 
 KERNEL = """
@@ -41,9 +42,8 @@ def test_every_listed_kernel_is_there_and_takes_so_many_arguments() -> None:
             assert len(wanted) == len(inspect.signature(function).parameters), f"{module}.{name}"
 
 
-def test_every_listed_kernel_takes_the_types_listed(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_every_listed_kernel_takes_the_types_listed() -> None:
     """One that does not would end the second process, and what is listed behind it be compiled by the run."""
-    monkeypatch.setattr("os.nice", lambda more: more)
     compile_all(_kernels())
 
 
@@ -58,7 +58,6 @@ def test_types_are_read() -> None:
 def test_what_was_compiled_is_kept_and_asks_for_no_second_process(
     kernel: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("os.nice", lambda more: more)
     started: list[object] = []
     popen = subprocess.Popen
     monkeypatch.setattr(subprocess, "Popen", lambda *a, **k: started.append(a) or popen(*a, **k))
@@ -67,8 +66,11 @@ def test_what_was_compiled_is_kept_and_asks_for_no_second_process(
     compile_all(LISTED)
     assert list(tmp_path.glob("__pycache__/*.nbi"))
     started.clear()
+    read: list[object] = []
+    monkeypatch.setattr(kernels, "compile_all", read.append)
     with compiled_ahead(LISTED):
         assert not started
+    assert read == [LISTED], "kernels that are kept are read ahead"
 
 
 def test_the_second_process_fills_the_cache(kernel: None, tmp_path: Path) -> None:
