@@ -17,6 +17,7 @@ from pipeline.instrument.laser import LaserSheet
 from pipeline.instrument.probe import Probe
 from pipeline.machine.stage import Context
 from pipeline.recording.base import Illumination, Recording
+from pipeline.system.parallel import in_threads
 
 _LOOKED_AT = 40
 """Lit pictures, spread over the run, that are looked at. Of 24, the same text was found in open-1-field."""
@@ -46,6 +47,7 @@ _DARK = 8.0
 _BLUE, _RED = 0, 2
 _YELLOW_NM = 575.0
 """Lasers of a shorter wavelength reach the red channel least, others the blue one."""
+_THREADS = 2
 _WORTH_A_WORD = 0.01
 """Share of the picture of the wall that is told: no open recording has any."""
 
@@ -91,8 +93,7 @@ def what_stays(images: Iterable[Image], wall: Bool) -> Bool:
     """Return where (h, w) something stays in grey pictures (H, W), while the ``wall`` (h, w) moves."""
     last, count = None, 0
     total, power = (np.zeros(wall.shape, np.float32) for _ in range(2))
-    for image in images:
-        fine = _fine(image, wall.shape)
+    for fine in in_threads(lambda image: _fine(image, wall.shape), images, _THREADS):
         if last is None or _moved(last, fine, wall):
             total, power, last, count = total + fine, power + fine * fine, fine, count + 1
     if count < _FEWEST:
