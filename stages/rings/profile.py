@@ -16,7 +16,6 @@ import numba
 import numpy as np
 
 from pipeline.arrays import Byte, Float, Float32
-from pipeline.system.parallel import side_by_side
 from stages.rings.kernels import (
     FAST,
     bell,
@@ -92,15 +91,11 @@ def fit_line(
     filled = np.where(known, seed_px, np.nanmean(seed_px)) if known.any() else seed_px
     step = sectors.azimuth_rad[1] - sectors.azimuth_rad[0]
     slope = (np.roll(filled, -_SLOPE_SECTORS) - np.roll(filled, _SLOPE_SECTORS)) / (2 * _SLOPE_SECTORS * step)
-    out, middle = np.full((len(ProfileFit._fields), len(seed_px)), np.nan), len(seed_px) // 2
-
-    def fit(some: range) -> None:
-        _fit_sectors(
-            image.ravel(), sectors.start, sectors.pixel, sectors.radius_px, sectors.offset_rad,
-            seed_px, slope, width_px, response, response.trusted_level, some.start, some.stop, out,
-        )  # fmt: skip
-
-    side_by_side(fit, (range(middle), range(middle, len(seed_px))))
+    out = np.empty((len(ProfileFit._fields), len(seed_px)))
+    _fit_sectors(
+        image.ravel(), sectors.start, sectors.pixel, sectors.radius_px, sectors.offset_rad,
+        seed_px, slope, width_px, response, response.trusted_level, out,
+    )  # fmt: skip
     return ProfileFit(*out)
 
 
@@ -238,13 +233,12 @@ def _settle(y, t, count, width, response, trusted, n, v, p):  # type: ignore[no-
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
-def _fit_sectors(  # type: ignore[no-untyped-def]
-    image, start, pixel, radius, offset, seed, slope, width, response, trusted, first, end, out
-):
+def _fit_sectors(image, start, pixel, radius, offset, seed, slope, width, response, trusted, out):  # type: ignore[no-untyped-def]
     n, v, p = np.empty((5, 5)), np.empty(5), np.empty(5)
     half = WINDOW_WIDTHS * width
     y, t = np.empty(int(8 * half) + 64), np.empty(int(8 * half) + 64)
-    for a in range(first, end):
+    out[:] = np.nan
+    for a in range(seed.size):
         if not np.isfinite(seed[a]):
             continue
         count = _gather(image, start, pixel, radius, offset, a, seed[a], slope[a], half, y, t)

@@ -10,7 +10,6 @@ import numpy as np
 
 from pipeline.adjustment.robust import MAD_TO_SIGMA
 from pipeline.arrays import Byte, Float, Float32, Int
-from pipeline.system.parallel import side_by_side
 from stages.rings.kernels import FAST, first_at_least, neighbours_joined
 from stages.rings.sectors import Sectors
 
@@ -60,15 +59,11 @@ def search_band(
 ) -> Candidates:
     """Find the matched filter's peaks of every sector between ``low_px`` and ``high_px`` (A,)."""
     radius, score = np.full((len(low_px), _CANDIDATES), np.nan), np.zeros((len(low_px), _CANDIDATES))
-    template, middle = matched_template(width_px), len(low_px) // 2
-
-    def search(some: range) -> None:
-        _search_sectors(
-            image.ravel(), sectors.start, sectors.pixel, sectors.radius_px, low_px, high_px, template,
-            some.start, some.stop, radius, score,
-        )  # fmt: skip
-
-    side_by_side(search, (range(middle), range(middle, len(low_px))))
+    template = matched_template(width_px)
+    _search_sectors(
+        image.ravel(), sectors.start, sectors.pixel, sectors.radius_px, low_px, high_px, template,
+        radius, score,
+    )  # fmt: skip
     return Candidates(radius, score / noise)
 
 
@@ -135,12 +130,12 @@ def _keep_peaks(response, low, high, first, radius, score):  # type: ignore[no-u
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
 def _search_sectors(  # type: ignore[no-untyped-def]
-    image, start, pixel, radius, low_px, high_px, template, begin, end, found_px, score
+    image, start, pixel, radius, low_px, high_px, template, found_px, score
 ):
     reach = template.size // 2
     size = int(np.nanmax(high_px - low_px)) + 2 * reach + 4
     total, count, response = np.empty(size), np.empty(size, np.int64), np.empty(size)
-    for a in range(begin, end):
+    for a in range(low_px.size):
         if not np.isfinite(low_px[a]):
             continue
         first = int(np.floor(low_px[a])) - reach

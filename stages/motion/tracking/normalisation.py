@@ -13,7 +13,6 @@ import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
 from pipeline.arrays import Bool, Float, Float32
-from pipeline.system.parallel import side_by_side
 from stages.rings.kernels import FAST
 
 SOFTENING_PX = 1.2
@@ -67,16 +66,13 @@ def equally_sharp(contrast: Float32, coarse_uv: Float32, steps: tuple[int, int])
     share = np.linspace(0, 1, _BLURS)
     sizes = wanted.min(0) + share[:, None] * (wanted.max(0) - wanted.min(0))
     level = (_BLURS - 1) * np.clip((wanted[:, 0] - sizes[0, 0]) / max(np.ptp(sizes[:, 0]), 1e-6), 0, 1)
-
-    def share_of(k: int) -> tuple[slice, Float32]:
+    out = np.zeros_like(contrast)
+    for k, (sigma_along, sigma_around) in enumerate(sizes):
         weight = np.maximum(1 - np.abs(level - k), 0).astype(np.float32)[:, None]
         rows = np.flatnonzero(weight)
-        part = slice(rows[0], rows[-1] + 1) if rows.size else slice(0, 0)
-        return part, weight[part] * _blurred(contrast, part, *sizes[k])
-
-    out = np.zeros_like(contrast)
-    for part, blurred in side_by_side(share_of, range(_BLURS)):
-        out[part] += blurred
+        if rows.size:
+            part = slice(rows[0], rows[-1] + 1)
+            out[part] += weight[part] * _blurred(contrast, part, sigma_along, sigma_around)
     return out
 
 
