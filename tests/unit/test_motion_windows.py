@@ -224,28 +224,49 @@ def test_matches_share_more_of_their_error_where_they_disagree_by_more() -> None
     MotionParameters.model_validate(with_shared_error(usual, 50.0).model_dump())
 
 
-class Lagging(TrackedTexture):
-    """Texture as a hasty codec shows it: noisy, and moved too little where it is far ahead."""
+class Noisy(TrackedTexture):
+    """Texture whose matches err by noise alone."""
+
+    def between(self, first: int, last: int) -> Tracks:
+        tracks = super().between(first, last)
+        noise = 0.4 * np.random.default_rng(1).standard_normal(tracks.uv.shape)
+        return replace(tracks, uv=tracks.uv + noise)
+
+
+class Lagging(Noisy):
+    """Texture as a hasty codec shows it: off for some frames alike, and moved too little far ahead."""
 
     def between(self, first: int, last: int) -> Tracks:
         tracks, camera = super().between(first, last), small_probe().camera
         away = tracks.uv - camera.centre_px
         lag_px = np.clip((np.radians(45) - tracks.polar_angle(camera)) / np.radians(7), 0, 1)
-        noise = 0.4 * np.random.default_rng(1).standard_normal(away.shape)
         lag = lag_px[:, None] * away / np.linalg.norm(away, axis=1, keepdims=True)
-        return replace(tracks, uv=tracks.uv - lag + noise)
+        spans = tracks.landmark, tracks.frame // 10
+        shape = [1 + int(span.max()) for span in spans]
+        lasting = 0.4 * np.random.default_rng(2).standard_normal((*shape, 2))[spans]
+        return replace(tracks, uv=tracks.uv - lag + lasting)
+
+
+def with_texture(drawn: LongMotion, shown: type[TrackedTexture]) -> RunEstimate:
+    """Return the motion of a run without encoder."""
+    texture = drawn.run.texture
+    run = replace(drawn.run, encoder=None, texture=shown(texture.store, texture.grid, texture.poses))
+    return estimated(replace(drawn, run=run), 100, 20)
 
 
 def test_texture_that_lags_far_ahead_does_not_lengthen_the_way(monkeypatch: pytest.MonkeyPatch) -> None:
-    drawn = long_motion(100, 0.6, 4.0)
-    texture = drawn.run.texture
-    run = replace(drawn.run, encoder=None, texture=Lagging(texture.store, texture.grid, texture.poses))
-    off = []
+    drawn, off = long_motion(100, 0.6, 4.0), []
     for farthest in (np.radians(45), 0.0):
         monkeypatch.setattr("stages.motion.windows.first_window._FARTHEST_RAD", farthest)
-        found = estimated(replace(drawn, run=run), 100, 20).joined.T_pc
+        found = with_texture(drawn, Lagging).joined.T_pc
         off.append(difference(found, drawn.T_pc)[-1, 2] / np.ptp(drawn.T_pc[:, 2, 3]))
     assert abs(off[0]) < 0.3 * abs(off[1]), off
+
+
+def test_noise_alone_is_no_reason_to_leave_texture_out() -> None:
+    drawn = long_motion(100, 0.6, 4.0)
+    farthest = [with_texture(drawn, shown).steady.run.farthest_rad for shown in (Noisy, Lagging)]
+    assert farthest == [0.0, np.radians(45)]
 
 
 def test_unsure_heading_does_not_become_roll_where_the_way_turns() -> None:

@@ -35,10 +35,11 @@ _LAG = 1.2
 """Error along the radius of templates, which are cut far ahead, over the error that a landmark's neighbouring
 matches share: against true poses 0.2 to 0.45 px of 0.28 px in open-1-field's copy at crf 30."""
 _FARTHEST_RAD = np.radians(45)
-"""Smallest polar angle of matches that count where matches share errors: wall one radius ahead. Codecs move
-the dim wall ahead of it too slowly: in open-1-field's copy at crf 30 the stream's own motion vectors lag
-behind the wall by .3 px a picture at 40°, by .02 px at 60°. Distances of open-1 and open-3 at crf 30 without
-encoder are .43 and -.20 % off without such matches, .71 and .43 % with them."""
+"""Smallest polar angle of matches that count where more of their error than ``match_bias_px`` lasts: wall one
+radius ahead. Codecs move the dim wall ahead of it too slowly: in open-1-field's copy at crf 30 the stream's
+own motion vectors lag behind the wall by .3 px a picture at 40°, by .02 px at 60°. Distances of open-1 to
+open-3 at crf 30 without encoder are .43, .14 and -.20 % off without such matches, .71, .28 and .43 % with
+them. Where matches err as much by noise alone (0 px last in open-3, .2 px at crf 30), all of them count."""
 _MOST_SHARED_PX = 2.0
 """Where matches disagree by more, the parameter's own limit holds."""
 _IN_REDUCER = 0.005
@@ -116,6 +117,12 @@ class _Adjusted:
     estimate: Estimate
     watch: Watch
 
+    @property
+    def lasting_px(self) -> float:
+        """Return the error, px, that a landmark's neighbouring matches share."""
+        residual = self.estimate.adjusted.equations.texture.residual
+        return lasting_excess(residual, self.measured.tracks.landmark)
+
     def with_encoder(self, encoder: EncoderReadings) -> _Adjusted:
         """Return it with other readings, not adjusted to them yet."""
         run = replace(self.run, encoder=encoder)
@@ -153,9 +160,10 @@ def _with_shared_error(first: _Adjusted) -> tuple[_Adjusted, float]:
     noisy = with_shared_error(first.parameters, first.estimate.adjusted.equations.reprojection_px)
     if noisy is first.parameters:
         return first, 0.0
-    first = _without_far_texture(replace(first, parameters=noisy))
-    residual = first.estimate.adjusted.equations.texture.residual
-    lag_px = _LAG * lasting_excess(residual, first.measured.tracks.landmark)
+    lasts = first.lasting_px > first.parameters.match_bias_px
+    first = replace(first, parameters=noisy)
+    first = _without_far_texture(first) if lasts else first.again(first.estimate.state)
+    lag_px = _LAG * first.lasting_px
     halves = scale_between_halves(first.estimate, first.measured, noisy, first.watch)
     return first, float(
         np.hypot(halves, scale_by_lag(lag_px, first.run.texture.grid, first.run.probe.camera))
