@@ -146,9 +146,9 @@ def _warn_of_mirrored(mirrored: Bool, rings: RingSamples, context: Context) -> N
         context.warn(
             f"in {len(where)} of {len(mirrored)} rings {100 * mirrored[where].mean():.0f} % of the line lies "
             f"far outside the circle of the rest, about {_middle_clock(mirrored, rings)} in the picture: "
-            "standing water or a shiny wall mirrors it, or the pipe is open there. It is not taken for wall, "
-            "and nothing is measured there. What to do: drain the pipe, or judge what lies above the water "
-            "alone"
+            "standing water or a shiny wall mirrors it, the pipe is open there, or the pictures were cropped "
+            "or scaled. It is not taken for wall, and nothing is measured there. What to do: drain the pipe, "
+            "or judge what lies above the water alone; see that the pictures are whole"
         )
 
 

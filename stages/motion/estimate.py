@@ -158,7 +158,8 @@ def _require_convergence(radius_mm: float, estimate: Estimate) -> None:
             f"the adjustment of the motion does not converge: its radius is {found:.4g} mm, that of the "
             f"rings {radius_mm:.4g} mm",
             limit=f"{100 * _LARGEST_CHANGE:.0f} % of difference",
-            hint="cut the recording where the pictures jump, and process the parts",
+            hint="see that the pictures are whole, in their own size, and of the stated probe; else cut the "
+            "recording where they jump, and process the parts",
         )
 
 

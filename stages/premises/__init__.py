@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, field_validator
 
-from pipeline.arrays import Bool, Int
+from pipeline.arrays import Bool, Float, Int
 from pipeline.errors import UnusableError
 from pipeline.instrument.probe import Probe
 from pipeline.machine.stage import Context, Parameters, Stage
@@ -36,7 +36,7 @@ from stages.premises.order import off_the_pipe, out_of_order
 from stages.premises.pictures import Pictures, look_at_pictures
 from stages.premises.repeats import copies, repeated, rows_of_repeats
 from stages.premises.rows import Alignment, Lights, aligned
-from stages.premises.scale import check_diameter, encoder_factor, radius_seen_mm
+from stages.premises.scale import check_diameter, encoder_factor, radius_seen_mm, rings_seen_mm, warn_of_oval
 from stages.premises.stays import places_that_stay
 
 _LASER, _LED, _BOTH = Illumination.LASER.value, Illumination.LED.value, Illumination.BOTH.value
@@ -123,6 +123,7 @@ class _Matched:
     left_out: LeftOut
     jumps: list[ClockJump]
     steps: Steps
+    rings_mm: Float
     radius_mm: float
 
 
@@ -144,12 +145,13 @@ def _matched(recording: Recording, probe: Probe, seen: _Seen) -> _Matched:
     copy = _copies(recording, table, pictures, light, alignment)
     label = np.where(copy, _stated(table, alignment.row), _labels(table, alignment, light, pictures))
     steps, sway = steps_of_wall(pictures, seen.shown, copy), sway_of_line(pictures, light)
-    radius_mm = radius_seen_mm(pictures, probe)
+    rings_mm = rings_seen_mm(pictures, probe)
+    radius_mm = radius_seen_mm(rings_mm)
     row = rows_by_motion(alignment.row, steps, rhythm_of(light), table, encoder, sway, radius_mm)
     stated_s = without_stretch(row_times(table, row), row, table, recording.frame_rate)
     jumps = clock_jumps(stated_s, steps, encoder)
     changes = Changes(recording.frames, label, row, without_jumps(stated_s, jumps))
-    return _Matched(changes, LeftOut(seen.outside, seen.astray, copy), jumps, steps, radius_mm)
+    return _Matched(changes, LeftOut(seen.outside, seen.astray, copy), jumps, steps, rings_mm, radius_mm)
 
 
 def _compared(recording: Recording, probe: Probe, seen: _Seen, found: _Matched, context: Context) -> float:
@@ -161,6 +163,7 @@ def _compared(recording: Recording, probe: Probe, seen: _Seen, found: _Matched, 
     found.left_out.warn(frame, context)
     warn_of_cuts(cuts(pictures, seen.shown, found.left_out.any, changes.time_s), pictures, frame, context)
     check_diameter(found.radius_mm, recording.pipe, probe.lighting.radius_mm, context)
+    warn_of_oval(found.rings_mm, context)
     factor = encoder_factor(recording, changes.time_s, found.steps, found.radius_mm, context)
     warn_of_clock(found.jumps, changes.time_s, recording, context)
     _report(pictures, found.radius_mm, changes, context)
@@ -286,7 +289,7 @@ def _report(pictures: Pictures, radius_mm: float, changes: Changes, context: Con
 
 PREMISES = Stage(
     "premises",
-    "16",
+    "17",
     PremisesParameters,
     check_premises,
     "lights, times, encoder and diameter as stated, held against the pictures and mended",

@@ -6,10 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pipeline.adjustment.circles import circles_through
 from pipeline.arrays import Float
+from pipeline.artefacts.findings import clock_of_azimuth
 from pipeline.errors import UnusableError
 from pipeline.instrument.probe import Probe
 from pipeline.machine.stage import Context
+from pipeline.pages import notation
 from pipeline.recording.base import Encoder, PipeFacts, Recording
 from stages.premises.losses import Steps
 from stages.premises.pictures import CLOSED, Pictures
@@ -26,24 +29,32 @@ _NEAR_UNIT = 1.25
 # Unrolled walls show motion to about a tenth, and a gauge's bores differ from their mean: neither makes two.
 _CONTRADICTS = 2.0
 _LEAST_STEPS, _ONE_SIGN = 8, 0.8
+# Second harmonic of the ring, in radii, from which it is told; .013 at most in 15 fields (open-1 to open-3,
+# a01 to a12), .030 where pictures were made 2 % wider. Departures count no farther than so many radii.
+_OVAL, _CLIPPED = 0.02, 0.2
 # With the right probe every pixel of the line lies on the laser sheet; half leaves room for false lines.
 _MOST_LOST = 0.5
 
 
-def radius_seen_mm(pictures: Pictures, probe: Probe) -> float:
-    """Return the median distance of the laser line from the camera's axis; NaN where no line closes.
+def rings_seen_mm(pictures: Pictures, probe: Probe) -> Float:
+    """Return where closed laser lines lie across the camera's axis (L, R, 2), mm."""
+    closed = pictures.line_px[pictures.closed > CLOSED].astype(float)
+    direction = np.stack([np.cos(pictures.azimuth_rad), np.sin(pictures.azimuth_rad)], -1)
+    uv = np.asarray(probe.camera.centre_px) + closed[..., None] * direction
+    return probe.triangulate(uv)[..., :2] if closed.size else np.empty((0, len(direction), 2))
+
+
+def radius_seen_mm(rings_mm: Float) -> float:
+    """Return the median distance of rings (L, R, 2) from the camera's axis; NaN without any.
 
     Raises
     ------
     UnusableError
         When the stated probe has no place on the laser sheet for most of the line.
     """
-    closed = pictures.line_px[pictures.closed > CLOSED].astype(float)
-    if not closed.size:
+    if not rings_mm.size:
         return float("nan")
-    direction = np.stack([np.cos(pictures.azimuth_rad), np.sin(pictures.azimuth_rad)], -1)
-    uv = np.asarray(probe.camera.centre_px) + closed[..., None] * direction
-    radius_mm = np.linalg.norm(probe.triangulate(uv)[..., :2], axis=-1)
+    radius_mm = np.linalg.norm(rings_mm, axis=-1)
     lost = 1 - float(np.isfinite(radius_mm).mean())
     if lost > _MOST_LOST:
         raise UnusableError(
@@ -55,6 +66,30 @@ def radius_seen_mm(pictures: Pictures, probe: Probe) -> float:
             "be stated for pictures of this size",
         )
     return float(np.nanmedian(radius_mm))
+
+
+def warn_of_oval(rings_mm: Float, context: Context) -> None:
+    """Warn where rings (L, R, 2) are oval, as a pipe may be, or a picture that was stretched."""
+    if not len(rings_mm):
+        return
+    centre, radius = circles_through(rings_mm.astype(np.float32))
+    told = np.isfinite(radius)
+    if told.sum() < _LEAST_STEPS:
+        return
+    around = (rings_mm - centre[:, None])[told] @ np.array([1, 1j]) / radius[told, None]
+    departs = np.clip(np.abs(around) - 1, -_CLIPPED, _CLIPPED)
+    each = 2 * np.nanmean(departs * (around / np.abs(around)) ** 2, axis=1)
+    oval = complex(np.nanmedian(each.real), np.nanmedian(each.imag))
+    context.report("ring longer than wide by", 200 * abs(oval), "%")
+    if abs(oval) > _OVAL:
+        towards = notation.clock(float(clock_of_azimuth(np.angle(oval) / 2)))
+        context.warn(
+            f"with the stated probe the laser ring is {200 * abs(oval):.1f} % longer towards {towards} in "
+            "the picture than across. Either the pipe is so oval, or something mirrors the line; or pictures "
+            "were stretched, cropped or taken by another camera, and radii and findings are wrong by more "
+            "than their σ. What to do: measure the pipe's height and width; see that camera and recorder "
+            "keep the pictures' shape, and that the probe file is of this camera with these settings"
+        )
 
 
 def check_diameter(radius_mm: float, pipe: PipeFacts, lamps_mm: float, context: Context) -> None:

@@ -44,6 +44,16 @@ def test_a_diameter_that_the_ring_contradicts_ends_the_run(diameter_mm, message,
         checked(replace(good, pipe=PipeFacts(diameter_mm)), run.probe)
 
 
+@pytest.mark.parametrize(("stretch", "told_of"), [(1.0, False), (1.03, True)])
+def test_pictures_that_were_stretched_are_told_from_a_round_pipe(stretch, told_of, good, run):
+    """Of pixels 2 % too wide three warnings came, and none said what was wrong."""
+    (u, _), size = run.probe.camera.centre_px, good.source.image_size
+    wider = np.float32([[stretch, 0, u * (1 - stretch)], [0, 1, 0]])
+    images = {k: cv2.warpAffine(image, wider, size) for k, image in good.source.images.items()}
+    _, told = checked(replace(good, source=MemorySource(images, size)), run.probe)
+    assert any("% longer towards 3:00 in the picture" in t or "towards 9:00" in t for t in told) is told_of
+
+
 def test_lengths_in_inch_throughout_end_the_run(good, run):
     """All of them agree, but for the lamps, and the pipe came out 25 times too small without a word."""
     laser = replace(run.probe.laser, baseline_mm=BASELINE / 25.4)
