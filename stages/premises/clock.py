@@ -74,19 +74,13 @@ def _jumped(jump: ClockJump, time_s: Float, steps: Steps, encoder: Encoder) -> b
     usual = float(np.median(steps.size[~over])) if not over.all() else 0.0
     if not over.any() or usual == 0:
         return False
-    by_encoder = _advance(time_s, steps, encoder)
+    by_encoder = steps.by_encoder(encoder, time_s)
     moving = ~over & (steps.size / usual > 1 / _LIKE)
     mm_per_radius = float(np.median(by_encoder[moving] / steps.size[moving]))
     wall = float(np.median(steps.size[over])) * mm_per_radius
     stated = float(np.median(by_encoder[over]))
-    mended = float(np.median(_advance(without_jumps(time_s, [jump]), steps, encoder)[over]))
+    mended = float(np.median(steps.by_encoder(encoder, without_jumps(time_s, [jump]))[over]))
     return _alike(wall, usual * mm_per_radius) and not _alike(stated, wall) and _alike(mended, wall)
-
-
-def _advance(time_s: Float, steps: Steps, encoder: Encoder) -> Float:
-    """Return by how much the encoder advances over each step (K,), in its own unit."""
-    read = np.interp(time_s, encoder.time_s, encoder.distance_mm)
-    return np.asarray(read[steps.end] - read[steps.start])
 
 
 def _alike(one: float, other: float) -> bool:

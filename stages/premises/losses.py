@@ -49,6 +49,11 @@ class Steps:
     end: Int
     size: Float
 
+    def by_encoder(self, encoder: Encoder, time_s: Float) -> Float:
+        """Return by how much the encoder advances over each step (K,), in its own unit."""
+        read = np.interp(time_s, encoder.time_s, encoder.distance_mm)
+        return np.asarray(read[self.end] - read[self.start])
+
 
 def steps_of_wall(pictures: Pictures, shown: Int, copy: Bool) -> Steps:
     """Return the steps between pictures that are ``shown`` (F,) to be of the lit wall, or are stated to be.
@@ -172,9 +177,8 @@ def _shows_more(encoder: Encoder | None, time_s: Float, steps: Steps, radius_mm:
     """Return whether the encoder advances by more than the wall over all steps: matching held them back."""
     if encoder is None or not np.isfinite(radius_mm):
         return False
-    by_encoder = np.interp(time_s[steps.end], encoder.time_s, encoder.distance_mm)
-    by_encoder -= np.interp(time_s[steps.start], encoder.time_s, encoder.distance_mm)
-    return bool(abs(by_encoder.sum()) > _MORE * radius_mm * abs(steps.size.sum()))
+    shown = steps.by_encoder(encoder, time_s).sum()
+    return bool(abs(shown) > _MORE * radius_mm * abs(steps.size.sum()))
 
 
 def _encoder_agrees(encoder: Encoder | None, time_s: Float, way_mm: float, part: float) -> bool:

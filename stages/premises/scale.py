@@ -189,8 +189,7 @@ def encoder_factor(
 
 def _ratio(encoder: Encoder, time_s: Float, steps: Steps, radius_mm: float) -> _Ratio:
     known = (time_s >= encoder.time_s[0]) & (time_s <= encoder.time_s[-1])
-    reading = np.interp(time_s, encoder.time_s, encoder.distance_mm)
-    by_encoder, by_wall = reading[steps.end] - reading[steps.start], steps.size * radius_mm
+    by_encoder, by_wall = steps.by_encoder(encoder, time_s), steps.size * radius_mm
     # Only steps of half the fast ones' size (the 0.9 quantile) count: the ratio of two short steps is unsure.
     moving = np.abs(by_wall) > 0.5 * np.nanquantile(np.abs(by_wall), 0.9) if len(by_wall) else by_wall > 0
     use = known[steps.end] & known[steps.start] & moving
