@@ -181,6 +181,7 @@ def clipped_line(scene: Scene, frames: Iterable[tuple[int, Byte | None]]) -> flo
 def black_of_photo(frames: Iterable[tuple[int, Byte | None]]) -> float:
     """Return the grey level of the darkest tenth of laser frames in colour, whose range the photo has."""
     grey = [np.asarray(image[::4, ::4].mean(2)) for _, image in frames if image is not None]
+    # A tenth (chosen): the line and its stray light reach far less than nine tenths of a laser frame.
     return float(np.median([np.median(g[g <= np.quantile(g, 0.1)]) for g in grey])) if grey else 0.0
 
 
