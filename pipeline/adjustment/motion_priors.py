@@ -125,31 +125,51 @@ def _third_difference_of_poses(T_pc: Float, time_s: Float, known: Int, gaps: int
     return np.asarray(np.einsum("nk,nki->ni", coefficient, _position_and_turn(T_pc[window])))
 
 
+def jerking_sigma(T_pc: Float, time_s: Float, sigma: Float) -> Float:
+    """Return the 1 σ (N − 3, 6) of each third difference: ``sigma`` (6,), or its own size where that is more.
+
+    A probe that stops or turns back jerks a hundred times as much as on its way. Where the prior does not
+    expect that, it pulls the poses one way, and an effect that gives way to the pull seems to be there.
+
+    Parameters
+    ----------
+    T_pc : (N, 4, 4)
+        Poses as they are measured.
+    time_s : (N,)
+    sigma : (6,)
+    """
+    return np.asarray(np.hypot(sigma, _third_differences(T_pc, time_s)[2]))
+
+
 def smooth_motion_rows(T_pc: Float, time_s: Float, sigma: Float, border: int) -> Rows:
-    """Hold third differences of position and turn of neighbouring frames to 0 ± ``sigma`` (6,).
+    """Hold third differences of position and turn of neighbouring frames to 0 ± ``sigma``.
 
     Parameters
     ----------
     T_pc : (N, 4, 4)
     time_s : (N,)
         The differences are divided ones, so that uneven spacing does not matter.
-    sigma : (6,)
-        1 σ for even spacing, mm and rad.
+    sigma : (6,) or (N − 3, 6)
+        1 σ for even spacing, mm and rad; of all, or of each.
     border : int
         Number of global unknowns.
     """
-    first = np.arange(max(len(time_s) - 3, 0))
-    frame = first[:, None] + np.arange(4)
-    coefficient = third_difference_coefficients(time_s[frame])
-    residual = np.einsum("mk,mki->mi", coefficient, _position_and_turn(T_pc[frame]))
-    by_frame = np.zeros((len(first), 6, 4, BLOCK))
+    frame, coefficient, residual = _third_differences(T_pc, time_s)
+    by_frame = np.zeros((len(frame), 6, 4, BLOCK))
     for i in range(6):
         by_frame[:, i, :, i] = coefficient
-    none = np.zeros((6 * len(first), border))
+    none = np.zeros((6 * len(frame), border))
     return Rows(
         np.repeat(frame, 6, 0), by_frame.reshape(-1, 4, BLOCK), none, residual.ravel(),
-        np.tile(sigma, len(first)), Cauchy(_JERK_SIGMAS),
+        np.broadcast_to(sigma, residual.shape).ravel(), Cauchy(_JERK_SIGMAS),
     )  # fmt: skip
+
+
+def _third_differences(T_pc: Float, time_s: Float) -> tuple[Int, Float, Float]:
+    """Return frames and coefficients (N − 3, 4) of third differences, and their values (N − 3, 6)."""
+    frame = np.arange(max(len(time_s) - 3, 0))[:, None] + np.arange(4)
+    coefficient = third_difference_coefficients(time_s[frame])
+    return frame, coefficient, np.einsum("mk,mki->mi", coefficient, _position_and_turn(T_pc[frame]))
 
 
 def slip_drift_rows(slip: Float, sigma_mm: float, border: int) -> Rows:

@@ -7,6 +7,7 @@ import pytest
 
 from pipeline.adjustment.motion_priors import (
     LOOSE,
+    jerking_sigma,
     slip_drift_rows,
     smooth_motion_rows,
     third_difference_growth,
@@ -113,6 +114,46 @@ def test_rows_are_third_differences_with_their_derivatives() -> None:
         )
     steady = np.outer(time_s**2, [3.0, -2.0, 5.0, 0, 0, 0])
     np.testing.assert_allclose(smooth_motion_rows(poses(steady), time_s, SIGMA, 5).residual, 0, atol=1e-9)
+
+
+def late_by(sigma: Float, path: Float, time_s: Float) -> float:
+    """Return by how many σ pictures seem late where every fourth tells without noise where the probe is."""
+    rows = smooth_motion_rows(poses(path), time_s, sigma, 0)
+    along, frames = slice(2, None, 6), len(time_s)
+    prior = np.zeros((frames - 3, frames))
+    np.put_along_axis(prior, rows.frame[along], rows.by_frame[along, :, 2], 1)
+    known, accuracy_mm = np.arange(0, frames, 4), 0.005
+    speed = np.gradient(path[:, 2], time_s)[known]
+    weight = np.r_[rows.weight[along], np.full(len(known), accuracy_mm**-2)]
+    design = np.block([[prior, np.zeros((frames - 3, 1))], [np.eye(frames)[known], speed[:, None]]])
+    inverse = np.linalg.inv(design.T * weight @ design)
+    return float(
+        (inverse @ (design.T * weight @ np.r_[np.zeros(frames - 3), path[known, 2]]))[-1]
+        / inverse[-1, -1] ** 0.5
+    )
+
+
+def test_a_probe_that_turns_back_does_not_seem_to_be_late() -> None:
+    """Speeds of a rendered gauge run, 32, -20, 14 and 39 mm/s, each reached as a motor reaches its speed."""
+    time_s = np.arange(216) / 30
+    speed = np.full(216, 32.0)
+    for start_s, change in ((3.1, -52.0), (4.3, 34.0), (5.1, 25.0)):
+        speed -= change * np.expm1(-np.maximum(time_s - start_s, 0) / 0.07)
+    path = np.zeros((216, 6))
+    path[:, 2] = np.cumsum(speed) / 30
+    usual = np.array([1, 1, 0.0055, 1, 1, 1])
+    assert abs(late_by(jerking_sigma(poses(path), time_s, usual), path, time_s)) < 0.5
+    assert abs(late_by(usual, path, time_s)) > 2
+
+
+def test_where_a_probe_jerks_its_motion_may_jerk() -> None:
+    time_s = np.arange(30.0)
+    path = np.zeros((30, 6))
+    path[15:, 2] = 7.0 * (time_s[15:] - 14)
+    found = jerking_sigma(poses(path), time_s, SIGMA)
+    np.testing.assert_allclose(found[:12], np.tile(SIGMA, (12, 1)))
+    rows = smooth_motion_rows(poses(path), time_s, found, 0)
+    assert np.max(rows.residual**2 * rows.weight) <= 1
 
 
 def test_drift_is_the_change_of_slip_and_jumps_weigh_little() -> None:

@@ -56,8 +56,8 @@ class GaugeRun:
     time_s : (N,)
     encoder : Encoder or None
     bore_sigma_mm : float
-    motion_sigma : (6,)
-        1 σ of the poses' third differences.
+    motion_sigma : (N − 3, 6)
+        1 σ of each of the poses' third differences.
     edge_weight, ring_weight : (E,), (R,)
         Fixed, so that hypotheses are compared on the same measurements.
     watch : Watch

@@ -101,8 +101,7 @@ def _best(
 def _some_size_is_possible(model: EffectModel, shape: Shape, amplitude: Float) -> bool:
     """Return whether the effect may be that large, or a little of it with the same sign.
 
-    What points to an exposure shorter than none is no evidence of another exposure, however many σ it has. It
-    had turned the answer about a probe with nothing wrong into "something that no known effect explains".
+    What points to an exposure shorter than none is no evidence of another exposure, however many σ it has.
     """
     return model.possible(shape, amplitude) or model.possible(shape, _LITTLE * amplitude)
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipeline.adjustment.levenberg_marquardt import Watch, unwatched
-from pipeline.adjustment.motion_priors import third_difference_sigma
+from pipeline.adjustment.motion_priors import jerking_sigma, third_difference_sigma
 from pipeline.arrays import Float, Int
 from stages.calibrate.gauge import MeasuredRun
 from stages.calibrate.gauge.adjust import NEAR_SIGMA, adjust
@@ -75,7 +75,8 @@ def prepare(measured_run: MeasuredRun, watch: Watch = unwatched) -> tuple[GaugeR
     run = GaugeRun(
         measured.edges, rings, widths_at(source.rings, source.index, rings.frame, rings.outward),
         measured.time_s, measured.encoder,
-        max(measured.bore_sigma_mm, _LEAST_BORE_SIGMA_MM), _LOOSER * sigma,
+        max(measured.bore_sigma_mm, _LEAST_BORE_SIGMA_MM),
+        jerking_sigma(smooth.T_pc, measured.time_s, _LOOSER * sigma),
         measured.edges.sigma_px**-2, np.ones(len(rings.frame)), watch,
     )  # fmt: skip
     return weighed(run, linearise(run, smooth, ())), stated_start(smooth)
