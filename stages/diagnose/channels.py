@@ -24,7 +24,8 @@ from stages.diagnose.field.evidence import FieldEvidence, field_evidence, nothin
 from stages.diagnose.field.run import FieldRun, field_run
 from stages.diagnose.gauge.examine import Examined, examine
 from stages.diagnose.profile.evidence import ProfileEvidence, profile_evidence
-from stages.diagnose.travel.evidence import PLACED_SIGMA_MM, TravelEvidence, travel_evidence
+from stages.diagnose.travel.evidence import TravelEvidence, travel_evidence
+from stages.diagnose.travel.left_over import PLACED_SIGMA_MM
 from stages.diagnose.travel.sight import sight_of_poses
 from stages.motion import EncoderReadings, Equations, Measurements, MotionParameters, State
 
@@ -290,8 +291,8 @@ FREE_MOTION = Stage(
     "free_motion", "2", MotionParameters, adjust_freely, "an inspection's motion without encoder", "motion"
 )
 GAUGE_EVIDENCE = Stage(
-    "evidence", "22", DiagnosisParameters, examine_gauge, "what a gauge run shows of effects", "diagnosis"
+    "evidence", "23", DiagnosisParameters, examine_gauge, "what a gauge run shows of effects", "diagnosis"
 )
 FIELD_EVIDENCE = Stage(
-    "evidence", "10", DiagnosisParameters, examine_field, "what an inspection shows of effects", "diagnosis"
+    "evidence", "11", DiagnosisParameters, examine_field, "what an inspection shows of effects", "diagnosis"
 )

@@ -17,12 +17,10 @@ from stages.diagnose.profile.evidence import ProfileEvidence
 from stages.diagnose.profile.finding import Finding
 from stages.diagnose.result import CourseFound, EffectFound, Location, Value
 from stages.diagnose.travel.evidence import TravelEstimate, TravelEvidence
+from stages.diagnose.travel.left_over import TRAVEL_FOUND
 from stages.diagnose.travel.lines import Line
 from stages.diagnose.travel.steps import StepFound
 
-# Below this chance, motion against encoder shows an effect: of 300 recordings without any, with three smooth
-# effects each, a hundredth of one would.
-TRAVEL_FOUND = 1e-5
 # Drawn cases of each channel that were named, all of them rightly: gauge runs at ring level, drawn lines.
 # After n of them the next is right with a chance of (n + 1) / (n + 2): no more is told.
 _DRILLED = {Channel.MOTION: 44, Channel.PROFILE: 9}
@@ -164,7 +162,7 @@ def _of_estimate(e: TravelEstimate, travel: TravelEvidence) -> Claim:
     fixed_to, time = goes_with.pop() if len(goes_with) == 1 else (None, None)
     return Claim(
         e.effect, {e.quantity: Value(e.value, e.size_sigma)}, e.statement, e.p_value,
-        tuple(n for n, _ in e.alike), travel.source, _stretch(travel, e.where, fixed_to, time), e.agreements,
+        tuple(n for n, _ in e.alike), travel.source, stretch(travel, e.where, fixed_to, time), e.agreements,
         fits_p=travel.fits_p, otherwise=e.otherwise,
     )  # fmt: skip
 
@@ -179,7 +177,7 @@ def _of_slip(step: StepFound, travel: TravelEvidence) -> Claim:
         f"gains {step.gain_mm:+.2f} mm."
     )
     where = (step.place - 1, step.place)
-    location = _stretch(travel, where, FixedTo.TIME, "event")
+    location = stretch(travel, where, FixedTo.TIME, "event")
     return Claim(
         "encoder_slip", size, words, step.p_value, (), travel.source, location, step.agreements,
         fits_p=travel.fits_p,
@@ -203,7 +201,7 @@ def _of_swing(line: Line, seen: Seen, travel: TravelEvidence) -> Claim:
         f"The camera swings across the pipe by {line.amplitude_mm:.3f} mm at {line.frequency_hz:.2f} Hz "
         "or an alias of it."
     )
-    location = _stretch(travel, None, FixedTo.TIME, "periodic")
+    location = stretch(travel, None, FixedTo.TIME, "periodic")
     return Claim(
         "probe_vibration", size, words, line.p_value, others, travel.source, location, line.agreements
     )
@@ -243,7 +241,7 @@ def _of_finding(f: Finding, profile: ProfileEvidence, where: str) -> Claim:
     return Claim(f.effect, size, f.statement, f.p_value, f.alike, where, location, f.agreements, counted)
 
 
-def _stretch(
+def stretch(
     travel: TravelEvidence, places: tuple[int, int] | None, fixed_to: FixedTo | None, time: str | None
 ) -> Location:
     """Return where motion shows it: in the frames between two places of the sight, else in all."""

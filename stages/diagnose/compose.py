@@ -13,7 +13,7 @@ from pipeline.instrument.probe import Probe
 from pipeline.physics.catalogue import effect
 from pipeline.physics.effect import Channel
 from stages.diagnose.channels import Seen
-from stages.diagnose.claims import Claim, claims_of
+from stages.diagnose.claims import Claim, claims_of, stretch
 from stages.diagnose.gauge import answer as of_gauge
 from stages.diagnose.gauge.examine import Examined
 from stages.diagnose.result import (
@@ -28,7 +28,7 @@ from stages.diagnose.result import (
 )
 
 _SAME_FREQUENCY_HZ = 0.15
-_IN_PROFILE, _IN_MOTION = (Location(str(c), None, None) for c in (Channel.PROFILE, Channel.MOTION))
+_IN_PROFILE = Location(str(Channel.PROFILE), None, None)
 _UNKNOWN = "a cause that the library does not have, such as {}"
 _OF_ENCODER = "an error of the encoder that depends on distance or speed in another way"
 _AGAIN = (
@@ -52,10 +52,10 @@ def composed(
     unnamed = len(known) < len(every) or bool(of_travel)
     said = _said(examined, known, unnamed, bool(of_profile))
     asked = said.members if said.members else [e.name for e in said.effects]
-    nameless = _IN_PROFILE if of_profile else _IN_MOTION if of_travel else None
+    nameless = _IN_PROFILE if of_profile else of_travel[0][1] if of_travel else None
     location = _location(examined, every, asked) or nameless
     words = _identifiable(said, examined, any(c.may_go_otherwise for c in known))
-    identifiable = " ".join(s for s in (words, *of_profile, *of_travel) if s)
+    identifiable = " ".join(s for s in (words, *of_profile, *(said for said, _ in of_travel)) if s)
     partly = said.verdict is Verdict.PARTLY
     found = Diagnosis(
         recording=field.name if field is not None else "",
@@ -210,10 +210,14 @@ def _unexplained_profile(*recordings: Seen | None) -> tuple[str, ...]:
     return tuple(f"{name}: {p.unexplained.statement}" for name, p in profiles if p.unexplained is not None)
 
 
-def _unexplained_travel(*recordings: Seen | None) -> tuple[str, ...]:
-    """Return sentences on what is between motion and encoder and no effect of the encoder explains."""
+def _unexplained_travel(*recordings: Seen | None) -> list[tuple[str, Location]]:
+    """Return what is between motion and encoder and no effect of the encoder explains, and where."""
     travels = [(s.name, s.travel) for s in recordings if s is not None and s.travel is not None]
-    return tuple(f"{name}: {t.unexplained}" for name, t in travels if t.unexplained)
+    return [
+        (f"{name}: {t.unexplained.statement}", stretch(t, t.unexplained.where, None, None))
+        for name, t in travels
+        if t.unexplained is not None
+    ]
 
 
 def _global_p(field: Seen | None, gauge: Seen | None) -> float:

@@ -14,6 +14,7 @@ from pipeline.recording.base import Encoder, Recording
 from stages.diagnose.agreement import Agreement
 from stages.diagnose.effects.library import LIBRARY
 from stages.diagnose.travel.events import with_events
+from stages.diagnose.travel.left_over import LeftOver, left_over
 from stages.diagnose.travel.lines import Line, find_lines
 from stages.diagnose.travel.model import TravelFit, second_predictions
 from stages.diagnose.travel.sight import Sight, quantum_mm
@@ -30,12 +31,8 @@ _QUANTUM_SHARE = 0.5
 _REPORTED = 1e-3
 _SELDOM = 0.02
 _SHORTEST_MM = 20.0
-# 1 σ of a picture's place by fiducials, which may be put there wrongly. Debt: data/debts.md.
-PLACED_SIGMA_MM = 0.05
 # Logarithm of odds beyond which they decide anyway.
 _SURE_OF = 50.0
-# What is left of the reading is noise unless its chance is below this. Debt: data/debts.md.
-_NOISE = 1e-6
 
 
 @dataclass(frozen=True)
@@ -105,8 +102,8 @@ class TravelEvidence:
         None without a usable encoder.
     shortcomings : tuple of str
         What this recording cannot tell, and why.
-    unexplained : str
-        What is between motion and encoder and no effect of the encoder explains; else empty.
+    unexplained : LeftOver or None
+        What is between motion and encoder and no effect of the encoder explains.
     """
 
     source: str
@@ -116,7 +113,7 @@ class TravelEvidence:
     lines: tuple[Line, ...]
     fit: TravelFit | None
     shortcomings: tuple[str, ...]
-    unexplained: str = ""
+    unexplained: LeftOver | None = None
 
     @property
     def least_p(self) -> float:
@@ -128,6 +125,8 @@ class TravelEvidence:
     @property
     def fits_p(self) -> float:
         """Chance that what all effects and events leave between motion and encoder is noise."""
+        if self.unexplained is not None:
+            return 0.0
         return self.fit.fits_p if self.fit is not None else 1.0
 
     def estimate(self, name: str) -> TravelEstimate | None:
@@ -174,7 +173,7 @@ def travel_evidence(
     doubtful = tuple(s for s in steps if s.rivals)
     estimates = _estimates(source, fit, scale_sigma_stated, quantum_mm(encoder))
     missing = (*missing, *_blind([e for e in estimates if e.effect not in without], sight))
-    left = _unexplained(fit, quantum_mm(encoder)) if sight.placed else ""
+    left = left_over(fit, steps, quantum_mm(encoder))
     return TravelEvidence(source, estimates, slips, doubtful, lines, fit, missing, left)
 
 
@@ -268,18 +267,6 @@ def _shortcomings(source: str, recording: Recording, sight: Sight) -> tuple[str,
             "or speed cannot be told."
         )
     return tuple(out)
-
-
-def _unexplained(fit: TravelFit, count_mm: float) -> str:
-    """Return by how much the reading is off in a way that is no noise, where fiducials place every picture.
-
-    A random walk is what the way gathers from picture to picture. Where each is placed by itself, none is.
-    """
-    sigma = float(np.sqrt(PLACED_SIGMA_MM**2 + fit.noise.white_mm**2 + count_mm**2))
-    left = float(np.max(np.abs(fit.whitened.residual - np.median(fit.whitened.residual))))
-    if 2 * norm.sf(left / sigma) * len(fit.whitened.residual) > _NOISE:
-        return ""
-    return f"The reading is off by up to {left:.2f} mm in a way that no effect of an encoder explains."
 
 
 def _blind(estimates: Sequence[TravelEstimate], sight: Sight) -> tuple[str, ...]:
