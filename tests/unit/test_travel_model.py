@@ -8,10 +8,12 @@ import numpy as np
 import pytest
 
 from stages.diagnose.travel.events import with_events
-from stages.diagnose.travel.evidence import TravelEstimate, _estimates, _goes_otherwise, _unexplained
+from stages.diagnose.travel.evidence import TravelEstimate, _estimates, _goes_otherwise
+from stages.diagnose.travel.left_over import left_over
 from stages.diagnose.travel.model import EventKind
 from stages.diagnose.travel.sight import quantum_mm, readings_at
 from stages.diagnose.travel.solve import DELAY, PLAY, SCALE
+from stages.diagnose.travel.steps import steps_found
 from tests.travel_cases import read, seen
 
 STATED = 0.002
@@ -111,11 +113,36 @@ def test_what_is_not_known_is_neither_fitted_nor_taken_for_noise(name, fault, si
     faulty, left = read(**{fault: size}), {}
     for without in ((), (name, "time_offset", "encoder_slip")):
         fit = with_events(placed, faulty, without)
-        left[without] = _unexplained(fit, quantum_mm(faulty))
-    assert list(map(bool, left.values())) == [False, True]
+        left[without] = left_over(fit, steps_found(fit, faulty), quantum_mm(faulty))
+    assert [one is not None for one in left.values()] == [False, True]
     assert fit.values[column] == 0.0
     assert not np.isfinite(fit.sigma[column])
     assert all(e.kind is not EventKind.STEP for e in fit.events)
+
+
+@pytest.mark.parametrize("placed", [True, False])
+@pytest.mark.parametrize("at_s", [4.2, 7.7])
+def test_a_slip_that_nobody_knows_is_unexplained_from_its_time_on(placed, at_s):
+    """Near the end the fit takes it for a few stray pictures, beside which nothing is left."""
+    sight = replace(seen(np.random.default_rng(10), drift_mm=0.001), placed=placed)
+    slipped = read(slips=((at_s, 1.36),))
+    known, unknown = (with_events(sight, slipped, without) for without in ((), ("encoder_slip",)))
+    assert left_over(known, steps_found(known, slipped), 0.05) is None
+    left = left_over(unknown, steps_found(unknown, slipped), 0.05)
+    assert left is not None
+    if at_s > 7:
+        assert left.off_mm == pytest.approx(1.36, abs=0.1)
+        assert left.time_s[0] == pytest.approx(at_s, abs=0.1)
+
+
+@pytest.mark.parametrize("placed", [True, False])
+def test_one_stray_picture_and_a_sound_encoder_leave_nothing(placed):
+    sight = replace(seen(np.random.default_rng(11), drift_mm=0.001), placed=placed)
+    stray = sight.distance_mm.copy()
+    stray[40] += 1.0
+    for one in (sight, replace(sight, distance_mm=stray)):
+        fit = with_events(one, read())
+        assert left_over(fit, steps_found(fit, read()), 0.05) is None
 
 
 def test_a_picture_is_missed_by_its_noise_when_all_others_predict_it():
