@@ -1,89 +1,106 @@
-"""Whether the wall's σ is true over many instruments: one recording, run with drawn probe files.
+"""Whether the wall's common σ is true over many instruments: one recording, drawn probes and wheels.
 
 The instrument's error is the same in all samples of a recording: one draw. The share of samples inside their
 intervals is therefore near 0 or near 100 % in most single recordings, and no test of that part of σ. Here
-probe files are drawn about a calibrated one by the uncertainty that the recording's own file states, as a
-maker's certificate would be off, and each is run: over the draws 95 % must be inside, and the mean error of
-the radius must be one of its stated σ, rms.
+probes are drawn about a calibrated one by the uncertainty that the recording's own file states, and the
+encoder's readings are scaled by a draw of its stated uncertainty. Rings and texture are measured once, in
+px; motion is adjusted anew for each draw. How far radius and way are from those by the calibrated probe and
+the encoder as it is must be one of the stated σ, rms, and 95 % of them within 1.96.
 
-usage: python -m tests.benchmarks.bench_stated_probe OUT RECORDING CALIBRATED [--draws N] [--understate F]
+usage: python -m tests.benchmarks.bench_stated_probe RUN RECORDING CALIBRATED [--draws N] [--first N]
+           [--understate F] [--right-wheel]
 
-With ``--understate 3`` the files state a third of what was drawn: the share inside must then be bad.
+With ``--understate 3`` the files state a third of what was drawn, which must show. With ``--right-wheel`` the
+readings stay as they are: what the wheel's σ adds to that of radii then goes unused.
 """
 
 from __future__ import annotations
 
 import argparse
-import json
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-import yaml
 
-from tests.benchmarks.bench_hard_footage import axial_sigmas, scored
-
-
-def drawn(stated: Path, centre: Path, understate: float, random: np.random.Generator) -> dict[str, object]:
-    """Return a probe file's content: ``stated``, with camera and laser drawn about those of ``centre``."""
-    probe, at = (yaml.safe_load(path.read_text("utf-8")) for path in (stated, centre))
-    sigma, camera, laser = probe["standard_uncertainty"], probe["camera"], probe["laser"]
-    focal = random.normal(0, sigma["focal_px"])
-    camera["focal_px"] = [f + focal for f in at["camera"]["focal_px"]]
-    for name in ("centre_px", "distortion"):
-        camera[name] = [float(v) for v in random.normal(at["camera"][name], sigma[name])]
-    for name in ("baseline_mm", "opening_angle_deg"):
-        laser[name] = float(random.normal(at["laser"][name], sigma[name]))
-    across = np.radians(at["laser"]["tilt_direction_deg"])
-    tilt = at["laser"]["tilt_deg"] * np.array([np.cos(across), np.sin(across)])
-    tilt = random.normal(tilt, sigma["tilt_deg"])
-    laser["tilt_deg"], laser["tilt_direction_deg"] = (
-        float(np.hypot(*tilt)),
-        float(np.degrees(np.arctan2(*tilt[::-1]))),
-    )
-    probe["standard_uncertainty"] = {n: (np.array(v) / understate).tolist() for n, v in sigma.items()}
-    return dict(probe)
+from pipeline.geometry.axis import distance_along
+from pipeline.instrument.probe import Probe
+from pipeline.instrument.probe_file import read_probe
+from stages.accumulate import calibration_spread
+from stages.accumulate.survey import RingsOnWall, survey_of
+from stages.motion.measuring import measure_run
+from stages.motion.parameters import MotionParameters
+from stages.motion.rings import looking_at_wall
+from stages.motion.trajectory import trajectory_of
+from stages.motion.windows.measured_run import MeasuredRun
+from stages.motion.windows.sliding_window import adjust_run
+from tests.benchmarks.painted_rings import Background, background
+from tests.quiet import quiet_context
 
 
-def calibration_sigma_mm(run: Path) -> float:
-    """Return the median σ of the radius that a run states for its instrument."""
-    stages = json.loads((run / "run.json").read_text("utf-8"))["stages"]
-    numbers = {n["name"]: n["value"] for s in stages for n in s["numbers"]}
-    return float(numbers["1 σ of the radius, calibration, median"])
+def drawn(stated: Probe, centre: Probe, understate: float, random: np.random.Generator) -> Probe:
+    """Return a probe drawn about ``centre`` as unsure as ``stated``, which states too little by a factor."""
+    directions = stated.principal_uncertainties()
+    off = directions @ random.standard_normal(directions.shape[1])
+    probe = stated.with_parameters(centre.parameters + off, stated.covariance / understate**2)
+    return replace(probe, encoder_scale_sigma=stated.encoder_scale_sigma / understate)
+
+
+@dataclass(frozen=True)
+class Found:
+    """Radius and way, mm, that a run was found to have, with 1 σ of each by the instrument."""
+
+    radius_mm: float
+    radius_sigma_mm: float
+    way_mm: float
+    way_sigma_mm: float
+
+    def in_sigma(self, right: Found) -> tuple[float, float]:
+        """Return how far radius and way are from the right ones, in σ."""
+        radius = (self.radius_mm - right.radius_mm) / self.radius_sigma_mm
+        return radius, (self.way_mm - right.way_mm) / self.way_sigma_mm
+
+
+def adjusted(back: Background, run: MeasuredRun) -> Found:
+    """Adjust the motion and return what it finds of the pipe."""
+    joined = adjust_run(run, MotionParameters(), lambda *_: None, lambda *_: None).joined
+    motion = trajectory_of(joined, back.recording.frames, run.probe, run.encoder is not None)
+    probe = run.probe.as_found_in(motion)
+    survey = survey_of(RingsOnWall(probe, back.rings, back.points, motion))
+    sigma = calibration_spread(probe, back.rings, motion, survey).sigma_mm
+    way = np.ptp(distance_along(motion.axis, motion.T_pc))
+    return Found(joined.radius_mm, float(np.median(sigma)), float(way), motion.distance_sigma_mm)
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("out", type=Path)
+    parser.add_argument("run", type=Path)
     parser.add_argument("recording", type=Path)
     parser.add_argument("calibrated", type=Path)
     parser.add_argument("--draws", type=int, default=12)
+    parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--understate", type=float, default=1.0)
+    parser.add_argument("--right-wheel", action="store_true")
     asked = parser.parse_args()
-    asked.out.mkdir(parents=True, exist_ok=True)
-    rows = []
-    for draw in range(asked.draws):
-        name = f"{asked.recording.name}-{draw}" + f"-by-{asked.understate:g}" * (asked.understate != 1)
-        file, run = asked.out / f"{name}.yaml", asked.out / f"{name}-run"
-        probe = drawn(
-            asked.recording / "probe.yaml", asked.calibrated, asked.understate, np.random.default_rng(draw)
-        )
-        file.write_text(yaml.safe_dump(probe), "utf-8")
-        score = scored(asked.recording, run, ["--probe", str(file)])
-        if score is None:
-            print(f"{name} FAILED: {run.with_suffix('.log').read_text('utf-8')[-300:]}", flush=True)
-            continue
-        bias, sigma = score["wall"]["radius_bias_mm"], calibration_sigma_mm(run)
-        rows.append((score["wall"]["within_1.96_sigma"], bias / sigma, axial_sigmas(score, run)))
+    back, stated = background(asked.run, asked.recording), read_probe(asked.recording / "probe.yaml")
+    recording, centre = looking_at_wall(back.recording, back.rings, back.points), read_probe(asked.calibrated)
+    run = measure_run(recording, stated, back.rings, back.points, MotionParameters(), quiet_context(0))
+    encoder, right, rows = run.encoder, adjusted(back, replace(run, probe=centre)), []
+    for draw in range(asked.first, asked.first + asked.draws):
+        random = np.random.default_rng(draw)
+        probe, wheel = drawn(stated, centre, asked.understate, random), random.standard_normal()
+        if run.encoder is not None and not asked.right_wheel:
+            off = 1 + wheel * stated.encoder_scale_sigma
+            encoder = replace(run.encoder, distance_mm=run.encoder.distance_mm * off)
+        found = adjusted(back, replace(run, probe=probe, encoder=encoder))
+        rows.append(found.in_sigma(right))
         print(
-            f"{name} bias {bias:+.3f} mm ({rows[-1][1]:+.2f} of its σ {sigma:.3f}), "
-            f"inside {100 * rows[-1][0]:.1f} %, axial {rows[-1][2]:+.2f} σ", flush=True,
-        )  # fmt: skip
-    inside, radius, axial = np.array(rows).T
-    print(
-        f"{len(rows)} draws: inside {100 * inside.mean():.1f} % (single ones {100 * inside.min():.1f} to "
-        f"{100 * inside.max():.1f}), radius rms {np.sqrt(np.mean(radius**2)):.2f} σ, "
-        f"axial rms {np.sqrt(np.mean(axial**2)):.2f} σ"
-    )
+            f"draw {draw}: radius {found.radius_mm - right.radius_mm:+.3f} mm ({rows[-1][0]:+.2f} σ of "
+            f"{found.radius_sigma_mm:.3f}), way {found.way_mm - right.way_mm:+.3f} mm ({rows[-1][1]:+.2f} σ)",
+            flush=True,
+        )
+    for name, z in zip(("radius", "way"), np.array(rows).T, strict=True):
+        inside = 100 * np.mean(np.abs(z) < 1.96)
+        print(f"{name}: {len(z)} draws, rms {np.sqrt(np.mean(z**2)):.2f} σ, {inside:.0f} % inside 1.96 σ")
 
 
 if __name__ == "__main__":
