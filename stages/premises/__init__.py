@@ -147,7 +147,8 @@ def _matched(recording: Recording, probe: Probe, seen: _Seen) -> _Matched:
     steps, sway = steps_of_wall(pictures, seen.shown, copy), sway_of_line(pictures, light)
     rings_mm = rings_seen_mm(pictures, probe)
     radius_mm = radius_seen_mm(rings_mm)
-    row = rows_by_motion(alignment.row, steps, rhythm_of(light), table, encoder, sway, radius_mm)
+    one_bore = recording.kind != "gauge"
+    row = rows_by_motion(alignment.row, steps, rhythm_of(light), table, encoder, sway, radius_mm, one_bore)
     stated_s = without_stretch(row_times(table, row), row, table, recording.frame_rate)
     jumps = clock_jumps(stated_s, steps, encoder)
     changes = Changes(recording.frames, label, row, without_jumps(stated_s, jumps))
@@ -289,7 +290,7 @@ def _report(pictures: Pictures, radius_mm: float, changes: Changes, context: Con
 
 PREMISES = Stage(
     "premises",
-    "17",
+    "18",
     PremisesParameters,
     check_premises,
     "lights, times, encoder and diameter as stated, held against the pictures and mended",

@@ -97,6 +97,7 @@ def rows_by_motion(
     encoder: Encoder | None,
     sway: Float,
     radius_mm: float = np.nan,
+    one_bore: bool = True,
 ) -> Int:
     """Return ``row`` (F,) with more or fewer rows skipped where the wall moves by more or less than usual.
 
@@ -104,7 +105,8 @@ def rows_by_motion(
     moved, compared with the steps around, gives the rest. Steps tell nothing where the encoder shows the
     same leap (the probe moved faster), over pictures that were left out (the speed is not known for so long),
     where the line's ``sway`` (F,) leaps and the rhythm goes on (the camera was knocked), or where the encoder
-    agrees with the wall, by the pipe's ``radius_mm``, but shows more in all: a codec that repeats blocks
+    agrees with the wall, by the pipe's ``radius_mm``, rather than with the loss. That is asked where half the
+    way or more would be missing, and of all where the encoder shows more in all: a codec that repeats blocks
     holds back usual steps.
     """
     if len(steps.end) < _LEAST_STEPS:
@@ -116,11 +118,12 @@ def rows_by_motion(
     passed = np.maximum(time[steps.end] - time[steps.start], 1e-9) / period
     rhythm, over = _over_whole_periods(np.rint(passed).astype(np.int64), rhythm)
     sigmas = np.where(over > 0, _SIGMAS_LOST, _SIGMAS_LOST if left > 0 else _SIGMAS)
-    for start, end, lost, size in _leaps(steps, passed, rhythm, over, sigmas):
+    for start, end, lost, size in _leaps(steps, passed, rhythm, over, sigmas, one_bore):
         skips = np.diff(row[start : end + 1]) - 1
         believed = left >= lost or _encoder_was_steady(encoder, float(time[end]), period)
-        if held_back:
-            part = 1 - lost / max((time[end] - time[start]) / period + lost, 1.0)
+        part = 1 - lost / max((time[end] - time[start]) / period + lost, 1.0)
+        # No error of the pipe's radius makes the wall's way twice the encoder's.
+        if held_back or part <= 1 / 2:
             believed &= not _encoder_agrees(encoder, time[[start, end]], size * radius_mm, part)
         if lost % rhythm == 0:
             believed &= sway[start + 1 : end + 1].max() < _LINE_LEAPS * (1 + abs(lost) / rhythm)
@@ -142,20 +145,21 @@ def _over_whole_periods(pictures: Int, rhythm: int) -> tuple[int, Int]:
 
 
 def _leaps(
-    steps: Steps, passed: Float, rhythm: int, over: Int, sigmas: Float
+    steps: Steps, passed: Float, rhythm: int, over: Int, sigmas: Float, one_bore: bool
 ) -> list[tuple[int, int, int, float]]:
     """Return (start, end, lost pictures, size) of steps that stand out by ``sigmas`` (K,), clearest first.
 
-    ``passed`` (K,) is how many pictures they took by their times, to which ``over`` (K,) or a number of whole
-    periods more is to be added. The error of matching is what is then left: losses do not widen it, however
-    many there are. Where the rhythm breaks, a loss has only to fit better than none.
+    ``passed`` (K,) is how many pictures they took by their times, to which ``over`` (K,) or a number of
+    whole periods more is to be added. The error of matching is what is then left: losses do not widen it,
+    however many there are. Where the rhythm breaks, a loss has only to fit better than none. Without
+    ``one_bore`` steps of one speed differ as the bores of a gauge do: what looks like losses is error, too.
     """
     excess = steps.size / _usual_speed(steps.size / passed, over == 0) - passed
     for _ in range(_ROUNDS):
         lost = over + rhythm * np.rint((excess - over) / rhythm).astype(np.int64)
         speed = steps.size / np.maximum(passed + lost, 0.5)
         excess = steps.size / _usual_speed(speed, np.ones(len(lost), bool)) - passed
-    error = np.quantile(np.abs(excess - lost), 0.9)
+    error = np.quantile(np.abs(excess - lost * one_bore), 0.9)
     stand_out = (
         (np.abs(excess) > sigmas * (error / _NINE_IN_TEN + 1e-9))
         & (lost != 0)
@@ -194,5 +198,7 @@ def _encoder_was_steady(encoder: Encoder | None, time_s: float, period_s: float)
     if encoder is None or not encoder.time_s[0] < time_s < encoder.time_s[-1]:
         return False
     at = time_s + period_s * np.arange(-_NEARBY, _NEARBY + 1)
-    step = np.abs(np.diff(np.interp(at, encoder.time_s, encoder.distance_mm)))
-    return bool(step.max() < 2 * np.median(step))
+    step = np.diff(np.interp(at, encoder.time_s, encoder.distance_mm))
+    usual = float(np.median(step))
+    # A probe that turns back moves as fast as before, but not evenly.
+    return bool(np.abs(step).max() < 2 * abs(usual) and np.all(step * usual >= 0))

@@ -140,6 +140,19 @@ def test_a_camera_knocked_in_mid_run_is_no_loss(knocked):
     assert row[-1] - 119 == (0 if knocked else 2)
 
 
+@pytest.mark.parametrize(("turns", "lost"), [(False, 2), (True, 0)])
+def test_where_a_probe_turns_back_a_longer_step_is_no_loss(turns, lost):
+    """Sizes of steps in a gauge differ by its bores; where it turned, up to 44 pictures "were lost"."""
+    frame = np.arange(0, 120, 2)
+    size = np.where(frame[1:] == 60, 0.04, 0.02) + 0.0001 * np.sin(frame[1:])
+    table = FrameTable(np.arange(120), np.arange(120) / 30, np.full(120, "led"))
+    way_mm = 30 * table.time_s
+    encoder = Encoder(table.time_s, np.where(turns & (way_mm > 64), 128 - way_mm, way_mm))
+    steps = Steps(frame[:-1], frame[1:], size)
+    row = rows_by_motion(np.arange(120), steps, 2, table, encoder, np.ones(120))
+    assert row[-1] - 119 == lost
+
+
 @pytest.mark.parametrize("stood", [False, True])
 def test_a_jump_of_the_clock_is_taken_out_and_a_probe_that_stood_is_not(stood, good, run):
     """At 5 s the run came out more than twice as long as it was."""
