@@ -18,7 +18,6 @@ from pipeline.artefacts.model import Overlay, Overlays
 from pipeline.export.report.page import Flat, Legend, Mark, Strip, Tick, round_ticks
 from pipeline.export.report.tables import RunSummary
 from pipeline.pages import data_uri
-from pipeline.system.parallel import side_by_side
 
 TOP_RAD = -1.5 * np.pi  # 6 o'clock, a turn below +π/2
 # Pixels of one picture of the whole wall, and of one about a finding: the page stays below 8 MB.
@@ -51,14 +50,12 @@ class Gallery:
 
     def flats(self) -> tuple[Flat, ...]:
         """Return the pictures of the whole wall, the photo first."""
-        photo = () if self.photo is None else (("The wall, unrolled", "photo of the wall", self.photo, None),)
-        views = (*photo, *((o.title, o.title, image, _legend(o)) for o, image in self.overlays))
-
-        def flat(view: tuple[str, str, FlatImage, Legend | None]) -> Flat:
-            title, what, image, legend = view
-            return Flat(title, self._strips(image, what), legend)
-
-        return tuple(side_by_side(flat, views) if views else ())
+        out = []
+        if self.photo is not None:
+            out.append(Flat("The wall, unrolled", self._strips(self.photo, "photo of the wall"), None))
+        for overlay, image in self.overlays:
+            out.append(Flat(overlay.title, self._strips(image, overlay.title), _legend(overlay)))
+        return tuple(out)
 
     def crops(self, defect: Defect) -> tuple[str, str]:
         """Return photo and deviation around a defect, as addresses; empty where there is none."""
