@@ -165,6 +165,10 @@ def _leaps(
         & (lost != 0)
         & (error < _TOLD_APART * rhythm)
     )
+    # Where most breaks of the rhythm are losses, the others are likely to be losses, too.
+    breaks = over > 0
+    if np.sum(stand_out & breaks) > np.sum(breaks) / 2:
+        stand_out |= breaks & (lost != 0)
     stand_out &= passed < _LONGEST_STEP * np.median(passed)
     clearest = sorted(np.flatnonzero(stand_out), key=lambda k: -abs(float(excess[k])))
     return [(int(steps.start[k]), int(steps.end[k]), int(lost[k]), float(steps.size[k])) for k in clearest]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.optimize import least_squares
@@ -13,9 +15,9 @@ from pipeline.adjustment.motion_priors import trembling
 from pipeline.adjustment.normal_equations import BandedCholesky
 from pipeline.adjustment.robust import Cauchy, GemanMcClure, Loss, Squares
 from pipeline.arrays import Float, Int
-from pipeline.geometry.rigid import vector_from_rotation
-from stages.motion.bundle_adjustment.equations import Equations, Scales, linearised, scales_of
-from stages.motion.bundle_adjustment.solver import adjust, estimate_state, trembles
+from pipeline.geometry.rigid import from_parts, rotation_from_vector, vector_from_rotation
+from stages.motion.bundle_adjustment.equations import Equations, Measurements, Scales, linearised, scales_of
+from stages.motion.bundle_adjustment.solver import adjust, ends_in_line, estimate_state, trembles
 from stages.motion.bundle_adjustment.unknowns import State
 from stages.motion.parameters import MotionParameters
 from tests.motion_scene import SHAKE, displaced, scene
@@ -248,6 +250,39 @@ def test_stated_sigma_covers_the_errors() -> None:
         error = got.state.T_pc[1:, :3, 3] - given.truth.T_pc[1:, :3, 3]
         ratio.append(np.einsum("ni,nij,nj->n", error, np.linalg.inv(covariance), error) / 3)
     assert 0.2 < np.mean(ratio) < 2.0
+
+
+def swung(T_pc: Float, by_rad: Float) -> Float:
+    """Return poses turned about their x-axes, and about the middle of the ring, which hardly shows it."""
+    ahead = np.array([0.0, 0.0, 22.0])
+    turned = T_pc[:, :3, :3] @ rotation_from_vector(by_rad[:, None] * np.array([1.0, 0.0, 0.0]))
+    return from_parts(turned, T_pc[:, :3, 3] + (T_pc[:, :3, :3] - turned) @ ahead)
+
+
+def test_a_swing_of_the_first_pictures_which_texture_does_not_place_is_no_trap() -> None:
+    """Half of the radii were wrong: loose motion had swung by 14° before the first texture was seen."""
+    given = scene(60, 140, noise=1.0, seed=2)
+    measured, truth = given.measured, given.truth
+    tracks, seen = measured.tracks.some(measured.tracks.frame >= 3)
+    swing = 0.2 * np.clip(1 - np.arange(60) / 3, 0, None) ** 2
+    start = replace(truth, xyz_p=truth.xyz_p[seen], T_pc=swung(truth.T_pc, swing))
+    fresh = Measurements.of(tracks, measured.rings, measured.time_s, measured.encoder, measured.probe)
+    got = estimate_state(start, fresh, MotionParameters(alike=1.0)).state.T_pc
+    across = vector_from_rotation(np.swapaxes(truth.T_pc, 1, 2)[:, :3, :3] @ got[:, :3, :3])[:, :2]
+    assert np.abs(across).max() < 0.02
+
+
+def test_ends_without_texture_go_on_from_the_next_poses_unless_they_are_long() -> None:
+    time_s = np.r_[np.arange(12), 14, 15] / 30
+    turn = np.outer(time_s, [0.1, 0.0, 0.3])
+    straight = from_parts(rotation_from_vector(turn), np.outer(time_s, [1.0, 2.0, 30.0]))
+    swing = np.zeros(14)
+    swing[[0, 1, 13]] = 0.2, 0.1, -0.3
+    found = ends_in_line(swung(straight, swing), time_s, np.arange(2, 13))
+    np.testing.assert_allclose(found, straight, atol=1e-3)
+    for seen in (np.arange(6, 12), np.arange(2, 5), np.array([], np.int64)):
+        poses = swung(straight, swing)
+        np.testing.assert_array_equal(ends_in_line(poses, time_s, seen)[:2], poses[:2])
 
 
 def test_trembling_loosens_the_motion_across_the_pipe_and_no_other() -> None:

@@ -153,6 +153,22 @@ def test_where_a_probe_turns_back_a_longer_step_is_no_loss(turns, lost):
     assert row[-1] - 119 == lost
 
 
+@pytest.mark.parametrize(("broken", "lost"), [(10, 10), (1, 0)])
+def test_a_doubtful_break_of_the_rhythm_is_a_loss_where_most_breaks_are(broken, lost):
+    """One picture in six lost, and one of the breaks half as clear as the others."""
+    passed = np.full(40, 2)
+    passed[1 : 2 * broken : 2] = 3
+    frame = np.r_[0, np.cumsum(passed)]
+    clear = np.where(np.arange(40) == 2 * broken - 1, 0.55, 1.0)
+    size = 0.02 * (passed + clear * (passed == 3)) + 0.006 * np.sin(np.arange(40.0))
+    table = FrameTable(np.arange(130), np.arange(130) / 30, np.full(130, "led"))
+    encoder = Encoder(table.time_s, 30 * table.time_s)
+    row = rows_by_motion(
+        np.arange(frame[-1] + 1), Steps(frame[:-1], frame[1:], size), 2, table, encoder, np.ones(130)
+    )
+    assert row[-1] - frame[-1] == lost
+
+
 @pytest.mark.parametrize("stood", [False, True])
 def test_a_jump_of_the_clock_is_taken_out_and_a_probe_that_stood_is_not(stood, good, run):
     """At 5 s the run came out more than twice as long as it was."""

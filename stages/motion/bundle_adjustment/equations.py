@@ -64,6 +64,8 @@ class Measurements:
         1 σ of the pose's third difference from frame to frame, mm and rad.
     shared : (S,) or None
         Encoder scale and instrument (`State.shared`) as the whole run has them, where that is known.
+    held : int
+        The frame that stays where it is, since it defines the frame of the estimate.
     """
 
     tracks: Tracks
@@ -74,6 +76,7 @@ class Measurements:
     unsure: Float
     smooth_sigma: Float
     shared: Float | None = None
+    held: int = 0
 
     @staticmethod
     def of(
@@ -190,7 +193,7 @@ def linearised(
 ) -> Equations:
     """Return all equations at a state, weighted by given scales."""
     rows = [
-        residuals.origin_rows(state),
+        residuals.origin_rows(state, measured.held),
         smooth_motion_rows(state.T_pc, measured.time_s, measured.smooth_sigma, state.border_size),
     ]
     rows.append(residuals.turn_rows(state, parameters.turn_sigma_rad))

@@ -157,13 +157,11 @@ def no_slip_rows(state: State) -> Rows:
     return Rows(np.arange(n)[:, None], by_frame, np.zeros((n, state.border_size)), state.slip, np.ones(n))
 
 
-def origin_rows(state: State) -> Rows:
-    """Return the equations: the first frame stays where it is, since it defines the frame of the estimate."""
+def origin_rows(state: State, held: int) -> Rows:
+    """Return the equations: the frame ``held`` stays where it is; it defines the frame of the estimate."""
     by_frame = np.zeros((6, 1, BLOCK))
     by_frame[np.arange(6), 0, np.arange(6)] = 1
-    return Rows(
-        np.zeros((6, 1), np.int64), by_frame, np.zeros((6, state.border_size)), np.zeros(6), ORIGIN_SIGMA
-    )
+    return Rows(np.full((6, 1), held), by_frame, np.zeros((6, state.border_size)), np.zeros(6), ORIGIN_SIGMA)
 
 
 def axis_rows(state: State, bend_sigma: float) -> Rows:

@@ -15,6 +15,7 @@ from pipeline.adjustment.motion_priors import TREMBLING_GROWTH, third_difference
 from pipeline.arrays import Float, Int
 from pipeline.errors import UnusableError
 from pipeline.geometry.axis import distance_along
+from pipeline.geometry.rigid import vector_from_rotation
 from stages.motion.bundle_adjustment.equations import (
     Equations,
     Measurements,
@@ -23,7 +24,7 @@ from stages.motion.bundle_adjustment.equations import (
     rescaled,
     scales_of,
 )
-from stages.motion.bundle_adjustment.unknowns import State
+from stages.motion.bundle_adjustment.unknowns import State, moved
 from stages.motion.parameters import MotionParameters
 
 ROUGHLY, CLOSELY = 1e-2, 1e-5
@@ -49,6 +50,9 @@ _SHORTEST_MM = 1.0
 _ROUNDS, _MORE = 3, 1.2
 """Times that the smoothness of trembling pictures is looked at again while it grows by a fifth: the prior of
 a motion not known yet holds down strong trembling. Not measured."""
+_IN_LINE = 4
+"""Frames with texture from which the motion at an end of a run is taken: their poses' noise hardly matters,
+and the motion has not changed much. Not measured."""
 _RAYLEIGH_MEDIAN = float(np.sqrt(2 * np.log(2)))
 """Median length of an error of two coordinates, of 1 σ each."""
 
@@ -82,9 +86,12 @@ def estimate_state(
         When the motion is not determined.
     """
     with _refusing_undetermined():
-        loose = adjust(start, measured, parameters, ROUGHLY, watch).state
+        seen = np.unique(measured.tracks.frame)
+        held = replace(measured, held=int(seen[0]) if len(seen) else 0)
+        loose = adjust(start, held, parameters, ROUGHLY, watch).state
         loose = loose.with_bore_in_place(measured.probe.laser.baseline_mm)
         sigma = _smoothness(loose.T_pc, measured.time_s, measured.tracks.poses.known)
+        loose = replace(loose, T_pc=ends_in_line(loose.T_pc, measured.time_s, seen))
         smooth = adjust(loose, replace(measured, smooth_sigma=sigma), parameters, CLOSELY, watch)
         for _ in range(_ROUNDS):
             looser = _looser(sigma, smooth.state.T_pc, measured.time_s, measured.tracks.poses.known)
@@ -93,6 +100,36 @@ def estimate_state(
             sigma = looser
             smooth = adjust(smooth.state, replace(measured, smooth_sigma=sigma), parameters, CLOSELY, watch)
         return Estimate(smooth, smooth.equations.factor(), sigma)
+
+
+def ends_in_line(T_pc: Float, time_s: Float, seen: Int) -> Float:
+    """Return poses (N, 4, 4); those before and behind all texture go on evenly from the next ones.
+
+    While motion is loose, a ring alone leaves open how the camera is turned: the first pose may lie on a
+    swing of some degrees, from which robust smoothness, once it is known, never brings it back. For the same
+    reason the first frame that texture places is held meanwhile: with the first one held, all others turned.
+
+    Parameters
+    ----------
+    T_pc : (N, 4, 4)
+    time_s : (N,)
+    seen : (K,) int
+        Frames with matches of texture, ascending. Ends that last longer than four of them stay as they are.
+    """
+    out = T_pc.copy()
+    if len(seen) < _IN_LINE:
+        return out
+    inner = seen[_IN_LINE - 1], seen[-_IN_LINE]
+    for end, a, b in (
+        (slice(0, seen[0]), seen[0], inner[0]),
+        (slice(seen[-1] + 1, None), seen[-1], inner[1]),
+    ):
+        share = (time_s[end] - time_s[a]) / (time_s[b] - time_s[a])
+        if np.all(share >= -1):
+            turn = vector_from_rotation(T_pc[a, :3, :3].T @ T_pc[b, :3, :3])
+            step = np.append(T_pc[b, :3, 3] - T_pc[a, :3, 3], turn)
+            out[end] = moved(T_pc[a], share[:, None] * step)
+    return out
 
 
 def scale_between_halves(
