@@ -76,10 +76,12 @@ def warn_of_oval(rings_mm: Float, context: Context) -> None:
     told = np.isfinite(radius)
     if told.sum() < _LEAST_STEPS:
         return
-    around = (rings_mm - centre[:, None])[told] @ np.array([1, 1j]) / radius[told, None]
-    departs = np.clip(np.abs(around) - 1, -_CLIPPED, _CLIPPED)
-    each = 2 * np.nanmean(departs * (around / np.abs(around)) ** 2, axis=1)
-    oval = complex(np.nanmedian(each.real), np.nanmedian(each.imag))
+    around = (rings_mm - centre[:, None])[told] / radius[told, None, None]
+    departs = np.clip(np.linalg.norm(around, axis=-1) - 1, -_CLIPPED, _CLIPPED)
+    twice = 2 * np.arctan2(around[..., 1], around[..., 0])
+    oval = complex(
+        *(np.nanmedian(2 * np.nanmean(departs * wave(twice), axis=1)) for wave in (np.cos, np.sin))
+    )
     context.report("ring longer than wide by", 200 * abs(oval), "%")
     if abs(oval) > _OVAL:
         towards = notation.clock(float(clock_of_azimuth(np.angle(oval) / 2)))

@@ -11,7 +11,7 @@ import pytest
 from pipeline.errors import UnusableError
 from pipeline.recording.base import Encoder, PipeFacts
 from stages.premises.losses import Steps
-from stages.premises.scale import encoder_factor
+from stages.premises.scale import encoder_factor, warn_of_oval
 from tests.drawn_run import BASELINE, RADIUS
 from tests.premises_run import checked
 from tests.quiet import quiet_context
@@ -52,6 +52,18 @@ def test_pictures_that_were_stretched_are_told_from_a_round_pipe(stretch, told_o
     images = {k: cv2.warpAffine(image, wider, size) for k, image in good.source.images.items()}
     _, told = checked(replace(good, source=MemorySource(images, size)), run.probe)
     assert any("% longer towards 3:00 in the picture" in t or "towards 9:00" in t for t in told) is told_of
+
+
+def test_a_ring_with_gaps_is_oval_by_what_is_seen_of_it():
+    """A point in the very centre and sectors without a line ended gauge runs with a division by nothing."""
+    azimuth = np.linspace(-np.pi, np.pi, 72, endpoint=False)
+    radius = 25 * (1 + 0.03 * np.cos(2 * (azimuth - np.pi / 2)))
+    rings = np.tile(radius[:, None] * np.stack([np.cos(azimuth), np.sin(azimuth)], -1), (20, 1, 1))
+    rings[::3, 5:12] = np.nan
+    rings[1, 40], rings[2] = 0, np.nan
+    told = []
+    warn_of_oval(rings, replace(quiet_context(), warn=told.append))
+    assert "6.0 % longer towards 6:00" in told[0] or "6.0 % longer towards 12:00" in told[0], told
 
 
 def test_lengths_in_inch_throughout_end_the_run(good, run):

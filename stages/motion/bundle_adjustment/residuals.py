@@ -157,7 +157,7 @@ def no_slip_rows(state: State) -> Rows:
     return Rows(np.arange(n)[:, None], by_frame, np.zeros((n, state.border_size)), state.slip, np.ones(n))
 
 
-def origin_rows(state: State, held: int) -> Rows:
+def origin_rows(state: State, held: int = 0) -> Rows:
     """Return the equations: the frame ``held`` stays where it is; it defines the frame of the estimate."""
     by_frame = np.zeros((6, 1, BLOCK))
     by_frame[np.arange(6), 0, np.arange(6)] = 1

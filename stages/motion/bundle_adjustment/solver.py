@@ -53,6 +53,9 @@ a motion not known yet holds down strong trembling. Not measured."""
 _IN_LINE = 4
 """Frames with texture from which the motion at an end of a run is taken: their poses' noise hardly matters,
 and the motion has not changed much. Not measured."""
+_SWING_RAD = np.radians(1)
+"""Least swing of an end that is no motion: in the few pictures before texture is followed no probe turns as
+far in a pipe. Not measured."""
 _RAYLEIGH_MEDIAN = float(np.sqrt(2 * np.log(2)))
 """Median length of an error of two coordinates, of 1 σ each."""
 
@@ -86,12 +89,9 @@ def estimate_state(
         When the motion is not determined.
     """
     with _refusing_undetermined():
-        seen = np.unique(measured.tracks.frame)
-        held = replace(measured, held=int(seen[0]) if len(seen) else 0)
-        loose = adjust(start, held, parameters, ROUGHLY, watch).state
+        loose = _loosely(start, measured, parameters, watch)
         loose = loose.with_bore_in_place(measured.probe.laser.baseline_mm)
         sigma = _smoothness(loose.T_pc, measured.time_s, measured.tracks.poses.known)
-        loose = replace(loose, T_pc=ends_in_line(loose.T_pc, measured.time_s, seen))
         smooth = adjust(loose, replace(measured, smooth_sigma=sigma), parameters, CLOSELY, watch)
         for _ in range(_ROUNDS):
             looser = _looser(sigma, smooth.state.T_pc, measured.time_s, measured.tracks.poses.known)
@@ -102,12 +102,26 @@ def estimate_state(
         return Estimate(smooth, smooth.equations.factor(), sigma)
 
 
-def ends_in_line(T_pc: Float, time_s: Float, seen: Int) -> Float:
-    """Return poses (N, 4, 4); those before and behind all texture go on evenly from the next ones.
+def _loosely(start: State, measured: Measurements, parameters: MotionParameters, watch: Watch) -> State:
+    """Adjust with loose motion; anew, with a frame held that texture places, where the ends swing.
 
     While motion is loose, a ring alone leaves open how the camera is turned: the first pose may lie on a
-    swing of some degrees, from which robust smoothness, once it is known, never brings it back. For the same
-    reason the first frame that texture places is held meanwhile: with the first one held, all others turned.
+    swing of some degrees, with which all others turn. Robust smoothness, once it is known, never brings that
+    back.
+    """
+    loose = adjust(start, measured, parameters, ROUGHLY, watch).state
+    seen = np.unique(measured.tracks.frame)
+    in_line = ends_in_line(loose.T_pc, measured.time_s, seen)
+    turn = vector_from_rotation(np.swapaxes(in_line, 1, 2)[:, :3, :3] @ loose.T_pc[:, :3, :3])
+    if np.abs(turn).max() < _SWING_RAD:
+        return loose
+    held = replace(measured, held=int(seen[0]))
+    loose = adjust(start, held, parameters, ROUGHLY, watch).state
+    return replace(loose, T_pc=ends_in_line(loose.T_pc, measured.time_s, seen))
+
+
+def ends_in_line(T_pc: Float, time_s: Float, seen: Int) -> Float:
+    """Return poses (N, 4, 4); those before and behind all texture go on evenly from the next ones.
 
     Parameters
     ----------
