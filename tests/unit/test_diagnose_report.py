@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pipeline.api.diagnosis.apply import DefectChange, GeometryChange
-from pipeline.api.diagnosis.report import Shown, headline, write_page
+from pipeline.api.diagnosis.report import Shown, headline, sizes, write_page
 from stages.diagnose.compared import OnImage, worst_frame
 from stages.diagnose.residual import RingResidual
 from stages.diagnose.result import (
@@ -97,3 +97,10 @@ def test_every_other_verdict_has_its_page(tmp_path, verdict):
     page = (tmp_path / "diagnosis.html").read_text()
     assert headline(bare) in page
     assert "nan" not in page
+
+
+def test_every_size_of_a_slip_is_told_in_words() -> None:
+    numbers = {"slip_mm": Value(-3.3, 0.06), "time_s": Value(4.2, 0.02), "duration_s": Value(0.29, 0.02)}
+    told = sizes(EffectFound("encoder_slip", 0.98, numbers, "", ""))
+    assert told[-1] == "how long it lasts: 0.290 ± 0.020 s"
+    assert not any("_" in words for words in told)

@@ -28,6 +28,8 @@ from stages.diagnose.result import (
     WallPicture,
 )
 
+# What the diagnosis measures of events beyond the numbers of their laws: meaning and unit.
+_OF_EVENTS = {"duration_s": ("how long it lasts", "s")}
 _HEADLINES = {
     Verdict.CONSISTENT: "The recording agrees with the stated instrument",
     Verdict.CLASS: "Something was left out; its kind is known, its name is not",
@@ -75,10 +77,10 @@ def headline(found: Diagnosis) -> str:
 def sizes(found: EffectFound) -> tuple[str, ...]:
     """Return each estimated size of an effect in words, with its 1 σ; what is counted has none."""
     law = ALL_EFFECTS.get(found.name)
-    known = {q.name: q for q in law.quantities} if law is not None else {}
+    known = {q.name: (q.meaning, q.unit) for q in law.quantities} if law is not None else {}
     out = []
     for name, value in found.parameters.items():
-        meaning, unit = (known[name].meaning, known[name].unit) if name in known else (name, "")
+        meaning, unit = (_OF_EVENTS | known).get(name, (name, ""))
         share, unit = (100.0, "%") if name == "relative" else (1.0, unit)
         if value.sd > 0:
             out.append(f"{meaning}: {measured(share * value.value, share * value.sd, unit)}")
