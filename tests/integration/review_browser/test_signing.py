@@ -85,6 +85,19 @@ def test_for_whom_it_was_inspected_is_given_on_the_page_and_printed(page: Tab) -
     page.page.fill("#fact-site", "")
 
 
+def test_news_leave_the_focus_where_something_is_being_written(page: Tab) -> None:
+    """A field lost it when the seal came, and what was typed next were shortcuts that decide on findings."""
+    page.keys("3")
+    page.page.fill("#wall", "")
+    page.page.focus("#wall")
+    with page.one_change():
+        page.js("boresight.session.act({do: 'describe', site: 'Hall 1'})")
+    page.until("boresight.session.seal !== null")
+    page.keys("6")
+    assert page.page.input_value("#wall") == "6"
+    page.page.fill("#wall", "")
+
+
 def test_every_paper_can_be_taken_away(page: Tab) -> None:
     page.keys("3")
     links = page.page.locator(".papers a")

@@ -12,7 +12,12 @@ export function signPage(session: Session): HTMLElement {
   const root = element("main", { class: "page" });
   const form = session.source.readOnly ? null : signature(session);
   const assumed = session.source.readOnly ? null : element("div", {}, inspection(session), assumptions(session));
-  const paint = () => root.replaceChildren(...parts(session, form, assumed));
+  // Put in place again, a field loses the focus, and what is typed next would be taken for shortcuts.
+  const paint = () => {
+    const writing = document.activeElement;
+    root.replaceChildren(...parts(session, form, assumed));
+    if (writing instanceof HTMLElement && root.contains(writing)) writing.focus({ preventScroll: true });
+  };
   session.on(["state", "seal"], paint);
   session.on(["named"], () => {
     const name = root.querySelector<HTMLInputElement>("#sign-name");
