@@ -2,6 +2,7 @@
 
 import fcntl
 import os
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -12,9 +13,18 @@ from tests.reviewed import reviewed
 from tests.sample_run import run_sample
 
 
+def _files_of(run: Path) -> dict[str, tuple[int, int]]:
+    """Size and time of every file of a run, by its name."""
+    told = {str(p.relative_to(run)): p.stat() for p in run.rglob("*") if p.is_file()}
+    return {name: (of.st_size, of.st_mtime_ns) for name, of in told.items()}
+
+
 @pytest.fixture(scope="session")
-def sample(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The finished run of the sample recording, made once for all test processes; not to be changed."""
+def sample(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """The finished run of the sample recording, made once for all test processes; not to be changed.
+
+    Other tests copy it meanwhile: whoever changes it, be it for a second, breaks them.
+    """
     base = tmp_path_factory.getbasetemp()
     folder = base.parent if "PYTEST_XDIST_WORKER" in os.environ else base
     with (folder / "sample.lock").open("w") as lock:
@@ -24,7 +34,9 @@ def sample(tmp_path_factory: pytest.TempPathFactory) -> Path:
             run.parent.mkdir(exist_ok=True)
             run_sample(run)
             (folder / "sample.done").touch()
-    return run
+    before = _files_of(run)
+    yield run
+    assert _files_of(run) == before, "a test has changed the run that all tests share"
 
 
 @pytest.fixture(scope="module")

@@ -83,6 +83,8 @@ def test_every_layer_is_there_for_the_page_and_for_the_copy(compared: Compared, 
     assert (tmp_path / "copy" / "growth.csv").is_file()
 
 
-def test_years_without_an_earlier_run_are_refused(sample: Path) -> None:
-    done = CliRunner().invoke(app, ["review", str(sample), "--years", "2", "--no-browser"])
+def test_years_without_an_earlier_run_are_refused(sample: Path, tmp_path: Path) -> None:
+    run = tmp_path / "run"
+    shutil.copytree(sample, run)
+    done = CliRunner().invoke(app, ["review", str(run), "--years", "2", "--no-browser"])
     assert done.exit_code != 0

@@ -24,8 +24,7 @@ from tests.faults import on_small_disk
 def files(sample: Path, tmp_path: Path) -> RunFiles:
     """A run with a recording of its own to spoil."""
     run, recording = tmp_path / "run", tmp_path / "recording"
-    # Another test may have reviewed it already.
-    shutil.copytree(sample, run, ignore=shutil.ignore_patterns("review"))
+    shutil.copytree(sample, run)
     shutil.copytree(SAMPLE, recording)
     record = json.loads((run / "run.json").read_text("utf-8"))
     record["recording"]["path"], record["probe"]["path"] = str(recording), str(recording / "probe.yaml")

@@ -69,7 +69,6 @@ def test_tables_fit_together(sample: Path) -> None:
 
 
 def test_the_same_command_again_does_nothing(sample: Path, tmp_path: Path) -> None:
-    # A copy, since a run that goes on is "running" for a while, and other tests read the sample's run.
     run = tmp_path / "run"
     shutil.copytree(sample, run)
 
