@@ -18,8 +18,9 @@ from pipeline.instrument.probe import Probe
 from pipeline.recording.base import Encoder, FrameTable, Recording
 from pipeline.recording.one_field import OneField
 
-# A step of the encoder is a jump when it is so many times the usual largest (this quantile), and so long.
-_LARGEST, _JUMP_FACTOR, _JUMP_MM = 0.95, 10.0, 1.0
+# A step of the encoder is a jump when it is so long, and so many times the usual largest (this quantile of
+# the steps by which it moves at all) and what it moves by just before and after (the median of five steps).
+_LARGEST, _JUMP_FACTOR, _BESIDE, _JUMP_MM = 0.95, 10.0, 5, 1.0
 
 
 def common_frames(table: FrameTable, count: int) -> tuple[FrameTable, tuple[str, ...]]:
@@ -68,9 +69,10 @@ def counted_on(encoder: Encoder) -> tuple[Encoder, tuple[str, ...]]:
     if not jumps.size:
         return encoder, ()
     step_mm, by_mm = np.diff(encoder.distance_mm), np.diff(encoder.distance_mm)[jumps]
-    usual_mm = float(np.median(step_mm))
+    moves_mm = step_mm[step_mm != 0]
+    usual_mm = float(np.median(moves_mm))
     whole_mm = float(np.median(by_mm)) - usual_mm
-    near_mm = 2 * float(np.quantile(np.abs(step_mm), _LARGEST))
+    near_mm = 2 * float(np.quantile(np.abs(moves_mm), _LARGEST))
     counts = np.ptp(encoder.distance_mm) < abs(whole_mm) + near_mm and whole_mm * usual_mm < 0
     if not counts or np.any(np.abs(by_mm - usual_mm - whole_mm) > near_mm):
         return encoder, ()
@@ -83,10 +85,18 @@ def counted_on(encoder: Encoder) -> tuple[Encoder, tuple[str, ...]]:
 
 
 def _jumps(encoder: Encoder) -> Int:
-    """Return the readings (K,) after which the encoder jumps."""
+    """Return the readings (K,) after which the encoder jumps.
+
+    One that counts coarsely stands for most readings, and so does a probe that waits: only steps that move
+    tell what is usual, and setting out is no jump, since the encoder then goes on as fast.
+    """
     step_mm = np.abs(np.diff(encoder.distance_mm))
-    usual_mm = float(np.quantile(step_mm, _LARGEST)) if step_mm.size else 0.0
-    return np.flatnonzero((step_mm > _JUMP_FACTOR * usual_mm) & (step_mm > _JUMP_MM))
+    if not step_mm.any():
+        return np.empty(0, np.int64)
+    usual_mm = float(np.quantile(step_mm[step_mm > 0], _LARGEST, method="lower"))
+    around = np.lib.stride_tricks.sliding_window_view(np.pad(step_mm, _BESIDE // 2, mode="edge"), _BESIDE)
+    least_mm = np.maximum(_JUMP_FACTOR * np.maximum(usual_mm, np.median(around, -1)), _JUMP_MM)
+    return np.flatnonzero(step_mm > least_mm)
 
 
 def _warned_of_jumps(encoder: Encoder) -> tuple[str, ...]:

@@ -40,7 +40,10 @@ _TYPE = re.compile(
 def compiled_ahead(kernels: Kernels) -> Iterator[None]:
     """Have kernels that Numba's cache lacks compiled meanwhile; results are the same with and without.
 
-    Kernels that are all there are read meanwhile, which takes .3 s: stages would wait for them.
+    Kernels that all seem to be there are read by a thread of this process, which takes .3 s: stages would
+    wait for them. Should Numba refuse what is kept, as after an update of it, the thread compiles them anew,
+    slower than a second process would. A kernel that cannot be compiled ends what is done here, and the stage
+    that calls it says why. Where the second process is not done when the run is, what it is at is given up.
     """
     if all(_is_kept(dispatcher) for dispatcher, _ in _found(kernels)):
         with ThreadPoolExecutor(1, "kernels") as aside:
@@ -97,7 +100,10 @@ def _found(kernels: Kernels) -> Iterator[tuple[Any, str]]:
 
 
 def _is_kept(dispatcher: Any) -> bool:
-    """Return whether the cache holds something of a kernel that was compiled since its file was changed."""
+    """Return whether the cache holds something of a kernel that was compiled since its file was changed.
+
+    Whether Numba will take it (its own version, the processor, the types) is not looked at.
+    """
     function = dispatcher.py_func
     file = Path(function.__code__.co_filename)
     kept = Path(dispatcher.stats.cache_path).glob(f"{file.stem}.{function.__qualname__}-*.nbi")

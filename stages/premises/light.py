@@ -25,6 +25,9 @@ _MOST_DARK = 0.5
 _FEWEST_ALIKE = 3
 # Brightness of each light is compared within so many frames on both sides, since lamps warm up.
 _AROUND = 8
+# The median of n normal values has a σ of √(π / 2) σ / √n (Huber 1981, § 1.2); beyond three times as much,
+# values differ: by chance in one recording of 400.
+_SIGMA_OF_MEDIAN, _SURE = 1.2533, 3.0
 # Both lights are among these frames if their brightness spans at least this part of that in the whole run.
 _BOTH_THERE = 0.4
 # Longest context (preceding lights) that predicts the next one; share of more errors that a shorter one may
@@ -74,13 +77,17 @@ def alike(pictures: Pictures, one: Bool, other: Bool) -> bool:
 
 
 def _goes_on(value: Float, one: Bool, other: Bool) -> bool:
-    """Return whether values (F,) change no more from one set (F,) to the other than within them."""
+    """Return whether values (F,) change no more from one set (F,) to the other than within them.
+
+    Compared are medians, so that one flash within a set does not make the sets alike.
+    """
     step = np.abs(np.diff(value))
     within = (one[:-1] & one[1:]) | (other[:-1] & other[1:])
     between = (one[:-1] & other[1:]) | (other[:-1] & one[1:])
     if between.sum() == 0 or within.sum() < _FEWEST_ALIKE * between.sum():
         return False
-    return bool(step[between].max() <= step[within].max())
+    sigma = _SIGMA_OF_MEDIAN * spread_about_median(step[within]) / np.sqrt(between.sum())
+    return bool(np.median(step[between]) <= np.median(step[within]) + _SURE * sigma)
 
 
 def _differ(one: Float, other: Float) -> bool:

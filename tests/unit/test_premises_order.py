@@ -10,7 +10,7 @@ import pytest
 from pipeline.recording.base import Encoder, FrameTable
 from stages.premises.light import Light
 from stages.premises.losses import Steps, rows_by_motion, sway_of_line
-from stages.premises.order import _in_usual_steps, _off_their_place
+from stages.premises.order import _in_usual_steps, _lights_exchanged, _off_their_place
 from stages.premises.pictures import Pictures, look_at_pictures
 from tests.drawn_run import drawn_run
 from tests.premises_run import COUNT, STEP_MM, checked, with_rings
@@ -225,6 +225,45 @@ def test_a_probe_that_stands_hides_no_exchange_and_makes_none(noise, seed):
     way[[50, 53]] = way[[53, 50]]
     size = np.diff(way, prepend=-2.0) + noise * random.standard_normal(80)
     assert np.flatnonzero(_off_their_place(_in_usual_steps(size))).tolist() == [50, 53]
+
+
+def exchanged(taken, way):
+    """Return which pictures count as exchanged, of those ``taken`` in this order at ``way``, by turns lit."""
+    light = np.where(taken % 2 == 0, Light.WALL, Light.LINE)
+    place = np.flatnonzero(light == Light.WALL)[1:]
+    size = np.diff(way[taken[np.flatnonzero(light == Light.WALL)]])
+    return np.flatnonzero(_lights_exchanged(light, place, size)).tolist()
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("sense", [1, -1])
+@pytest.mark.parametrize("still", [0, 6, 36])
+def test_neighbours_exchanged_are_told_also_where_the_probe_stood_just_before(still, sense):
+    """Three pictures of a standing wall made the usual speed 0, by which the way was divided."""
+    speed = np.ones(100)
+    speed[36 - still : 36] = 0
+    taken = np.arange(100)
+    taken[[40, 41]] = taken[[41, 40]]
+    assert exchanged(taken, sense * np.cumsum(speed)) == [40, 41]
+    assert exchanged(taken, 0 * speed) == []
+
+
+@pytest.mark.parametrize("sense", [1, -1])
+def test_two_losses_are_no_exchange_whichever_way_the_probe_goes(sense):
+    """Of a probe that goes back the longest steps around were taken for the usual ones, not the shortest."""
+    pairs = np.concatenate([k + np.arange(2) for k in (28, 34, 48, 54, 60)])
+    taken = np.setdiff1d(np.arange(100), np.r_[pairs, 42, 45])
+    assert exchanged(taken, sense * np.arange(100.0)) == []
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_probe_that_stands_for_most_of_a_run_makes_no_exchange(seed):
+    """More than half of the run noise was compared with noise."""
+    random = np.random.default_rng(seed)
+    size = np.where((np.arange(100) > 20) & (np.arange(100) < 90), 0.0, 2.0) + 0.05 * random.standard_normal(
+        100
+    )
+    assert not _off_their_place(_in_usual_steps(size)).any()
 
 
 @pytest.fixture(scope="module")

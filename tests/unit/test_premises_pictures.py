@@ -69,3 +69,32 @@ def test_a_light_that_drifts_is_one_light_and_one_that_steps_is_two(step: float)
         nothing,
     )  # fmt: skip
     assert alike(pictures, number < 80, number >= 80) is (step == 0)
+
+
+@pytest.mark.parametrize("flash", [False, True])
+@pytest.mark.parametrize("apart", [0.0, 4.0])
+def test_two_lights_are_not_alike_because_of_one_flash(flash: bool, apart: float) -> None:
+    """One flash within a light made all changes between the lights look usual."""
+    one = np.arange(COUNT) % 20 < 10
+    brightness = 10 + apart * one + 0.05 * np.random.default_rng(2).standard_normal(COUNT)
+    brightness[25] += 10 * flash
+    nothing = np.full(COUNT, np.nan)
+    line = np.ones((COUNT, 1), np.float32)
+    seen = Pictures(
+        brightness, np.full(COUNT, 0.9), line, np.zeros(1), nothing, np.arange(COUNT) - 1, nothing, nothing
+    )
+    assert alike(seen, one, ~one) is (apart == 0)
+
+
+def test_a_light_that_drifts_goes_on_into_what_the_table_calls_another() -> None:
+    """The control: the step from one to the other is like all steps, though the medians are far apart."""
+    first = np.arange(COUNT) < COUNT // 2
+    drifts = [
+        10 + 0.1 * np.arange(COUNT) + 0.1 * np.random.default_rng(s).standard_normal(COUNT) for s in range(20)
+    ]
+    nothing, line = np.full(COUNT, np.nan), np.ones((COUNT, 1), np.float32)
+    seen = [
+        Pictures(d, np.full(COUNT, 0.9), line, np.zeros(1), nothing, np.arange(COUNT) - 1, nothing, nothing)
+        for d in drifts
+    ]
+    assert all(alike(s, first, ~first) for s in seen)
