@@ -32,7 +32,7 @@ from stages.motion import EncoderReadings, Equations, Measurements, MotionParame
 _MOST_OF_RING = 0.5
 # What motion against encoder tells better than rings and fiducials do.
 TRAVEL_EFFECTS = frozenset(
-    {"probe_vibration", "encoder_scale", "encoder_slip", "encoder_backlash", "time_offset"}
+    {"probe_vibration", "encoder_scale", "encoder_slip", "encoder_backlash", "time_offset", "motion_blur"}
 )
 
 
@@ -291,8 +291,8 @@ FREE_MOTION = Stage(
     "free_motion", "2", MotionParameters, adjust_freely, "an inspection's motion without encoder", "motion"
 )
 GAUGE_EVIDENCE = Stage(
-    "evidence", "23", DiagnosisParameters, examine_gauge, "what a gauge run shows of effects", "diagnosis"
+    "evidence", "24", DiagnosisParameters, examine_gauge, "what a gauge run shows of effects", "diagnosis"
 )
 FIELD_EVIDENCE = Stage(
-    "evidence", "11", DiagnosisParameters, examine_field, "what an inspection shows of effects", "diagnosis"
+    "evidence", "12", DiagnosisParameters, examine_field, "what an inspection shows of effects", "diagnosis"
 )

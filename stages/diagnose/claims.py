@@ -13,6 +13,7 @@ from pipeline.physics.effect import Channel, FixedTo
 from stages.diagnose.agreement import Agreement, Part, agreement, chance_of_name
 from stages.diagnose.channels import Seen
 from stages.diagnose.inference import SURE
+from stages.diagnose.late_pictures import exposure_alike
 from stages.diagnose.profile.evidence import ProfileEvidence
 from stages.diagnose.profile.finding import Finding
 from stages.diagnose.result import CourseFound, EffectFound, Location, Value
@@ -150,20 +151,20 @@ def _of_recording(seen: Seen | None) -> dict[str, Claim]:
 def _every(seen: Seen) -> Iterable[Claim]:
     if seen.travel is not None:
         travel = seen.travel
-        yield from (_of_estimate(e, travel) for e in travel.estimates if e.p_value < TRAVEL_FOUND)
+        yield from (_of_estimate(e, travel, seen) for e in travel.estimates if e.p_value < TRAVEL_FOUND)
         yield from (_of_slip(s, travel) for s in travel.slips if s.p_value < TRAVEL_FOUND)
         yield from (_of_swing(line, seen, travel) for line in travel.lines if _is_swing(line))
     if seen.profile is not None:
         yield from (_of_finding(f, seen.profile, seen.name) for f in seen.profile.found)
 
 
-def _of_estimate(e: TravelEstimate, travel: TravelEvidence) -> Claim:
-    goes_with = {_GOES_WITH[n] for n in (e.effect, *(n for n, _ in e.alike)) if n in _GOES_WITH}
+def _of_estimate(e: TravelEstimate, travel: TravelEvidence, seen: Seen) -> Claim:
+    alike = (*(n for n, _ in e.alike), *exposure_alike(e, travel, seen.profile))
+    goes_with = {_GOES_WITH[n] for n in (e.effect, *alike) if n in _GOES_WITH}
     fixed_to, time = goes_with.pop() if len(goes_with) == 1 else (None, None)
     return Claim(
-        e.effect, {e.quantity: Value(e.value, e.size_sigma)}, e.statement, e.p_value,
-        tuple(n for n, _ in e.alike), travel.source, stretch(travel, e.where, fixed_to, time), e.agreements,
-        fits_p=travel.fits_p, otherwise=e.otherwise,
+        e.effect, {e.quantity: Value(e.value, e.size_sigma)}, e.statement, e.p_value, alike, travel.source,
+        stretch(travel, e.where, fixed_to, time), e.agreements, fits_p=travel.fits_p, otherwise=e.otherwise,
     )  # fmt: skip
 
 

@@ -10,10 +10,10 @@ from pipeline.arrays import Float
 from pipeline.physics.effect import CourseKind
 from pipeline.simulator.effects.switch import Switch, parse_switches
 from pipeline.simulator.scene import read_scene
-from stages.diagnose.effects.base import ImagePoints, Shape
-from stages.diagnose.effects.camera import MotionBlur
+from stages.diagnose.effects.base import Shape, Travel
 from stages.diagnose.effects.library import LIBRARY
 from stages.diagnose.effects.nameless import GENERIC, STEADY
+from stages.diagnose.effects.pose import MotionBlur
 from stages.diagnose.gauge.answer import effects_found, formula, verdict_of
 from stages.diagnose.gauge.examine import Examined, examine
 from stages.diagnose.gauge.fit import fit
@@ -75,8 +75,8 @@ def test_a_tilt_is_named_with_its_size():
 class ShorterExposure(MotionBlur):
     """An exposure whose law has the wrong sign, so that a longer one looks shorter than none."""
 
-    def image_shift_px(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
-        return -super().image_shift_px(points, shape, amplitude)
+    def reading_shift_mm(self, travel: Travel, shape: Shape, amplitude: Float) -> Float:
+        return -super().reading_shift_mm(travel, shape, amplitude)
 
 
 def test_a_size_that_cannot_be_is_no_evidence():
@@ -84,8 +84,10 @@ def test_a_size_that_cannot_be_is_no_evidence():
     measurements, start = prepare(run.measured)
     nothing, stated = fit(measurements, start, ()), stated_belief(run.truth.stated)
     (control,) = scan(measurements, nothing, {"motion_blur": MotionBlur()}, stated)
-    # What tells an exposure here is how the poses go on between pictures: little.
-    assert control.p_value < 1e-2
+    assert control.p_value < 1e-4
+    # Pictures are late by half of it, 40 ms, which the encoder tells.
+    (size,) = control.score.amplitude
+    assert size == pytest.approx(0.08, abs=3 * control.score.covariance[0, 0] ** 0.5)
     assert scan(measurements, nothing, {"motion_blur": ShorterExposure()}, stated) == []
 
 

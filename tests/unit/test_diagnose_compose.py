@@ -81,6 +81,37 @@ def test_what_leaves_more_than_noise_or_may_go_otherwise_is_not_named(real_probe
     assert found.effects[0].probability < 0.9
 
 
+@pytest.mark.parametrize(
+    ("delay_s", "width_ms", "names"),
+    [
+        (0.008, None, {"time_offset", "motion_blur"}),
+        (0.008, (16.0, 9.0), {"time_offset", "motion_blur"}),
+        (0.008, (0.0, 1.0), {"time_offset"}),
+        (0.008, (16.0, 1.0), {"motion_blur"}),
+        # Readings that come early, and exposures longer than from picture to picture, are no exposures.
+        (-0.008, None, {"time_offset"}),
+        (0.05, None, {"time_offset"}),
+    ],
+)
+def test_pictures_that_are_late_may_be_exposed_longer(
+    real_probe: Probe, delay_s: float, width_ms: tuple[float, float] | None, names: set[str]
+) -> None:
+    fit = with_events(sight(np.random.default_rng(8)), read(delay_s=delay_s))
+    late = TravelEstimate("time_offset", "delay_s", delay_s, 2e-4, 1e-3, 1e-12, 0.01, (), (AGREES,))
+    recording = seen("gauge", estimates=(late,), fit=fit)
+    if width_ms is not None:
+        value, sigma = width_ms
+        z = value / sigma
+        size = Size("exposure_s", "s", 1e-3 * value, 1e-3 * sigma)
+        blur = replace(
+            finding("motion_blur", z, 1e-12 if z > 6 else 0.5, (size,), "It widens."), agreements=(AGREES,)
+        )
+        recording = replace(recording, profile=ProfileEvidence("toy", np.arange(9), (blur,)))
+    found = answer(real_probe, None, recording)
+    assert found.verdict is (Verdict.NAMED if len(names) == 1 else Verdict.CLASS)
+    assert {e.name for e in found.effects} | set(found.members) == names
+
+
 def test_parts_that_contradict_each_other_take_the_name_away(real_probe: Probe) -> None:
     found = of_gauge(real_probe, estimates=(replace(PLAY, agreements=(AGREES, DIFFERS)),))
     assert found.verdict is Verdict.CLASS

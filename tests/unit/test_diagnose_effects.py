@@ -29,7 +29,7 @@ LEAVES_TEXTURE = {
     "laser_tilt", "laser_cone", "baseline", "beam_decentre", "sheet_waviness", "laser_rocking",
     "baseline_drift", "pixel_locking", "albedo_bias", "subsurface", "line_skew", "vignetting",
 }  # fmt: skip
-READINGS = {"encoder_scale", "encoder_slip", "encoder_backlash", "time_offset"}
+READINGS = {"encoder_scale", "encoder_slip", "encoder_backlash", "time_offset", "motion_blur"}
 BORE = Bore(42.0, (4.0, -7.0, 0.0), (0.03, -0.02, 1.0))
 
 

@@ -43,8 +43,12 @@ def test_flicker_changes_rows_by_the_mean_power_of_their_exposure():
     frequency, readout, exposure = 120.0, 0.02, 0.003
     truth = truth_with("light_flicker", 0.3, frequency)
     shutter = replace(truth.instrument.shutter, kind="rolling", readout_s=readout, exposure_s=exposure)
-    banded = replace(truth, instrument=replace(truth.instrument, shutter=shutter))
-    steady = replace(small_truth(), instrument=replace(small_truth().instrument, shutter=shutter))
+    banded, steady = (
+        replace(
+            t, instrument=replace(t.instrument, shutter=shutter), stated=replace(t.stated, shutter=shutter)
+        )
+        for t in (truth, small_truth())
+    )
     seen = [np.nansum(renderer_of(t).light(LED)[..., 1], axis=1) for t in (banded, steady)]
     # the mean over many moments of the exposure, by hand
     row = np.arange(300)
@@ -209,3 +213,11 @@ def test_what_lamps_throw_back_is_their_light_times_the_reflectance():
     )
     assert ((lit - plain) > 0).all()
     assert 0.05 < (lit - plain).sum() / plain.sum() < 0.4
+
+
+def test_a_longer_exposure_from_the_same_start_shows_the_camera_later():
+    truth, longer = small_truth(), 0.024
+    shot = renderer_of(truth_with("motion_blur", longer)).shot(LED)
+    expected = truth.motion.pose(truth.frames.time_s[LED] + longer / 2, truth.wall.axis)
+    np.testing.assert_allclose(shot.T_pc[..., :3, 3].mean(axis=(0, 1)), expected[:3, 3], atol=1e-3)
+    assert np.linalg.norm(expected[:3, 3] - truth.poses()[LED, :3, 3]) > 0.1

@@ -109,7 +109,7 @@ def rolling_shutter(truth: SceneTruth, readout_s: float) -> SceneTruth:
 
 
 def motion_blur(truth: SceneTruth, exposure_s: float) -> SceneTruth:
-    """Expose longer than stated with the same light in all; a frame's time is the exposure's middle."""
+    """Expose longer than stated from the same start, with the same light in all: frames are late by half."""
     shutter = truth.instrument.shutter
     longer = replace(shutter, exposure_s=shutter.exposure_s + exposure_s)
     moments = max(truth.rendering.time_samples, _BLUR_MOMENTS)

@@ -182,9 +182,9 @@ def _ambient() -> Check:
 def _blurred() -> Iterator[Check]:
     """Check that a camera which moves across while it exposes widens the line."""
     rate, exposure, truth = 60.0, 0.01, strip_truth(_R)
-    moving = replace(
-        truth, motion=Motion(constant(0.0), Signal(np.array([-1.0, 1.0]), np.array([-rate, rate])))
-    )
+    # Half of the longer exposure later it passes the middle.
+    along = rate * (np.array([-1.0, 1.0]) - exposure / 2)
+    moving = replace(truth, motion=Motion(constant(0.0), Signal(np.array([-1.0, 1.0]), along)))
     widths = [
         float(np.mean(profiles(t, Switch("motion_blur", (exposure,))).sigma() ** 2)) for t in (truth, moving)
     ]

@@ -120,18 +120,6 @@ class RollingShutter(Scalar):
         return np.asarray(row_s[:, None] * points.velocity_px)
 
 
-class MotionBlur(Scalar):
-    """A longer exposure from the same start: the image is that of half the exposure later."""
-
-    name = "motion_blur"
-    amplitudes = one(name, 0.005)
-    words = "The exposure is {exposure_s:+.4f} s longer than stated and blurs what moves."
-
-    def image_shift_px(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
-        """Return half an exposure's motion."""
-        return np.asarray(0.5 * amplitude[0] * points.velocity_px)
-
-
 class BaselineDrift(Drifting):
     """The baseline grows while the probe warms up."""
 
@@ -202,7 +190,6 @@ CAMERA_MODELS: tuple[EffectModel, ...] = (
     PixelAspect(),
     PupilShift(),
     RollingShutter(),
-    MotionBlur(),
     BaselineDrift(),
     FocalDrift(),
     CentreDrift(),

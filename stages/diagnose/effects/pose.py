@@ -149,6 +149,22 @@ class TimeOffset(Scalar):
         return np.asarray(np.interp(held, travel.time_s, travel.distance_mm) + beyond - travel.distance_mm)
 
 
+class MotionBlur(TimeOffset):
+    """A longer exposure from the same start: all pictures are late by half of it.
+
+    Poses are free in every picture and follow it, so that rings and fiducials show none of it: only the
+    encoder, which then reads as though it were late, and the line's width.
+    """
+
+    name = "motion_blur"
+    amplitudes = one(name, 0.005)
+    words = "The exposure is {exposure_s:+.4f} s longer than stated and blurs what moves."
+
+    def reading_shift_mm(self, travel: Travel, shape: Shape, amplitude: Float) -> Float:
+        """Return what readings that are late by half the exposure would be off by."""
+        return super().reading_shift_mm(travel, shape, 0.5 * np.asarray(amplitude))
+
+
 POSE_MODELS: tuple[EffectModel, ...] = (
     PipeBend(),
     Ovality(),
@@ -157,4 +173,5 @@ POSE_MODELS: tuple[EffectModel, ...] = (
     EncoderSlip(),
     EncoderBacklash(),
     TimeOffset(),
+    MotionBlur(),
 )
