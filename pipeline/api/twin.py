@@ -73,10 +73,20 @@ def twin(
 
 @dataclass(frozen=True)
 class TwinOf:
-    """The folder of the run whose frames are re-rendered, and its stages that are computed again."""
+    """The folder of the run whose frames are re-rendered, and what differs from that run.
+
+    Attributes
+    ----------
+    run : str
+    again : tuple of str
+        Stages that are computed again since the program or their parameters are others.
+    diagnosed : bool
+        Whether the corrected probe of a diagnosis takes the place of the run's, and all is computed again.
+    """
 
     run: str
     again: tuple[str, ...] = ()
+    diagnosed: bool = False
 
 
 def twin_job(
@@ -103,7 +113,7 @@ def twin_job(
         kept = RunFolder(run).store
         steps = [job.plan.step(s.label) for s in _MEASURED]
         again = tuple(s.stage.label for s in steps if not kept.has(s.stage.name, s.key))
-    more = value_source(tried), value_source(TwinOf(str(run.resolve()), again))
+    more = value_source(tried), value_source(TwinOf(str(run.resolve()), again, diagnosis is not None))
     return replace(job, sources=(*job.sources, *more), lent=(run,))
 
 
@@ -114,6 +124,7 @@ def twin_document(found: Twin, tried: DiagnosisTried, of: TwinOf) -> dict[str, A
         "format": 1,
         "run": of.run,
         "computed_again": list(of.again),
+        "with_diagnosis": of.diagnosed,
         "frames": [int(f) for f in found.frame],
         "withheld": found.withheld,
         "noise": _figures(found.noise),
@@ -160,13 +171,23 @@ def _known(value: float) -> float | None:
     return float(value) if math.isfinite(value) else None
 
 
+def psnr_without_noise(found: Twin) -> str:
+    """Return in words the peak signal to noise ratio of lit wall whose noise is taken off."""
+    if math.isnan(found.psnr_db):
+        return "not compared"
+    if math.isinf(found.psnr_noise_free_db):
+        return "all of it is noise"
+    return f"{found.psnr_noise_free_db:.1f} dB"
+
+
 def write_twin(found: Twin, tried: DiagnosisTried, of: TwinOf, made_by: MadeBy, folder: Path) -> None:
     """Write twin.json and twin.html."""
     document = twin_document(found, tried, of) | {"made_by": made_by.document()}
     (folder / "twin.json").write_text(json.dumps(document, indent=1, ensure_ascii=False) + "\n", "utf-8")
     views = [_shown(v) for v in found.views]
     maps = [{"name": m.name, "picture": jpeg_uri(m.picture, _JPEG_QUALITY)} for m in found.maps]
-    page = page_template("twin").render(d=document, views=views, maps=maps)
+    psnr = psnr_without_noise(found)
+    page = page_template("twin").render(d=document, views=views, maps=maps, psnr=psnr)
     (folder / "twin.html").write_text(page, "utf-8")
 
 

@@ -11,7 +11,7 @@ from rich.console import Console
 
 from pipeline.api.diagnosis.simulated import DiagnosisTried
 from pipeline.api.job import result_of, run_shown
-from pipeline.api.twin import TwinOf, twin_job
+from pipeline.api.twin import TwinOf, psnr_without_noise, twin_job
 from pipeline.artefacts.twin import Twin
 from pipeline.commands import Assignments, ResultFolder
 from pipeline.machine.display import ProgressDisplay
@@ -64,8 +64,16 @@ def _show(found: Twin, output: Path) -> None:
             continue
         typer.echo(f"{r.name:<14}{r.pixels:>12}{r.chi2_before:>12.2f}{r.chi2_after:>10.2f}")
     typer.echo(f"lit wall by the camera's noise alone: χ² per pixel {found.chi2_camera:.2f}")
-    beyond = f"{found.psnr_noise_free_db:.1f} dB" if math.isfinite(found.psnr_noise_free_db) else "beyond it"
-    typer.echo(f"lit wall: {found.psnr_db:.1f} dB, without the noise {beyond}")
+    typer.echo(f"lit wall: {_psnr(found)}")
     for mismatch in found.found:
         typer.echo(f"found: {mismatch.name or 'without a name'}: {mismatch.statement}")
     typer.echo(f"Page: {output / 'twin.html'}")
+
+
+def _psnr(found: Twin) -> str:
+    """Return in words by how much recorded and re-rendered wall differ."""
+    beyond = psnr_without_noise(found)
+    if not math.isfinite(found.psnr_db):
+        return beyond
+    known = math.isfinite(found.psnr_noise_free_db)
+    return f"{found.psnr_db:.1f} dB, {'without the noise ' if known else ''}{beyond}"

@@ -4,9 +4,9 @@
 effect, run with withheld frames, and compared: wall, motion and photo are measured in the spoilt pictures, as
 a user's would be. ``--nulls N`` renders N scenes in which nothing is switched on, each of another wall, probe
 and noise: what is found there is a false alarm. With ``--as-shipped`` nulls keep the scenes' light and gloss:
-they clip and shine, which may be told, by ``saturation`` and without a name; any other name is false. A case
-that has its answer in OUT is not done again. At last every case is scored by the answer of another one, too:
-those counts must collapse.
+they clip and shine, which may be told, by ``saturation`` and without a name; any other name is false: their
+answers have names of their own. A case that has its answer in OUT is not done again. At last every case is
+scored by the answer of another one, too: those counts must collapse.
 """
 
 from __future__ import annotations
@@ -147,7 +147,8 @@ def answer(scene: Scene, folder: Path) -> dict[str, Any]:
 def answers(given: argparse.Namespace) -> Iterator[tuple[str, Case | None, dict[str, Any]]]:
     """Yield name, case and answer of every case and every null; what is there is read."""
     wanted = [(c.effect, _NULLS[0], c, given.seed) for c in CASES if given.only in c.effect]
-    wanted += [(f"null-{k:03d}", _NULLS[k % len(_NULLS)], None, 1000 + k) for k in range(given.nulls)]
+    kind = "shipped" if given.as_shipped else "null"
+    wanted += [(f"{kind}-{k:03d}", _NULLS[k % len(_NULLS)], None, 1000 + k) for k in range(given.nulls)]
     for name, scene, case, seed in wanted:
         file = given.out / f"{name}.json"
         if not file.is_file():
