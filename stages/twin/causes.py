@@ -24,11 +24,12 @@ from stages.twin.cells import (
     Law,
     drift,
     fitted,
+    half_turn,
     of_sectors,
     sigmas,
     try_law,
 )
-from stages.twin.laws import LED_AZIMUTHS, line_laws, lit_laws, steps_of
+from stages.twin.laws import LED_AZIMUTHS, SECTOR_STEP_DEG, line_laws, lit_laws, steps_of
 from stages.twin.locate import FALSE_ALARM
 from stages.twin.scene import Ring
 
@@ -108,7 +109,7 @@ def _same_sector(one: Fitted, other: Fitted) -> bool:
     """Return whether two dim sectors overlap: the second is what the first one's shape leaves over."""
     if not one.law.name == other.law.name == "laser_sector":
         return False
-    away = abs(_half_turn(float(one.place[0] - other.place[0])))
+    away = abs(half_turn(float(one.place[0] - other.place[0])))
     return bool(away < (one.place[1] + other.place[1]) / 2 + 360 / SECTORS)
 
 
@@ -166,7 +167,7 @@ def _mismatch(best: Fitted, rivals: list[str], cells: Cells, ring: Ring) -> Mism
     else:
         where, width = best.place[:2]
         place = (
-            NamedFigure("azimuth_deg", where, 90 / SECTORS, "deg"),
+            NamedFigure("azimuth_deg", where, SECTOR_STEP_DEG / 2, "deg"),
             NamedFigure("width_deg", width, 0.25 * width, "deg"),
         )
         said = f"About image azimuth {where:.0f}°, over {width:.0f}°, the laser has lost"
@@ -183,10 +184,6 @@ def _mismatch(best: Fitted, rivals: list[str], cells: Cells, ring: Ring) -> Mism
 def _when(frame: Int, first: int) -> NamedFigure:
     gap = float(frame[first] - frame[first - 1])
     return NamedFigure("frame_from", (frame[first] + frame[first - 1]) / 2, gap / np.sqrt(12), "frame")
-
-
-def _half_turn(angle_deg: float) -> float:
-    return (angle_deg + 180) % 360 - 180
 
 
 def _steps(
@@ -261,7 +258,7 @@ def _flicker_or_else(
 
 def _of_led(found: Fitted, cells: Cells) -> tuple[NamedFigure, NamedFigure]:
     """Return when and where an LED fails."""
-    where = _half_turn(float(np.degrees(found.place[0])))
+    where = half_turn(float(np.degrees(found.place[0])))
     at = NamedFigure("azimuth_deg", where, 180 / LED_AZIMUTHS, "deg")
     return _when(cells.frame, int(found.place[1])), at
 

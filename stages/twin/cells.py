@@ -196,6 +196,11 @@ def sector_azimuth_rad() -> Float:
     return np.asarray(-np.pi + 2 * np.pi * (np.arange(SECTORS) + 0.5) / SECTORS)
 
 
+def half_turn(angle_deg: float) -> float:
+    """Return an angle within half a turn of 0, from −180° on."""
+    return (angle_deg + 180) % 360 - 180
+
+
 def drift(frames: int) -> Float:
     """Return columns (K, F, S) of a slow change over the frames."""
     knots = int(np.clip(frames // _FRAMES_OF_KNOT, 1, _DRIFT_KNOTS))

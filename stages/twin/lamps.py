@@ -127,9 +127,10 @@ def _beside_wall(one: Suspected, lamp: LampLight, scene: Scene, samples: BlockSa
     if one.mismatch.name == "led_dead":  # and nothing that sends the same share to every polar angle
         lost, azimuth = one.told[0]
         law = np.log1p(-np.float32(min(lost, 0.999)) * share_at(scene, float(azimuth), theta, phi))
-    groups, light = (samples.orders["wall"], samples.frame), samples.light_and_brightness[0]
+    groups = samples.orders["wall"], samples.frame
+    light = centred(samples.log_light, *groups)
     values = (centred(np.asarray(a, float), *groups) for a in (law, samples.log_change + pattern))
-    # What another law of the lamps' distance makes of a probe that wanders is no pattern.
+    # What follows light that is uneven in the image, or as the probe wanders, to another power is no pattern.
     made, bright = (a - (a @ light) / max(float(light @ light), 1e-12) * light for a in values)
     step = np.float32(2 * np.pi / WALL_COLUMNS)
     within = float(np.mean((lamp.around(phi + step) - pattern) ** 2)) / 12
@@ -166,9 +167,10 @@ def flicker_of_measured(
 
     Compared frames lie at regular steps, and lights that flicker in step with them look steady.
     """
+    clipped = state.line_is_clipped  # tells hardly anything of the laser's power
     courses = (
         ("flicker", "LEDs", "intensity", None if state.lamp is None else state.lamp.gain),
-        ("laser_flicker", "laser", "line", None if state.line is None else state.line.course),
+        ("laser_flicker", "laser", "line", None if clipped or state.line is None else state.line.course),
     )
     told = {name for m in found for name in m.name.split(" or ")}
     made = []

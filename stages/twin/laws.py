@@ -14,8 +14,8 @@ from stages.twin.scene import Ring
 
 LED_AZIMUTHS, _FINE = 24, 5
 _SECTOR_WIDTHS_DEG, _SECTOR_LOSSES = (10, 13, 16, 20, 25, 32, 40, 50, 65, 80, 100, 120), (0.3, 0.7, 0.95)
-
-
+SECTOR_STEP_DEG = 180 / SECTORS
+"""Between azimuths at which a dim sector is tried: half a cell of the picture, as finely as cells tell."""
 _LEAST_AHEAD = 0.05
 """Least distance ahead of the LEDs, in radii, at which they are taken to light the wall."""
 
@@ -97,7 +97,7 @@ def _sector_patterns() -> tuple[Float, Float]:
     """Return log brightness (C, S) of dim sectors, and middle, width and loss of each (C, 3)."""
     fine = (np.arange(SECTORS * _FINE) + 0.5) / _FINE * 360 / SECTORS - 180
     patterns, places = [], []
-    for middle in np.arange(-180.0, 180.0, 180 / SECTORS):
+    for middle in np.arange(-180.0, 180.0, SECTOR_STEP_DEG):
         away = np.abs((fine - middle + 180) % 360 - 180)
         for width in _SECTOR_WIDTHS_DEG:
             shape = np.exp(-np.log(2) * (2 * away / width) ** 8).reshape(SECTORS, _FINE).mean(1)

@@ -136,7 +136,7 @@ def _exponents(samples: BlockSamples, side: int) -> tuple[Int, Float]:
     place = (samples.row // side) * 10_000 + samples.column // side
     cell, of, count = np.unique(place + samples.frame * 10_000_000, return_inverse=True, return_counts=True)
     whole = count >= side**2 / 2
-    logs = (samples.log_level, np.log1p(np.maximum(samples.change, -0.99)) + samples.log_level)
+    logs = (samples.log_level, samples.log_change + samples.log_level)
     frame, place = cell[whole] // 10_000_000, np.unique(cell[whole] % 10_000_000, return_inverse=True)[1]
     x, y = (centred((np.bincount(of, v) / count)[whole], place, frame) for v in logs)
     above, below = (np.bincount(frame, v, samples.frame.max() + 1) for v in (x * y, x * x))
@@ -234,7 +234,12 @@ def cannot_tell(state: PhotometricState) -> tuple[str, ...]:
         "Lamps that are uneven in all frames are told from wall that is paler on one side only as far as the "
         "probe rolls.",
     ]
-    if state.black_in_photo:
+    if np.isnan(state.photo_black):
+        said.append(
+            "Whether the black level is in the wall's photo is not known, for want of a frame of the laser "
+            "alone in colour: the photo's contrast does not tell the response."
+        )
+    elif state.black_in_photo:
         said.append(
             f"The black level of {state.photo_black:.0f} grey levels is in the wall's photo, too: its "
             "contrast does not tell the response."

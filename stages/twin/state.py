@@ -56,7 +56,8 @@ class PhotometricState:
     line_clipped : float
         Share of the line's middle at which its strongest channel is at full scale.
     photo_black : float
-        Grey level without light in the colours that the wall's photo is made of: it is in the photo, too.
+        Grey level without light in the colours that the wall's photo is made of: it is in the photo, too. NaN
+        where no frame tells.
     power : float
         Exponent that frames have the photo's contrast to; another than 1 only when tried.
     gain_map : (H, W) float32 or None
@@ -84,8 +85,8 @@ class PhotometricState:
 
     @property
     def black_in_photo(self) -> bool:
-        """Whether so much black is in the wall's photo that its contrast tells nothing of the response."""
-        return self.photo_black > _MOST_BLACK
+        """Whether so much black is, or may be, in the wall's photo that its contrast tells no response."""
+        return not self.photo_black <= _MOST_BLACK
 
     @property
     def line_is_clipped(self) -> bool:
@@ -179,10 +180,13 @@ def clipped_line(scene: Scene, frames: Iterable[tuple[int, Byte | None]]) -> flo
 
 
 def black_of_photo(frames: Iterable[tuple[int, Byte | None]]) -> float:
-    """Return the grey level of the darkest tenth of laser frames in colour, whose range the photo has."""
+    """Return the grey level of the darkest tenth of laser frames in colour, whose range the photo has.
+
+    NaN without any such frame: then it is not known.
+    """
     grey = [np.asarray(image[::4, ::4].mean(2)) for _, image in frames if image is not None]
     # A tenth (chosen): the line and its stray light reach far less than nine tenths of a laser frame.
-    return float(np.median([np.median(g[g <= np.quantile(g, 0.1)]) for g in grey])) if grey else 0.0
+    return float(np.median([np.median(g[g <= np.quantile(g, 0.1)]) for g in grey])) if grey else float("nan")
 
 
 def _view(lit: list[Float32], black: float, scene: Scene) -> tuple[Bool, Bool]:

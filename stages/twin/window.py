@@ -14,7 +14,8 @@ import numpy as np
 
 from pipeline.arrays import Bool, Float, Float32
 from pipeline.artefacts.twin import Look, Mismatch, NamedFigure
-from stages.twin.cells import SECTORS, sigmas
+from stages.twin.cells import half_turn, sigmas
+from stages.twin.laws import SECTOR_STEP_DEG
 from stages.twin.locate import FALSE_ALARM, LEAST_CHANGE, ImagePlace
 from stages.twin.render import Region, TwinFrame
 from stages.twin.scene import Ring
@@ -224,12 +225,16 @@ def through_window(
     hides in it, and shows in lit frames at the same azimuth, nearer or farther, as the opposite of itself.
     """
     return tuple(
-        m if m.name != "laser_sector" or not any(_same_azimuth(m, w, ring) for w in on_window) else replace(
-            m, name=" or ".join(("laser_sector", *_AT_LINE)),
-            statement=f"{m.statement} Or what is on the window or the lens there takes it away.",
-        )
+        _or_window(m)
+        if "laser_sector" in m.name.split(" or ") and any(_same_azimuth(m, w, ring) for w in on_window)
+        else m
         for m in found
-    )  # fmt: skip
+    )
+
+
+def _or_window(sector: Mismatch) -> Mismatch:
+    said = f"{sector.statement} Or dirt on the window or the lens, which lies there, dims the line."
+    return replace(sector, name=" or ".join((sector.name, *_AT_LINE)), statement=said)
 
 
 def _same_azimuth(sector: Mismatch, on_window: Mismatch, ring: Ring) -> bool:
@@ -238,19 +243,22 @@ def _same_azimuth(sector: Mismatch, on_window: Mismatch, ring: Ring) -> bool:
     if "u_px" not in at or on_window.fixed_to != "image":
         return False
     u, v = at["u_px"] - ring.centre_px[0], at["v_px"] - ring.centre_px[1]
-    reach = at["width_deg"] / 2 + np.degrees(at["radius_px"] / max(np.hypot(u, v), 1.0)) + 90 / SECTORS
-    apart = (np.degrees(np.arctan2(v, u)) - at["azimuth_deg"] + 180) % 360 - 180
-    return bool(abs(apart) < reach)
+    wide = at["width_deg"] + SECTOR_STEP_DEG
+    reach = wide / 2 + float(np.degrees(at["radius_px"] / max(np.hypot(u, v), 1.0)))
+    return abs(half_turn(float(np.degrees(np.arctan2(v, u))) - at["azimuth_deg"])) < reach
 
 
 def _with_photo(share: NamedFigure) -> NamedFigure:
     """Return the share s of light that dirt takes, with the σ of what of the dirt may be in the wall's photo.
 
-    The photo was made through the same window. It may hold nothing of the dirt, or as much as makes twin and
-    recording alike: a part f of it, uniform from 0 to 1, whose σ is 1 / √12, moves the share by s (1 − s).
+    The photo was made through the same window. Where it is darker by h itself, 1 − t = (1 − s)(1 − h): dirt
+    takes t = s + h (1 − s). Nothing tells h. It is taken to be uniform from 0 to s: the photo holds no more
+    than frames show beyond it, since it is a mean of views through other places of the window as well. The
+    r.m.s. of t about the s that is told is then s (1 − s) / √3. Where the photo holds more, t is larger than
+    σ says: hence the words "at least".
     """
-    sd = float(np.hypot(share.sd, share.value * (1 - share.value) / np.sqrt(12)))
-    return replace(share, sd=sd)
+    known = float(np.clip(share.value, 0.0, 1.0))
+    return replace(share, sd=float(np.hypot(share.sd, known * (1 - known) / np.sqrt(3))))
 
 
 def _fall_of_drop(sums: Float, aside_px: float) -> FittedLaw:

@@ -11,6 +11,7 @@ from pipeline.api.diagnosis.simulated import DiagnosisTried
 from pipeline.api.twin import TwinOf, twin_document, write_twin
 from pipeline.artefacts.measured import RingValidity
 from pipeline.artefacts.twin import GaugeTwin, Mismatch, NamedFigure, RegionFit, Twin, TwinView
+from pipeline.commands.twin import _show
 from pipeline.files.provenance import MadeBy
 from pipeline.recording.base import Illumination
 from stages.twin.compare import BLOCK_PX, Comparison, block_ratios, exposure_of
@@ -228,13 +229,20 @@ def test_a_line_that_is_clipped_tells_nothing_of_the_laser_and_that_is_said():
 
 
 def test_a_photo_that_holds_the_black_level_tells_no_response():
-    dark = np.full((40, 60, 3), 12, np.uint8)
-    dark[:8] = 90
-    assert black_of_photo([(0, dark), (1, None)]) == 12
+    ramp = np.arange(100, dtype=np.uint8).reshape(10, 10).repeat(4, 0).repeat(4, 1)[..., None].repeat(3, 2)
+    assert black_of_photo([(0, ramp), (1, None)]) == 4.5, "the median of 0 to 9, the darkest tenth"
+    assert black_of_photo([(0, ramp), (1, ramp + 9), (2, ramp + 8)]) == 12.5
     state = PhotometricState(None, None, None, *(np.zeros(1) for _ in range(5)), photo_black=12.0)
     assert state.black_in_photo
     assert any("12 grey levels" in said for said in cannot_tell(state))
     assert not replace(state, photo_black=0.4).black_in_photo
+
+
+def test_a_black_level_that_no_frame_tells_may_be_in_the_photo():
+    black = black_of_photo([(0, None)])
+    state = PhotometricState(None, None, None, *(np.zeros(1) for _ in range(5)), photo_black=black)
+    assert state.black_in_photo
+    assert any("black level" in said and "is not known" in said for said in cannot_tell(state))
 
 
 def test_a_line_clips_where_its_strongest_channel_does_whatever_its_grey():
@@ -278,6 +286,36 @@ def test_what_is_not_known_is_null_and_the_page_holds_all_frames(tmp_path):
     assert page.count("</script>") == 1
 
 
+@pytest.mark.parametrize(
+    ("whole", "beyond", "said", "tile"),
+    [
+        (45.0, 52.3, "45.0 dB, without the noise 52.3 dB", "52.3 dB"),
+        (45.0, np.inf, "45.0 dB, all of it is noise", "all of it is noise"),
+        (np.inf, np.inf, "all of it is noise", "all of it is noise"),
+        (np.nan, np.nan, "not compared", "not compared"),
+    ],
+)
+def test_how_far_the_wall_differs_is_said_in_words_where_no_number_can(
+    whole, beyond, said, tile, tmp_path, capsys
+):
+    found = replace(_twin(), psnr_db=whole, psnr_noise_free_db=beyond)
+    _show(found, tmp_path)
+    assert f"lit wall: {said}\n" in capsys.readouterr().out
+    write_twin(found, DiagnosisTried(), TwinOf("/runs/one"), MadeBy("twin", {}, {}), tmp_path)
+    assert f"<dd>{tile}</dd>" in (tmp_path / "twin.html").read_text("utf-8")
+
+
+@pytest.mark.parametrize("diagnosed", [True, False])
+@pytest.mark.parametrize("differs", [1.1, 9.0])
+def test_the_page_says_once_that_the_probe_is_that_of_a_diagnosis(diagnosed, differs, tmp_path):
+    regions = tuple(RegionFit(n, 9, 10.0, differs) for n in ("line_core", "wall"))
+    of = TwinOf("/runs/one", (), diagnosed)
+    write_twin(replace(_twin(), regions=regions), DiagnosisTried(), of, MadeBy("twin", {}, {}), tmp_path)
+    page = (tmp_path / "twin.html").read_text("utf-8")
+    assert page.count("with the probe as the diagnosis corrected it") == diagnosed
+    assert twin_document(_twin(), DiagnosisTried(), of)["with_diagnosis"] == diagnosed
+
+
 @pytest.mark.parametrize("found", [True, False])
 def test_a_line_that_still_differs_is_unexplained_only_where_no_cause_was_found(found, tmp_path):
     worse = replace(_twin(), regions=(RegionFit("line_core", 9, 10.0, 2.5),), found=())
@@ -288,7 +326,6 @@ def test_a_line_that_still_differs_is_unexplained_only_where_no_cause_was_found(
     page = (tmp_path / "twin.html").read_text("utf-8")
     assert "differs by 1.6 times its noise" in page
     assert ("no law here explains" in page) != found
-    assert ("measured again with the diagnosis' probe" in page) == found
 
 
 def _sight(random, count=8000):

@@ -225,4 +225,5 @@ def test_two_looks_at_falls_alarm_no_more_often_than_their_chance_says():
     random = np.random.default_rng(9)
     foretold = np.exp(0.8 * random.standard_normal((2000, 8)))
     chance = [_borne_out(f * random.standard_normal(8), f)[1] for f in foretold]
-    assert np.mean(np.array(chance) < 0.05) < 0.06
+    # The two looks are alike, so that together they alarm less often than twice; one alone does at .05.
+    assert np.mean(np.array(chance) < 0.05) < 0.04

@@ -17,6 +17,7 @@ from stages.twin.on_wall import touching, unnamed
 from stages.twin.reference import BlockSamples, BlocksOfFrames
 from stages.twin.render import Region, TwinFrame
 from stages.twin.scene import Ring
+from stages.twin.switched import share_at
 from tests.synthetic_wall import plain_bore
 
 SHAPE, FRAMES, STEP_PX = (240, 320), 10, 8
@@ -146,31 +147,67 @@ def test_a_dim_led_is_told_from_lamps_that_shine_unevenly():
     assert not uneven_lamps(_lamp(0 * azimuth), SCENE, frames)
 
 
-@pytest.mark.parametrize(("rolled_deg", "of", "kept"), [(40, "lamps", 1), (40, "photo", 0), (0, "lamps", 0)])
-def test_lamps_are_uneven_only_where_wall_seen_twice_says_so(rolled_deg, of, kept):
-    lamp, frames = _lamp(0.05 * np.cos(np.linspace(-np.pi, np.pi, 37)[:-1] + np.pi / 36)), 12
+def _seen_by_a_probe(rolled_deg, change, light=lambda at: 0 * at):
+    """A scene, and the blocks of frames of a probe that moves on and rolls.
+
+    ``change`` is that of the logarithm of brightness by azimuth in the image, on the wall, and polar angle.
+    """
+    frames = 12
     frame, row, column = (a.ravel() for a in np.mgrid[0:frames, 0:16, 0:24])
     v, u = np.mgrid[0:128, 0:192].astype(np.float32)
     phi, theta = np.arctan2(v - 64, u - 96), np.hypot(v - 64, u - 96) / 60
-    scene = SimpleNamespace(probe=SCENE.probe, ring=RING, polar=(theta, phi, None))
-    roll = np.radians(rolled_deg) * np.sin(frame)
-    at = phi[4::8, 4::8][row, column]
-    on_wall = np.mod(at + roll, 2 * np.pi)
-    # Either the lamps are as the twin has them, or its photo holds what they are not.
-    change = 0 * at if of == "lamps" else lamp.around(on_wall.astype(np.float32)) - lamp.around(at)
+    at, angle = (a[4::8, 4::8][row, column] for a in (phi, theta))
+    on_wall = np.mod(at + np.radians(rolled_deg) * np.sin(frame), 2 * np.pi).astype(np.float32)
     noise = 0.003 * np.random.default_rng(1).standard_normal(len(at))
-    along, around = (
-        (8 * np.hypot(row - 7.5, column - 11.5) + 4 * frame).astype(int),
-        (128 / 2 / np.pi * on_wall).astype(int),
-    )
+    along = (8 * np.hypot(row - 7.5, column - 11.5) + 4 * frame).astype(int)
+    around = (128 / 2 / np.pi * on_wall).astype(int)
     samples = BlockSamples(
-        np.expm1(change + noise), 4 + 0 * at, 32 + 0 * at, frame, row, column, along, around, 0.0, 2.5,
-        np.arange(frames), row / 40, 0 * at,
+        np.expm1(change(at, on_wall, angle) + noise), 4 + 0 * at, 32 + 0 * at, frame, row, column,
+        along, around, 0.0, 2.5, np.arange(frames), row / 40, light(at),
     )  # fmt: skip
-    suspected = uneven_lamps(lamp, scene, np.arange(8))
-    told, withdrawn = parted_from_wall(suspected, lamp, scene, samples)
+    return SimpleNamespace(probe=SCENE.probe, ring=RING, polar=(theta, phi, None)), samples
+
+
+@pytest.mark.parametrize(
+    ("rolled_deg", "of", "kept"),
+    [(40, "lamps", 1), (40, "photo", 0), (40, "response", 0), (0, "lamps", 0)],
+)
+def test_lamps_are_uneven_only_where_wall_seen_twice_says_so(rolled_deg, of, kept):
+    lamp = _lamp(0.05 * np.cos(np.linspace(-np.pi, np.pi, 37)[:-1] + np.pi / 36))
+
+    def light(at):  # a probe off the axis lights one side more
+        return -0.6 * np.cos(at) if of == "response" else 0 * at
+
+    def change(at, on_wall, theta):
+        # Either the lamps are as the twin has them, or its photo holds what they are not.
+        of_photo = 0 * at if of == "lamps" else lamp.around(on_wall) - lamp.around(at)
+        return of_photo + (0.92 - 1) * light(at)  # a response of .92 makes as much of that light as lamps do
+
+    scene, samples = _seen_by_a_probe(rolled_deg, change, light)
+    told, withdrawn = parted_from_wall(uneven_lamps(lamp, scene, np.arange(8)), lamp, scene, samples)
     assert (len(told), len(withdrawn)) == (kept, 1 - kept)
     assert all(("too dark" in w.statement) == (of == "photo") for w in withdrawn)
+    assert all(("cannot be told" in w.statement) == (of != "photo") for w in withdrawn)
+
+
+@pytest.mark.parametrize("of", ["lamps", "photo"])
+def test_a_dim_led_is_told_without_a_roll_where_the_wall_comes_nearer(of):
+    """An LED sends another share of the light to the same wall when that lies at another polar angle."""
+    wide = replace(LIGHTING, radius_mm=30.0)  # an LED that is near shows its second harmonic
+    lamp = _lamp(np.log1p(-0.999 * dim_share(wide, 2.0, 50.0, np.array([0.9])).mean((0, 1))))
+    scene, _ = _seen_by_a_probe(0, lambda at, on_wall, theta: 0 * at)
+    scene.probe = SimpleNamespace(lighting=wide)
+    (suspected,) = uneven_lamps(lamp, scene, np.arange(8))
+    assert suspected.mismatch.name == "led_dead"
+    lost, azimuth = suspected.told[0]
+
+    def change(at, on_wall, theta):
+        of_lamps = np.log1p(-min(lost, 0.999) * share_at(scene, azimuth, theta, at))
+        return (of_lamps if of == "lamps" else 0 * at) - lamp.around(at)
+
+    told, withdrawn = parted_from_wall([suspected], lamp, scene, _seen_by_a_probe(0, change)[1])
+    assert (len(told), len(withdrawn)) == (of == "lamps", of == "photo")
+    assert all("too dark" in w.statement for w in withdrawn)
 
 
 def test_lights_that_flicker_in_step_with_the_compared_frames_are_told_by_the_measured_ones():
@@ -179,7 +216,9 @@ def test_lights_that_flicker_in_step_with_the_compared_frames_are_told_by_the_me
     def told(spread, found=(), drift=0.0):
         log = spread * random.standard_normal(12) + np.linspace(0, drift, 12)
         course = Course(np.arange(12), log, np.full(12, 1e-3))
-        state = SimpleNamespace(lamp=replace(_lamp(np.zeros(36)), gain=course), line=None)
+        state = SimpleNamespace(
+            lamp=replace(_lamp(np.zeros(36)), gain=course), line=None, line_is_clipped=False
+        )
         return flicker_of_measured(state, found, RING)
 
     (flicker,) = told(0.06)
@@ -189,3 +228,11 @@ def test_lights_that_flicker_in_step_with_the_compared_frames_are_told_by_the_me
     assert not told(0.002, drift=0.5), "a slow change is no flicker"
     sizes = [p for _ in range(300) for m in told(0.06) for p in m.parameters]
     assert np.mean([abs(p.value - 0.06) < 2 * p.sd for p in sizes]) > 0.88
+
+
+@pytest.mark.parametrize("clipped", [False, True])
+def test_a_line_that_is_clipped_tells_no_flicker_of_the_laser(clipped):
+    log = 0.2 * np.random.default_rng(2).standard_normal(12)
+    line = SimpleNamespace(course=Course(np.arange(12), log, np.full(12, 1e-3)))
+    told = flicker_of_measured(SimpleNamespace(lamp=None, line=line, line_is_clipped=clipped), (), RING)
+    assert [m.name for m in told] == ([] if clipped else ["laser_flicker"])
