@@ -7,8 +7,10 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from pipeline.arrays import Bool, Float, Int
+from stages.calibrate.gauge.edges import Edges
 from stages.diagnose.effects.courses import OWN_CLOCK, Coursed
 from stages.diagnose.gauge.elimination import EDGE, RING, Equations, Part, eliminate_globals, eliminate_poses
 from stages.diagnose.gauge.fit import Fit, evidence, kept_columns, own_unknowns
@@ -26,6 +28,9 @@ _SEEN_KINDS = (RING, EDGE)
 # So long that the poses of a block hold together, so short that several lie on either side of an event.
 _BLOCK_FRAMES = 8
 _SAME_AZIMUTH_RAD = np.radians(3.0)
+# Two edges of other pictures are at one place where the instrument's error is alike, as two rings are at one
+# azimuth: 3° of a circle of 400 px; how many near ones are looked through for one of another picture.
+_SAME_PLACE_PX, _SAME_STEEPNESS_RAD, _NEIGHBOURS = 20.0, np.radians(15.0), 40
 # What reflectance and relief do to a line is alike over a few mm of wall. Debt: data/debts.md.
 _OTHER_WALL_MM = 10.0
 
@@ -81,22 +86,43 @@ def _by_turns(frames: int) -> list[Bool]:
 def repeatability_px(run: GaugeRun, found: Fit) -> float:
     """Return the r.m.s. noise of rings and fiducials, of image and wall.
 
-    Of rings it is what two of them differ by at the same azimuth on other wall of the same bore, over √2: an
-    error of the instrument that is left is alike in both, so that a bad fit makes no larger floor. Of
-    fiducials it is their edges' own σ.
+    Of rings it is what two of them differ by at the same azimuth on other wall of the same bore, over √2; of
+    fiducials what edges differ by that other pictures show at the same place of the image, or their stated σ
+    where that is more: samples of one fiducial may err alike. An error of the instrument that is left is
+    alike in both, so that a bad fit makes no larger floor.
     """
     about = found.linearised
     equations, per_px = about.equations, ring_mm_per_px(about.rings)
     ring, edge = equations.kind == RING, equations.kind == EDGE
-    weight = np.where(np.isfinite(per_px), equations.weight[ring] * per_px**2, 0.0)
-    value = equations.residual[ring] / per_px
-    first, second = _on_other_wall(run, found)
-    both = np.sqrt(weight[first] * weight[second])
+    of_rings = np.where(np.isfinite(per_px), equations.weight[ring] * per_px**2, 0.0)
+    of_edges = equations.weight[edge]
+    stated = float(of_edges @ run.edges.sigma_px**2)
+    edges = _variance(equations.residual[edge], of_edges, *_in_other_pictures(run.edges)) * of_edges.sum()
+    rings = _variance(equations.residual[ring] / per_px, of_rings, *_on_other_wall(run, found))
+    squares = of_rings.sum() * rings + max(edges, stated)
+    return float(np.sqrt(squares / (of_rings.sum() + of_edges.sum())))
+
+
+def _variance(value: Float, weight: Float, first: Int, second: Int) -> float:
+    """Return the variance that pairs (P,) of values (M,) show, whatever both have in common; 0 without pairs.
+
+    With the product of weights independent errors come to just their weighted mean square.
+    """
+    both = weight[first] * weight[second]
     used = both > 0
-    of_rings = float(np.average((value[second] - value[first])[used] ** 2, weights=both[used])) / 2
-    of_edges = float(equations.weight[edge] @ run.edges.sigma_px**2)
-    squares = weight.sum() * of_rings + of_edges
-    return float(np.sqrt(squares / (weight.sum() + equations.weight[edge].sum())))
+    if not used.any():
+        return 0.0
+    return float(np.average((value[second] - value[first])[used] ** 2, weights=both[used])) / 2
+
+
+def _in_other_pictures(edges: Edges) -> tuple[Int, Int]:
+    """Return pairs (P,) of fiducials' edges of other pictures, at one place of the image and as steep."""
+    place = np.concatenate([edges.uv / _SAME_PLACE_PX, edges.normal / _SAME_STEEPNESS_RAD], axis=1)
+    apart, near = cKDTree(place).query(place, k=min(_NEIGHBOURS, len(place)))
+    near = np.asarray(near)
+    other = (edges.frame[near] != edges.frame[:, None]) & (apart < 1)
+    first = np.flatnonzero(other.any(axis=1))
+    return first, near[first, np.argmax(other[first], axis=1)]
 
 
 def _on_other_wall(run: GaugeRun, found: Fit) -> tuple[Int, Int]:
