@@ -18,8 +18,11 @@ FRAMES = 12
 RING = Ring((96.0, 64.0), 40.0, 50.0, 20.0)
 
 
-def _samples(power, photo_wrong=0.0, wandering=0.12):
-    """Return blocks of a wall lit from a probe off the axis; the photo may hold the light's error, too."""
+def _samples(power, photo_wrong=0.0, wandering=0.12, slopes_err=0.0):
+    """Return blocks of a wall lit from a probe off the axis; the photo may hold the light's error, too.
+
+    Slopes of the radius map may err: the light that is foretold then does, too, from block to block.
+    """
     random = np.random.default_rng(3)
     frame, row, column = (a.ravel() for a in np.mgrid[0:FRAMES, 0:16, 0:24])
     turn = np.arctan2(row - 8.0, column - 12.0)
@@ -28,6 +31,8 @@ def _samples(power, photo_wrong=0.0, wandering=0.12):
     light = nearer - 0.02 * np.hypot(row - 8, column - 12)  # the second part is learned as the lamps' falloff
     along = row + 3 * frame
     log = (power - 1) * nearer + photo_wrong * np.sin(along) + 0.01 * random.standard_normal(len(frame))
+    error = slopes_err * random.standard_normal(len(frame))
+    light, log = light + error, log - error  # the twin is as bright as the foretold light
     return BlockSamples(
         np.expm1(log), 4 + 0 * log, 32 + 0 * log, frame, row, column, along, column, 0.0, 2.5,
         10 * np.arange(FRAMES), row / 40, light,
@@ -47,6 +52,12 @@ def test_a_response_is_told_by_how_the_wall_brightens_where_lamps_come_nearer(po
 @pytest.mark.parametrize("power", [1.0, 0.85])
 def test_light_as_the_lamps_throw_it_or_a_little_of_it_bounced_is_no_response(power):
     assert power_of_lamps(_samples(power), RING) == ()
+
+
+@pytest.mark.parametrize("power", [1.0, 0.7])
+def test_slopes_of_the_wall_that_err_do_not_draw_the_power(power):
+    (figure,) = lamp_power(_samples(power, slopes_err=0.02))
+    assert figure.value == pytest.approx(power, abs=0.02)
 
 
 @pytest.mark.parametrize("wandering", [0.0, 1e-6])
