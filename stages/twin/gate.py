@@ -11,11 +11,10 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import t
 
 from pipeline.arrays import Float, Float32, Int
 from pipeline.artefacts.twin import Mismatch, NamedFigure
-from stages.twin.cells import sigmas
+from stages.twin.falls import over_frames
 from stages.twin.locate import FALSE_ALARM
 from stages.twin.switched import Law, Pair, Shown
 
@@ -23,8 +22,6 @@ _SURE, _MOST, _FEWEST = 3.0, 16, 6
 """σ from frame to frame that z must fall by; most frames that are rendered again, and fewest that judge."""
 _MOST_SQUARE = 25.0
 """Square of z that a pixel counts with at most: a glint of thirty σ would outweigh a thousand pixels."""
-_MOST_ALIKE = 0.9
-"""Correlation of neighbours that counts at most: of so few frames it is not told better."""
 _LEAST_FALL = 0.05
 """Of the usual fall: frames that an effect should change by less say nothing of it. Chosen."""
 _FEWEST_PIXELS = 200
@@ -108,26 +105,12 @@ def _borne_out(fall: Float, foretold: Float) -> tuple[float, float]:
     like chance. Falls over what the effect should make them, where it acts, are alike: of both the surer one
     counts, at the chance of that in two tries.
     """
-    each = [_over_frames(fall)]
+    each = [over_frames(fall)]
     acts = foretold > _LEAST_FALL * np.median(foretold) if len(foretold) else foretold > 0
     if acts.sum() >= _FEWEST:
-        each.append(_over_frames(fall[acts] / foretold[acts]))
+        each.append(over_frames(fall[acts] / foretold[acts]))
     told, chance = min(each, key=lambda e: e[1])
     return told, min(len(each) * chance, 1.0)
-
-
-def _over_frames(fall: Float) -> tuple[float, float]:
-    """Return by how many σ falls (F,) in the order of time are above 0, and the chance of that.
-
-    Frames that follow each other see the same wall: as far as their falls are alike they count as fewer.
-    """
-    if len(fall) < 3:
-        return 0.0, 1.0
-    off = fall - fall.mean()
-    alike = float(np.clip((off[1:] * off[:-1]).sum() / max(float((off**2).sum()), 1e-12), 0.0, _MOST_ALIKE))
-    worth = (1 - alike) / (1 + alike)
-    told = sigmas(fall) * float(np.sqrt(worth))
-    return told, float(t.sf(told, len(fall) - 1))
 
 
 def _squares(shown: Shown, pair: Pair) -> Float:

@@ -6,12 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import least_squares
-from scipy.stats import t
 
 from pipeline.adjustment.robust import left_out_sd
 from pipeline.arrays import Float, Float32, Int
 from pipeline.artefacts.twin import NamedFigure
-from stages.twin.cells import sigmas
+from stages.twin.falls import over_frames
 
 WIDEST_PX = 48.0
 """A place is looked at so far about its middle, or over two radii or this far beyond it if that is more. A
@@ -22,7 +21,7 @@ _OF_LIGHT = 0.005
 """1 σ of a share of the light for want of knowing the light about the spot: half of a photo's error."""
 _LEAST_WIDTH_PX, _MIDDLE = 2.0, 0.25
 """Narrowest spot, 1 σ; the middle of a spot reaches to where a quarter of its depth is gone."""
-_PARTS = 6
+PARTS = 6
 """Parts of the frames of which each is left out once, for the σ of a spot: neighbours in time go together."""
 
 
@@ -35,8 +34,8 @@ class FittedLaw:
 
     @property
     def chance(self) -> float:
-        """The probability that chance makes χ² fall as much."""
-        return float(t.sf(sigmas(self.fall), len(self.fall) - 1))
+        """The probability that chance makes χ² fall as much, neighbouring frames seeing the same wall."""
+        return over_frames(self.fall)[1]
 
 
 def fall_of_spot(sums: Float32, start: Float, beyond: float) -> FittedLaw:
@@ -53,7 +52,7 @@ def fall_of_spot(sums: Float32, start: Float, beyond: float) -> FittedLaw:
     for half in (frames % 2 == 0, frames % 2 == 1):
         shape = _spot(_fitted_spot(sums[half].sum(0), best[None], beyond), sums.shape[2:])
         fall[~half] = (2 * shape * sums[~half, 0] - shape**2 * sums[~half, 1]).sum((1, 2))
-    parts = np.array_split(frames, min(_PARTS, len(frames)))
+    parts = np.array_split(frames, min(PARTS, len(frames)))
     fits = np.array([_fitted_spot(whole - sums[p].sum(0), best[None], beyond) for p in parts])
     without = fits[:, 0] / (1 - fits[:, 5])
     spread = float(left_out_sd(without))

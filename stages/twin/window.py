@@ -11,6 +11,7 @@ from dataclasses import dataclass, field, replace
 
 import cv2
 import numpy as np
+from scipy.stats import t
 
 from pipeline.arrays import Bool, Float, Float32
 from pipeline.artefacts.twin import Look, Mismatch, NamedFigure
@@ -19,13 +20,13 @@ from stages.twin.laws import SECTOR_STEP_DEG
 from stages.twin.locate import FALSE_ALARM, LEAST_CHANGE, ImagePlace
 from stages.twin.render import Region, TwinFrame
 from stages.twin.scene import Ring
-from stages.twin.spot import WIDEST_PX, FittedLaw, fall_of_spot
+from stages.twin.spot import PARTS, WIDEST_PX, FittedLaw, fall_of_spot
 
 _POWER_STEP, _ASIDE_PX = 0.4, 0.5
 """Steps of bending that are tried; 1 σ of a displacement, since blocks of 24 px blunt its peak. Chosen."""
 _SURELY = 2.0
-"""σ by which a size must be above 0, and by which texture must be drawn aside before that alone makes a drop:
-radii that err by an unstated tilt of the laser had made two drops of .4 ± .5 px."""
+"""σ by which a drop's size must be above 0, and by which texture must be drawn aside before that alone makes
+one: radii that err by an unstated tilt of the laser had made two drops of .4 ± .5 px."""
 _DROPS = tuple((power, size) for power in (0.6, 1.0, 1.4, 1.8) for size in (1.0, 1.2, 1.4, 1.7, 2.0))
 """Bending and radius, in radii of the place, of the drops that are tried."""
 _LARGE_PX = 16.0
@@ -167,11 +168,20 @@ class WindowPlace:
         law = tried[name]
         # A place that displaced texture has found is no dirt below what counts as such elsewhere.
         least = LEAST_CHANGE if name == "window_dirt" else 0.0
-        if abs(law.size.value) < max(_SURELY * law.size.sd, least):
+        if abs(law.size.value) < max(self._surely(name) * law.size.sd, least):
             return None
         if name == "window_dirt":
             law = replace(law, size=_with_photo(law.size))
         return self._mismatch([name, *rivals], fixed_to or "image", law, chance)
+
+    def _surely(self, name: str) -> float:
+        """Return by how many σ a size must be above 0.
+
+        That of a spot comes from a few parts of the frames: 2 σ come by chance at one place in twenty, and
+        wall that differs in one part of the run leaves as much.
+        """
+        parts = min(PARTS, len(self.frame))
+        return _SURELY if name == "droplet" else float(t.isf(FALSE_ALARM, parts - 1))
 
     def _mismatch(self, names: list[str], fixed_to: str, law: FittedLaw, chance: float) -> Mismatch:
         place, size = self.place, law.size

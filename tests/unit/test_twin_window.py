@@ -73,7 +73,8 @@ def test_texture_that_is_stronger_than_the_photo_has_it_is_no_scatter():
 
 
 @pytest.mark.parametrize(
-    ("share", "sd", "told"), [(0.06, 0.01, True), (0.06, 0.05, False), (0.02, 0.001, False)]
+    ("share", "sd", "told"),
+    [(0.06, 0.01, True), (0.06, 0.05, False), (0.06, 0.022, False), (0.02, 0.001, False)],
 )
 def test_a_share_that_may_be_nothing_is_not_told(share, sd, told, monkeypatch):
     law = FittedLaw(np.linspace(9, 11, 9), NamedFigure("share", share, sd))
@@ -83,6 +84,13 @@ def test_a_share_that_may_be_nothing_is_not_told(share, sd, told, monkeypatch):
         level = _textured(random)
         place.add(frame, level, _frame(level), np.ones(level.shape, bool))
     assert (place.judged("image") is not None) == told
+
+
+def test_wall_that_a_few_neighbouring_frames_see_is_no_proof_of_a_spot():
+    size = NamedFigure("share", 0.05, 0.01)
+    passing = np.repeat([9.0, 8.0, -1.0, 1.0, 0.5], 3)
+    by_turns = passing.reshape(5, 3).T.ravel()
+    assert FittedLaw(passing, size).chance > 0.01 > FittedLaw(by_turns, size).chance
 
 
 @pytest.mark.parametrize("texture", [1.0, 0.92, 1.06])
