@@ -37,7 +37,7 @@ from stages.twin.name import (
     noise_figures,
     state_figures,
 )
-from stages.twin.on_wall import unnamed
+from stages.twin.on_wall import ring_step_mm, unnamed
 from stages.twin.pixels import defective_pixels
 from stages.twin.render import Region, Renderer
 from stages.twin.scene import Scene, scene_of
@@ -210,9 +210,10 @@ def compared_with(
     whole, withdrawn = sums.named(samples, recording, failed)
     on_window, unsure = beside_blur(sums.on_window(samples), whole)
     on_window, glints = told_apart(on_window, sums.glints())
+    apart_mm, clear = ring_step_mm(rings, scene.trajectory), (*on_window, *glints)
     found: tuple[Mismatch, ...] = (
         *through_window(over_time, on_window, scene.ring), *on_window, *photometry.pixels,
-        *unnamed(samples and samples.clear_of((*on_window, *glints)), scene.surface), *whole, *glints,
+        *unnamed(samples and samples.clear_of(clear), scene.surface, apart_mm), *whole, *glints,
         *clipped(rings, state.line_clipped, comparison.clipped_wall / max(comparison.lit, 1.0)),
     )  # fmt: skip
     fall, unnamed_map = left_over(None if samples is None else samples.seen_through(state.gain_map))
@@ -278,7 +279,7 @@ PHOTOMETRY = Stage(
 )
 TWIN = Stage(
     "twin",
-    "25",
+    "26",
     TwinParameters,
     compare_with_twin,
     "recorded frames beside the same frames, re-rendered from what the run has measured",

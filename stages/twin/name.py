@@ -247,7 +247,8 @@ def cannot_tell(state: PhotometricState) -> tuple[str, ...]:
     if state.line_is_clipped:
         said.append(
             f"The line is clipped in {100 * state.line_clipped:.0f} % of its middle: whether the laser's "
-            "power changes over time or around the sheet cannot be told."
+            "power changes over time or around the sheet cannot be told, nor whether charge leaks from "
+            "pixels of which one colour alone is clipped."
         )
     if state.lamp is None:
         said.append("No lit frame could be used: nothing is known of lamps, vignetting and photon transfer.")

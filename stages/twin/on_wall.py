@@ -13,6 +13,7 @@ from scipy.stats import norm, t
 
 from pipeline.adjustment.robust import spread_about_median
 from pipeline.arrays import Bool, Float, Int
+from pipeline.artefacts.measured import RingSamples, Trajectory
 from pipeline.artefacts.twin import Mismatch, NamedFigure
 from stages.texture.surface import WallSurface
 from stages.twin.cells import centred, sigmas
@@ -32,12 +33,20 @@ _NOISY = 3.0
 """Medians of the size of two normal errors that the largest of some hundred reaches: 2.8, rounded up."""
 
 
-def unnamed(samples: BlockSamples | None, surface: WallSurface) -> tuple[Mismatch, ...]:
-    """Return what is fixed to the wall, whose shape is ``surface``, or to rows."""
-    return () if samples is None else (*_regions_of_wall(samples, surface), *_banding(samples))
+def unnamed(samples: BlockSamples | None, surface: WallSurface, ring_step_mm: float) -> tuple[Mismatch, ...]:
+    """Return what is fixed to the wall, whose shape is ``surface`` by rings so far apart, or to rows."""
+    return () if samples is None else (*_regions_of_wall(samples, surface, ring_step_mm), *_banding(samples))
 
 
-def _regions_of_wall(samples: BlockSamples, surface: WallSurface) -> tuple[Mismatch, ...]:
+def ring_step_mm(rings: RingSamples, trajectory: Trajectory) -> float:
+    """Return how far apart rings measure the wall: the median; 0 without two rings that have a pose."""
+    place = trajectory.T_pc[np.isin(trajectory.frame, rings.frame), :3, 3]
+    return float(np.median(np.linalg.norm(np.diff(place, axis=0), axis=1))) if len(place) > 1 else 0.0
+
+
+def _regions_of_wall(
+    samples: BlockSamples, surface: WallSurface, ring_step_mm: float
+) -> tuple[Mismatch, ...]:
     """Return regions of the wall that differ from their photo, if frames bear it out.
 
     Steep wall errs in brightness as its smoothed slope does: that counts to the σ of a region.
@@ -62,7 +71,7 @@ def _regions_of_wall(samples: BlockSamples, surface: WallSurface) -> tuple[Misma
         size, told = _gloss_of(samples, use)
         shines = told > _SURE and size > _LEAST_SHINE
         value, spread = (shine, shine_sd) if shines else (mean, sd)
-        if _most(value, region) < tail * slope_error(surface, samples, region):
+        if _most(value, region) < tail * slope_error(surface, samples, region, ring_step_mm):
             continue
         if shines or samples.fixed_to(use) == "wall":
             gloss_sd = size / max(told, 1e-9) if shines else 0.0
@@ -75,21 +84,23 @@ def _most(values: Float, cells: Int) -> float:
     return float(np.nanmax(np.abs(values[tuple(cells.T)])))
 
 
-def slope_error(surface: WallSurface, samples: BlockSamples, cells: Int) -> float:
+def slope_error(surface: WallSurface, samples: BlockSamples, cells: Int, ring_step_mm: float) -> float:
     """Return the 1 σ of the relative brightness of cells (N, 2) of the wall for want of its exact slope.
 
     What smoothing the slopes once more takes off is what the first smoothing took (J. W. Tukey's twicing,
-    1977); light at 45°, as lamps give about the ring, changes by as much as the slope. Noise of the radius
-    map is taken off: it does not keep one sign over a cell.
+    1977); light at 45°, as lamps give about the ring, changes by as much as the slope. Along the pipe the map
+    is smoothed by its rings as well: straight lines between rings h apart are a running mean by a triangle,
+    whose variance is h² / 6. Noise of the radius map is taken off: it does not keep one sign over a cell.
     """
     step = float(surface.distance_mm[1] - surface.distance_mm[0])
     around_mm = 2 * np.pi * surface.mean_radius_mm / surface.radius_mm.shape[1]
     first, last = (samples.first_mm + (f(cells[:, 0]) + 0.5) * samples.cell_mm for f in (np.min, np.max))
-    more = samples.cell_mm + 4 * SHADING_MM
+    along_mm = float(np.hypot(SHADING_MM, ring_step_mm / np.sqrt(6)))
+    more = samples.cell_mm + 4 * along_mm
     rows = np.flatnonzero((surface.distance_mm > first - more) & (surface.distance_mm < last + more))
     if not len(rows):
         return 0.0
-    part, sigma = slice(rows[0], rows[-1] + 1), (SHADING_MM / step, SHADING_MM / around_mm)
+    part, sigma = slice(rows[0], rows[-1] + 1), (along_mm / step, SHADING_MM / around_mm)
     lost = np.hypot(*(
         a[part] - gaussian_filter(a[part], sigma, mode=("nearest", "wrap"))
         for a in (surface.along, surface.around)

@@ -13,7 +13,7 @@ from stages.twin.glints import SpotsOfFrames
 from stages.twin.lamp_light import Course, LampLight
 from stages.twin.lamps import flicker_of_measured, parted_from_wall, uneven_lamps
 from stages.twin.laws import dim_share
-from stages.twin.on_wall import touching, unnamed
+from stages.twin.on_wall import ring_step_mm, touching, unnamed
 from stages.twin.reference import BlockSamples, BlocksOfFrames
 from stages.twin.render import Region, TwinFrame
 from stages.twin.scene import Ring
@@ -80,7 +80,7 @@ def test_noise_and_one_spot_are_no_glints():
     assert not _spots(lambda n, r: np.float32(90.0))  # all of it too bright: no spot
 
 
-def _wall(change, surface=None, seed=3):
+def _wall(change, surface=None, seed=3, rings_mm=0.5):
     random, blocks = np.random.default_rng(seed), BlocksOfFrames(RING)
     for number in range(12):
         twin = _twin(number)
@@ -88,7 +88,7 @@ def _wall(change, surface=None, seed=3):
         aside = np.hypot(U - 160, V - 120) / 90
         noise = 2 * random.standard_normal(SHAPE).astype(np.float32)
         blocks.add(number, twin.level * (1 + change(patch, aside)).astype(np.float32) + noise, twin, 255.0)
-    return unnamed(blocks.samples(), surface or plain_bore())
+    return unnamed(blocks.samples(), surface or plain_bore(), rings_mm)
 
 
 def test_wall_that_shines_or_is_dark_is_told_and_has_no_name():
@@ -112,6 +112,22 @@ def test_steep_wall_is_as_bright_as_its_slope_is_known():
     assert _wall(lambda patch, aside: -0.15 * patch, plain)
     assert not _wall(lambda patch, aside: -0.15 * patch, steep)
     assert _wall(lambda patch, aside: -0.9 * patch, steep)
+
+
+def test_wall_between_rings_far_apart_is_as_bright_as_straight_lines_between_them():
+    plain = plain_bore()
+    s = np.broadcast_to(plain.distance_mm[:, None] - 100, plain.radius_mm.shape)
+    weld = replace(plain, along=(0.3 * s / 4 * np.exp(-0.5 * (s / 4) ** 2)).astype(np.float32))
+    found = [len(_wall(lambda patch, aside: -0.09 * patch, weld, rings_mm=h)) for h in (0.5, 4.0)]
+    assert found == [1, 0]
+
+
+def test_rings_lie_as_far_apart_as_the_camera_went_between_them():
+    T_pc = np.tile(np.eye(4), (7, 1, 1))
+    T_pc[:, 2, 3] = [0, 1, 3, 4, 6, 7, 9]
+    trajectory = SimpleNamespace(frame=np.arange(7), T_pc=T_pc)
+    assert ring_step_mm(SimpleNamespace(frame=np.array([0, 2, 4, 6, 9])), trajectory) == 3
+    assert ring_step_mm(SimpleNamespace(frame=np.array([2])), trajectory) == 0
 
 
 def test_cells_of_noise_that_lie_near_each_other_are_no_region():
