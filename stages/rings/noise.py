@@ -33,7 +33,7 @@ def noise_response(image: Image, sectors: Sectors, fit: ProfileFit, guess: Respo
 
     Mean absolute residuals are used: a few misfitted sectors do not count for more than their number.
     """
-    total, count = np.zeros(_BINS), np.zeros(_BINS)
+    total, count, sectors = np.zeros(_BINS), np.zeros(_BINS), sectors.taken or sectors
     _residuals_by_level(
         image.ravel(), sectors.start, sectors.pixel, sectors.radius_px, fit.radius_px, fit.width_px,
         fit.amplitude, fit.background, guess.black, guess.clip_level, total, count,

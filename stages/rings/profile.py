@@ -87,7 +87,7 @@ def fit_line(
     image: Byte | Float32, sectors: Sectors, seed_px: Float, width_px: float, response: Response
 ) -> ProfileFit:
     """Fit the line near ``seed_px`` (A,) in every sector of ``image`` (H, W); NaN seeds are left out."""
-    known = np.isfinite(seed_px)
+    known, sectors = np.isfinite(seed_px), sectors.taken or sectors
     filled = np.where(known, seed_px, np.nanmean(seed_px)) if known.any() else seed_px
     step = sectors.azimuth_rad[1] - sectors.azimuth_rad[0]
     slope = (np.roll(filled, -_SLOPE_SECTORS) - np.roll(filled, _SLOPE_SECTORS)) / (2 * _SLOPE_SECTORS * step)

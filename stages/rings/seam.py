@@ -19,6 +19,9 @@ _ARC_RAD = np.radians(2.25)
 _STANDS_OUT = 9.0
 # Steps at either end of one row or column of pixels differ across it by this part of the ring. Chosen.
 _ONE_LINE = 0.02
+# Ends of a line that cuts the ring are so far apart, a radius. One that grazes it runs along the line: coarse
+# rows, as of interlaced pictures, made steps there that looked like a seam. Chosen.
+_LEAST_APART_RAD = np.radians(60.0)
 _FEWEST = 5
 
 
@@ -56,6 +59,8 @@ def seam_of(samples: RingSamples) -> Seam | None:
     near = _ONE_LINE * 2 * float(np.nanmedian(radius))
     # Ends are in the order of their steps: the first pair on one line is the clearest.
     for later, earlier in ((j, i) for j in range(1, len(ends)) for i in range(j)):
+        if np.cos(np.diff(samples.azimuth_rad[ends[[earlier, later]]])[0]) > np.cos(_LEAST_APART_RAD):
+            continue
         for axis, along in enumerate(("column", "row")):
             both = place[[earlier, later], axis]
             if abs(both[0] - both[1]) < near:

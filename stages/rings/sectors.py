@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numba
 import numpy as np
@@ -32,6 +32,8 @@ class Sectors:
         Index into the flattened image.
     radius_px, offset_rad : (N,) float32
         Distance from the centre, and azimuth relative to the sector's centre.
+    taken : Sectors, optional
+        The same without pixels that were not taken but put between others; None where all were taken.
     """
 
     azimuth_rad: Float
@@ -41,6 +43,7 @@ class Sectors:
     pixel: Int32
     radius_px: Float32
     offset_rad: Float32
+    taken: Sectors | None = None
 
     @property
     def outermost_px(self) -> Float:
@@ -52,6 +55,23 @@ class Sectors:
         ring = radius_px.astype(np.float32)
         out = np.empty(_count_near(self.start, self.radius_px, ring, most_px), np.int32)
         return out[: _pick_near(self.start, self.pixel, self.radius_px, ring, least_px, most_px, out)]
+
+
+def with_even_rows_taken(sectors: Sectors) -> Sectors:
+    """Return sectors of pictures whose odd rows lie between the even ones, of which the line is then fitted.
+
+    Below and above the centre the line runs along rows: a mean of two broadens it there, and by how much
+    depends on its place between them. Beside the centre, where it crosses the rows, all count: a sector may
+    hold odd rows alone.
+    """
+    upright = np.abs(np.sin(sectors.azimuth_rad)) > np.sqrt(0.5)
+    of_sector = np.repeat(np.arange(len(upright)), np.diff(sectors.start))
+    keep = ~upright[of_sector] | (sectors.pixel // sectors.image_size[0] % 2 == 0)
+    start = np.concatenate([[0], np.cumsum(keep)])[sectors.start]
+    pixels = (values[keep] for values in (sectors.pixel, sectors.radius_px, sectors.offset_rad))
+    return replace(
+        sectors, taken=Sectors(sectors.azimuth_rad, sectors.centre_px, sectors.image_size, start, *pixels)
+    )
 
 
 def cut_sectors(image_size: tuple[int, int], centre_px: Float, azimuths: int) -> Sectors:
