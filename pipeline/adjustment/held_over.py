@@ -42,6 +42,15 @@ class HeldOver:
         below = self.likeness <= _NOTHING
         return int(np.argmax(below)) if below.any() else len(self.likeness) - 1
 
+    def independent(self, count: int) -> int:
+        """Return by how many rings that share nothing so many in a row are outweighed, rounded.
+
+        The variance of their mean is Σ_ij ρ_(i−j) / n² of one's. Next to nothing shared counts as nothing.
+        """
+        apart = np.arange(1, min(len(self.likeness), count))
+        shared = np.where(self.likeness > _NOTHING, self.likeness, 0.0)[apart]
+        return round(count / (1 + 2 * float(shared @ (1 - apart / count)))) if count > 1 else count
+
     def gain_in_mean(self, width: float) -> float:
         """Return how many times the σ of a Gaussian mean over ``width`` ring spacings is that of other rings.
 
@@ -51,6 +60,10 @@ class HeldOver:
         apart = np.arange(1, len(self.likeness))
         shared = np.exp(-((apart / (2 * width)) ** 2))
         return float(np.sqrt(1 + 2 * self.likeness[1:] @ shared))
+
+
+NOTHING_HELD = HeldOver(np.ones(1))
+"""Of rings that share nothing."""
 
 
 def held_over(structures: Sequence[Float], distance_mm: Float, sample_mm: float) -> HeldOver:

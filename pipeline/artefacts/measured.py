@@ -13,6 +13,7 @@ from enum import IntEnum
 
 import numpy as np
 
+from pipeline.adjustment.held_over import NOTHING_HELD, HeldOver
 from pipeline.arrays import Bool, Byte, Float, Float32, Int
 from pipeline.artefacts.wall_map import FixedToProbe, WallMap
 from pipeline.geometry.axis import PipeAxis
@@ -267,13 +268,15 @@ class PointCloud:
 class Wall:
     """Result of accumulation: cloud, radius map, and the axis both refer to.
 
-    ``fixed`` is what stays at one place of the image, None where nothing does.
+    ``fixed`` is what stays at one place of the image, None where nothing does; ``held`` is how alike its
+    rings are because a codec repeats light.
     """
 
     cloud: PointCloud
     radius_map: RadiusMap
     axis: PipeAxis
     fixed: FixedToProbe | None = None
+    held: HeldOver = NOTHING_HELD
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ The effect of the instrument's uncertainty on the radius is common to all rings:
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from pydantic import Field
@@ -162,9 +162,9 @@ def accumulate_wall(
     grid = map_grid(survey, parameters.distance_step_mm, parameters.azimuth_samples)
     spread = calibration_spread(found, rings, trajectory, survey)
     fixed = fixed_to_probe(survey, rings.frame, trajectory.radius_mm, grid, context.scratch)
-    wall = empty_wall(grid, survey, trajectory.axis, fixed, context.scratch)
-    smoothing_mm, gap_mm = parameters.smoothing_mm, parameters.largest_gap_mm
     held = _held_in(rings, survey, trajectory.radius_mm)
+    wall = replace(empty_wall(grid, survey, trajectory.axis, fixed, context.scratch), held=held)
+    smoothing_mm, gap_mm = parameters.smoothing_mm, parameters.largest_gap_mm
     stretches = cut_stretches(grid, survey, smoothing_mm, gap_mm)
     for done, stretch in enumerate(stretches, 1):
         systematic = spread.on(grid.rows(stretch.from_row, stretch.to_row))
@@ -196,8 +196,9 @@ def warn_of_held(held: HeldOver, context: Context) -> None:
         context.warn(
             f"neighbouring rings share {100 * alike:.0f} % of the line's finest structure, where good "
             "recordings share 16 % at most: the codec repeats light of earlier pictures. The σ of radii "
-            "includes this, but findings are less sure than stated: single ones may be false, and small pits "
-            "too shallow. What to do: look at the picture of every finding, record with less compression"
+            "includes this, and such rings count together where they confirm a finding; yet single findings "
+            "may be false, and small pits too shallow or missed. What to do: look at the picture of every "
+            "finding, record with less compression"
         )
 
 
@@ -269,7 +270,7 @@ def _report(context: Context, wall: Wall, spread: CalibrationSpread) -> None:
 
 ACCUMULATE = Stage(
     "accumulate",
-    "9",
+    "10",
     AccumulateParameters,
     accumulate_wall,
     "point cloud and radius map about the pipe's own axis, with σ",

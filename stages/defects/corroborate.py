@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import label
 
+from pipeline.adjustment.held_over import NOTHING_HELD, HeldOver
 from pipeline.arrays import Bool, Float
 from pipeline.artefacts.measured import RingSamples, RingValidity, WallTexture
 from stages.defects.depth import Depth
@@ -47,7 +48,7 @@ class Evidence:
     Attributes
     ----------
     rings : int
-        How many show it.
+        How many show it; rings that share light of a codec count together.
     photo : bool, optional
         Whether the photo does; None where it cannot tell.
     score : float
@@ -118,11 +119,15 @@ class Evidence:
 
 @dataclass(frozen=True)
 class Witnesses:
-    """What findings are compared with: the wall's photo, and rings and lit pictures where they are known."""
+    """What findings are compared with: the wall's photo, and rings and lit pictures where they are known.
+
+    Rings that a codec ``held`` alike are no witnesses of their own.
+    """
 
     texture: WallTexture
     rings: RingSamples | None = None
     pictures: LitPictures | None = None
+    held: HeldOver = NOTHING_HELD
 
 
 def evidence_for(
@@ -137,7 +142,7 @@ def evidence_for(
     size = min(n * c for n, c in zip(region.mask.shape, relief.cell_mm, strict=True))
     shifted = abs(depth.depth_mm) > size
     return Evidence(
-        rings_behind(region, depth.depth_mm, surface),
+        seen_by.held.independent(rings_behind(region, depth.depth_mm, surface)),
         None if shifted else photo_stands_out(seen_by.texture, relief, region),
         score,
         _is_fixed(region, surface, fixed_mm),

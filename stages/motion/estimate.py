@@ -33,7 +33,8 @@ from stages.motion.route.laying import lay_route
 from stages.motion.tracking.strips import WallView
 from stages.motion.trajectory import (
     SeenCentres,
-    doubting_texture,
+    camera_trembles,
+    doubting_instrument,
     report_instrument,
     report_motion,
     report_steps,
@@ -93,7 +94,8 @@ def estimate_motion(
     require_along_pipe(trajectory)
     loops.report(context)
     report_instrument(probe, trajectory, context)
-    steady, trajectory = estimate.steady, doubting_texture(trajectory, probe, estimate.lasting)
+    steady, shaken = estimate.steady, camera_trembles(trajectory, run.texture.poses, seen)
+    trajectory = doubting_instrument(trajectory, probe, estimate.lasting, shaken)
     return replace(
         trajectory, events=events, image_scale=steady.scale, image_scale_sigma=steady.scale_sigma,
         radius_doubt=doubt,
@@ -178,7 +180,7 @@ def _motion_of_run(
 
 MOTION = Stage(
     "motion",
-    "39",
+    "40",
     MotionParameters,
     _motion_of_run,
     "camera pose in every frame and the pipe's axis, from texture, rings and encoder together",

@@ -92,12 +92,17 @@ def trajectory_of(run: JoinedRun, frames: FrameTable, probe: Probe, has_encoder:
     )
 
 
-def doubting_texture(trajectory: Trajectory, probe: Probe, lasting: float) -> Trajectory:
-    """Return a trajectory whose instrument is as unsure as it was moved, where matches contradict the motion.
+def doubting_instrument(trajectory: Trajectory, probe: Probe, lasting: float, trembles: bool) -> Trajectory:
+    """Return a trajectory whose instrument is as unsure as it was moved, where what moved it is in doubt.
 
-    They moved it, and by what they share: a lamp mirrored in a polished wall made radii 0.3 mm too large.
+    Where matches contradict the motion, they moved it by what they share: a lamp mirrored in a polished wall
+    made radii 0.3 mm too large. Where the camera ``trembles`` or the probe does not fit, the picture may move
+    in place of the probe: shaken by 2 px at random, it made radii 0.06 mm too small.
     """
-    if trajectory.instrument is None or trajectory.instrument_covariance is None or lasting <= _MOST_LASTING:
+    if trajectory.instrument is None or trajectory.instrument_covariance is None:
+        return trajectory
+    doubtful = trembles or lasting > _MOST_LASTING or _moved_by(trajectory, probe) > _TOO_FAR
+    if not doubtful:
         return trajectory
     moved = trajectory.instrument - probe.parameters
     return replace(
@@ -109,8 +114,7 @@ def report_instrument(probe: Probe, trajectory: Trajectory, context: Context) ->
     """Report how far the probe was moved, in its stated σ, and warn where it cannot have been right."""
     if trajectory.instrument is None:
         return
-    change = trajectory.instrument - probe.parameters
-    farthest = _farthest(change, probe.principal_uncertainties())
+    change, farthest = trajectory.instrument - probe.parameters, _moved_by(trajectory, probe)
     context.report("instrument moved by the adjustment, at most", farthest, "stated σ")
     if farthest > _TOO_FAR:
         sigma = np.sqrt(np.diagonal(probe.covariance))
@@ -199,22 +203,29 @@ def _warn_of_texture(lasting: float, tracked: TrackedPoses, observations: int, c
         )
 
 
-def _warn_of_trembling(
-    trajectory: Trajectory, texture: TrackedPoses, seen: SeenCentres, context: Context
-) -> None:
-    """Warn where the camera's turn differs from picture to picture by more than poses err by.
+def camera_trembles(trajectory: Trajectory, texture: TrackedPoses, seen: SeenCentres) -> bool:
+    """Return whether the camera's turn differs from picture to picture by more than poses err by.
 
     A camera that trembles moves the ring as well. Where the ring stays, matches tremble, as by glints.
     """
     shaken = trembling(trajectory.T_pc, trajectory.time_s, texture.frames)
+    told = trembles(shaken) and not texture.mostly_lost
+    return told and not seen.deny_trembling(trajectory, texture.frames)
+
+
+def _warn_of_trembling(
+    trajectory: Trajectory, texture: TrackedPoses, seen: SeenCentres, context: Context
+) -> None:
+    """Warn of a camera that trembles, or of matches that do; without texture neither is known."""
+    shaken = trembling(trajectory.T_pc, trajectory.time_s, texture.frames)
     turn = float(shaken[3:5].max())
     context.report("trembling of the camera, 1 σ", 1e3 * turn, "mrad")
-    if not trembles(shaken):
+    if not trembles(shaken) or texture.mostly_lost:
         return
     moves = (
         f"from picture to picture it turns by {np.degrees(turn):.2g}° and moves by {shaken[:2].max():.2g} mm"
     )
-    if seen.deny_trembling(trajectory, texture.frames):
+    if not camera_trembles(trajectory, texture, seen):
         context.warn(
             f"by its texture the camera trembles: {moves} (1 σ). The laser's ring does not, so the camera "
             "stands firm and texture is matched wrongly: glints, reflections, blur or compression. Radii "
@@ -230,9 +241,12 @@ def _warn_of_trembling(
         )
 
 
-def _farthest(change: Float, directions: Float) -> float:
-    """Return the longest part of a change (P,) along the principal directions (P, Q), in σ."""
-    moved, *_ = np.linalg.lstsq(directions, change, rcond=None)
+def _moved_by(trajectory: Trajectory, probe: Probe) -> float:
+    """Return how far the instrument was moved along a principal direction of its uncertainty, at most, σ."""
+    if trajectory.instrument is None:
+        return 0.0
+    change = trajectory.instrument - probe.parameters
+    moved, *_ = np.linalg.lstsq(probe.principal_uncertainties(), change, rcond=None)
     return float(np.max(np.abs(moved), initial=0.0))
 
 

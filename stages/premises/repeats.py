@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.ndimage import label, median_filter
+from scipy.ndimage import label, median_filter, rank_filter
 
 from pipeline.arrays import Bool, Float, Int
 from pipeline.recording.base import Encoder
@@ -15,6 +15,9 @@ from stages.premises.pictures import Pictures
 _STANDS, _ONE_STEP = 0.25, 1.5
 # Steps on either side from which the usual speed is taken.
 _AROUND_STEP = 9
+# Of these changes the third least is compared with that of a picture that may repeat one: where all pictures
+# tremble, two that happen to be moved alike change as little as in a steady recording.
+_LEAST_OF_AROUND = 2
 
 
 def rows_of_repeats(row: Int, pictures: Pictures) -> Int:
@@ -76,8 +79,9 @@ def _repeated_alone(pictures: Pictures, light: Int) -> Bool:
             continue
         change = pictures.change[place]
         usual = median_filter(change, _AROUND_STEP, mode="mirror")
+        least = rank_filter(change, _LEAST_OF_AROUND, _AROUND_STEP, mode="mirror")
         changes = np.pad(change > 2 * _STANDS * usual, 1, constant_values=True)
-        out[place] = (change < _STANDS * usual) & changes[:-2] & changes[2:]
+        out[place] = (change < _STANDS * least) & changes[:-2] & changes[2:]
     return out
 
 

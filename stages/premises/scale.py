@@ -181,10 +181,12 @@ def encoder_factor(
             f"{factor:g}. What to do: correct encoder.csv"
         )
     elif contradicts:
+        held_back = ", or the codec holds the wall's texture back" if abs(found.value) > 1 else ""
         context.warn(
             f"the encoder reads {found.value:.3g} mm where the wall's texture moves by 1 mm, in "
-            f"{found.steps} steps: one of the encoder's scale, its clock and the probe's baseline is wrong. "
-            "What to do: check all three; distances may be wrong by this factor"
+            f"{found.steps} steps: one of the encoder's scale, its clock and the probe's baseline is "
+            f"wrong{held_back}. What to do: see whether the wall flows evenly in lit pictures, and check all "
+            "three; distances may be wrong by this factor"
         )
     return factor
 

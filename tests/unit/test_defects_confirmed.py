@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.ndimage import maximum_filter
 
+from pipeline.adjustment.held_over import NOTHING_HELD, HeldOver
 from pipeline.artefacts.measured import RingSamples, RingValidity
 from stages.defects import DefectParameters, find_defects
 from stages.defects.corroborate import Evidence, photo_stands_out
@@ -23,12 +24,12 @@ AZIMUTH = -np.pi + np.arange(360) * np.pi / 180
 PLACE = slice(100, 112)
 
 
-def found(rings, depth_mm=-1.0, photo=False, unsure=False):
+def found(rings, depth_mm=-1.0, photo=False, unsure=False, held=NOTHING_HELD, noise_mm=SIGMA, warned=None):
     """Return what is found where so many rings (rows of the map) stand off the wall by ``depth_mm``."""
     random = np.random.default_rng(5)
-    radius = RADIUS + smooth_noise(random, (len(DISTANCE), len(AZIMUTH)), SIGMA, 1.0)
+    radius = RADIUS + smooth_noise(random, (len(DISTANCE), len(AZIMUTH)), noise_mm, 1.0)
     radius[30 : 30 + rings, PLACE] += depth_mm
-    wall = wall_of(DISTANCE, AZIMUTH, radius, SIGMA)
+    wall = replace(wall_of(DISTANCE, AZIMUTH, radius, noise_mm), held=held)
     if unsure:
         sigma = wall.cloud.sigma_mm.reshape(radius.shape).copy()
         sigma[30 : 30 + rings, PLACE] *= 10
@@ -37,7 +38,8 @@ def found(rings, depth_mm=-1.0, photo=False, unsure=False):
     texture.bgra[..., :3] += random.integers(0, 8, (*radius.shape, 1), np.uint8)
     if photo:
         texture.bgra[30 : 30 + rings, PLACE, :3] = 60
-    return find_defects(bare_recording(2 * RADIUS, None), wall, texture, DefectParameters(), quiet_context())
+    context = quiet_context() if warned is None else replace(quiet_context(), warn=warned.append)
+    return find_defects(bare_recording(2 * RADIUS, None), wall, texture, DefectParameters(), context)
 
 
 @pytest.mark.parametrize("depth_mm", [-1.0, 1.0])
@@ -55,6 +57,25 @@ def test_one_ring_and_the_photo_are_a_finding():
 def test_rings_that_are_not_sure_of_themselves_do_not_speak_for_a_finding():
     told = found(2, unsure=True)
     assert (len(told.items), len(told.unconfirmed)) == (0, 1)
+
+
+def test_rings_of_one_coded_picture_count_as_one() -> None:
+    """A codec showed one block in three rings, a gouge of 6.5 ± .5 mm at .98 that was none."""
+    coded = HeldOver(0.8 ** np.arange(17))
+    assert len(found(3).items) == 1
+    told = found(3, held=coded)
+    assert (len(told.items), len(told.unconfirmed)) == (0, 1)
+    assert len(found(3, held=coded, photo=True).items) == 1
+
+
+def test_a_limit_of_detection_far_above_what_is_asked_for_is_told() -> None:
+    quiet: list[str] = []
+    noisy: list[str] = []
+    found(2, warned=quiet)
+    limit = found(2, noise_mm=0.15, warned=noisy).smallest_depth_mm
+    assert not [w for w in quiet if "nine of ten" in w]
+    assert limit > 0.4
+    assert [w for w in noisy if f"only from {limit:.2g} mm of depth on" in w]
 
 
 def found_beside_hidden_wall(top, hidden, depth_mm=-1.0, width=8):

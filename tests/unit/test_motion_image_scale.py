@@ -17,7 +17,7 @@ from stages.motion import MotionParameters, estimate_motion
 from stages.motion.bore import ONE_BORE, Bore
 from stages.motion.bundle_adjustment.image_scale import ScaleDrift, drift_of_scale
 from stages.motion.bundle_adjustment.solver import estimate_state
-from stages.motion.trajectory import doubting_texture
+from stages.motion.trajectory import doubting_instrument
 from stages.motion.windows.steady_scale import with_steady_scale
 from stages.motion.windows.submaps import Window
 from stages.triangulate import TriangulateParameters, triangulate_rings
@@ -162,15 +162,20 @@ def test_what_is_known_of_the_scale_goes_into_the_radii() -> None:
     assert gain == pytest.approx(0.02 * RADIUS, rel=0.01), "a probe that encoder and diameter contradict"
 
 
-def test_a_probe_moved_by_matches_that_contradict_is_as_unsure_as_it_was_moved() -> None:
+@pytest.mark.parametrize(
+    ("lasting", "trembles", "by", "doubted"),
+    [(0.5, False, 3.0, False), (0.7, False, 3.0, True), (0.5, True, 3.0, True), (0.5, False, 6.0, True)],
+    ids=["sound", "matches contradict", "the camera trembles", "another probe"],
+)
+def test_a_probe_moved_by_what_is_in_doubt_is_as_unsure_as_it_was_moved(
+    lasting: float, trembles: bool, by: float, doubted: bool
+) -> None:
     run = drawn_run(0.9 * np.arange(4), np.zeros(4))
-    moved = np.zeros_like(run.probe.parameters)
-    moved[0] = 0.3
+    moved = by * run.probe.principal_uncertainties()[:, 0]
     got = Trajectory(
         np.arange(4), np.arange(4) / 30, run.T_pc, np.zeros((4, 6, 6)), straight_axis(-50.0, 150.0), RADIUS,
         1, 0, 0, (), run.probe.parameters + moved, 1e-4 * np.eye(len(moved)),
     )  # fmt: skip
-    for lasting, sigma in ((0.5, 0.01), (0.7, np.hypot(0.01, 0.3))):
-        found = doubting_texture(got, run.probe, lasting).instrument_covariance
-        assert found is not None
-        assert np.sqrt(found[0, 0]) == pytest.approx(sigma)
+    found = doubting_instrument(got, run.probe, lasting, trembles).instrument_covariance
+    assert found is not None
+    np.testing.assert_allclose(found, 1e-4 * np.eye(len(moved)) + doubted * np.outer(moved, moved))

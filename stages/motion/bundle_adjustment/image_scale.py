@@ -85,6 +85,10 @@ class ScaleDrift:
         """Return the course as one that is neither told nor ambiguous."""
         return replace(self, p_steady=1.0, p_neither=1.0)
 
+    def not_told_from_width(self) -> ScaleDrift:
+        """Return the course as one that a pipe that widens explains as well."""
+        return replace(self, p_steady=1.0, p_even=1.0)
+
     @property
     def change(self) -> float:
         """Return the relative gain of the scale from first to last."""

@@ -23,6 +23,10 @@ OBSERVATION = np.dtype(
 the row and column of the strip where the landmark was found first."""
 
 
+_MOSTLY = 0.5
+"""Share of the frames without texture from which it tells nothing of the whole run. Chosen."""
+
+
 @dataclass
 class LandmarkMap:
     """Strip positions, offsets, patches and history of the landmarks (L,) that may still be looked for.
@@ -111,6 +115,11 @@ class TrackedPoses:
     def known(self) -> Int:
         """Return the frames (k,) whose poses texture tells: not the lost ones, but the first."""
         return np.asarray(self.frames[~self.lost | (np.arange(len(self.lost)) == 0)])
+
+    @property
+    def mostly_lost(self) -> bool:
+        """Whether most frames show too little texture: then it tells nothing of how the camera moves."""
+        return bool(len(self.lost) > 1 and self.lost[1:].mean() > _MOSTLY)
 
     def between(self, first: int, last: int) -> TrackedPoses:
         """Return those of frames ``first`` to ``last`` (exclusive), counted from ``first``."""

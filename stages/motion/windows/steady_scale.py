@@ -67,7 +67,8 @@ def with_steady_scale(
     """Test the image scale for drift in a window, and correct it where the window is the whole run.
 
     A large drift is told and not taken out. In a reducer nothing is told: rings and texture depart there as
-    they do where the image scale drifts.
+    they do where the image scale drifts. Without texture in most pictures, nothing tells it from a pipe that
+    widens.
 
     Raises
     ------
@@ -77,6 +78,8 @@ def with_steady_scale(
     drift = drift_of_scale(estimate, measured)
     if run.bore.reduces:
         drift = drift.not_told()
+    elif run.texture.poses.mostly_lost:
+        drift = drift.not_told_from_width()
     if not drift.told or window != run.whole or drift.large:
         return SteadyRun(run, estimate, measured, drift, taken_out=False)
     first = drift
