@@ -108,7 +108,7 @@ class Evidence:
                 "wall may have drawn it aside"
             )
         if not self.corroborated:
-            return "No second ring shows it, nor do one ring and the photo"
+            return "No second ring shows it by light of its own, nor do one ring and the photo"
         if self.bright:
             return (
                 "The line is brighter there than at nine of ten places of its ring, as of a glint or a "

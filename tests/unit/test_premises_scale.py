@@ -66,6 +66,16 @@ def test_a_ring_with_gaps_is_oval_by_what_is_seen_of_it():
     assert "6.0 % longer towards 6:00" in told[0] or "6.0 % longer towards 12:00" in told[0], told
 
 
+def test_blocks_of_a_codec_taken_for_the_line_make_no_oval():
+    azimuth = np.linspace(-np.pi, np.pi, 128, endpoint=False)
+    rings = np.tile(25 * np.stack([np.cos(azimuth), np.sin(azimuth)], -1), (20, 1, 1))
+    rings[:, 60:70] *= 0.7
+    rings[:, 120:128] *= 0.8
+    told = []
+    warn_of_oval(rings, replace(quiet_context(), warn=told.append))
+    assert not told
+
+
 def test_lengths_in_inch_throughout_end_the_run(good, run):
     """All of them agree, but for the lamps, and the pipe came out 25 times too small without a word."""
     laser = replace(run.probe.laser, baseline_mm=BASELINE / 25.4)
