@@ -17,8 +17,9 @@ from stages.motion import MotionParameters, estimate_motion
 from stages.motion.bore import ONE_BORE, Bore
 from stages.motion.bundle_adjustment.image_scale import ScaleDrift, drift_of_scale
 from stages.motion.bundle_adjustment.solver import estimate_state
+from stages.motion.tracking.landmarks import TrackedPoses
 from stages.motion.trajectory import doubting_instrument
-from stages.motion.windows.steady_scale import with_steady_scale
+from stages.motion.windows.steady_scale import SteadyRun, with_steady_scale
 from stages.motion.windows.submaps import Window
 from stages.triangulate import TriangulateParameters, triangulate_rings
 from tests.drawn_run import RADIUS, DrawnRun, drawn_run
@@ -78,17 +79,33 @@ def test_a_little_change_of_the_rings_may_be_either() -> None:
     assert np.ptp(drift.stated_sigma) * drift.ring_mm > 0.05
 
 
+def steady_run(bore: Bore, lost: float, **changes: float) -> SteadyRun:
+    """Return what is told of a run's image scale in a ``bore`` where so many lit pictures are ``lost``."""
+    made, parameters = scene(FRAMES, LANDMARKS, noise=1.0, **changes), MotionParameters(match_bias_px=0.01)
+    estimate = estimate_state(made.truth, made.measured, parameters)
+    poses = TrackedPoses(np.arange(FRAMES), made.truth.T_pc, np.arange(FRAMES) < lost * FRAMES)
+    run = SimpleNamespace(bore=bore, whole=None, image_scale=None, texture=SimpleNamespace(poses=poses))
+    run.time_s = made.measured.time_s
+    part_of_run, nobody = Window(0, FRAMES), cast(Any, None)
+    return with_steady_scale(cast(Any, run), part_of_run, estimate, made.measured, parameters, nobody)
+
+
 @pytest.mark.parametrize("changes", [{"picture_grows": GROWS}, {"widens": 0.002}], ids=["grows", "either"])
 def test_in_a_reducer_no_drift_is_told(changes: dict[str, float]) -> None:
     """Rings and texture depart from each other there as they do where the picture grows."""
-    made, parameters = scene(FRAMES, LANDMARKS, noise=1.0, **changes), MotionParameters(match_bias_px=0.01)
-    estimate = estimate_state(made.truth, made.measured, parameters)
-    part_of_run, nobody = Window(0, FRAMES), cast(Any, None)
     for bore, told in ((ONE_BORE, True), (REDUCER, False)):
-        run = cast(Any, SimpleNamespace(bore=bore, whole=None, image_scale=None, time_s=made.measured.time_s))
-        steady = with_steady_scale(run, part_of_run, estimate, made.measured, parameters, nobody)
+        steady = steady_run(bore, 0.0, **changes)
         assert (steady.drift.told or steady.drift.ambiguous) == told
         assert (steady.scale_sigma is not None) == told
+
+
+def test_without_texture_a_picture_that_grows_may_be_a_pipe_that_widens() -> None:
+    """Of 85 lit pictures 84 showed no texture, and the picture was said to grow by 8 %."""
+    seen, lost = (steady_run(ONE_BORE, share, picture_grows=GROWS) for share in (0.1, 0.9))
+    assert seen.drift.told
+    assert not lost.drift.told
+    assert lost.drift.ambiguous
+    assert lost.scale_sigma is not None
 
 
 @pytest.mark.parametrize(("course", "told"), [((-1, 0.5, 1), True), ((-1, 1, -0.5), False)])
