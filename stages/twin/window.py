@@ -166,22 +166,23 @@ class WindowPlace:
         more = {n: sigmas(tried[name].fall - fit.fall) for n, fit in tried.items() if n != name}
         rivals = [n for n, by in more.items() if by < _SURE and not bends]
         law = tried[name]
-        # A place that displaced texture has found is no dirt below what counts as such elsewhere.
-        least = LEAST_CHANGE if name == "window_dirt" else 0.0
-        if abs(law.size.value) < max(self._surely(name) * law.size.sd, least):
+        if abs(law.size.value) < self._least(name, law.size.sd):
             return None
         if name == "window_dirt":
             law = replace(law, size=_with_photo(law.size))
         return self._mismatch([name, *rivals], fixed_to or "image", law, chance)
 
-    def _surely(self, name: str) -> float:
-        """Return by how many σ a size must be above 0.
+    def _least(self, name: str, sd: float) -> float:
+        """Return the size, whose 1 σ is given, from which it is told.
 
         That of a spot comes from a few parts of the frames: 2 σ come by chance at one place in twenty, and
-        wall that differs in one part of the run leaves as much.
+        wall that differs in one part of the run leaves as much. What the photo leaves over stays in all
+        frames: a spot must surely be more.
         """
+        if name == "droplet":
+            return _SURELY * sd
         parts = min(PARTS, len(self.frame))
-        return _SURELY if name == "droplet" else float(t.isf(FALSE_ALARM, parts - 1))
+        return max(float(t.isf(FALSE_ALARM, parts - 1)) * sd, LEAST_CHANGE + _SURELY * sd)
 
     def _mismatch(self, names: list[str], fixed_to: str, law: FittedLaw, chance: float) -> Mismatch:
         place, size = self.place, law.size

@@ -74,7 +74,13 @@ def test_texture_that_is_stronger_than_the_photo_has_it_is_no_scatter():
 
 @pytest.mark.parametrize(
     ("share", "sd", "told"),
-    [(0.06, 0.01, True), (0.06, 0.05, False), (0.06, 0.022, False), (0.02, 0.001, False)],
+    [
+        (0.06, 0.01, True),
+        (0.06, 0.05, False),
+        (0.06, 0.022, False),
+        (0.045, 0.01, False),
+        (0.02, 0.001, False),
+    ],
 )
 def test_a_share_that_may_be_nothing_is_not_told(share, sd, told, monkeypatch):
     law = FittedLaw(np.linspace(9, 11, 9), NamedFigure("share", share, sd))
