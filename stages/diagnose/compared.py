@@ -20,7 +20,6 @@ from stages.diagnose.residual import (
     GaugeResiduals,
     RingResidual,
     azimuths_rad,
-    floor_px,
     rings_against_fiducials,
     rings_against_texture,
     wall_distances_mm,
@@ -76,7 +75,7 @@ def compared(
             # What happens at a time of the gauge run need not happen in the field: the gauge's own held-out
             # rings tell.
             return _gauge_alone(of_gauge, examined)
-        return _in_field(field, corrected or field, linear, examined, of_gauge)
+        return _in_field(field, corrected or field, linear, of_gauge)
     except np.linalg.LinAlgError:
         return None
 
@@ -128,17 +127,12 @@ def _gauge_alone(of: GaugeResiduals, examined: Examined | None) -> Compared:
     return Compared(of.before, of.after, examined.quality if examined is not None else None)
 
 
-def _in_field(
-    field: FieldRun, corrected: FieldRun, linear: Linear, examined: Examined | None, of: GaugeResiduals | None
-) -> Compared:
+def _in_field(field: FieldRun, corrected: FieldRun, linear: Linear, of: GaugeResiduals | None) -> Compared:
     """Return the field's residuals; it was not used for the correction, so it is what is held out."""
     before = rings_against_texture(field)
     after = rings_against_texture(corrected, linear)
-    best = examined.best if examined is not None else None
-    terms = tuple((t.model, t.shape, t.amplitude) for t in best.fit.terms) if best is not None else ()
-    floor = floor_px(corrected, after, terms)
     every = (of.before.rms_px, of.after.rms_px) if of is not None else (before.rms_px, after.rms_px)
-    return Compared(before, after, FitQuality("px", *every, before.rms_px, after.rms_px, floor))
+    return Compared(before, after, FitQuality("px", *every, before.rms_px, after.rms_px, after.floor_px))
 
 
 def _of_own_clock(examined: Examined | None) -> bool:

@@ -11,13 +11,13 @@ from pipeline.arrays import Bool, Float, Int
 from pipeline.recording.base import Illumination
 from stages.calibrate.gauge.state import Unknowns
 from stages.diagnose.effects.base import EffectModel, Shape
-from stages.diagnose.effects.library import columns
 from stages.diagnose.field.reduce import reduced, rings_after
 from stages.diagnose.field.run import FieldRun
 from stages.diagnose.field.run import ring_points as field_points
 from stages.diagnose.field.system import field_system
 from stages.diagnose.gauge.elimination import RING
 from stages.diagnose.gauge.fit import Fit, fit
+from stages.diagnose.gauge.heldout import on_other_wall, variance_of_pairs
 from stages.diagnose.gauge.linearise import ring_mm_per_px
 from stages.diagnose.gauge.points import ring_points as gauge_points
 from stages.diagnose.gauge.run import GaugeRun, Term
@@ -67,6 +67,14 @@ class RingResidual:
     def rms_px(self) -> float:
         """R.m.s. of what is usable, px."""
         return float(np.sqrt(np.mean(self.residual_px[self.usable] ** 2)))
+
+    @property
+    def floor_px(self) -> float:
+        """R.m.s., px, of what rings do not repeat at the same azimuth of the image on other wall."""
+        own = np.flatnonzero(self.usable)
+        one_bore = np.zeros(len(own), np.int64)
+        pairs = on_other_wall(self.azimuth_c_rad[own], self.frame[own], self.distance_mm[own], one_bore)
+        return float(np.sqrt(variance_of_pairs(self.residual_px[own], np.ones(len(own)), *pairs)))
 
     def over_frames(self, frames: Int) -> Float:
         """Return the mean residual, mm, over (F, `AZIMUTHS`) frames and azimuth in C; NaN where none is."""
@@ -186,16 +194,6 @@ def rings_against_texture(
         "field", frame, points.azimuth_rad, points.azimuth_p_rad, points.distance_mm, points.uv,
         residual, residual / mm_per_px, usable,
     )  # fmt: skip
-
-
-def floor_px(run: FieldRun, left: RingResidual, terms: Sequence[tuple[EffectModel, Shape, Float]]) -> float:
-    """Return the r.m.s., px, that is left when the effects' sizes are fitted to these very rings."""
-    points = field_points(run)
-    patterns = [columns(model, points, shape) for model, shape, _ in terms]
-    design = np.concatenate([np.ones((len(left.frame), 1)), *patterns], 1)
-    keep = left.usable & np.isfinite(design).all(1)
-    found = np.linalg.lstsq(design[keep], left.residual_px[keep], rcond=None)[0]
-    return float(np.sqrt(np.mean((left.residual_px[keep] - design[keep] @ found) ** 2)))
 
 
 def _between_lit(run: FieldRun, frame: Int) -> Bool:

@@ -9,6 +9,7 @@ import pytest
 from stages.calibrate.gauge.edges import Edges
 from stages.diagnose.gauge.elimination import EDGE, RING
 from stages.diagnose.gauge.heldout import repeatability_px
+from stages.diagnose.residual import RingResidual
 
 PICTURES, EDGES, RINGS = 24, 160, 8
 
@@ -46,3 +47,22 @@ def test_it_is_the_fiducials_own_noise_whatever_the_instrument_is_off_by(left_px
 
 def test_it_is_no_less_than_what_is_stated_of_fiducials() -> None:
     assert floor_px(0.12, 0.09, 0.0) == pytest.approx(0.12)
+
+
+def of_rings(noise_px: float, left_px: float) -> RingResidual:
+    """Return an inspection's rings, the instrument off by up to ``left_px`` alike in all of them."""
+    random = np.random.default_rng(6)
+    frame, azimuth = (g.ravel() for g in np.mgrid[:40, -180:180:5])
+    angle = np.radians(azimuth)
+    residual = left_px * np.cos(angle) + random.normal(0, noise_px, len(frame))
+    return RingResidual(
+        "field", frame, angle, angle, 2.0 * frame, np.zeros((len(frame), 2)), residual, residual,
+        np.ones(len(frame), bool),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("left_px", [0.0, 0.4])
+def test_an_inspections_floor_is_what_its_rings_do_not_repeat(left_px: float) -> None:
+    seen = of_rings(0.07, left_px)
+    assert seen.floor_px == pytest.approx(0.07, rel=0.05)
+    assert (seen.rms_px > 0.2) == (left_px > 0)

@@ -97,13 +97,18 @@ def repeatability_px(run: GaugeRun, found: Fit) -> float:
     of_rings = np.where(np.isfinite(per_px), equations.weight[ring] * per_px**2, 0.0)
     of_edges = equations.weight[edge]
     stated = float(of_edges @ run.edges.sigma_px**2)
-    edges = _variance(equations.residual[edge], of_edges, *_in_other_pictures(run.edges)) * of_edges.sum()
-    rings = _variance(equations.residual[ring] / per_px, of_rings, *_on_other_wall(run, found))
+    edges = (
+        variance_of_pairs(equations.residual[edge], of_edges, *_in_other_pictures(run.edges)) * of_edges.sum()
+    )
+    along_mm = found.state.T_pc[run.rings.frame, 2, 3]
+    azimuth = np.arctan2(run.rings.outward[:, 1], run.rings.outward[:, 0])
+    pairs = on_other_wall(azimuth, run.rings.frame, along_mm, run.rings.section)
+    rings = variance_of_pairs(equations.residual[ring] / per_px, of_rings, *pairs)
     squares = of_rings.sum() * rings + max(edges, stated)
     return float(np.sqrt(squares / (of_rings.sum() + of_edges.sum())))
 
 
-def _variance(value: Float, weight: Float, first: Int, second: Int) -> float:
+def variance_of_pairs(value: Float, weight: Float, first: Int, second: Int) -> float:
     """Return the variance that pairs (P,) of values (M,) show, whatever both have in common; 0 without pairs.
 
     With the product of weights independent errors come to just their weighted mean square.
@@ -125,16 +130,21 @@ def _in_other_pictures(edges: Edges) -> tuple[Int, Int]:
     return first, near[first, np.argmax(other[first], axis=1)]
 
 
-def _on_other_wall(run: GaugeRun, found: Fit) -> tuple[Int, Int]:
-    """Return pairs (P,) of ring bins of one azimuth and bore, as near in time as other wall allows."""
-    outward, along = run.rings.outward, found.state.T_pc[:, 2, 3]
-    place = np.round(np.arctan2(outward[:, 1], outward[:, 0]) / _SAME_AZIMUTH_RAD).astype(np.int64)
-    frames, turn = np.unique(run.rings.frame, return_inverse=True)
-    step_mm = float(np.median(np.abs(np.diff(along[frames])))) if len(frames) > 1 else np.inf
+def on_other_wall(azimuth_rad: Float, frame: Int, along_mm: Float, section: Int) -> tuple[Int, Int]:
+    """Return pairs (P,) of ring bins of one azimuth and bore, as near in time as other wall allows.
+
+    Parameters
+    ----------
+    azimuth_rad, frame, along_mm, section : (M,)
+        In the image; where along the pipe; in which bore.
+    """
+    place = np.round(azimuth_rad / _SAME_AZIMUTH_RAD).astype(np.int64)
+    frames, at, turn = np.unique(frame, return_index=True, return_inverse=True)
+    step_mm = float(np.median(np.abs(np.diff(along_mm[at])))) if len(frames) > 1 else np.inf
     apart = min(max(int(np.ceil(_OTHER_WALL_MM / max(step_mm, 1e-9))), 1), max(len(frames) // 4, 1))
     order = np.lexsort((turn, place))
     first, second = order[:-apart], order[apart:]
-    alike = (place[first] == place[second]) & (run.rings.section[first] == run.rings.section[second])
+    alike = (place[first] == place[second]) & (section[first] == section[second])
     alike &= turn[second] - turn[first] <= 2 * apart
     return first[alike], second[alike]
 
