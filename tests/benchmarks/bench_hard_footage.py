@@ -79,7 +79,7 @@ def make(kind: str, source: Path, folder: Path, frames: int, seed: int) -> None:
         repaint(folder, unspoilt, seed, taken=dict(enumerate(kept)))
         forget_lost(folder, kept)
     if kind in CODED:
-        repaint(folder, unspoilt, seed, "libx265", CODED[kind])
+        repaint(folder, unspoilt, seed, *CODED[kind])
     if kind in REWRITTEN:
         REWRITTEN[kind](folder, random)
     if kind in DAMAGED:
