@@ -294,5 +294,5 @@ GAUGE_EVIDENCE = Stage(
     "evidence", "25", DiagnosisParameters, examine_gauge, "what a gauge run shows of effects", "diagnosis"
 )
 FIELD_EVIDENCE = Stage(
-    "evidence", "12", DiagnosisParameters, examine_field, "what an inspection shows of effects", "diagnosis"
+    "evidence", "13", DiagnosisParameters, examine_field, "what an inspection shows of effects", "diagnosis"
 )

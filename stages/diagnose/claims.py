@@ -17,8 +17,8 @@ from stages.diagnose.late_pictures import exposure_alike
 from stages.diagnose.profile.evidence import ProfileEvidence
 from stages.diagnose.profile.finding import Finding
 from stages.diagnose.result import CourseFound, EffectFound, Location, Value
+from stages.diagnose.travel.events import is_found
 from stages.diagnose.travel.evidence import TravelEstimate, TravelEvidence
-from stages.diagnose.travel.left_over import TRAVEL_FOUND
 from stages.diagnose.travel.lines import Line
 from stages.diagnose.travel.steps import StepFound
 
@@ -151,8 +151,8 @@ def _of_recording(seen: Seen | None) -> dict[str, Claim]:
 def _every(seen: Seen) -> Iterable[Claim]:
     if seen.travel is not None:
         travel = seen.travel
-        yield from (_of_estimate(e, travel, seen) for e in travel.estimates if e.p_value < TRAVEL_FOUND)
-        yield from (_of_slip(s, travel) for s in travel.slips if s.p_value < TRAVEL_FOUND)
+        yield from (_of_estimate(e, travel, seen) for e in travel.estimates if is_found(e.p_value))
+        yield from (_of_slip(s, travel) for s in travel.slips if is_found(s.p_value))
         yield from (_of_swing(line, seen, travel) for line in travel.lines if _is_swing(line))
     if seen.profile is not None:
         yield from (_of_finding(f, seen.profile, seen.name) for f in seen.profile.found)
@@ -186,7 +186,7 @@ def _of_slip(step: StepFound, travel: TravelEvidence) -> Claim:
 
 
 def _is_swing(line: Line) -> bool:
-    return line.p_value < TRAVEL_FOUND and "probe_vibration" in line.explained_by
+    return is_found(line.p_value) and "probe_vibration" in line.explained_by
 
 
 def _of_swing(line: Line, seen: Seen, travel: TravelEvidence) -> Claim:

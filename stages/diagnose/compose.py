@@ -11,7 +11,7 @@ import numpy as np
 
 from pipeline.instrument.probe import Probe
 from pipeline.physics.catalogue import effect
-from pipeline.physics.effect import Channel
+from pipeline.physics.effect import Channel, FixedTo
 from stages.diagnose.channels import Seen
 from stages.diagnose.claims import Claim, claims_of, stretch
 from stages.diagnose.gauge import answer as of_gauge
@@ -26,6 +26,7 @@ from stages.diagnose.result import (
     classes_of,
     record_next,
 )
+from stages.diagnose.travel.events import SLIP
 
 _SAME_FREQUENCY_HZ = 0.15
 _IN_PROFILE = Location(str(Channel.PROFILE), None, None)
@@ -49,13 +50,14 @@ def composed(
     every = claims_of(field, gauge)
     known = [c.not_knowing(without) for c in every if c.name not in without]
     of_profile, of_travel = _unexplained_profile(field, gauge), _unexplained_travel(field, gauge)
-    unnamed = len(known) < len(every) or bool(of_travel)
-    said = _said(examined, known, unnamed, bool(of_profile))
+    unnamed = len(known) < len(every) or any(not u.by_slip for u in of_travel)
+    by_slip = any(u.by_slip for u in of_travel)
+    said = _said(examined, known, unnamed, bool(of_profile), (SLIP,) if by_slip else ())
     asked = said.members if said.members else [e.name for e in said.effects]
-    nameless = _IN_PROFILE if of_profile else of_travel[0][1] if of_travel else None
+    nameless = _IN_PROFILE if of_profile else of_travel[0].location if of_travel else None
     location = _location(examined, every, asked) or nameless
     words = _identifiable(said, examined, any(c.may_go_otherwise for c in known))
-    identifiable = " ".join(s for s in (words, *of_profile, *(said for said, _ in of_travel)) if s)
+    identifiable = " ".join(s for s in (words, *of_profile, *(u.sentence for u in of_travel)) if s)
     partly = said.verdict is Verdict.PARTLY
     found = Diagnosis(
         recording=field.name if field is not None else "",
@@ -89,16 +91,20 @@ def _of_rest(said: _Said) -> Verdict:
     return Verdict.CLASS if said.members else Verdict.UNEXPLAINED
 
 
-def _said(examined: Examined | None, known: Sequence[Claim], unnamed: bool, unexplained: bool) -> _Said:
+def _said(
+    examined: Examined | None, known: Sequence[Claim], unnamed: bool, unexplained: bool,
+    doubtful: Sequence[str],
+) -> _Said:  # fmt: skip
     """Return what rings and fiducials, and then the claims beyond them, come to.
 
-    What is sure is named, whatever is left beside it; what is left is a class, or unexplained.
+    What is sure is named, whatever is left beside it; what is left is a class, or unexplained. Names that are
+    ``doubtful`` may be no effect at all.
     """
     rings = verdict_of_rings(examined, bool(known))
     of_rings = of_gauge.effects_found(examined) if examined is not None else ()
     claims = _beyond(known, of_rings)
     certain = (*_sure_of_rings(examined, rings, unexplained), *(c.found for c in claims if c.sure))
-    doubted = [n for c in claims if not c.sure for n in (*c.rivals, c.name)]
+    doubted = [*(n for c in claims if not c.sure for n in (*c.rivals, c.name)), *doubtful]
     if rings in (Verdict.CLASS, Verdict.PARTLY, Verdict.NAMED):
         unsure = [e.name for e in of_rings if e not in certain]
         doubted += [*(of_gauge.members(examined) if unsure and examined is not None else ()), *unsure]
@@ -165,7 +171,7 @@ def _identifiable(said: _Said, examined: Examined | None, encoder_otherwise: boo
         unknown = _unknown(examined) if examined is not None else ()
         unknown += (_OF_ENCODER,) * encoder_otherwise
         told = [*(e.statement for e in said.effects), *(_UNKNOWN.format(f) for f in unknown)]
-        return "; or ".join(dict.fromkeys(words.rstrip(".") for words in told)) + "."
+        return "; or ".join(dict.fromkeys(words.rstrip(".") for words in told)) + "." if told else ""
     nameless = said.verdict in (Verdict.UNEXPLAINED, Verdict.PARTLY) and not said.members
     return of_gauge.formula(examined) if nameless and examined is not None else ""
 
@@ -210,14 +216,27 @@ def _unexplained_profile(*recordings: Seen | None) -> tuple[str, ...]:
     return tuple(f"{name}: {p.unexplained.statement}" for name, p in profiles if p.unexplained is not None)
 
 
-def _unexplained_travel(*recordings: Seen | None) -> list[tuple[str, Location]]:
-    """Return what is between motion and encoder and no effect of the encoder explains, and where."""
-    travels = [(s.name, s.travel) for s in recordings if s is not None and s.travel is not None]
-    return [
-        (f"{name}: {t.unexplained.statement}", stretch(t, t.unexplained.where, None, None))
-        for name, t in travels
-        if t.unexplained is not None
-    ]
+@dataclass(frozen=True)
+class _Untold:
+    """What is between motion and encoder and has no name; whether a slip may have made it."""
+
+    sentence: str
+    location: Location
+    by_slip: bool
+
+
+def _unexplained_travel(*recordings: Seen | None) -> list[_Untold]:
+    """Return what is between motion and encoder and may be a slip or stray pictures, or nothing explains."""
+    out = []
+    for name, travel in ((s.name, s.travel) for s in recordings if s is not None and s.travel is not None):
+        for step in travel.unsettled:
+            where = stretch(travel, (step.place - 1, step.place), FixedTo.TIME, "event")
+            out.append(_Untold(f"{name}: {step.doubt}", where, True))
+        left = travel.unexplained
+        if left is not None:
+            where = stretch(travel, left.where, None, None)
+            out.append(_Untold(f"{name}: {left.statement}", where, left.by_slip))
+    return out
 
 
 def _global_p(field: Seen | None, gauge: Seen | None) -> float:

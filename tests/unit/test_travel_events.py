@@ -92,6 +92,29 @@ def test_a_slip_beside_a_stray_picture_at_the_end_ends_there(stray_at: int, slip
     assert all(e.place - e.during > 0 and e.place < 40 for e in events if e.kind is EventKind.STEP)
 
 
+@pytest.mark.parametrize("placed", [True, False])
+@pytest.mark.parametrize(("strays", "count"), [(slice(-3, None), 3), (slice(0, 3), 3)])
+def test_stray_pictures_at_an_end_are_no_sure_slip(placed: bool, strays: slice, count: int) -> None:
+    sight = seen(np.random.default_rng(10), drift_mm=0.001)
+    distance_mm = sight.distance_mm.copy()
+    distance_mm[strays] += 1.0
+    wrong = replace(sight, distance_mm=distance_mm, placed=placed)
+    (found,) = steps_found(with_events(wrong, read()), read())
+    assert EventKind.OUTLIER in found.rivals
+    assert f"{count} stray pictures" in found.doubt
+    assert f"{found.gain_mm:+.2f} mm" in found.doubt
+    assert f"At {found.time_s:.2f} s" in found.doubt
+    assert "they cannot be told apart: record the passage again, slowly" in found.doubt
+
+
+def test_a_slip_in_the_last_pictures_is_sure_where_the_reading_itself_jumps() -> None:
+    sight = seen(np.random.default_rng(10), drift_mm=0.001)
+    (found,) = slips(sight, read(slips=((7.78, 1.36),)))
+    assert found.doubt == ""
+    assert found.gain_mm == pytest.approx(1.36, abs=0.1)
+    assert found.time_s == pytest.approx(7.78, abs=0.05)
+
+
 def test_missing_pictures_at_steady_speed_are_not_called_a_slip() -> None:
     sight, encoder = seen(np.random.default_rng(5), False), read(False)
     noise = sight.distance_mm - way(sight.time_s, False)

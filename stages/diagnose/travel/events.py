@@ -13,12 +13,15 @@ from stages.diagnose.travel.solve import DELAY, FAR_BETTER, PLAY, SMOOTH, DriftN
 # So many steps and stray pictures are taken up, one after the other.
 _MOST = 16
 _ENTERS = 1e-4
-# A step needs pictures on both of its sides, else it is one stray picture.
-_SIDE = 3
+# A step needs so many pictures on both of its sides, else they may be stray; with no more it is in doubt.
+SIDE = 3
 # Prior of how long a wheel slips: evenly between the time of a few readings, as over a bead, and this, as in
 # mud or grease. What creeps for longer is held by the noise's random walk. Debt: data/debts.md.
 SHORTEST_S, LONGEST_S = 0.03, 0.5
-_SLIP = "encoder_slip"
+SLIP = "encoder_slip"
+# Below this chance, motion against encoder shows an effect: of 300 recordings without any, with three smooth
+# effects each, a hundredth of one would.
+TRAVEL_FOUND = 1e-5
 
 
 def with_events(sight: Sight, encoder: Encoder, without: tuple[str, ...] = ()) -> TravelFit:
@@ -109,6 +112,11 @@ def _without_needless(fit: TravelFit, encoder: Encoder) -> TravelFit:
     return fit
 
 
+def is_found(p_value: float) -> bool:
+    """Return whether what chance would do so rarely is an effect between motion and encoder, or in motion."""
+    return p_value < TRAVEL_FOUND
+
+
 def chance(score: float, count: int, measurements: int) -> float:
     """Return the probability that the largest of ``count`` scores z² is so large by chance.
 
@@ -122,11 +130,11 @@ def _strongest(fit: TravelFit) -> tuple[Event, float, int]:
     sight = fit.sight
     speed = np.gradient(sight.distance_mm, sight.time_s)
     best, score, count = Event(EventKind.STEP, 0), 0.0, 0
-    known = (EventKind.STEP,) if _SLIP not in fit.without else ()
+    known = (EventKind.STEP,) if SLIP not in fit.without else ()
     for kind in (*known, EventKind.OUTLIER):
         gain = fit.whitened.gain(candidate_columns(sight, kind, speed))[1]
         if kind is EventKind.STEP:
-            gain[:_SIDE], gain[len(gain) - _SIDE + 1 :] = 0.0, 0.0
+            gain[:SIDE], gain[len(gain) - SIDE + 1 :] = 0.0, 0.0
         count += len(gain)
         if gain.max(initial=0.0) > score:
             best, score = Event(kind, int(np.argmax(gain))), float(gain.max())

@@ -13,7 +13,7 @@ from pipeline.physics.catalogue import effect
 from pipeline.recording.base import Encoder, Recording
 from stages.diagnose.agreement import Agreement
 from stages.diagnose.effects.library import LIBRARY
-from stages.diagnose.travel.events import with_events
+from stages.diagnose.travel.events import is_found, with_events
 from stages.diagnose.travel.left_over import LeftOver, left_over
 from stages.diagnose.travel.lines import Line, find_lines
 from stages.diagnose.travel.model import TravelFit, second_predictions
@@ -96,7 +96,7 @@ class TravelEvidence:
     slips : tuple of StepFound
         Steps that only a slip explains.
     doubtful : tuple of StepFound
-        Steps that a stray picture or missing frames explain as well.
+        Steps that a stray picture or missing frames explain as well: their `StepFound.doubt` tells it.
     lines : tuple of Line
     fit : TravelFit or None
         None without a usable encoder.
@@ -120,12 +120,18 @@ class TravelEvidence:
         """Least chance of what shows between motion and encoder, or in the motion; 1 where nothing does."""
         smooth = (e.p_value for e in self.estimates if e.p_value < _REPORTED)
         steps = (s.p_value for s in (*self.slips, *self.doubtful))
-        return min((*smooth, *steps, *(line.p_value for line in self.lines)), default=1.0)
+        left = () if self.unexplained is None else (self.unexplained.p_value,)
+        return min((*smooth, *steps, *(line.p_value for line in self.lines), *left), default=1.0)
+
+    @property
+    def unsettled(self) -> tuple[StepFound, ...]:
+        """The doubtful steps that are more than chance."""
+        return tuple(s for s in self.doubtful if is_found(s.p_value))
 
     @property
     def fits_p(self) -> float:
-        """Chance that what all effects and events leave between motion and encoder is noise."""
-        if self.unexplained is not None:
+        """Chance that what all effects and sure slips leave between motion and encoder is noise."""
+        if self.unexplained is not None or self.unsettled:
             return 0.0
         return self.fit.fits_p if self.fit is not None else 1.0
 

@@ -1,4 +1,4 @@
-"""What is between motion and encoder and no effect that was told explains: how much, and when."""
+"""What is between motion and encoder and no effect that was told explains: how much, when, how surely."""
 
 from __future__ import annotations
 
@@ -6,55 +6,92 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.stats import f as fisher
 from scipy.stats import norm
 
-from pipeline.arrays import Float
-from stages.diagnose.travel.events import chance
+from stages.diagnose.travel.events import SLIP, chance, is_found
 from stages.diagnose.travel.model import EventKind, TravelFit
-from stages.diagnose.travel.steps import StepFound
+from stages.diagnose.travel.solve import (
+    DELAY,
+    FAR_BETTER,
+    OFFSET,
+    PLAY,
+    SMOOTH,
+    DriftNoise,
+    Whitened,
+    whitened_fit,
+)
+from stages.diagnose.travel.steps import StepFound, or_else
 
-# Below this chance, motion against encoder shows an effect: of 300 recordings without any, with three smooth
-# effects each, a hundredth of one would.
-TRAVEL_FOUND = 1e-5
 # 1 σ of a picture's place by fiducials, which may be put there wrongly. Debt: data/debts.md.
 PLACED_SIGMA_MM = 0.05
 # What is left of the reading is noise unless its chance is below this. Debt: data/debts.md.
 _NOISE = 1e-6
+# A stretch whose information is less than this share of the most says nothing.
+_TOLD = 1e-9
+# What a stretch has of its own: begin, end and size.
+_OWN = 3
 
 
 @dataclass(frozen=True)
 class LeftOver:
-    """By how much the reading is off beyond all that was told.
+    """By how much the reading is off beyond all that was told, in the stretch where it shows most.
+
+    The first picture's reading is taken for right: after a slip the reading is off, not before it.
 
     Attributes
     ----------
     off_mm : float
-        Where it is most.
+        Reading − sight, mean over the stretch.
     where : tuple of int
-        Places of the `Sight`, both included, between which it is off by at least half as much.
+        Places of the `Sight`, both included, between which it is off.
     time_s : tuple of float
         Their times.
+    p_value : float
+        Of so much by chance, over all stretches that were tried.
+    stray : int
+        So many pictures in a row were taken for stray ones; 0 where it lasts too long for that.
+    by_slip : bool
+        Whether one slip would explain it too.
     """
 
     off_mm: float
     where: tuple[int, int]
     time_s: tuple[float, float]
+    p_value: float
+    stray: int
+    by_slip: bool
 
     @property
     def statement(self) -> str:
         """Return it in a plain sentence."""
         first, last = self.time_s
-        return (
-            f"Between {first:.2f} and {last:.2f} s the reading is off by up to {self.off_mm:.2f} mm in a way "
-            "that no effect of an encoder explains."
-        )
+        off = f"Between {first:.2f} and {last:.2f} s the reading is off by {self.off_mm:+.2f} mm"
+        if self.by_slip:
+            return or_else(f"{off}: the wheel slipped", f"{self.stray} pictures in a row are stray")
+        unless = f", unless {self.stray} pictures in a row are stray" if self.stray else ""
+        return f"{off} in a way that no effect of an encoder explains{unless}."
+
+
+@dataclass(frozen=True)
+class _Stretch:
+    """Pictures from ``first`` to before ``end`` that are off by ``size_mm``.
+
+    ``gain`` is by how much it lowers χ², and ``misfit`` the χ² left for each degree of freedom.
+    """
+
+    first: int
+    end: int
+    size_mm: float
+    gain: float
+    misfit: float
 
 
 def left_over(fit: TravelFit, steps: Sequence[StepFound], count_mm: float) -> LeftOver | None:
-    """Return what is left beside smooth effects and sure slips; None where it may be noise.
+    """Return what is left beside smooth effects, steps and single stray pictures; None where it may be noise.
 
-    Steps that may be something else are not told as slips, and neighbouring pictures that are off alike are
-    no stray ones: what the fit takes out for them is still to be explained.
+    Neighbouring pictures that are off alike are no stray ones: what the fit takes out for them is still to be
+    explained. Smooth effects are estimated again beside it, so that they take no share of it.
 
     Parameters
     ----------
@@ -63,32 +100,84 @@ def left_over(fit: TravelFit, steps: Sequence[StepFound], count_mm: float) -> Le
     count_mm
         Unit of the readings.
     """
+    noise = _of_places(fit, count_mm) if fit.sight.placed else fit.noise
     untold = _untold(fit, steps)
-    off = fit.whitened.residual + fit.columns[:, untold] @ fit.values[untold]
-    off = np.abs(off - np.median(off))
-    if not (_off_from_places(fit, off, count_mm) if fit.sight.placed else _off_from_way(fit, untold)):
-        return None
-    far = np.flatnonzero(off >= off.max() / 2)
-    first, last = int(far[0]), int(far[-1])
-    time_s = float(fit.sight.time_s[first]), float(fit.sight.time_s[last])
-    return LeftOver(float(off.max()), (first, last), time_s)
-
-
-def _off_from_places(fit: TravelFit, off_mm: Float, count_mm: float) -> bool:
-    """Return whether (N,) is more than errors of fiducials, which place every picture by itself."""
-    sigma = float(np.sqrt(PLACED_SIGMA_MM**2 + fit.noise.white_mm**2 + count_mm**2))
-    return float(2 * norm.sf(off_mm.max() / sigma)) * len(off_mm) < _NOISE
-
-
-def _off_from_way(fit: TravelFit, untold: list[int]) -> bool:
-    """Return whether there is more than what a way gathers from picture to picture, a random walk."""
+    off = _beside(fit, untold, noise)
     count = len(fit.sight.time_s)
-    each = (fit.event_z2[k - 4] for k in untold)
-    return fit.fits_p < _NOISE or any(chance(z2, 2 * count, count) < TRAVEL_FOUND for z2 in each)
+    p_value = _p_of_places(fit, off, noise) if fit.sight.placed else _p_of_way(fit, off)
+    if p_value >= _NOISE:
+        return None
+    off = _simplest(fit, untold, noise, off)
+    length, time_s = off.end - off.first, fit.sight.time_s
+    told = float(fisher.sf(off.misfit, count, max(count / 3, 1.0))) > _NOISE
+    between_s = float(time_s[off.first]), float(time_s[off.end - 1])
+    by_slip = told and SLIP not in fit.without and off.end == count
+    stray = min(length, count - length) if untold else 0
+    return LeftOver(off.size_mm, (off.first, off.end - 1), between_s, p_value, stray, by_slip)
+
+
+def _of_places(fit: TravelFit, count_mm: float) -> DriftNoise:
+    """Return the noise of pictures that fiducials place each by itself: it gathers from none to another."""
+    return DriftNoise(float(np.sqrt(PLACED_SIGMA_MM**2 + fit.noise.white_mm**2 + count_mm**2)), 0.0)
+
+
+def _simplest(fit: TravelFit, untold: list[int], noise: DriftNoise, beside: _Stretch) -> _Stretch:
+    """Return the stretch that is there ``beside`` delay and play, or beside neither where that is simpler.
+
+    What is off for a while may have been taken for a delay or a play.
+    """
+    lags = [k for k in (DELAY, PLAY) if fit.values[k] != 0]
+    alone = _beside(fit, [*lags, *untold], noise)
+    free = max(len(fit.sight.time_s) - len(fit.values), 1)
+    return alone if (alone.misfit - beside.misfit) * free < FAR_BETTER * len(lags) else beside
+
+
+def _beside(fit: TravelFit, untold: list[int], noise: DriftNoise) -> _Stretch:
+    """Return the strongest stretch beside all that was found but the ``untold`` columns."""
+    held = [k for k in range(len(SMOOTH)) if k != OFFSET and fit.values[k] == 0]
+    difference = fit.whitened.residual + fit.columns @ fit.whitened.estimate
+    columns = np.delete(fit.columns, [*held, *untold], axis=1)
+    return _strongest_stretch(whitened_fit(difference, columns, noise.covariance(fit.sight.path_mm)))
+
+
+def _strongest_stretch(rest: Whitened) -> _Stretch:
+    """Return the stretch that, off by a constant, explains most of what is left, of all behind a picture.
+
+    What a stretch from a to b adds is a difference of sums up to b and up to a, and its information likewise.
+    """
+    up_to = np.pad(np.cumsum(rest.weighted), (1, 0))
+    both = np.pad(np.cumsum(np.cumsum(rest.projector, 0), 1), ((1, 0), (1, 0)))
+    information = np.diag(both)[:, None] + np.diag(both) - both - both.T
+    tried = np.triu(np.ones(both.shape, bool), 1)
+    tried[0] = False
+    tried &= information > _TOLD * np.max(information)
+    safe = np.where(tried, information, 1.0)
+    score = np.where(tried, up_to - up_to[:, None], 0.0)
+    first, end = np.unravel_index(np.argmax(score**2 / safe), both.shape)
+    size, gain = score[first, end] / safe[first, end], score[first, end] ** 2 / safe[first, end]
+    free = len(rest.residual) - len(rest.estimate) - _OWN
+    misfit = max(float(rest.residual @ rest.weighted - gain), 0.0) / max(free, 1)
+    return _Stretch(int(first), int(end), float(size), float(gain), misfit)
+
+
+def _p_of_places(fit: TravelFit, off: _Stretch, noise: DriftNoise) -> float:
+    """Return the chance of a stretch by errors of fiducials: neighbouring pictures share them."""
+    return min(1.0, _tries(fit) * float(2 * norm.sf(abs(off.size_mm) / noise.white_mm)))
+
+
+def _p_of_way(fit: TravelFit, off: _Stretch) -> float:
+    """Return the chance of a stretch, or of all that is left, by a way's random walk: the lesser of two."""
+    one = chance(off.gain / max(off.misfit, 1.0), _tries(fit), len(fit.sight.time_s))
+    return min(1.0, 2 * min(one, fit.fits_p))
+
+
+def _tries(fit: TravelFit) -> int:
+    count = len(fit.sight.time_s)
+    return count * (count - 1) // 2
 
 
 def _untold(fit: TravelFit, steps: Sequence[StepFound]) -> list[int]:
-    """Return the places among the fit's values of events that nothing told explains."""
+    """Return which values are of pictures off in a row, or of steps that chance may make."""
     found, out = iter(steps), []
     stray = {e.place: fit.values[4 + k] for k, e in enumerate(fit.events) if e.kind is EventKind.OUTLIER}
     for k, event in enumerate(fit.events):
@@ -96,8 +185,7 @@ def _untold(fit: TravelFit, steps: Sequence[StepFound]) -> list[int]:
             beside = (stray.get(event.place + way, 0.0) for way in (-1, 1))
             is_told = not any(other * stray[event.place] > 0 for other in beside)
         else:
-            step = next(found)
-            is_told = not step.rivals and step.p_value < TRAVEL_FOUND
+            is_told = is_found(next(found).p_value)
         if not is_told:
             out.append(4 + k)
     return out

@@ -11,7 +11,7 @@ from scipy.stats import chi2
 from pipeline.arrays import Float
 from pipeline.recording.base import Encoder
 from stages.diagnose.agreement import Agreement, Part, agreement
-from stages.diagnose.travel.events import LONGEST_S, SHORTEST_S, chance
+from stages.diagnose.travel.events import LONGEST_S, SHORTEST_S, SIDE, chance
 from stages.diagnose.travel.model import EventKind, TravelFit, candidate_columns, fitted, moment
 from stages.diagnose.travel.sight import Sight, quantum_mm, readings_at
 from stages.diagnose.travel.solve import whitened_fit
@@ -131,6 +131,8 @@ class StepFound:
         How long it takes, as of a wheel that slips evenly.
     agreements : tuple of Agreement
         What the reading alone says of it.
+    stray : int
+        So many pictures, placed wrongly, would explain it where a stray picture does.
     """
 
     place: int
@@ -142,6 +144,23 @@ class StepFound:
     rivals: tuple[EventKind, ...]
     lasting_s: float = SHORTEST_S
     agreements: tuple[Agreement, ...] = ()
+    stray: int = 1
+
+    @property
+    def doubt(self) -> str:
+        """What else it may be, in a plain sentence with its time and size; empty where it is a slip."""
+        words = {
+            EventKind.STEP: "",
+            EventKind.OUTLIER: f"{self.stray} stray picture{'s' * (self.stray != 1)}",
+            EventKind.LOST_TIME: "missing frames",
+        }
+        slip = f"At {self.time_s:.2f} s the reading gains {self.gain_mm:+.2f} mm: a slip of the wheel"
+        return or_else(slip, " or ".join(words[r] for r in self.rivals)) if self.rivals else ""
+
+
+def or_else(slip: str, instead: str) -> str:
+    """Return a sentence that a slip may be something else, and how to find out."""
+    return f"{slip}, or {instead}; they cannot be told apart: record the passage again, slowly."
 
 
 def steps_found(fit: TravelFit, encoder: Encoder) -> tuple[StepFound, ...]:
@@ -158,6 +177,9 @@ def _judged(fit: TravelFit, place_in_list: int, encoder: Encoder) -> StepFound:
     rounding = quantum_mm(encoder) * np.sqrt(2 / 12)
     sigma = float(np.hypot(fit.sigma[4 + place_in_list], rounding))
     rivals = _rivals(fit, place_in_list, encoder)
+    beyond = min(event.place - event.during, len(sight.time_s) - event.place)
+    if beyond <= SIDE and EventKind.OUTLIER not in rivals:
+        rivals = (EventKind.OUTLIER, *rivals)
     # Somewhere between two pictures; where the reading itself jumps, as long as a short slip lasts.
     within_s = float(sight.time_s[event.place] - sight.time_s[event.place - 1])
     if event.during:
@@ -179,7 +201,7 @@ def _judged(fit: TravelFit, place_in_list: int, encoder: Encoder) -> StepFound:
     z2 = float(fit.event_z2[place_in_list]) if np.isfinite(sigma) else 0.0
     return StepFound(
         event.place, time_s, within_s / np.sqrt(12), gain_mm, sigma, chance(z2, 2 * count, count), rivals,
-        lasting_s, () if again is None else (again,),
+        lasting_s, () if again is None else (again,), event.during + beyond * (beyond <= SIDE) or 1,
     )  # fmt: skip
 
 
