@@ -24,19 +24,20 @@ from stages.premises.changes import (
 )
 from stages.premises.clock import ClockJump, clock_jumps, warn_of_clock, without_jumps, without_stretch
 from stages.premises.cuts import cuts, warn_of_cuts
-from stages.premises.light import (
-    Light,
-    alike,
-    light_seen,
-    pattern_breaks,
-    rhythm_of,
-)
+from stages.premises.light import Light, alike, light_seen, pattern_breaks, rhythm_of
 from stages.premises.losses import Steps, row_times, rows_by_motion, steps_of_wall, sway_of_line
 from stages.premises.order import off_the_pipe, out_of_order
 from stages.premises.pictures import Pictures, look_at_pictures
 from stages.premises.repeats import copies, repeated, rows_of_repeats
 from stages.premises.rows import Alignment, Lights, aligned
-from stages.premises.scale import check_diameter, encoder_factor, radius_seen_mm, rings_seen_mm, warn_of_oval
+from stages.premises.scale import (
+    check_diameter,
+    encoder_factor,
+    radius_along_mm,
+    radius_seen_mm,
+    rings_seen_mm,
+    warn_of_oval,
+)
 from stages.premises.stays import places_that_stay
 
 _LASER, _LED, _BOTH = Illumination.LASER.value, Illumination.LED.value, Illumination.BOTH.value
@@ -148,7 +149,8 @@ def _matched(recording: Recording, probe: Probe, seen: _Seen) -> _Matched:
     rings_mm = rings_seen_mm(pictures, probe)
     radius_mm = radius_seen_mm(rings_mm)
     one_bore = recording.kind != "gauge"
-    row = rows_by_motion(alignment.row, steps, rhythm_of(light), table, encoder, sway, radius_mm, one_bore)
+    along_mm = radius_along_mm(pictures, rings_mm)
+    row = rows_by_motion(alignment.row, steps, rhythm_of(light), table, encoder, sway, along_mm, one_bore)
     stated_s = without_stretch(row_times(table, row), row, table, recording.frame_rate)
     jumps = clock_jumps(stated_s, steps, encoder)
     changes = Changes(recording.frames, label, row, without_jumps(stated_s, jumps))
@@ -290,7 +292,7 @@ def _report(pictures: Pictures, radius_mm: float, changes: Changes, context: Con
 
 PREMISES = Stage(
     "premises",
-    "20",
+    "21",
     PremisesParameters,
     check_premises,
     "lights, times, encoder and diameter as stated, held against the pictures and mended",

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.ndimage import median_filter
 
 from pipeline.arrays import Bool, Float, Int
 from pipeline.recording.base import Encoder, FrameTable
+from stages.premises.beside_encoder import Pace
 from stages.premises.light import Light
+from stages.premises.moving import lower_speed, usual_speed
 from stages.premises.pictures import CLOSED, Pictures
+from stages.premises.rhythm_of_steps import over_whole_periods
 
 # A step of the wall stands out when it is so many robust σ above the steps around it: by noise alone once in
 # 10^9 steps, were they normal; matching errs worse than that, and six is what outliers need everywhere here.
@@ -21,7 +23,7 @@ _SIGMAS_LOST = 3.5
 # 0.9 quantile of normal errors in σ. It gives σ here, because errors of matching are not normal.
 _NINE_IN_TEN = 1.645
 # Steps on either side from which the usual speed is taken.
-_AROUND_STEP = 9
+_AROUND_STEP, _ON_EACH_SIDE = 4, 2
 _LEAST_STEPS = 12
 # Steps that took more than so many usual times tell nothing of lost pictures: over 32 frames, of which 30
 # were left out, phase correlation erred by the advance of 6 frames (open-1-field at half its size).
@@ -30,6 +32,10 @@ _LONGEST_STEP = 4.0
 # pixel, in the time that would have passed. In open-1 to open-3, a01 and a09 it moves up to 3
 # times as far, twice in a run more than 2.5; where all pictures of open-1 were moved by 4 px, 5.4 times.
 _LINE_LEAPS, _LEAST_SWAY_PX = 2.5, 0.5
+# The median of nine steps tells the usual speed where up to four of them were lengthened by a loss.
+_MOST_OF_STEPS = 4 / 9
+# Where one in ten of the steps between is a loss, the recorder loses pictures at the ends as well (chosen).
+_OFTEN = 0.1
 # The usual speed is taken anew, with the lost pictures counted, so many times.
 _ROUNDS = 2
 # Over a run, the wall's steps make the encoder's way within this factor: single steps err by a tenth.
@@ -37,8 +43,14 @@ _MORE = 1.1
 # Errors of matching beyond whole periods are told from lost pictures where nine in ten are below this part of
 # a period: if they were anything, they would be spread evenly over half a period, and .45 would be the part.
 _TOLD_APART = 1 / 3
-# The encoder is looked at over so many frames on either side of a leap.
-_NEARBY = 10
+
+
+@dataclass(frozen=True)
+class _Leap:
+    """A step, of K, that stands out as if so many pictures were ``lost``."""
+
+    step: int
+    lost: int
 
 
 @dataclass(frozen=True)
@@ -96,97 +108,158 @@ def rows_by_motion(
     table: FrameTable,
     encoder: Encoder | None,
     sway: Float,
-    radius_mm: float = np.nan,
+    radius_mm: Float | float = np.nan,
     one_bore: bool = True,
 ) -> Int:
     """Return ``row`` (F,) with more or fewer rows skipped where the wall moves by more or less than usual.
 
     The lights give the number of lost pictures only up to whole periods of their rhythm. How far the wall
-    moved, compared with the steps around, gives the rest. Steps tell nothing where the encoder shows the
-    same leap (the probe moved faster), over pictures that were left out (the speed is not known for so long),
-    where the line's ``sway`` (F,) leaps and the rhythm goes on (the camera was knocked), or where the encoder
-    agrees with the wall, by the pipe's ``radius_mm``, rather than with the loss. That is asked where half the
-    way or more would be missing, and of all where the encoder shows more in all: a codec that repeats blocks
-    holds back usual steps.
+    moved, compared with the steps around, gives the rest. Steps tell nothing where the wall stands, where the
+    encoder shows the same leap (the probe moved faster), over pictures that were left out (the speed is not
+    known for so long), or where the line's ``sway`` (F,) leaps and the rhythm goes on (the camera was
+    knocked). Steps are compared in mm where the pipe's ``radius_mm`` (F,), or one for all pictures, is known:
+    in another bore they have another size. Where the encoder goes farther in all than the wall, a codec that
+    repeats blocks holds back usual steps: the encoder must then agree with the loss rather than the wall.
     """
     if len(steps.end) < _LEAST_STEPS:
         return row
-    time = row_times(table, row)
+    time, radius = row_times(table, row), np.broadcast_to(radius_mm, len(row))[steps.end]
+    measured = bool(np.isfinite(radius).all())
+    steps = replace(steps, size=steps.size * radius) if measured else steps
     period = float(np.median(np.diff(time)))
     out, left = row.copy(), len(table.frame) - 1 - int(row[-1])
-    held_back = _shows_more(encoder, time, steps, radius_mm)
     passed = np.maximum(time[steps.end] - time[steps.start], 1e-9) / period
-    rhythm, over = _over_whole_periods(np.rint(passed).astype(np.int64), rhythm)
+    rhythm, over = over_whole_periods(np.rint(passed).astype(np.int64), steps.size, rhythm)
     sigmas = np.where(over > 0, _SIGMAS_LOST, _SIGMAS_LOST if left > 0 else _SIGMAS)
-    for start, end, lost, size in _leaps(steps, passed, rhythm, over, sigmas, one_bore):
+    leaps = _leaps(steps, passed, rhythm, over, sigmas, one_bore)
+    leaps = [leap for leap in leaps if not _knocked(leap, steps, rhythm, sway)]
+    pace = Pace.of(encoder, period, float(np.median(passed)))
+    held_back = measured and _shows_more(encoder, time, steps)
+    spare = _in_spare_rows(leaps, left)
+    for leap in sorted(leaps, key=lambda one: one.step):
+        start, end = int(steps.start[leap.step]), int(steps.end[leap.step])
+        between_s = row_times(table, out)[[start, end]]
         skips = np.diff(row[start : end + 1]) - 1
-        believed = left >= lost or _encoder_was_steady(encoder, float(time[end]), period)
-        part = 1 - lost / max((time[end] - time[start]) / period + lost, 1.0)
-        # No error of the pipe's radius makes the wall's way twice the encoder's.
-        if held_back or part <= 1 / 2:
-            believed &= not _encoder_agrees(encoder, time[[start, end]], size * radius_mm, part)
-        if lost % rhythm == 0:
-            believed &= sway[start + 1 : end + 1].max() < _LINE_LEAPS * (1 + abs(lost) / rhythm)
-        if (lost > 0 and believed) or (lost < 0 and skips.max() + lost >= 0):
+        believed = leap.lost > 0 or skips.max() + leap.lost >= 0
+        believed &= _encoder_bears_out(leap, pace, between_s, in_spare_rows=leap in spare)
+        if held_back:
+            way_mm = float(steps.size[leap.step])
+            believed &= not _encoder_agrees(encoder, between_s, way_mm, _part(between_s / period, leap.lost))
+        if believed:
             first = int(np.argmax(skips)) + start + 1 if skips.max() > 0 else (start + end + 1) // 2
-            out[first:] += lost
-            left -= lost
+            out[first:] += leap.lost
     return out
 
 
-def _over_whole_periods(pictures: Int, rhythm: int) -> tuple[int, Int]:
-    """Return the rhythm, and how many lost pictures (K,) make steps over so many whole periods of it.
+def _encoder_bears_out(leap: _Leap, pace: Pace | None, between_s: Float, *, in_spare_rows: bool) -> bool:
+    """Return whether a leap between two times is a loss: the encoder does not leap then.
 
-    Where most steps span the same number of pictures, two or more, one picture in each period shows the wall.
+    A loss for which the table has rows to spare, or of rows that were skipped, needs no encoder, but none may
+    contradict it. Beside any other it must be steady, whatever its clock is off by.
     """
-    counts, often = np.unique(pictures, return_counts=True)
-    usual = int(counts[np.argmax(often)])
-    return (usual, -pictures % usual) if usual > 1 else (rhythm, np.zeros_like(pictures))
+    known = in_spare_rows or leap.lost < 0
+    if pace is None:
+        return known
+    shown = pace.excess(float(between_s[0]), float(between_s[1])) / leap.lost
+    if known:
+        return not shown[0] > 1 / 2
+    return bool(np.isfinite(shown[0]) and np.all(np.isnan(shown) | (np.abs(shown) < 1 / 2)))
 
 
-def _leaps(
-    steps: Steps, passed: Float, rhythm: int, over: Int, sigmas: Float, one_bore: bool
-) -> list[tuple[int, int, int, float]]:
-    """Return (start, end, lost pictures, size) of steps that stand out by ``sigmas`` (K,), clearest first.
+def _part(between: Float, lost: int) -> float:
+    """Return which part of a way is gone if none were ``lost`` between two times (2,), in pictures."""
+    return 1 - lost / max(float(between[1] - between[0]) + lost, 1.0)
+
+
+def _knocked(leap: _Leap, steps: Steps, rhythm: int, sway: Float) -> bool:
+    """Return whether the camera was knocked: the line leaps with the wall, and the lights' rhythm goes on."""
+    over = sway[int(steps.start[leap.step]) + 1 : int(steps.end[leap.step]) + 1]
+    return bool(leap.lost % rhythm == 0 and over.max() >= _LINE_LEAPS * (1 + abs(leap.lost) / rhythm))
+
+
+def _in_spare_rows(leaps: list[_Leap], left: int) -> list[_Leap]:
+    """Return which leaps, the clearest first, the rows account for that the table has ``left``."""
+    out = []
+    for leap in leaps:
+        if 0 < leap.lost <= left:
+            out.append(leap)
+            left -= leap.lost
+    return out
+
+
+def _leaps(steps: Steps, passed: Float, rhythm: int, over: Int, sigmas: Float, one_bore: bool) -> list[_Leap]:
+    """Return the steps that stand out by ``sigmas`` (K,), clearest first.
 
     ``passed`` (K,) is how many pictures they took by their times, to which ``over`` (K,) or a number of
     whole periods more is to be added. The error of matching is what is then left: losses do not widen it,
-    however many there are. Where the rhythm breaks, a loss has only to fit better than none. Without
-    ``one_bore`` steps of one speed differ as the bores of a gauge do: what looks like losses is error, too.
+    however many there are. It is a part of a picture's way or a length, whichever is more: a slow wall errs
+    by more of its way. Where the rhythm breaks, a loss has only to fit better than none. Without ``one_bore``
+    steps of one speed differ as the bores of a gauge do: what looks like losses is error, too.
+    Where the wall stands nothing stands out.
     """
-    excess = steps.size / _usual_speed(steps.size / passed, over == 0) - passed
-    for _ in range(_ROUNDS):
-        lost = over + rhythm * np.rint((excess - over) / rhythm).astype(np.int64)
-        speed = steps.size / np.maximum(passed + lost, 0.5)
-        excess = steps.size / _usual_speed(speed, np.ones(len(lost), bool)) - passed
-    error = np.quantile(np.abs(excess - lost * one_bore), 0.9)
+    speed = steps.size / (passed + over)
+    lost, usual = _counted(steps.size, passed, rhythm, over, lower_speed(speed))
+    if np.mean(lost[usual != 0] > over[usual != 0]) < _MOST_OF_STEPS:
+        lost, usual = _counted(steps.size, passed, rhythm, over, usual_speed(speed))
+    moves, excess = usual != 0, _excess(steps.size, usual, passed)
+    if moves.sum() < _LEAST_STEPS:
+        return []
+    off = np.abs(excess - lost * one_bore)
+    error = np.quantile(off[moves], 0.9)
+    by_speed = np.quantile((off * np.abs(usual))[moves], 0.9) / np.where(moves, np.abs(usual), 1.0)
     stand_out = (
-        (np.abs(excess) > sigmas * (error / _NINE_IN_TEN + 1e-9))
+        moves
+        & (np.abs(excess) > sigmas * (np.maximum(error, by_speed) / _NINE_IN_TEN + 1e-9))
         & (lost != 0)
         & (error < _TOLD_APART * rhythm)
     )
     # Where most breaks of the rhythm are losses, the others are likely to be losses, too.
-    breaks = over > 0
+    breaks = (over > 0) & moves
     if np.sum(stand_out & breaks) > np.sum(breaks) / 2:
         stand_out |= breaks & (lost != 0)
     stand_out &= passed < _LONGEST_STEP * np.median(passed)
+    often = np.mean(stand_out[_ON_EACH_SIDE:-_ON_EACH_SIDE]) > _OFTEN
+    stand_out &= _has_neighbours(steps, passed, breaks | often)
     clearest = sorted(np.flatnonzero(stand_out), key=lambda k: -abs(float(excess[k])))
-    return [(int(steps.start[k]), int(steps.end[k]), int(lost[k]), float(steps.size[k])) for k in clearest]
+    return [_Leap(int(k), int(lost[k])) for k in clearest]
 
 
-def _usual_speed(speed: Float, known: Bool) -> Float:
-    """Return the usual speed about each step (K,) by those ``known`` (K,); where it is 0, none compares."""
-    at = np.flatnonzero(known) if known.sum() >= _LEAST_STEPS else np.arange(len(speed))
-    usual = np.interp(np.arange(len(speed)), at, median_filter(speed[at], _AROUND_STEP, mode="nearest"))
-    return np.where(usual == 0, np.inf, usual)
+def _has_neighbours(steps: Steps, passed: Float, believed: Bool) -> Bool:
+    """Return which steps (K,) have four others close by, and two on either side unless ``believed`` (K,).
+
+    Where steps miss in between, as at the end of a gauge, the speed may be another meanwhile: half as many
+    again as would lie there without a gap are too far off. At the ends of a run a loss is not told from a
+    probe that is about to go faster, unless the rhythm breaks, too, or pictures are lost all the time.
+    """
+    middle = (steps.start + steps.end) / 2
+    ahead = middle - middle[:, None]
+    close = np.abs(ahead) <= 1.5 * _AROUND_STEP * np.median(passed)  # half as many again
+    before, behind = (close & (ahead < 0)).sum(1), (close & (ahead > 0)).sum(1)
+    beside = believed | (np.minimum(before, behind) >= _ON_EACH_SIDE)
+    return np.asarray(beside & (before + behind >= _AROUND_STEP))
 
 
-def _shows_more(encoder: Encoder | None, time_s: Float, steps: Steps, radius_mm: float) -> bool:
-    """Return whether the encoder advances by more than the wall over all steps: matching held them back."""
-    if encoder is None or not np.isfinite(radius_mm):
+def _counted(size: Float, passed: Float, rhythm: int, over: Int, usual: Float) -> tuple[Int, Float]:
+    """Return how many pictures (K,) were lost by the ``usual`` speed (K,), and that with them counted."""
+    for _ in range(_ROUNDS):
+        excess = _excess(size, usual, passed)
+        lost = over + rhythm * np.rint((excess - over) / rhythm).astype(np.int64)
+        lost = np.where(usual != 0, lost, 0)
+        usual = usual_speed(size / np.maximum(passed + lost, 0.5))
+    return lost, usual
+
+
+def _excess(size: Float, usual: Float, passed: Float) -> Float:
+    """Return by how many pictures (K,) steps are longer than at the usual speed; 0 where the wall stands."""
+    return np.where(usual != 0, size / np.where(usual != 0, usual, 1.0) - passed, 0.0)
+
+
+def _shows_more(encoder: Encoder | None, time_s: Float, steps: Steps) -> bool:
+    """Return whether the encoder advances by more than the wall over all steps, mm: they were held back."""
+    if encoder is None:
         return False
     shown = steps.by_encoder(encoder, time_s).sum()
-    return bool(abs(shown) > _MORE * radius_mm * abs(steps.size.sum()))
+    return bool(abs(shown) > _MORE * abs(steps.size.sum()))
 
 
 def _encoder_agrees(encoder: Encoder | None, time_s: Float, way_mm: float, part: float) -> bool:
@@ -195,14 +268,3 @@ def _encoder_agrees(encoder: Encoder | None, time_s: Float, way_mm: float, part:
         return False
     shown_mm = float(np.diff(np.interp(time_s, encoder.time_s, encoder.distance_mm))[0])
     return abs(shown_mm - way_mm) < abs(shown_mm - part * way_mm)
-
-
-def _encoder_was_steady(encoder: Encoder | None, time_s: float, period_s: float) -> bool:
-    """Return whether the encoder advances evenly around a time; False where it is not known."""
-    if encoder is None or not encoder.time_s[0] < time_s < encoder.time_s[-1]:
-        return False
-    at = time_s + period_s * np.arange(-_NEARBY, _NEARBY + 1)
-    step = np.diff(np.interp(at, encoder.time_s, encoder.distance_mm))
-    usual = float(np.median(step))
-    # A probe that turns back moves as fast as before, but not evenly.
-    return bool(np.abs(step).max() < 2 * abs(usual) and np.all(step * usual >= 0))

@@ -1,8 +1,9 @@
-"""Whether the wall moves: where it stands, no comparison of steps tells anything."""
+"""Whether the wall moves, and how fast it usually does: where it stands, comparing steps tells nothing."""
 
 from __future__ import annotations
 
 import numpy as np
+from scipy.ndimage import binary_erosion, median_filter, percentile_filter
 
 from pipeline.arrays import Bool, Float
 
@@ -12,9 +13,35 @@ _MOVES = 0.25
 # The fast steps are told by this quantile: a probe may stand for nine tenths of a run, and the longest tenth
 # holds whatever leaps.
 _FAST = 0.9
+# Steps, of those around, from which a speed is told. Where pictures were lost in up to half of them, this
+# percentile is the speed without.
+_AROUND, _LOWER = 9, 25
 
 
 def wall_moves(speed: Float, of_run: Float) -> Bool:
     """Return where the wall moves (K,) at a ``speed`` (K,), by all the speeds ``of_run`` (N,)."""
     fast = float(np.quantile(np.abs(of_run), _FAST)) if len(of_run) else 0.0
     return np.asarray(np.abs(speed) > _MOVES * fast)
+
+
+def usual_speed(speed: Float) -> Float:
+    """Return the usual speed (K,) about each step; 0 where the wall stands.
+
+    The first and the last step are not repeated beyond the ends, where they would outvote all others.
+    """
+    usual = median_filter(speed, _AROUND, mode="mirror")
+    return np.where(wall_moves(usual, speed), usual, 0.0)
+
+
+def lower_speed(speed: Float) -> Float:
+    """Return the speed (K,) about each step as if no pictures were lost; 0 where the wall stands.
+
+    Lost pictures, however many, only make steps longer: the lower ones of those that move tell it. Steps of a
+    wall that stands are shorter for another reason, and so are those in which it stops or sets out.
+    """
+    out = np.zeros(len(speed))
+    moves = binary_erosion(wall_moves(speed, speed), border_value=True)
+    if moves.any():
+        sense = np.sign(median_filter(speed[moves], _AROUND, mode="nearest"))
+        out[moves] = sense * percentile_filter(np.abs(speed[moves]), _LOWER, _AROUND, mode="nearest")
+    return out

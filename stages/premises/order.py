@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.ndimage import binary_erosion, median_filter, percentile_filter
+from scipy.ndimage import median_filter
 
 from pipeline.arrays import Bool, Float, Int
 from stages.premises.light import Light, pattern_breaks
-from stages.premises.moving import wall_moves
+from stages.premises.moving import lower_speed, wall_moves
 from stages.premises.pictures import CLOSED, Pictures
 
 # In usual steps: two pictures exchanged go on by two, back by one, on by two. The middle between these and
@@ -16,8 +16,6 @@ _ON, _BACK, _ASTRAY = 1.5, -0.5, 0.5
 # Neighbours in two lights that were exchanged look like two losses, of which the wall shows nothing: it goes
 # on by 1 in place of 1.5 times the usual way at least.
 _NO_LOSS = 1.25
-# Percentile of the steps around that is the speed where pictures were lost in up to half of them.
-_LOWER = 25
 _AROUND = 9
 _FEWEST = 12
 # The rhythm is looked at as far behind an exchange as its memory reaches.
@@ -81,7 +79,7 @@ def _lights_exchanged(light: Int, place: Int, size: Float) -> Bool:
     out = np.zeros(len(light), bool)
     breaks = pattern_breaks(light)
     way = np.cumsum(size)
-    speed = _speed_without_losses(size / np.diff(place, prepend=place[0] - 1))
+    speed = lower_speed(size / np.diff(place, prepend=place[0] - 1))
     for first in np.flatnonzero(breaks[:-1] & (light[:-1] != light[1:])):
         last = int(np.searchsorted(place, first)) - 1
         after = int(np.searchsorted(place, first + 1, side="right"))
@@ -90,20 +88,6 @@ def _lights_exchanged(light: Int, place: Int, size: Float) -> Bool:
         usual = speed[after] * (place[after] - place[last])
         if 0 < (way[after] - way[last]) / usual < _NO_LOSS and _mends(light, breaks, int(first)):
             out[first : first + 2] = True
-    return out
-
-
-def _speed_without_losses(speed: Float) -> Float:
-    """Return the wall's speed (K,) were no pictures lost about each step; 0 where the wall stands.
-
-    Lost pictures, however many, only make steps longer: the lower ones of those that move tell it. Steps of a
-    wall that stands are shorter for another reason, and so are those in which it stops or sets out.
-    """
-    out = np.zeros(len(speed))
-    moves = binary_erosion(wall_moves(speed, speed), border_value=True)
-    if moves.any():
-        sense = np.sign(median_filter(speed[moves], _AROUND, mode="nearest"))
-        out[moves] = sense * percentile_filter(np.abs(speed[moves]), _LOWER, _AROUND, mode="nearest")
     return out
 
 

@@ -5,9 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.ndimage import median_filter
 
 from pipeline.adjustment.circles import circles_through
-from pipeline.adjustment.robust import basis_of, ring_harmonics
+from pipeline.adjustment.robust import basis_of, ring_harmonics, row_median
 from pipeline.arrays import Float
 from pipeline.artefacts.findings import clock_of_azimuth
 from pipeline.errors import UnusableError
@@ -67,6 +68,16 @@ def radius_seen_mm(rings_mm: Float) -> float:
             "be stated for pictures of this size",
         )
     return float(np.nanmedian(radius_mm))
+
+
+def radius_along_mm(pictures: Pictures, rings_mm: Float) -> Float:
+    """Return the pipe's radius (F,) at each picture by the closed laser lines about it; NaN without any."""
+    place, ring_mm = np.flatnonzero(pictures.closed > CLOSED), row_median(np.linalg.norm(rings_mm, axis=-1))
+    known = np.isfinite(ring_mm)
+    if not known.any():
+        return np.full(len(pictures.closed), np.nan)
+    smooth_mm = median_filter(ring_mm[known], _LEAST_STEPS + 1, mode="nearest")
+    return np.interp(np.arange(len(pictures.closed)), place[known], smooth_mm)
 
 
 def warn_of_oval(rings_mm: Float, context: Context) -> None:

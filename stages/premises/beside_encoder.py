@@ -1,0 +1,80 @@
+"""Whether the encoder shows, too, that the probe was faster for a moment: then no pictures were lost."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.ndimage import median_filter
+
+from pipeline.arrays import Float
+from pipeline.recording.base import Encoder
+from stages.premises.moving import usual_speed
+
+# The encoder's clock may be off by so many pictures, as it is behind losses that were not found: within them
+# it must be steady (chosen: a third of a second at 30 a second).
+_SHIFTS = np.arange(-10, 11)
+# The usual speed is that over nine steps, as for the wall, and over five changes of the count at least: more
+# than half of them must lie outside of the one that is looked at.
+_STEPS, _COUNTS = 9, 5
+
+
+@dataclass(frozen=True)
+class Pace:
+    """How far an encoder goes, and how fast it usually does.
+
+    Attributes
+    ----------
+    time_s, distance : (N,)
+        Midway between readings that differ. There a count is known to the width of a reading, however coarse
+        it is; in between only that it goes on.
+    grid_s, usual : (M,)
+        Usual advance per picture; 0 where the encoder stands.
+    period_s, least : float
+        From picture to picture, and the smallest advance over one that is no standing.
+    """
+
+    time_s: Float
+    distance: Float
+    grid_s: Float
+    usual: Float
+    period_s: float
+    least: float
+
+    @classmethod
+    def of(cls, encoder: Encoder | None, period_s: float, step_pictures: float) -> Pace | None:
+        """Return the pace of an encoder beside steps of so many pictures; None where it stands."""
+        k = np.empty(0, np.int64) if encoder is None else np.flatnonzero(np.diff(encoder.distance_mm))
+        if encoder is None or len(k) < _COUNTS:
+            return None
+        time_s, mm = ((v[k] + v[k + 1]) / 2 for v in (encoder.time_s, encoder.distance_mm))
+        grid_s = np.arange(time_s[0], time_s[-1], period_s)
+        speed = np.diff(np.interp(grid_s, time_s, mm))
+        if len(speed) < _STEPS:
+            return None
+        slow = _COUNTS * float(np.median(np.diff(time_s))) / period_s
+        usual = median_filter(speed, 2 * round(max(_STEPS * step_pictures, slow) / 2) + 1, mode="nearest")
+        least = float(np.abs(usual_speed(speed)[usual_speed(speed) != 0]).min(initial=np.inf))
+        return cls(time_s, mm, grid_s[1:] - period_s / 2, usual, period_s, least)
+
+    def excess(self, begin_s: float, end_s: float) -> Float:
+        """Return by how many pictures (21,) more than usual the encoder advances from one time to another.
+
+        There is a value for each assumed shift of its clock, first that for none. Compared is the way between
+        those changes of the count that enclose the times, so that a slow or coarse count is compared over as
+        long as it takes. NaN where no changes enclose them, infinite where the encoder turns back.
+        """
+        shifts_s = self.period_s * np.r_[0, _SHIFTS[_SHIFTS != 0]]
+        sense = float(np.sign(np.interp((begin_s + end_s) / 2, self.grid_s, self.usual)))
+        return np.array([self._excess(begin_s + s, end_s + s, sense) for s in shifts_s])
+
+    def _excess(self, begin_s: float, end_s: float, sense: float) -> float:
+        begin = int(np.searchsorted(self.time_s, begin_s, side="right")) - 1
+        end = int(np.searchsorted(self.time_s, end_s))
+        if begin < 0 or end >= len(self.time_s):
+            return float("nan")
+        span_s, way = (float(v[end] - v[begin]) for v in (self.time_s, self.distance))
+        usual = float(np.interp((self.time_s[begin] + self.time_s[end]) / 2, self.grid_s, self.usual))
+        if usual * sense < 0 or sense == 0:
+            return float("inf")
+        return sense * (way - usual * span_s / self.period_s) / max(abs(usual), self.least)

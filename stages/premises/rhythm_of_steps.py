@@ -1,0 +1,63 @@
+"""In which rhythm the wall was shown when the pictures were taken, told by the steps between lit ones."""
+
+from __future__ import annotations
+
+from math import gcd
+
+import numpy as np
+from scipy.ndimage import median_filter
+
+from pipeline.arrays import Float, Int
+
+# Steps over so many pictures count as a part of the pattern where they are one in ten of all, and six: a last
+# step that is not whole, or a loss by chance, is none. Chosen.
+_SHARE, _FEWEST = 0.1, 6
+# Sizes of steps are compared with the median of so many about them that span the usual number.
+_AROUND = 9
+# The pictures that steps truly took are whole numbers within this part of one (chosen: steps err by a tenth),
+# and a recorder loses one in two at most in a pattern.
+_WHOLE, _LONGEST = 0.25, 2
+
+
+def over_whole_periods(pictures: Int, size: Float, rhythm: int) -> tuple[int, Int]:
+    """Return the rhythm, and how many lost pictures (K,) make steps over so many whole periods of it.
+
+    Steps over 1 and 3 pictures by turns, of which the latter go twice as far, were taken over 2 and 4: no
+    others fit. The evidence is the numbers of ``pictures`` (K,) that many steps span, and the median size of
+    such steps; what single steps span, at the end or elsewhere, decides nothing. Where no whole numbers fit,
+    the number that more than half of the steps span is the period. Where there is none, or steps go as far as
+    their pictures lead to expect, the ``rhythm`` of the lights stays.
+    """
+    span, often = np.unique(pictures, return_counts=True)
+    pattern = span[often >= max(_SHARE * len(pictures), _FEWEST)]
+    usual = int(span[np.argmax(often)])
+    if usual not in pattern:
+        return rhythm, np.zeros_like(pictures)
+    taken = _taken_over(pattern, _sizes(pictures, size, pattern, usual), usual)
+    if taken is None:
+        pattern = taken = np.array([usual if 2 * often.max() > len(pictures) else 1])
+    period = gcd(*map(int, taken))
+    if period == 1 or (len(pattern) > 1 and np.array_equal(taken, pattern)):
+        return rhythm, np.zeros_like(pictures)
+    over = -pictures % period
+    for one, true in zip(pattern, taken, strict=True):
+        over[pictures == one] = true - one
+    return period, over
+
+
+def _sizes(pictures: Int, size: Float, pattern: Int, usual: int) -> Float:
+    """Return the median size (P,) of steps of a pattern, in that of steps over the ``usual`` number."""
+    same = np.flatnonzero(pictures == usual)
+    beside = median_filter(np.abs(size[same]), _AROUND, mode="mirror")
+    around = np.interp(np.arange(len(size)), same, beside)
+    relative = np.abs(size) / np.where(around > 0, around, np.inf)
+    return np.array([float(np.median(relative[pictures == one])) for one in pattern])
+
+
+def _taken_over(pattern: Int, size: Float, usual: int) -> Int | None:
+    """Return over how many pictures (P,) steps of a pattern were taken: the fewest that fit their sizes."""
+    for first in range(usual, _LONGEST * usual + 1):
+        taken = np.rint(first * size).astype(np.int64)
+        if np.all(np.abs(first * size - taken) < _WHOLE) and np.all(taken >= pattern):
+            return taken
+    return None

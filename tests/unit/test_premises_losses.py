@@ -1,0 +1,102 @@
+"""Lost pictures told by the wall's motion: none where a hand pulls the probe, and true ones in place."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from stages.premises.losses import Steps
+from stages.premises.rhythm_of_steps import over_whole_periods
+from tests.hand_pulled import RADIUS_MM, Pulled, pulled
+
+# Encoders in readings a second and mm a count; runs in which pictures had been lost that were there.
+ENCODERS = [(100, 0.0), (10, 0.0), (10, 1.0), (5, 0.0)]
+INVENTED = {1: (12, 17, 22, 29, 65, 98, 99, 142, 158, 159, 163, 190), 2: (9, 31, 43, 81, 140)}
+
+
+@pytest.mark.parametrize("rhythm", [1, 2])
+@pytest.mark.parametrize(("encoder_hz", "quantum_mm"), ENCODERS)
+def test_a_probe_pulled_by_hand_loses_no_pictures(encoder_hz: float, quantum_mm: float, rhythm: int) -> None:
+    """Where it stopped, turned or was jerked, 3 % of the runs lost pictures, and more with slow encoders."""
+    kind = {"rhythm": rhythm, "encoder_hz": encoder_hz, "quantum_mm": quantum_mm}
+    seeds = (*INVENTED[rhythm], *range(1000, 1010))
+    assert [seed for seed in seeds if pulled(seed, **kind).invented()] == []
+
+
+def test_without_an_encoder_no_loss_is_told() -> None:
+    assert [s for s in range(20) if pulled(s, encoder_hz=0).invented()] == []
+
+
+def every(k: int) -> np.ndarray[tuple[int], np.dtype[np.int64]]:
+    return np.arange(k - 1, 400, k)
+
+
+@pytest.mark.parametrize("encoder", [(100, 0.0), (10, 0.0), (100, 2.0)], ids=str)
+@pytest.mark.parametrize("k", [3, 4, 5, 6, 7, 8])
+@pytest.mark.parametrize("rhythm", [1, 2])
+def test_every_kth_picture_lost_is_found_in_its_place(
+    rhythm: int, k: int, encoder: tuple[float, float]
+) -> None:
+    """Every third one was not found where a picture in two is lit, nor where all are."""
+    if (rhythm, k) == (2, 4):
+        pytest.skip("all steps are alike: a picture in three is lit, and nothing tells of losses")
+    kind = {"rhythm": rhythm, "encoder_hz": encoder[0], "quantum_mm": encoder[1]}
+    found, true = pulled(3, lost=every(k), steady=True, errors=0.5, **kind).over_steps()
+    np.testing.assert_array_equal(found, true)
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("rhythm", [1, 2])
+def test_bursts_and_pairs_are_found_in_a_run_that_goes_on(rhythm: int, seed: int) -> None:
+    lost = np.concatenate([k + np.arange(2 + seed % 2) * rhythm for k in range(40 + seed, 380, 60)])
+    lost = np.unique(np.concatenate([lost + j for j in range(rhythm)]))
+    found, true = pulled(seed, rhythm=rhythm, lost=lost, steady=True, errors=0.5).over_steps()
+    np.testing.assert_array_equal(found, true)
+
+
+def test_the_rhythm_is_not_told_by_a_last_step() -> None:
+    """Of steps over 2 and 3 by turns the last one made 3 the rhythm, and losses of the others."""
+    pictures, size = np.tile([2, 3], 20), np.tile([2.0, 4.0], 20)
+    for end in (39, 40):
+        rhythm, over = over_whole_periods(pictures[-end:], size[-end:], 5)
+        assert rhythm == 2
+        np.testing.assert_array_equal(over, pictures[-end:] == 3)
+
+
+@pytest.mark.parametrize("end", [39, 40])
+def test_lights_that_take_turns_unevenly_lose_nothing(end: int) -> None:
+    """Of laser, led, led the steps span 1 and 2 pictures, and go as far as that: no period is broken."""
+    pictures = np.tile([1, 2], 20)[-end:]
+    rhythm, over = over_whole_periods(pictures, 0.5 * pictures, 3)
+    assert (rhythm, over.any()) == (3, False)
+
+
+@pytest.mark.parametrize("sense", [1, -1])
+def test_a_run_that_goes_faster_behind_a_gap_loses_nothing(sense: int) -> None:
+    """At the end of a gauge, behind pictures that told no motion, one step at a new speed was 8 pictures."""
+    run = pulled(5, rhythm=4, frames=240, steady=True)
+    steps, encoder = run.steps, run.encoder
+    assert encoder is not None
+    gap_s = steps.end[-6] / 30
+    faster = np.where(np.arange(len(steps.end)) > len(steps.end) - 6, 3, 1)
+    kept = np.r_[np.arange(len(faster) - 6), len(faster) - 1]
+    way = encoder.distance_mm + 2 * np.maximum(encoder.distance_mm - 30 * gap_s, 0)
+    went = Steps(steps.start[kept], steps.end[kept], sense * (steps.size * faster)[kept])
+    assert replace(run, steps=went, encoder=replace(encoder, distance_mm=sense * way)).invented() == 0
+
+
+@pytest.mark.parametrize("narrower", [1.0, 1.7, 1 / 1.7])
+def test_behind_a_reducer_losses_are_found_and_none_invented(narrower: float) -> None:
+    """One radius for the whole pipe made the encoder agree with a loss where the bore is wider."""
+
+    def reduced(run: Pulled) -> Pulled:
+        factor = np.where(run.true_row > 200, narrower, 1.0)
+        steps = replace(run.steps, size=run.steps.size * factor[run.steps.end])
+        return replace(run, steps=steps, radius_mm=RADIUS_MM / factor)
+
+    assert [seed for seed in range(20) if reduced(pulled(seed)).invented()] == []
+    lost = np.array([100, 101, 300, 301])
+    found, true = reduced(pulled(1, lost=lost, steady=True, errors=0.5)).over_steps()
+    np.testing.assert_array_equal(found, true)
