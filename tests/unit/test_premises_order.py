@@ -256,6 +256,16 @@ def test_two_losses_are_no_exchange_whichever_way_the_probe_goes(sense):
     assert exchanged(taken, sense * np.arange(100.0)) == []
 
 
+@pytest.mark.parametrize("others", [0, 5])
+def test_two_losses_on_slow_wall_are_no_exchange_where_pictures_are_lost_all_the_time(others):
+    """With one picture in ten lost, two were "exchanged", left out, and three lost ones there not told."""
+    speed = np.ones(120)
+    speed[50:60] = 0.7
+    taken = np.setdiff1d(np.arange(120), np.r_[52, 55, 5 + 5 * np.arange(others), 80 + 5 * np.arange(others)])
+    first = int(np.flatnonzero(taken == 53)[0])
+    assert exchanged(taken, np.cumsum(speed)) == ([] if others else [first, first + 1])
+
+
 @pytest.mark.parametrize("seed", range(5))
 def test_a_probe_that_stands_for_most_of_a_run_makes_no_exchange(seed):
     """More than half of the run noise was compared with noise."""
