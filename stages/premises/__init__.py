@@ -35,6 +35,7 @@ from stages.premises.scale import (
     encoder_factor,
     radius_along_mm,
     radius_seen_mm,
+    refuse_backwards,
     rings_seen_mm,
     warn_of_oval,
 )
@@ -143,11 +144,12 @@ def _matched(recording: Recording, probe: Probe, seen: _Seen) -> _Matched:
     """Find the row of every picture by the lights, then by the motion of the wall, then the clock's jumps."""
     table, pictures, light, encoder = _table(recording), seen.pictures, seen.in_order, recording.encoder
     alignment = _aligned(recording.frames, table, pictures, light)
-    copy = _copies(recording, table, pictures, light, alignment)
+    copy = _copies(recording, table, pictures, light, alignment.row)
     label = np.where(copy, _stated(table, alignment.row), _labels(table, alignment, light, pictures))
     steps, sway = steps_of_wall(pictures, seen.shown, copy), sway_of_line(pictures, light)
     rings_mm = rings_seen_mm(pictures, probe)
     radius_mm = radius_seen_mm(rings_mm)
+    refuse_backwards(encoder, row_times(table, alignment.row), steps)
     one_bore = recording.kind != "gauge"
     along_mm = radius_along_mm(pictures, rings_mm)
     row = rows_by_motion(alignment.row, steps, rhythm_of(light), table, encoder, sway, along_mm, one_bore)
@@ -185,12 +187,10 @@ def _progressive(
     return recording, look_at_pictures(recording, probe, context), True
 
 
-def _copies(
-    recording: Recording, table: FrameTable, pictures: Pictures, light: Int, alignment: Alignment
-) -> Bool:
+def _copies(recording: Recording, table: FrameTable, pictures: Pictures, light: Int, row: Int) -> Bool:
     """Return which pictures (F,) repeat an earlier one."""
-    stated, time_s = _lights_of(_stated(table, alignment.row)), row_times(table, alignment.row)
-    return copies(pictures, light, stated, alignment.row, time_s, recording.encoder)
+    stated, time_s = _lights_of(_stated(table, row)), row_times(table, row)
+    return copies(pictures, light, stated, row, time_s, recording.encoder)
 
 
 def _table(recording: Recording) -> FrameTable:

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.ndimage import median_filter
 
 from pipeline.adjustment.circles import circles_through
-from pipeline.adjustment.robust import basis_of, ring_harmonics, row_median
+from pipeline.adjustment.robust import basis_of, ring_harmonics, root_mean_square, row_median
 from pipeline.arrays import Float
 from pipeline.artefacts.findings import clock_of_azimuth
 from pipeline.errors import UnusableError
@@ -31,6 +31,14 @@ _NEAR_UNIT = 1.25
 # Unrolled walls show motion to about a tenth, and a gauge's bores differ from their mean: neither makes two.
 _CONTRADICTS = 2.0
 _LEAST_STEPS, _ONE_SIGN = 8, 0.8
+# Motion that fits twice as well backwards in time is backwards: in 29 recordings that are not, open-1 to a12,
+# it fits 1.24 times as well at best, and in all 14 gauges when reversed 2.2 times or more. Few steps tell
+# nothing.
+_TWICE, _LEAST_TOLD = 2.0, 20
+_MAYBE_BACKWARDS = (
+    "Or the pictures are stored last first, which so steady a motion does not tell: then distances are wrong "
+    "by as much as the speed varied. Look whether the video runs backwards. "
+)
 # Second harmonic of the ring, in radii, from which it is told; .013 at most in 15 fields (open-1 to open-3,
 # a01 to a12), .030 where pictures were made 2 % wider.
 _OVAL = 0.02
@@ -167,6 +175,43 @@ class _Ratio:
     one_sign: float
 
 
+def refuse_backwards(encoder: Encoder | None, time_s: Float, steps: Steps) -> None:
+    """Refuse pictures that are stored last first: the wall moves as the encoder does, read backwards in time.
+
+    Raises
+    ------
+    UnusableError
+        When that fits the motion twice as well as the encoder as it is, whichever its sign and unit.
+    """
+    if encoder is None:
+        return
+    mirrored_s = time_s[0] + time_s[-1] - time_s
+    known = np.all((_ends(steps, time_s, mirrored_s) >= encoder.time_s[0]), axis=0)
+    known &= np.all((_ends(steps, time_s, mirrored_s) <= encoder.time_s[-1]), axis=0)
+    if known.sum() < _LEAST_TOLD:
+        return
+    as_it_is, backwards = (
+        _misfit(steps.size[known], steps.by_encoder(encoder, t)[known]) for t in (time_s, mirrored_s)
+    )
+    if _TWICE * backwards < as_it_is:
+        raise UnusableError(
+            "premises",
+            "the pictures are stored last first: the wall moves in them as the encoder says if it is read "
+            f"backwards in time, which fits {as_it_is / max(backwards, 1e-9):.1f} times as well",
+            hint="turn the order of the pictures round, or find out what reversed the video",
+        )
+
+
+def _ends(steps: Steps, *times_s: Float) -> Float:
+    """Return when steps begin and end (2 M, K) by M kinds of times (F,)."""
+    return np.stack([t[place] for t in times_s for place in (steps.start, steps.end)])
+
+
+def _misfit(wall: Float, shown: Float) -> float:
+    """Return by how much steps of the wall (K,) differ from those ``shown`` (K,), at the best ratio."""
+    return root_mean_square(wall - shown * float(wall @ shown) / max(float(shown @ shown), 1e-12))
+
+
 def encoder_factor(
     recording: Recording, time_s: Float, steps: Steps, radius_mm: float, context: Context
 ) -> float:
@@ -192,7 +237,7 @@ def encoder_factor(
         context.warn(
             f"the encoder reads {found.value:.3g} mm where the wall's texture moves by 1 mm, in "
             f"{found.steps} steps: its readings are taken as {' and '.join(wrong)}, and multiplied by "
-            f"{factor:g}. What to do: correct encoder.csv"
+            f"{factor:g}. {_MAYBE_BACKWARDS if factor < 0 else ''}What to do: correct encoder.csv"
         )
     elif contradicts:
         held_back = ", or the codec holds the wall's texture back" if abs(found.value) > 1 else ""

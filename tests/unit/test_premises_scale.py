@@ -9,13 +9,15 @@ import numpy as np
 import pytest
 
 from pipeline.errors import UnusableError
-from pipeline.recording.base import Encoder, PipeFacts
+from pipeline.recording.base import Encoder, FrameTable, PipeFacts
 from stages.premises.losses import Steps
-from stages.premises.scale import encoder_factor, warn_of_oval
+from stages.premises.scale import encoder_factor, refuse_backwards, warn_of_oval
 from tests.drawn_run import BASELINE, RADIUS
-from tests.premises_run import checked
+from tests.hand_pulled import pulled
+from tests.premises_run import COUNT, STEP_MM, checked
 from tests.quiet import quiet_context
 from tests.ring_images import MemorySource
+from tests.spoiled_recordings import KeptFrames
 
 
 @pytest.mark.parametrize(
@@ -138,3 +140,47 @@ def test_scratches_on_the_window_are_not_taken_for_the_wall(good, run, monkeypat
     assert found.applied_to(scratched).stays is not None
     monkeypatch.setattr("stages.premises.places_that_stay", lambda *parts: None)
     assert checked(scratched, run.probe)[0].encoder_factor == 1, "the control: scratches are followed"
+
+
+def turned_round(run, sense=1):
+    """Return a drawn run whose pictures are stored last first, and its encoder, with another ``sense``."""
+    last, steps = len(run.true_row) - 1, run.steps
+    turned = Steps(last - steps.end[::-1], last - steps.start[::-1], -steps.size[::-1])
+    return replace(run.encoder, distance_mm=sense * run.encoder.distance_mm), run.table.time_s, turned
+
+
+@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("encoder", [(100, 0.0), (10, 1.0)], ids=str)
+@pytest.mark.parametrize("sense", [1, -1])
+def test_pictures_stored_last_first_end_the_run(seed, encoder, sense):
+    """The encoder's sign was turned round, and half of the radii were wrong by more than stated."""
+    run = pulled(seed, encoder_hz=encoder[0], quantum_mm=encoder[1])
+    with pytest.raises(UnusableError, match="last first"):
+        refuse_backwards(*turned_round(run, sense))
+    sound = replace(run.encoder, distance_mm=sense * run.encoder.distance_mm)
+    refuse_backwards(sound, run.table.time_s, run.steps)
+
+
+def test_a_steady_probe_does_not_tell_whether_the_video_runs_backwards(good, run):
+    refuse_backwards(*turned_round(pulled(1, steady=True)))
+    backwards = replace(good, encoder=replace(good.encoder, distance_mm=-good.encoder.distance_mm))
+    assert "Look whether the video runs backwards" in checked(backwards, run.probe)[1][0]
+
+
+def test_a_recording_whose_video_runs_backwards_is_refused(good, run):
+    kept = np.r_[0:24:3, 24:COUNT]
+    time_s = good.frames.time_s[: len(kept)]
+    table = FrameTable(np.arange(len(kept)), time_s, good.frames.illumination[kept])
+    forward = replace(
+        good,
+        source=KeptFrames(good.source, kept),
+        frames=table,
+        listed=None,
+        encoder=Encoder(np.r_[-1, time_s, 9], STEP_MM * np.r_[0, kept, COUNT]),
+    )
+    last_first = {k: good.source.images[n] for k, n in enumerate(kept[::-1])}
+    source = MemorySource(last_first, run.probe.camera.image_size)
+    turned = replace(table, illumination=table.illumination[::-1])
+    assert not checked(forward, run.probe)[1], "the control: as it was taken nothing is wrong"
+    with pytest.raises(UnusableError, match="last first"):
+        checked(replace(forward, source=source, frames=turned), run.probe)
