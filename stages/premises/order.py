@@ -92,7 +92,8 @@ def _lights_exchanged(light: Int, place: Int, size: Float) -> Bool:
         if 0 < (way[after] - way[last]) / usual < _NO_LOSS and _mends(light, breaks, int(first)):
             out[first : first + 2] = True
             back[[first, first + 1]] = back[[first + 1, first]]
-    return out & (2 * pattern_breaks(back).sum() <= breaks.sum())
+    explained = 2 * int(pattern_breaks(back).sum()) <= int(breaks.sum())
+    return out if explained else np.zeros_like(out)
 
 
 def _mends(light: Int, breaks: Bool, first: int) -> bool:
