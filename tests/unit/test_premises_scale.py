@@ -184,3 +184,15 @@ def test_a_recording_whose_video_runs_backwards_is_refused(good, run):
     assert not checked(forward, run.probe)[1], "the control: as it was taken nothing is wrong"
     with pytest.raises(UnusableError, match="last first"):
         checked(replace(forward, source=source, frames=turned), run.probe)
+
+
+@pytest.mark.parametrize("late_s", [-0.1, 0.02, 0.1])
+def test_a_probe_that_goes_there_and_back_is_not_refused_for_a_late_clock(late_s):
+    """Where it turns just before the middle, a tenth of a second makes the encoder fit backwards."""
+    time_s = np.arange(217) / 30
+    turn_s = (time_s[-1] - late_s) / 2
+    at = np.arange(0, 217, 4)
+    size = np.diff(-np.abs(time_s[at] - turn_s)) + 0.002 * np.sin(at[1:])
+    read_s = np.arange(-100, 900) / 100
+    encoder = Encoder(read_s, -30 * np.abs(read_s - late_s - turn_s))
+    refuse_backwards(encoder, time_s, Steps(at[:-1], at[1:], size))
