@@ -26,8 +26,8 @@ class Pace:
     Attributes
     ----------
     time_s, distance : (N,)
-        Midway between readings that differ. There a count is known to the width of a reading, however coarse
-        it is; in between only that it goes on.
+        Midway between readings that differ, and at both ends. There a count is known to the width of a
+        reading, however coarse it is; in between only that it goes on.
     grid_s, usual : (M,)
         Usual advance per picture; 0 where the encoder stands.
     period_s, least : float
@@ -47,7 +47,10 @@ class Pace:
         k = np.empty(0, np.int64) if encoder is None else np.flatnonzero(np.diff(encoder.distance_mm))
         if encoder is None or len(k) < _COUNTS:
             return None
-        time_s, mm = ((v[k] + v[k + 1]) / 2 for v in (encoder.time_s, encoder.distance_mm))
+        time_s, mm = (
+            np.concatenate([v[:1], (v[k] + v[k + 1]) / 2, v[-1:]])
+            for v in (encoder.time_s, encoder.distance_mm)
+        )
         grid_s = np.arange(time_s[0], time_s[-1], period_s)
         speed = np.diff(np.interp(grid_s, time_s, mm))
         if len(speed) < _STEPS:

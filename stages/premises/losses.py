@@ -155,7 +155,8 @@ def _encoder_bears_out(leap: _Leap, pace: Pace | None, between_s: Float, *, in_s
     """Return whether a leap between two times is a loss: the encoder does not leap then.
 
     A loss for which the table has rows to spare, or of rows that were skipped, needs no encoder, but none may
-    contradict it. Beside any other it must be steady, whatever its clock is off by.
+    contradict it. Beside any other it must be steady, whatever its clock is off by, and known for a fifth
+    of that.
     """
     known = in_spare_rows or leap.lost < 0
     if pace is None:
@@ -163,7 +164,8 @@ def _encoder_bears_out(leap: _Leap, pace: Pace | None, between_s: Float, *, in_s
     shown = pace.excess(float(between_s[0]), float(between_s[1])) / leap.lost
     if known:
         return not shown[0] > 1 / 2
-    return bool(np.isfinite(shown[0]) and np.all(np.isnan(shown) | (np.abs(shown) < 1 / 2)))
+    steady = np.abs(shown[~np.isnan(shown)]) < 1 / 2
+    return bool(5 * len(steady) >= len(shown) and steady.all())
 
 
 def _part(between: Float, lost: int) -> float:
