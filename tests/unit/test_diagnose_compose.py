@@ -197,6 +197,16 @@ def test_doubtful_steps_of_two_recordings_are_both_told_and_bear_nothing_out(rea
     assert "At 1.30 s the reading gains +2.00 mm" in found.identifiable
 
 
+def test_several_doubtful_steps_of_one_recording_may_have_another_cause(real_probe: Probe) -> None:
+    """A delay that nobody knows looks like two of opposite sign where the probe turns."""
+    back = replace(DOUBTFUL, time_s=2.5, gain_mm=-2.0)
+    found = of_gauge(real_probe, doubtful=(DOUBTFUL, back))
+    assert found.verdict is Verdict.UNEXPLAINED
+    assert found.effects == ()
+    assert "gains +2.00 mm" in found.identifiable
+    assert "gains -2.00 mm" in found.identifiable
+
+
 def test_beside_a_doubtful_slip_a_scale_keeps_its_size_but_no_sure_name(real_probe: Probe) -> None:
     """Three pictures at the end, placed wrongly, may be a slip; the encoder's scale is 2 % off."""
     way, encoder = sight(np.random.default_rng(10), drift_mm=0.001), read(scale=0.02)
