@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import median_filter
 
 from pipeline.arrays import Bool, Float, Int
 from pipeline.errors import InputError
@@ -19,8 +20,9 @@ from pipeline.recording.base import Encoder, FrameTable, Recording
 from pipeline.recording.one_field import OneField
 
 # A step of the encoder is a jump when it is so long, and so many times the usual largest (this quantile of
-# the steps by which it moves at all) and what it moves by just before and after (the median of five steps).
-_LARGEST, _JUMP_FACTOR, _BESIDE, _JUMP_MM = 0.95, 10.0, 5, 1.0
+# the steps by which it moves at all) and what it moves by just before and after: the median of five steps, or
+# of two tenths of a second, since between readings of 30 a second others may have been put.
+_LARGEST, _JUMP_FACTOR, _BESIDE, _BESIDE_S, _JUMP_MM = 0.95, 10.0, 5, 0.2, 1.0
 
 
 def common_frames(table: FrameTable, count: int) -> tuple[FrameTable, tuple[str, ...]]:
@@ -94,8 +96,9 @@ def _jumps(encoder: Encoder) -> Int:
     if not step_mm.any():
         return np.empty(0, np.int64)
     usual_mm = float(np.quantile(step_mm[step_mm > 0], _LARGEST, method="lower"))
-    around = np.lib.stride_tricks.sliding_window_view(np.pad(step_mm, _BESIDE // 2, mode="edge"), _BESIDE)
-    least_mm = np.maximum(_JUMP_FACTOR * np.maximum(usual_mm, np.median(around, -1)), _JUMP_MM)
+    a_while = 2 * int(0.5 * _BESIDE_S / np.median(np.diff(encoder.time_s))) + 1
+    around_mm = median_filter(step_mm, max(_BESIDE, a_while), mode="nearest")
+    least_mm = np.maximum(_JUMP_FACTOR * np.maximum(usual_mm, around_mm), _JUMP_MM)
     return np.flatnonzero(step_mm > least_mm)
 
 

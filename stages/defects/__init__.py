@@ -22,6 +22,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import ndtri
 
+from pipeline.adjustment.held_over import HeldOver
 from pipeline.arrays import Float, Float32
 from pipeline.artefacts.cloud_along import cloud_along
 from pipeline.artefacts.findings import Defect, Defects
@@ -34,7 +35,7 @@ from pipeline.recording.base import Recording
 from pipeline.recording.checks import CheckedFrames
 from stages.defects.along import stretches
 from stages.defects.clean import clean_wall
-from stages.defects.corroborate import Evidence, Witnesses, evidence_for
+from stages.defects.corroborate import LEAST_RINGS, Evidence, Witnesses, evidence_for
 from stages.defects.credibility import (
     COUNTED,
     MOST_SURE,
@@ -65,6 +66,8 @@ _FEW_UNCONFIRMED, _MANY_FALSE = 3, 0.25
 _WALL_OR_NOT = 0.5
 # A limit of detection so many times what is asked for is told. Chosen; good ones are near what is asked for.
 _DEEPER = 2.0
+# The limit of detection is told for defects so long; by so many rings it is looked when two count as two.
+_SHORT_MM, _MOST_RINGS = 3.0, 40
 _UNSURE = "Its depth is not known to twice its σ"
 
 
@@ -110,6 +113,7 @@ def find_defects(
     _report(items, alone, len(regions) - len(found), expected, context)
     smallest_mm = _smallest_depth(seeds, parameters)
     _warn_of_missed(smallest_mm, parameters.min_depth_mm, context)
+    _warn_of_short_ones(wall.held, measured.spacing_mm, context)
     return Defects(items, expected, smallest_mm, alone)
 
 
@@ -228,8 +232,21 @@ def _warn_of_missed(smallest_mm: float, asked_mm: float, context: Context) -> No
         context.warn(
             f"only from {smallest_mm:.2g} mm of depth on nine of ten defects of 3 mm × 3 mm are found; "
             f"{asked_mm:.2g} mm are asked for, and the line is too unsteady here. Shallower ones are missed, "
-            "and deeper ones where the wall was not measured. What to do: record with less compression, a "
+            "and so is any where the wall was not measured. What to do: record with less compression, a "
             "sharper picture and a camera that sits tight"
+        )
+
+
+def _warn_of_short_ones(held: HeldOver, ring_spacing_mm: float, context: Context) -> None:
+    """Warn where rings share so much light that a short defect has no two of them to show it."""
+    enough = (n for n in range(LEAST_RINGS, _MOST_RINGS) if held.independent(n) >= LEAST_RINGS)
+    rings = next(enough, _MOST_RINGS)
+    length_mm = rings * ring_spacing_mm
+    if length_mm > _SHORT_MM and rings > LEAST_RINGS:
+        context.warn(
+            f"the codec repeats so much light that {rings} rings in a row say no more than {LEAST_RINGS} of "
+            f"a good recording: defects shorter than {length_mm:.2g} mm along the pipe count only where the "
+            "photo shows them, too, and are unconfirmed elsewhere. What to do: record with less compression"
         )
 
 
@@ -278,5 +295,5 @@ def _defects_of_run(
 
 
 DEFECTS = Stage(
-    "defects", "24", DefectParameters, _defects_of_run, "defects as instances with depth, clock and kind"
+    "defects", "25", DefectParameters, _defects_of_run, "defects as instances with depth, clock and kind"
 )

@@ -33,10 +33,11 @@ from stages.premises.rows import Alignment, Lights, aligned
 from stages.premises.scale import (
     check_diameter,
     encoder_factor,
+    in_mm,
     radius_along_mm,
     radius_seen_mm,
-    refuse_backwards,
     rings_seen_mm,
+    runs_forwards,
     warn_of_oval,
 )
 from stages.premises.stays import places_that_stay
@@ -127,6 +128,7 @@ class _Matched:
     steps: Steps
     rings_mm: Float
     radius_mm: float
+    forwards: bool
 
 
 def _seen(recording: Recording, probe: Probe, pictures: Pictures, context: Context) -> _Seen:
@@ -148,28 +150,28 @@ def _matched(recording: Recording, probe: Probe, seen: _Seen) -> _Matched:
     label = np.where(copy, _stated(table, alignment.row), _labels(table, alignment, light, pictures))
     steps, sway = steps_of_wall(pictures, seen.shown, copy), sway_of_line(pictures, light)
     rings_mm = rings_seen_mm(pictures, probe)
-    radius_mm = radius_seen_mm(rings_mm)
-    refuse_backwards(encoder, row_times(table, alignment.row), steps)
-    one_bore = recording.kind != "gauge"
-    along_mm = radius_along_mm(pictures, rings_mm)
-    row = rows_by_motion(alignment.row, steps, rhythm_of(light), table, encoder, sway, along_mm, one_bore)
+    along_mm, radius_mm = radius_along_mm(pictures, rings_mm), radius_seen_mm(rings_mm)
+    time_s = row_times(table, alignment.row)
+    forwards = runs_forwards(encoder, time_s, steps)
+    one_bore, read = recording.kind != "gauge", in_mm(encoder, time_s, steps, radius_mm)
+    row = rows_by_motion(alignment.row, steps, rhythm_of(light), table, read, sway, along_mm, one_bore)
     stated_s = without_stretch(row_times(table, row), row, table, recording.frame_rate)
     jumps = clock_jumps(stated_s, steps, encoder)
     changes = Changes(recording.frames, label, row, without_jumps(stated_s, jumps))
-    return _Matched(changes, LeftOut(seen.outside, seen.astray, copy), jumps, steps, rings_mm, radius_mm)
+    left_out = LeftOut(seen.outside, seen.astray, copy)
+    return _Matched(changes, left_out, jumps, steps, rings_mm, radius_mm, forwards)
 
 
 def _compared(recording: Recording, probe: Probe, seen: _Seen, found: _Matched, context: Context) -> float:
     """Warn of all that is not as stated; return the factor that the encoder's readings are to be given."""
     frame, pictures, changes = recording.frames.frame, seen.pictures, found.changes
-    warn_of_frames(
-        changes, pictures, np.where(seen.outside, Light.WALL, seen.light), _table(recording), context
-    )
+    shown = np.where(seen.outside, Light.WALL, seen.light)
+    warn_of_frames(changes, pictures, shown, _table(recording), context)
     found.left_out.warn(frame, context)
     warn_of_cuts(cuts(pictures, seen.shown, found.left_out.any, changes.time_s), pictures, frame, context)
     check_diameter(found.radius_mm, recording.pipe, probe.lighting.radius_mm, context)
     warn_of_oval(found.rings_mm, context)
-    factor = encoder_factor(recording, changes.time_s, found.steps, found.radius_mm, context)
+    factor = encoder_factor(recording, changes.time_s, found.steps, found.radius_mm, found.forwards, context)
     warn_of_clock(found.jumps, changes.time_s, recording, context)
     _report(pictures, found.radius_mm, changes, context)
     return factor
@@ -291,9 +293,6 @@ def _report(pictures: Pictures, radius_mm: float, changes: Changes, context: Con
 
 
 PREMISES = Stage(
-    "premises",
-    "21",
-    PremisesParameters,
-    check_premises,
+    "premises", "22", PremisesParameters, check_premises,
     "lights, times, encoder and diameter as stated, held against the pictures and mended",
-)
+)  # fmt: skip

@@ -65,7 +65,7 @@ class Pace:
 
         There is a value for each assumed shift of its clock, first that for none. Compared is the way between
         those changes of the count that enclose the times, so that a slow or coarse count is compared over as
-        long as it takes. NaN where no changes enclose them, infinite where the encoder turns back.
+        long as it takes. NaN where no changes enclose them, infinite where the encoder stands or turns back.
         """
         shifts_s = self.period_s * np.r_[0, _SHIFTS[_SHIFTS != 0]]
         sense = float(np.sign(np.interp((begin_s + end_s) / 2, self.grid_s, self.usual)))

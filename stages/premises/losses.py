@@ -131,7 +131,7 @@ def rows_by_motion(
     passed = np.maximum(time[steps.end] - time[steps.start], 1e-9) / period
     rhythm, over = over_whole_periods(np.rint(passed).astype(np.int64), steps.size, rhythm)
     sigmas = np.where(over > 0, _SIGMAS_LOST, _SIGMAS_LOST if left > 0 else _SIGMAS)
-    leaps = _leaps(steps, passed, rhythm, over, sigmas, one_bore)
+    leaps = _leaps(steps, passed, rhythm, over, sigmas, one_bore, left)
     leaps = [leap for leap in leaps if not _knocked(leap, steps, rhythm, sway)]
     pace = Pace.of(encoder, period, float(np.median(passed)))
     held_back = measured and _shows_more(encoder, time, steps)
@@ -155,8 +155,8 @@ def _encoder_bears_out(leap: _Leap, pace: Pace | None, between_s: Float, *, in_s
     """Return whether a leap between two times is a loss: the encoder does not leap then.
 
     A loss for which the table has rows to spare, or of rows that were skipped, needs no encoder, but none may
-    contradict it. Beside any other it must be steady, whatever its clock is off by, and known for a fifth
-    of that.
+    contradict it. Beside any other it must be steady, be its clock off by up to ten pictures, and known for a
+    fifth of these.
     """
     known = in_spare_rows or leap.lost < 0
     if pace is None:
@@ -189,18 +189,22 @@ def _in_spare_rows(leaps: list[_Leap], left: int) -> list[_Leap]:
     return out
 
 
-def _leaps(steps: Steps, passed: Float, rhythm: int, over: Int, sigmas: Float, one_bore: bool) -> list[_Leap]:
+def _leaps(
+    steps: Steps, passed: Float, rhythm: int, over: Int, sigmas: Float, one_bore: bool, left: int
+) -> list[_Leap]:
     """Return the steps that stand out by ``sigmas`` (K,), clearest first.
 
     ``passed`` (K,) is how many pictures they took by their times, to which ``over`` (K,) or a number of
     whole periods more is to be added. The error of matching is what is then left: losses do not widen it,
     however many there are. It is a part of a picture's way or a length, whichever is more: a slow wall errs
     by more of its way. Where the rhythm breaks, a loss has only to fit better than none. Without ``one_bore``
-    steps of one speed differ as the bores of a gauge do: what looks like losses is error, too.
-    Where the wall stands nothing stands out.
+    steps of one speed differ as the bores of a gauge do: what looks like losses is error, too. The table has
+    ``left`` rows more than there are pictures. Where the wall stands nothing stands out.
     """
     speed = steps.size / (passed + over)
     lost, usual = _counted(steps.size, passed, rhythm, over, lower_speed(speed))
+    if not usual.any():
+        return []
     if np.mean(lost[usual != 0] > over[usual != 0]) < _MOST_OF_STEPS:
         lost, usual = _counted(steps.size, passed, rhythm, over, usual_speed(speed))
     moves, excess = usual != 0, _excess(steps.size, usual, passed)
@@ -221,7 +225,7 @@ def _leaps(steps: Steps, passed: Float, rhythm: int, over: Int, sigmas: Float, o
         stand_out |= breaks & (lost != 0)
     stand_out &= passed < _LONGEST_STEP * np.median(passed)
     often = np.mean(stand_out[_ON_EACH_SIDE:-_ON_EACH_SIDE]) > _OFTEN
-    stand_out &= _has_neighbours(steps, passed, breaks | often)
+    stand_out &= _has_neighbours(steps, passed, breaks | often | ((lost > 0) & (lost <= left)))
     clearest = sorted(np.flatnonzero(stand_out), key=lambda k: -abs(float(excess[k])))
     return [_Leap(int(k), int(lost[k])) for k in clearest]
 
@@ -231,12 +235,13 @@ def _has_neighbours(steps: Steps, passed: Float, believed: Bool) -> Bool:
 
     Where steps miss in between, as at the end of a gauge, the speed may be another meanwhile: half as many
     again as would lie there without a gap are too far off. At the ends of a run a loss is not told from a
-    probe that is about to go faster, unless the rhythm breaks, too, or pictures are lost all the time.
+    probe that is about to go faster, unless the rhythm breaks, too, the table has rows for it, or pictures
+    are lost all the time.
     """
-    middle = (steps.start + steps.end) / 2
-    ahead = middle - middle[:, None]
-    close = np.abs(ahead) <= 1.5 * _AROUND_STEP * np.median(passed)  # half as many again
-    before, behind = (close & (ahead < 0)).sum(1), (close & (ahead > 0)).sum(1)
+    middle, own = (steps.start + steps.end) / 2, np.arange(len(steps.end))
+    far = 1.5 * _AROUND_STEP * np.median(passed)  # half as many again
+    before = own - np.searchsorted(middle, middle - far)
+    behind = np.searchsorted(middle, middle + far, side="right") - own - 1
     beside = believed | (np.minimum(before, behind) >= _ON_EACH_SIDE)
     return np.asarray(beside & (before + behind >= _AROUND_STEP))
 
@@ -265,8 +270,11 @@ def _shows_more(encoder: Encoder | None, time_s: Float, steps: Steps) -> bool:
 
 
 def _encoder_agrees(encoder: Encoder | None, time_s: Float, way_mm: float, part: float) -> bool:
-    """Return whether the encoder advances between two times by ``way_mm`` rather than by ``part`` of it."""
+    """Return whether the encoder moves between two times by ``way_mm`` rather than by ``part`` of it.
+
+    Its sign may not be known yet.
+    """
     if encoder is None or time_s[0] < encoder.time_s[0] or time_s[1] > encoder.time_s[-1]:
         return False
     shown_mm = float(np.diff(np.interp(time_s, encoder.time_s, encoder.distance_mm))[0])
-    return abs(shown_mm - way_mm) < abs(shown_mm - part * way_mm)
+    return abs(abs(shown_mm) - abs(way_mm)) < abs(abs(shown_mm) - abs(part * way_mm))

@@ -18,6 +18,9 @@ _ON, _BACK, _ASTRAY = 1.5, -0.5, 0.5
 _NO_LOSS = 1.25
 _AROUND = 9
 _FEWEST = 12
+# Breaks that lie anywhere in a run follow each other within so many pictures n² / N times as often: there two
+# losses look like an exchange.
+_CLOSE_BY = 3
 # The rhythm is looked at as far behind an exchange as its memory reaches.
 _BEHIND = 8
 # A run begins at its first closed line and ends at its last where none is seen for so many times as long as
@@ -70,8 +73,8 @@ def _off_their_place(step: Float) -> Bool:
 def _lights_exchanged(light: Int, place: Int, size: Float) -> Bool:
     """Return (F,) true for neighbours in two lights that break the rhythm, and would not the other way round.
 
-    None are told where they explain less than half of the breaks: a recorder that loses pictures all the time
-    also loses two so close by that they look exchanged.
+    Two pictures that are lost close by may look exchanged. None are told unless there are more of them than
+    the breaks that are left, if they lay anywhere, would make by chance.
 
     Parameters
     ----------
@@ -92,8 +95,9 @@ def _lights_exchanged(light: Int, place: Int, size: Float) -> Bool:
         if 0 < (way[after] - way[last]) / usual < _NO_LOSS and _mends(light, breaks, int(first)):
             out[first : first + 2] = True
             back[[first, first + 1]] = back[[first + 1, first]]
-    explained = 2 * int(pattern_breaks(back).sum()) <= int(breaks.sum())
-    return out if explained else np.zeros_like(out)
+    left = int(pattern_breaks(back).sum())
+    told = int(out.sum()) // 2 > _CLOSE_BY * left**2 / len(light)
+    return out if told else np.zeros_like(out)
 
 
 def _mends(light: Int, breaks: Bool, first: int) -> bool:

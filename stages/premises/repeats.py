@@ -15,9 +15,9 @@ from stages.premises.pictures import Pictures
 _STANDS, _ONE_STEP = 0.25, 1.5
 # Steps on either side from which the usual speed is taken.
 _AROUND_STEP = 9
-# Of these changes the third least is compared with that of a picture that may repeat one: where all pictures
-# tremble, two that happen to be moved alike change as little as in a steady recording.
-_LEAST_OF_AROUND = 2
+# The second least of those changes that are no copy's is compared with that of a picture that may repeat one:
+# where all pictures tremble, two that happen to be moved alike change as little as in a steady recording.
+_LEAST_OF_AROUND = 1
 
 
 def rows_of_repeats(row: Int, pictures: Pictures) -> Int:
@@ -79,7 +79,8 @@ def _repeated_alone(pictures: Pictures, light: Int) -> Bool:
             continue
         change = pictures.change[place]
         usual = median_filter(change, _AROUND_STEP, mode="mirror")
-        least = rank_filter(change, _LEAST_OF_AROUND, _AROUND_STEP, mode="mirror")
+        others = np.where(change < _STANDS * usual, np.inf, change)
+        least = rank_filter(others, _LEAST_OF_AROUND, _AROUND_STEP, mode="mirror")
         changes = np.pad(change > 2 * _STANDS * usual, 1, constant_values=True)
         out[place] = (change < _STANDS * least) & changes[:-2] & changes[2:]
     return out

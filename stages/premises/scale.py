@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.ndimage import median_filter
@@ -35,12 +35,12 @@ _LEAST_STEPS, _ONE_SIGN = 8, 0.8
 # it fits 1.24 times as well at best, and in all 14 gauges when reversed 2.2 times or more. Few steps tell
 # nothing.
 _TWICE, _LEAST_TOLD = 2.0, 20
-# The encoder's clock may be off meanwhile: five times the usual 0.02 s. Of 400 drawn runs there and back 1 %
-# is refused where it is off by .5 s, 3 % at 1 s.
-_LATE_S = np.linspace(-0.1, 0.1, 9)
+# The encoder's clock may be off meanwhile, by a second here. With a tenth, of 60 drawn runs that stop and go
+# up to 15 were refused where it was off by more; with a second none, and all 120 that ran backwards were.
+_LATE_S = np.linspace(-1, 1, 161)
 _MAYBE_BACKWARDS = (
-    "Or the pictures are stored last first, which so steady a motion does not tell: then distances are wrong "
-    "by as much as the speed varied. Look whether the video runs backwards. "
+    "Or the pictures are stored last first, which the motion in this recording does not tell: then distances "
+    "are wrong by as much as the speed varied. Look whether the video runs backwards. "
 )
 # Second harmonic of the ring, in radii, from which it is told; .013 at most in 15 fields (open-1 to open-3,
 # a01 to a12), .030 where pictures were made 2 % wider.
@@ -178,22 +178,24 @@ class _Ratio:
     one_sign: float
 
 
-def refuse_backwards(encoder: Encoder | None, time_s: Float, steps: Steps) -> None:
-    """Refuse pictures that are stored last first: the wall moves as the encoder does, read backwards in time.
+def runs_forwards(encoder: Encoder | None, time_s: Float, steps: Steps) -> bool:
+    """Return whether the wall's motion tells that the pictures are stored first to last.
+
+    It may be too steady to tell, or too few steps are known.
 
     Raises
     ------
     UnusableError
-        When that fits the motion twice as well as the encoder as it is, whichever its sign and unit, and
-        though its clock were a tenth of a second off: who goes there and back looks alike both ways.
+        When the encoder read backwards in time fits twice as well as it does as it is, whichever its sign and
+        unit, and though its clock were a second off: who goes there and back looks alike both ways.
     """
     if encoder is None:
-        return
+        return False
     mirrored_s = time_s[0] + time_s[-1] - time_s
     ends_s = np.stack([t[place] for t in (time_s, mirrored_s) for place in (steps.start, steps.end)])
     known = np.all((ends_s >= encoder.time_s[0]) & (ends_s <= encoder.time_s[-1]), axis=0)
     if known.sum() < _LEAST_TOLD:
-        return
+        return False
     late = (steps.by_encoder(encoder, time_s + by_s)[known] for by_s in _LATE_S)
     as_it_is = min(_misfit(steps.size[known], shown) for shown in late)
     backwards = _misfit(steps.size[known], steps.by_encoder(encoder, mirrored_s)[known])
@@ -204,6 +206,7 @@ def refuse_backwards(encoder: Encoder | None, time_s: Float, steps: Steps) -> No
             f"backwards in time, which fits {as_it_is / max(backwards, 1e-9):.1f} times as well",
             hint="turn the order of the pictures round, or find out what reversed the video",
         )
+    return _TWICE * as_it_is < backwards
 
 
 def _misfit(wall: Float, shown: Float) -> float:
@@ -212,7 +215,7 @@ def _misfit(wall: Float, shown: Float) -> float:
 
 
 def encoder_factor(
-    recording: Recording, time_s: Float, steps: Steps, radius_mm: float, context: Context
+    recording: Recording, time_s: Float, steps: Steps, radius_mm: float, forwards: bool, context: Context
 ) -> float:
     """Return the factor that brings the encoder to mm and to the direction of the wall's motion; warn of it.
 
@@ -222,6 +225,8 @@ def encoder_factor(
         Times of the pictures, corrected.
     radius_mm
         The pipe's radius from the laser ring: the texture's motion is measured in pipe radii.
+    forwards : bool
+        Whether the motion tells that the pictures are stored first to last: see `runs_forwards`.
     """
     if recording.encoder is None or not np.isfinite(radius_mm):
         return 1.0
@@ -233,10 +238,11 @@ def encoder_factor(
     factor = 1.0 if contradicts else size * float(np.sign(found.value))
     wrong = [f"in {unit} in place of mm"] * (abs(factor) != 1.0) + ["with its sign reversed"] * (factor < 0)
     if wrong:
+        perhaps = _MAYBE_BACKWARDS if factor < 0 and not forwards else ""
         context.warn(
             f"the encoder reads {found.value:.3g} mm where the wall's texture moves by 1 mm, in "
             f"{found.steps} steps: its readings are taken as {' and '.join(wrong)}, and multiplied by "
-            f"{factor:g}. {_MAYBE_BACKWARDS if factor < 0 else ''}What to do: correct encoder.csv"
+            f"{factor:g}. {perhaps}What to do: correct encoder.csv"
         )
     elif contradicts:
         held_back = ", or the codec holds the wall's texture back" if abs(found.value) > 1 else ""
@@ -260,6 +266,14 @@ def _ratio(encoder: Encoder, time_s: Float, steps: Steps, radius_mm: float) -> _
     ratio = by_encoder[use] / by_wall[use]
     value = float(np.median(ratio))
     return _Ratio(value, len(ratio), float((np.sign(ratio) == np.sign(value)).mean()) if value else 0.0)
+
+
+def in_mm(encoder: Encoder | None, time_s: Float, steps: Steps, radius_mm: float) -> Encoder | None:
+    """Return the encoder brought to mm by the wall's motion; its sign is kept."""
+    if encoder is None or not np.isfinite(radius_mm):
+        return encoder
+    _, size = _nearest_unit(abs(_ratio(encoder, time_s, steps, radius_mm).value))
+    return replace(encoder, distance_mm=encoder.distance_mm * size)
 
 
 def _nearest_unit(ratio: float) -> tuple[str, float]:

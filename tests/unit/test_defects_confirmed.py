@@ -78,6 +78,17 @@ def test_a_limit_of_detection_far_above_what_is_asked_for_is_told() -> None:
     assert [w for w in noisy if f"only from {limit:.2g} mm of depth on" in w]
 
 
+def test_the_length_from_which_rings_confirm_a_defect_is_told_where_a_codec_repeats_light() -> None:
+    """Nine of ten defects of 3 mm × 3 mm "were found"; none of them is, for seven rings are needed."""
+    quiet: list[str] = []
+    told: list[str] = []
+    found(2, warned=quiet)
+    coded = HeldOver(0.8 ** np.arange(17))
+    rings = next(n for n in range(2, 40) if found(n, held=coded, warned=told).items)
+    assert not [w for w in quiet if "shorter than" in w]
+    assert f"defects shorter than {rings} mm along the pipe" in told[0]
+
+
 def found_beside_hidden_wall(top, hidden, depth_mm=-1.0, width=8):
     """Return what is found where 20 rings show a ridge, highest at column ``top``, and others are hidden."""
     random = np.random.default_rng(6)

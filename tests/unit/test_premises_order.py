@@ -110,7 +110,7 @@ def test_a_speed_that_varies_over_pictures_left_out_is_no_loss():
     np.testing.assert_array_equal(row, np.arange(120))
 
 
-@pytest.mark.parametrize(("mm_a_frame", "lost"), [(1.0, 2), (2.0, 0)])
+@pytest.mark.parametrize(("mm_a_frame", "lost"), [(1.0, 2), (-1.0, 2), (2.0, 0), (-2.0, 0)])
 def test_steps_that_a_codec_holds_back_make_no_loss(mm_a_frame, lost):
     """Blocks of a codec stood, most steps came out at half, and the others were taken for lost pictures."""
     frame = np.arange(0, 120, 2)
@@ -264,6 +264,14 @@ def test_two_losses_on_slow_wall_are_no_exchange_where_pictures_are_lost_all_the
     taken = np.setdiff1d(np.arange(120), np.r_[52, 55, 5 + 5 * np.arange(others), 80 + 5 * np.arange(others)])
     first = int(np.flatnonzero(taken == 53)[0])
     assert exchanged(taken, np.cumsum(speed)) == ([] if others else [first, first + 1])
+
+
+def test_an_exchange_is_told_in_a_long_run_that_lost_pictures_elsewhere():
+    """Three lost pictures of 10 000 hid every exchange."""
+    taken = np.arange(10_000)
+    taken[[40, 41]] = taken[[41, 40]]
+    taken = np.delete(taken, 1000 + 700 * np.arange(9))
+    assert exchanged(taken, np.arange(10_000.0)) == [40, 41]
 
 
 @pytest.mark.parametrize("seed", range(5))

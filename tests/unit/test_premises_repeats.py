@@ -46,3 +46,11 @@ def test_trembling_pictures_moved_alike_by_chance_are_no_copies() -> None:
     steady = random.uniform(0.11, 0.25, 200)
     steady[[40, 90, 94]] = 0.02
     assert np.flatnonzero(line_copies(steady)).tolist() == [40, 90, 94]
+
+
+@pytest.mark.parametrize("often", [3, 4, 5, 8])
+def test_copies_that_come_often_are_all_told(often: int) -> None:
+    """Every third one, as a converter from 20 to 30 pictures a second makes them, hid the others."""
+    change = np.random.default_rng(6).uniform(0.2, 0.25, 240)
+    change[often::often] = 0.02
+    assert np.flatnonzero(line_copies(change)).tolist() == list(range(often, 240, often))

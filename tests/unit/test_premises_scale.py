@@ -11,7 +11,7 @@ import pytest
 from pipeline.errors import UnusableError
 from pipeline.recording.base import Encoder, FrameTable, PipeFacts
 from stages.premises.losses import Steps
-from stages.premises.scale import encoder_factor, refuse_backwards, warn_of_oval
+from stages.premises.scale import encoder_factor, in_mm, runs_forwards, warn_of_oval
 from tests.drawn_run import BASELINE, RADIUS
 from tests.hand_pulled import pulled
 from tests.premises_run import COUNT, STEP_MM, checked
@@ -107,7 +107,8 @@ def test_a_ratio_that_fits_no_unit_does_not_turn_the_encoder_round(good):
     time_s = np.arange(40) / 30
     told: list[str] = []
     spoiled = replace(good, encoder=Encoder(time_s, np.arange(40.0)))
-    assert encoder_factor(spoiled, time_s, steps, 1.0, replace(quiet_context(), warn=told.append)) == 1.0
+    context = replace(quiet_context(), warn=told.append)
+    assert encoder_factor(spoiled, time_s, steps, 1.0, forwards=True, context=context) == 1.0
     assert "one of the encoder's scale, its clock and the probe's baseline is wrong" in told[0]
 
 
@@ -156,13 +157,13 @@ def test_pictures_stored_last_first_end_the_run(seed, encoder, sense):
     """The encoder's sign was turned round, and half of the radii were wrong by more than stated."""
     run = pulled(seed, encoder_hz=encoder[0], quantum_mm=encoder[1])
     with pytest.raises(UnusableError, match="last first"):
-        refuse_backwards(*turned_round(run, sense))
+        runs_forwards(*turned_round(run, sense))
     sound = replace(run.encoder, distance_mm=sense * run.encoder.distance_mm)
-    refuse_backwards(sound, run.table.time_s, run.steps)
+    assert runs_forwards(sound, run.table.time_s, run.steps)
 
 
 def test_a_steady_probe_does_not_tell_whether_the_video_runs_backwards(good, run):
-    refuse_backwards(*turned_round(pulled(1, steady=True)))
+    assert not runs_forwards(*turned_round(pulled(1, steady=True)))
     backwards = replace(good, encoder=replace(good.encoder, distance_mm=-good.encoder.distance_mm))
     assert "Look whether the video runs backwards" in checked(backwards, run.probe)[1][0]
 
@@ -195,4 +196,41 @@ def test_a_probe_that_goes_there_and_back_is_not_refused_for_a_late_clock(late_s
     size = np.diff(-np.abs(time_s[at] - turn_s)) + 0.002 * np.sin(at[1:])
     read_s = np.arange(-100, 900) / 100
     encoder = Encoder(read_s, -30 * np.abs(read_s - late_s - turn_s))
-    refuse_backwards(encoder, time_s, Steps(at[:-1], at[1:], size))
+    runs_forwards(encoder, time_s, Steps(at[:-1], at[1:], size))
+
+
+@pytest.mark.parametrize("late_s", [0.3, 0.5, 1.0])
+@pytest.mark.parametrize("stop_s", [0.5, 1.0])
+def test_a_probe_that_stops_and_goes_is_not_refused_for_a_late_clock(stop_s, late_s):
+    """Pushed by rods, ended with "stored last first" in up to 15 of 60 runs."""
+    read_s = np.arange(-200, 2200) / 100
+    for seed in range(12):
+        random = np.random.default_rng(seed)
+        turns = np.cumsum(stop_s * (1 + 0.02 * random.standard_normal(80))) - 10
+        goes = np.searchsorted(turns, read_s) % 2
+        way = np.cumsum(0.3 * goes)
+        at = np.arange(0, 600, 2)
+        size = np.diff(np.interp(at / 30, read_s, way)) / 50
+        size += 0.002 * random.standard_normal(len(size))
+        encoder = Encoder(read_s + late_s, way)
+        runs_forwards(encoder, np.arange(600) / 30, Steps(at[:-1], at[1:], size))
+
+
+def test_a_motion_that_tells_its_direction_is_not_called_too_steady(good):
+    """An encoder with its sign reversed was told to be a video that may run backwards all the same."""
+    run, told = pulled(1), []
+    turned = replace(run.encoder, distance_mm=-run.encoder.distance_mm)
+    context = replace(quiet_context(), warn=told.append)
+    for forwards in (runs_forwards(turned, run.table.time_s, run.steps), False):
+        given = replace(good, encoder=turned), run.table.time_s, run.steps, 50.0
+        assert encoder_factor(*given, forwards=forwards, context=context) == -1
+    assert "runs backwards" not in told[0]
+    assert "runs backwards" in told[1]
+
+
+@pytest.mark.parametrize("unit_mm", [1.0, 25.4, 1000.0])
+def test_an_encoder_is_brought_to_mm_whichever_its_sign(unit_mm):
+    run = pulled(2)
+    read = replace(run.encoder, distance_mm=-run.encoder.distance_mm / unit_mm)
+    brought = in_mm(read, run.table.time_s, run.steps, 50.0)
+    np.testing.assert_allclose(brought.distance_mm, -run.encoder.distance_mm)

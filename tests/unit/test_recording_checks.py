@@ -47,6 +47,16 @@ def test_a_jump_is_told(way: str) -> None:
     assert f"jumps by up to 40{'.3' * (way != 'jumps while it stands')} mm" in noticed(read, 100)[1][0]
 
 
+@pytest.mark.parametrize("rate_hz", [30, 100, 200, 1000])
+@pytest.mark.parametrize("jump_mm", [40.0, -40.0])
+def test_a_jump_between_which_readings_were_put_is_told(jump_mm: float, rate_hz: float) -> None:
+    """Readings of 30 a second that a logger fills up to 100 spread a jump over three: "it sets out"."""
+    read_s = np.arange(300) / 30
+    way = 27 * read_s + jump_mm * (read_s > 5)
+    time_s = np.arange(0, read_s[-1], 1 / rate_hz)
+    assert "jumps by" in " ".join(noticed(np.interp(time_s, read_s, way), rate_hz)[1])
+
+
 @pytest.mark.parametrize("stands", [0, 2000])
 @pytest.mark.parametrize("count_mm", [0.01, 2.0])
 def test_a_counter_that_begins_anew_counts_on(count_mm: float, stands: int) -> None:
