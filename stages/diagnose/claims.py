@@ -64,6 +64,9 @@ class Claim:
         Effects that are not known to who claims it.
     counted : bool
         Whether names were counted on pictures like these; if not, past cases bear nothing out.
+    beside : int
+        What else the same readings show and nobody can name, by kinds. Each may come of a cause that made
+        this as well, at even odds: the name is unsure then, but no less likely than that.
     """
 
     name: str
@@ -75,6 +78,7 @@ class Claim:
     location: Location
     agreements: tuple[Agreement, ...] = ()
     counted: bool = True
+    beside: int = 0
     fits_p: float = 1.0
     otherwise: float = 0.0
     unknown: frozenset[str] = frozenset()
@@ -94,11 +98,11 @@ class Claim:
     @property
     def may_go_otherwise(self) -> bool:
         """Whether the name would be sure but for what it leaves, or for other courses in its place."""
-        return not self.sure and replace(self, fits_p=1.0, otherwise=0.0).sure
+        return not self.sure and replace(self, fits_p=1.0, otherwise=0.0, beside=0).sure
 
     @property
     def _chance(self) -> float:
-        doubts = len(self.rivals) + (not self.counted)
+        doubts = len(self.rivals) + (not self.counted) + self.beside
         return chance_of_name(self.p_value, doubts, self.agreements, self.fits_p, self.otherwise)
 
     def not_knowing(self, names: Collection[str]) -> Claim:
@@ -162,9 +166,12 @@ def _of_estimate(e: TravelEstimate, travel: TravelEvidence, seen: Seen) -> Claim
     alike = (*(n for n, _ in e.alike), *exposure_alike(e, travel, seen.profile))
     goes_with = {_GOES_WITH[n] for n in (e.effect, *alike) if n in _GOES_WITH}
     fixed_to, time = goes_with.pop() if len(goes_with) == 1 else (None, None)
+    # Stray pictures are as likely as a slip where a step is in doubt.
+    beside = bool(travel.unsettled) + (travel.unexplained is not None)
     return Claim(
         e.effect, {e.quantity: Value(e.value, e.size_sigma)}, e.statement, e.p_value, alike, travel.source,
-        stretch(travel, e.where, fixed_to, time), e.agreements, fits_p=travel.fits_p, otherwise=e.otherwise,
+        stretch(travel, e.where, fixed_to, time), e.agreements,
+        beside=beside, fits_p=travel.fits_p, otherwise=e.otherwise,
     )  # fmt: skip
 
 
@@ -179,9 +186,12 @@ def _of_slip(step: StepFound, travel: TravelEvidence) -> Claim:
     )
     where = (step.place - 1, step.place)
     location = stretch(travel, where, FixedTo.TIME, "event")
+    # A slip that the reading alone shows does not hang on what pictures leave in doubt elsewhere.
+    alone = bool(step.agreements) and all(a.confirmation.agrees for a in step.agreements)
+    beside = (bool(travel.unsettled) and not alone) + (travel.unexplained is not None)
     return Claim(
         "encoder_slip", size, words, step.p_value, (), travel.source, location, step.agreements,
-        fits_p=travel.fits_p,
+        beside=beside, fits_p=travel.fits_p,
     )  # fmt: skip
 
 

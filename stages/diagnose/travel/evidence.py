@@ -130,9 +130,7 @@ class TravelEvidence:
 
     @property
     def fits_p(self) -> float:
-        """Chance that what all effects and sure slips leave between motion and encoder is noise."""
-        if self.unexplained is not None or self.unsettled:
-            return 0.0
+        """Chance that what all effects and steps leave between motion and encoder is noise."""
         return self.fit.fits_p if self.fit is not None else 1.0
 
     def estimate(self, name: str) -> TravelEstimate | None:
