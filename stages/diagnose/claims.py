@@ -13,10 +13,11 @@ from pipeline.physics.effect import Channel, FixedTo
 from stages.diagnose.agreement import Agreement, Part, agreement, chance_of_name
 from stages.diagnose.channels import Seen
 from stages.diagnose.inference import SURE
-from stages.diagnose.late_pictures import exposure_alike
+from stages.diagnose.late_pictures import Exposure
 from stages.diagnose.profile.evidence import ProfileEvidence
 from stages.diagnose.profile.finding import Finding
 from stages.diagnose.result import CourseFound, EffectFound, Location, Value
+from stages.diagnose.rocking import rocking_excluded
 from stages.diagnose.travel.events import is_found
 from stages.diagnose.travel.evidence import TravelEstimate, TravelEvidence
 from stages.diagnose.travel.lines import Line
@@ -30,10 +31,10 @@ _GOES_WITH = {
     "encoder_scale": (FixedTo.PIPE, "static"),
     "encoder_backlash": (FixedTo.TIME, "reversal"),
     "time_offset": (FixedTo.TIME, "speed"),
+    "motion_blur": (FixedTo.CAMERA, "speed"),
 }
 # Another recording has its own events, its own aliases, and a P that is rolled otherwise.
 _OF_ONE_RECORDING = frozenset({"time_s", "duration_s", "slip_mm", "frequency_hz", "direction_deg"})
-_ROCKING_P = 0.01
 # Of a swing: what one ring takes for a turn of the camera.
 _TURNED = 0.01
 
@@ -127,9 +128,11 @@ class Claim:
         )  # fmt: skip
 
 
-def claims_of(field: Seen | None, gauge: Seen | None) -> list[Claim]:
+def claims_of(field: Seen | None, gauge: Seen | None, stated_exposure_s: float) -> list[Claim]:
     """Return what travel and profile show; of one effect the clearer, the other recording set beside it."""
-    of_gauge, of_field = _of_recording(gauge), _of_recording(field)
+    of_probe = Exposure.of(stated_exposure_s, (field, gauge)), Exposure.of(stated_exposure_s, (gauge, field))
+    field, gauge = of_probe[0].taken_off(field), of_probe[1].taken_off(gauge)
+    of_field, of_gauge = _of_recording(field, of_probe[0]), _of_recording(gauge, of_probe[1])
     out = []
     for name in dict.fromkeys((*of_gauge, *of_field)):
         each = [c for c in (of_gauge.get(name), of_field.get(name)) if c is not None]
@@ -145,29 +148,31 @@ def _excluded(claim: Claim, claims: Sequence[Claim]) -> bool:
     return any(c.name in claim.alike and claim.name not in c.alike for c in claims)
 
 
-def _of_recording(seen: Seen | None) -> dict[str, Claim]:
+def _of_recording(seen: Seen | None, exposure: Exposure) -> dict[str, Claim]:
     """Return the claims of a recording by name; of several events the clearest."""
     if seen is None:
         return {}
-    return {c.name: c for c in sorted(_every(seen), key=lambda c: -c.p_value)}
+    return {c.name: c for c in sorted(_every(seen, exposure), key=lambda c: -c.p_value)}
 
 
-def _every(seen: Seen) -> Iterable[Claim]:
+def _every(seen: Seen, exposure: Exposure) -> Iterable[Claim]:
     if seen.travel is not None:
         travel = seen.travel
-        yield from (_of_estimate(e, travel, seen) for e in travel.estimates if is_found(e.p_value))
+        yield from (_of_estimate(e, travel, exposure) for e in travel.estimates if is_found(e.p_value))
         yield from (_of_slip(s, travel) for s in travel.slips if is_found(s.p_value))
         yield from (_of_swing(line, seen, travel) for line in travel.lines if _is_swing(line))
     if seen.profile is not None:
         yield from (_of_finding(f, seen.profile, seen.name) for f in seen.profile.found)
 
 
-def _of_estimate(e: TravelEstimate, travel: TravelEvidence, seen: Seen) -> Claim:
-    alike = (*(n for n, _ in e.alike), *exposure_alike(e, travel, seen.profile))
-    goes_with = {_GOES_WITH[n] for n in (e.effect, *alike) if n in _GOES_WITH}
-    fixed_to, time = goes_with.pop() if len(goes_with) == 1 else (None, None)
+def _of_estimate(e: TravelEstimate, travel: TravelEvidence, exposure: Exposure) -> Claim:
+    alike = (*(n for n, _ in e.alike), *exposure.alike(e, travel))
+    goes_with = [_GOES_WITH[n] for n in (e.effect, *alike) if n in _GOES_WITH]
+    places, times = {place for place, _ in goes_with}, {time for _, time in goes_with}
+    fixed_to, time = places.pop() if len(places) == 1 else None, times.pop() if len(times) == 1 else None
     # Stray pictures are as likely as a slip where a step is in doubt.
     beside = bool(travel.unsettled) + (travel.unexplained is not None)
+    beside += e.effect == "time_offset" and exposure.doubted
     return Claim(
         e.effect, {e.quantity: Value(e.value, e.size_sigma)}, e.statement, e.p_value, alike, travel.source,
         stretch(travel, e.where, fixed_to, time), e.agreements,
@@ -216,27 +221,6 @@ def _of_swing(line: Line, seen: Seen, travel: TravelEvidence) -> Claim:
     return Claim(
         "probe_vibration", size, words, line.p_value, others, travel.source, location, line.agreements
     )
-
-
-def rocking_excluded(line: Line, seen: Seen) -> bool:
-    """Return whether a sheet that rocks as much as the ring swings would show, and rings show none.
-
-    Seen with the sheet believed at rest, a tilt φ of the sheet moves the ring as a camera r² φ / l off the
-    axis does; but only a sheet moves rings against fiducials, the more the wider the bore.
-    """
-    if seen.geometry is None or any("laser_rocking" in names for names in seen.geometry.unsplit):
-        return False
-    rings, verdicts = seen.geometry.searched.nothing.linearised.rings, seen.geometry.verdicts
-    about = [f for f in seen.geometry.feasibility if f.name == "laser_rocking"]
-    suspected = verdicts is not None and any(
-        p > _ROCKING_P and "laser_rocking" in j.names
-        for p, j in zip(verdicts.probability, verdicts.judged, strict=True)
-    )
-    if not about or suspected:
-        return False
-    widest_mm = float(np.max(rings.radius_mm))
-    needed_mrad = 1e3 * line.amplitude_mm * rings.probe.laser.baseline_mm / widest_mm**2
-    return bool(needed_mrad > about[0].detectable)
 
 
 def _of_finding(f: Finding, profile: ProfileEvidence, where: str) -> Claim:

@@ -47,7 +47,7 @@ def composed(
     Effects ``without`` which the library has to do may be seen, but not named.
     """
     examined = gauge.geometry if gauge is not None else None
-    every = claims_of(field, gauge)
+    every = claims_of(field, gauge, probe.shutter.exposure_s)
     known = [c.not_knowing(without) for c in every if c.name not in without]
     of_profile, of_travel = _unexplained_profile(field, gauge), _unexplained_travel(field, gauge)
     unnamed = len(known) < len(every) or any(not u.by_slip for u in of_travel)

@@ -28,9 +28,10 @@ from stages.diagnose.inference import INSTRUMENT, Column, Evidence, Stated, esti
 from stages.diagnose.result import EffectFound
 
 Change = Callable[[dict[str, float], Float, Shape], None]
+# A longer exposure makes pictures late, so that readings seem late by what it adds to their own delay.
 _OF_ENCODER = {
     "encoder_scale": "relative", "encoder_slip": "slip_mm", "encoder_backlash": "backlash_mm",
-    "time_offset": "delay_s",
+    "time_offset": "delay_s", "motion_blur": "exposure_s",
 }  # fmt: skip
 ENCODER_EFFECTS = frozenset(_OF_ENCODER)
 _ROUNDS = 3

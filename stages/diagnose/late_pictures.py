@@ -2,40 +2,85 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
 import numpy as np
+from scipy.stats import norm
 
 from stages.diagnose.agreement import TELLING, same
-from stages.diagnose.profile.evidence import ProfileEvidence
-from stages.diagnose.profile.finding import Size
+from stages.diagnose.channels import Seen
+from stages.diagnose.profile.finding import Finding, Size
 from stages.diagnose.travel.evidence import TravelEstimate, TravelEvidence
 
 _EXPOSURE, _DELAY = "motion_blur", "time_offset"
 
 
-def exposure_alike(
-    found: TravelEstimate, travel: TravelEvidence, profile: ProfileEvidence | None
-) -> tuple[str, ...]:
-    """Return ``motion_blur`` where an exposure may be what makes an encoder's readings seem late.
+@dataclass(frozen=True)
+class Exposure:
+    """What is known of how long a probe exposes its pictures.
 
-    Pictures exposed longer from the same start are late by half of that. The exposure ends before the next
-    picture begins, and blurs the line by as much as it is long.
+    Pictures exposed longer than stated from the same start are late by half of that, and blur the line by as
+    much as they are exposed longer.
+
+    Attributes
+    ----------
+    stated_s : float
+    widths : tuple of Finding
+        What the line's width tells of it, in each recording of the probe.
     """
-    if found.effect != _DELAY or travel.fit is None:
-        return ()
-    exposure = Size("exposure_s", "s", 2 * found.value, 2 * found.size_sigma)
-    longest = travel.fit.sight.frame_time_s + exposure.sigma
-    fits = 0 < exposure.value < longest and not _told_apart(exposure, profile)
-    return (_EXPOSURE,) if fits else ()
+
+    stated_s: float
+    widths: tuple[Finding, ...] = ()
+
+    @classmethod
+    def of(cls, stated_s: float, recordings: Iterable[Seen | None]) -> Exposure:
+        """Return what the line's width in some recordings tells, in their order."""
+        profiles = [s.profile for s in recordings if s is not None and s.profile is not None]
+        told = (f for p in profiles for f in p.findings if f.effect == _EXPOSURE and f.sizes)
+        return cls(stated_s, tuple(told))
+
+    @property
+    def doubted(self) -> bool:
+        """Whether a width shows a longer exposure that nothing bears out: what it adds is open then."""
+        shown = next((f for f in self.widths if f.found), None)
+        return shown is not None and not (
+            shown.agreements and all(a.confirmation.agrees for a in shown.agreements)
+        )
+
+    def taken_off(self, seen: Seen | None) -> Seen | None:
+        """Return a recording with the delay that is the encoder's own, if the width shows an exposure."""
+        longer = next((f.sizes[0] for f in self.widths if f.found), None)
+        if seen is None or seen.travel is None or longer is None:
+            return seen
+        each = (_less_half(e, longer) if e.effect == _DELAY else e for e in seen.travel.estimates)
+        return replace(seen, travel=replace(seen.travel, estimates=tuple(each)))
+
+    def alike(self, found: TravelEstimate, travel: TravelEvidence) -> tuple[str, ...]:
+        """Return ``motion_blur`` where a longer exposure may be what makes an encoder's readings seem late.
+
+        The exposure ends before the next picture begins. What the width shows was taken off before.
+        """
+        if found.effect != _DELAY or travel.fit is None or any(f.found for f in self.widths):
+            return ()
+        exposure = Size("exposure_s", "s", 2 * found.value, 2 * found.size_sigma)
+        longest = travel.fit.sight.frame_time_s - self.stated_s + exposure.sigma
+        told_apart = any(_another(exposure, f.sizes[0]) for f in self.widths)
+        return (_EXPOSURE,) if 0 < exposure.value < longest and not told_apart else ()
 
 
-def _told_apart(exposure: Size, profile: ProfileEvidence | None) -> bool:
-    """Return whether the line's width tells of another exposure."""
-    findings = profile.findings if profile is not None else ()
-    widths = [size for f in findings if f.effect == _EXPOSURE for size in f.sizes]
-    return any(_another(exposure, width) for width in widths)
+def _less_half(late: TravelEstimate, longer: Size) -> TravelEstimate:
+    """Return the delay less half of a longer exposure."""
+    value, sigma = late.value - longer.value / 2, float(np.hypot(late.sigma, longer.sigma / 2))
+    own = replace(late, value=value, sigma=sigma)
+    if not np.isfinite(sigma):
+        return own
+    return replace(own, p_value=float(2 * norm.sf(abs(value) / own.size_sigma)))
 
 
 def _another(exposure: Size, width: Size) -> bool:
-    telling = width.sigma < TELLING * exposure.value
+    """Return whether the line's width tells, and tells of another exposure."""
+    size = max(exposure.value, abs(width.value))
     gap = np.array([[exposure.sigma**2 + width.sigma**2]])
-    return telling and not same(np.array([exposure.value]), np.array([width.value]), gap, exposure.value)
+    agree = same(np.array([exposure.value]), np.array([width.value]), gap, size)
+    return width.sigma < TELLING * size and not agree
