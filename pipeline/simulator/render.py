@@ -273,8 +273,7 @@ class Renderer:
         shutter, samples = instrument.shutter, self.truth.rendering.time_samples
         within = ((np.arange(samples) + 0.5) / samples - 0.5) * shutter.exposure_s
         height = instrument.camera.model.image_size[1]
-        # A longer exposure from the same start has its middle later.
-        late = np.full(1, 0.5 * (shutter.exposure_s - self.truth.stated.shutter.exposure_s))
+        late = np.full(1, self.truth.late_s(instrument))
         if shutter.kind == "rolling" and shutter.readout_s > 0:
             late = late + ((np.arange(height) + 0.5) / height - 0.5) * shutter.readout_s
         opened = self._time_s(number) + late[:, None] + within

@@ -209,7 +209,7 @@ def room_mm(truth: SceneTruth, frame: int, uv: Float) -> Float:
     point_c = _on_sheet(instrument, *viewing_rays(instrument.camera, uv))
     rows = instrument.camera.model.image_size[1]
     readout = instrument.shutter.readout_s if instrument.shutter.kind == "rolling" else 0.0
-    seen_s = time_s + ((uv[:, 1] + 0.5) / rows - 0.5) * readout
+    seen_s = time_s + truth.late_s(instrument) + ((uv[:, 1] + 0.5) / rows - 0.5) * readout
     T_pc = truth.motion.pose(seen_s, truth.wall.axis)
     s, psi, r = to_pipe(truth.wall.axis, transform(T_pc, np.nan_to_num(point_c)))
     return np.where(np.isfinite(point_c[:, 2]), wall_radius(truth.wall, s, psi) - r, np.nan)

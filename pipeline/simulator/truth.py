@@ -69,6 +69,10 @@ class SceneTruth:
             instrument = change(instrument, time_s)
         return instrument
 
+    def late_s(self, instrument: TrueInstrument) -> float:
+        """Return how late frames are: the middle of a longer exposure from the same start is later."""
+        return 0.5 * (instrument.shutter.exposure_s - self.stated.shutter.exposure_s)
+
     def poses(self) -> Float:
         """Return true ``T_pc`` (N, 4, 4) at the frames' times."""
         return self.motion.pose(self.frames.time_s, self.wall.axis)

@@ -103,7 +103,7 @@ CASES = (
     Case("interreflection", (1.0,), ("interreflection", "ambient_light")),
     Case("ambient_light", (0.2,), ("ambient_light", "interreflection")),
     Case("ghost_ring", (0.1,), ("second_line",)),
-    Case("motion_blur", (0.1,), ("motion_blur",)),
+    Case("motion_blur", (0.03,), ("motion_blur",)),
 )
 
 

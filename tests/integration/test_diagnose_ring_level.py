@@ -80,14 +80,14 @@ class ShorterExposure(MotionBlur):
 
 
 def test_a_size_that_cannot_be_is_no_evidence():
-    run = measured(("motion_blur=0.08",), 65)
+    run = measured(("motion_blur=0.065",), 65)
     measurements, start = prepare(run.measured)
     nothing, stated = fit(measurements, start, ()), stated_belief(run.truth.stated)
     (control,) = scan(measurements, nothing, {"motion_blur": MotionBlur()}, stated)
     assert control.p_value < 1e-4
-    # Pictures are late by half of it, 40 ms, which the encoder tells.
+    # Pictures are late by half of it, which the encoder tells.
     (size,) = control.score.amplitude
-    assert size == pytest.approx(0.08, abs=3 * control.score.covariance[0, 0] ** 0.5)
+    assert size == pytest.approx(0.065, abs=3 * control.score.covariance[0, 0] ** 0.5)
     assert scan(measurements, nothing, {"motion_blur": ShorterExposure()}, stated) == []
 
 

@@ -121,6 +121,15 @@ def test_an_effect_changes_what_it_should_and_nothing_else(name: str) -> None:
     assert changed(plain, switch_on(plain, [typical_switch(name)])) == TOUCHES[name]
 
 
+def test_an_exposure_that_does_not_end_before_the_next_frame_is_refused() -> None:
+    plain = bench_truth(50.8)
+    own, frame_s = plain.stated.shutter.exposure_s, 1 / plain.frame_rate
+    longest = switch_on(plain, [Switch("motion_blur", (frame_s - own - 1e-6,))])
+    assert longest.instrument.shutter.exposure_s == pytest.approx(frame_s, abs=2e-6)
+    with pytest.raises(InputError, match="longer than a frame"):
+        switch_on(plain, [Switch("motion_blur", (frame_s - own + 1e-3,))])
+
+
 # Effects whose zero is an absent one, not a surface, a wave or a setting that acts as nothing.
 NOTHING_AT_ZERO = (
     "laser_tilt", "laser_cone", "baseline", "beam_decentre", "laser_rocking", "principal_point",

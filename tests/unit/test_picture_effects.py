@@ -10,8 +10,10 @@ from pipeline.physics.picture import PICTURE_EFFECTS
 from pipeline.simulator.effects import switch_on
 from pipeline.simulator.effects.switch import Switch
 from pipeline.simulator.instrument import TrueSensor
+from pipeline.simulator.motion import Signal
 from pipeline.simulator.render import renderer_of
 from pipeline.simulator.sensor import exposed, through_lens, with_dark_signal
+from pipeline.simulator.sheet import room_mm
 from pipeline.simulator.truth import SceneTruth
 from pipeline.simulator.wall_light import glow_of_lamps, lamps_of, ring_to_ring
 from tests.unit.simulated_pipe import small_truth
@@ -221,3 +223,14 @@ def test_a_longer_exposure_from_the_same_start_shows_the_camera_later():
     expected = truth.motion.pose(truth.frames.time_s[LED] + longer / 2, truth.wall.axis)
     np.testing.assert_allclose(shot.T_pc[..., :3, 3].mean(axis=(0, 1)), expected[:3, 3], atol=1e-3)
     assert np.linalg.norm(expected[:3, 3] - truth.poses()[LED, :3, 3]) > 0.1
+
+
+def test_the_line_of_a_longer_exposure_lies_where_the_camera_is_at_its_middle():
+    across = Signal(np.array([-1.0, 1.0]), np.array([-20.0, 20.0]))
+    truth, longer = replace(small_truth(), motion=replace(small_truth().motion, x_mm=across)), 0.024
+    azimuth = np.linspace(-3.0, 3.0, 12)
+    uv = np.array([199.5, 149.5]) + 100 * np.stack([np.cos(azimuth), np.sin(azimuth)], -1)
+    late = replace(truth, frames=replace(truth.frames, time_s=truth.frames.time_s + longer / 2))
+    room = room_mm(switch_on(truth, [Switch("motion_blur", (longer,))]), LED, uv)
+    np.testing.assert_allclose(room, room_mm(late, LED, uv), atol=1e-6)
+    assert np.nanmax(np.abs(room - room_mm(truth, LED, uv))) > 0.1

@@ -127,6 +127,15 @@ def test_what_a_diagnosis_found_is_switched_on_with_its_size_and_course(tmp_path
     assert said.by_chance == 1e-9, "the probability of a name is none of a mismatch by chance"
 
 
+def test_an_exposure_is_left_to_who_can_tell_and_not_withdrawn(tmp_path):
+    """Poses are measured in the same late pictures: with them the line lies where it did."""
+    folder = _diagnosis(tmp_path, [_effect("motion_blur", exposure_s=0.016)])
+    assert switches_of(folder / "diagnosis.json").of_line == ()
+    tried = try_diagnosis(folder, tmp_path / "gauge", SilentDisplay())
+    assert tried.withdrawn == ()
+    assert "cannot tell motion blur" in tried.cannot_tell[0]
+
+
 def test_without_a_gauge_run_pictures_decide_nothing_and_that_is_said(tmp_path):
     folder = _diagnosis(tmp_path, [_effect("laser_tilt", tilt_deg=0.3, direction_deg=0.0)])
     tried = try_diagnosis(folder, tmp_path / "gauge", SilentDisplay())

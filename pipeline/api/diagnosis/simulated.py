@@ -32,6 +32,8 @@ from stages.twin.gauge_line import GAUGE_LINE
 _SURE = 0.5
 """Probability from which an effect counts as found: it is likelier there than not."""
 _OF_LINE = ("laser", "camera", "window")
+_LATE = "motion_blur"
+"""What shows the line as it is a little later: poses, which are measured in the same pictures, follow it."""
 
 
 @dataclass(frozen=True)
@@ -63,7 +65,7 @@ class Switches:
 
 def moves_line(name: str) -> bool:
     """Return whether an effect changes where the line of a known bore lies in the picture."""
-    return name in ALL_EFFECTS and ALL_EFFECTS[name].family in _OF_LINE
+    return name in ALL_EFFECTS and ALL_EFFECTS[name].family in _OF_LINE and name != _LATE
 
 
 def switches_of(file: Path) -> Switches:

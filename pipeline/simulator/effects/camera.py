@@ -109,9 +109,20 @@ def rolling_shutter(truth: SceneTruth, readout_s: float) -> SceneTruth:
 
 
 def motion_blur(truth: SceneTruth, exposure_s: float) -> SceneTruth:
-    """Expose longer than stated from the same start, with the same light in all: frames are late by half."""
+    """Expose longer than stated from the same start, with the same light in all: frames are late by half.
+
+    Raises
+    ------
+    InputError
+        When the exposure does not end before the next frame begins.
+    """
     shutter = truth.instrument.shutter
     longer = replace(shutter, exposure_s=shutter.exposure_s + exposure_s)
+    if longer.exposure_s > 1 / truth.frame_rate:
+        raise InputError(
+            "scene", f"motion_blur makes an exposure of {longer.exposure_s:.4g} s, longer than a frame",
+            expected=f"no more than {1 / truth.frame_rate:.4g} s in all",
+        )  # fmt: skip
     moments = max(truth.rendering.time_samples, _BLUR_MOMENTS)
     rendering = truth.rendering.model_copy(update={"time_samples": moments})
     return replace(truth, instrument=replace(truth.instrument, shutter=longer), rendering=rendering)
