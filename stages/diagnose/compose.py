@@ -228,14 +228,16 @@ class _Untold:
 def _unexplained_travel(*recordings: Seen | None) -> list[_Untold]:
     """Return what is between motion and encoder and may be a slip or stray pictures, or nothing explains.
 
-    Several steps in one recording that may all be stray pictures may have a cause that nobody knows.
+    Several steps in one recording that may all be stray pictures may have a cause that nobody knows, and so
+    may one beside what no slip explains.
     """
     out = []
     for name, travel in ((s.name, s.travel) for s in recordings if s is not None and s.travel is not None):
+        left = travel.unexplained
+        by_slip = len(travel.unsettled) == 1 and (left is None or left.by_slip)
         for step in travel.unsettled:
             where = stretch(travel, (step.place - 1, step.place), FixedTo.TIME, "event")
-            out.append(_Untold(f"{name}: {step.doubt}", where, len(travel.unsettled) == 1))
-        left = travel.unexplained
+            out.append(_Untold(f"{name}: {step.doubt}", where, by_slip))
         if left is not None:
             where = stretch(travel, left.where, None, None)
             out.append(_Untold(f"{name}: {left.statement}", where, left.by_slip))

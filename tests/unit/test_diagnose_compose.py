@@ -282,6 +282,16 @@ def test_several_doubtful_steps_of_one_recording_may_have_another_cause(real_pro
     assert "gains -2.00 mm" in found.identifiable
 
 
+def test_a_doubtful_step_beside_what_no_effect_explains_is_no_class_of_slips(real_probe: Probe) -> None:
+    found = of_gauge(real_probe, doubtful=(DOUBTFUL,), unexplained=LEFT)
+    assert found.verdict is Verdict.UNEXPLAINED
+    assert found.members == ()
+    assert "gains +2.00 mm" in found.identifiable
+    assert "+1.36 mm in a way that no effect" in found.identifiable
+    by_slips = of_gauge(real_probe, doubtful=(DOUBTFUL,), unexplained=MAY_SLIP)
+    assert by_slips.members == ("encoder_slip",)
+
+
 def test_beside_a_doubtful_slip_a_scale_keeps_its_size_but_no_sure_name(real_probe: Probe) -> None:
     """Three pictures at the end, placed wrongly, may be a slip; the encoder's scale is 2 % off."""
     way, encoder = sight(np.random.default_rng(10), drift_mm=0.001), read(scale=0.02)
