@@ -70,7 +70,7 @@ class RingResidual:
 
     @property
     def floor_px(self) -> float:
-        """R.m.s., px, of what rings do not repeat at the same azimuth of the image on other wall."""
+        """R.m.s., px, of what rings do not repeat at one azimuth of the image on other wall; NaN: unknown."""
         own = np.flatnonzero(self.usable)
         one_bore = np.zeros(len(own), np.int64)
         pairs = on_other_wall(self.azimuth_c_rad[own], self.frame[own], self.distance_mm[own], one_bore)

@@ -1,5 +1,6 @@
 """The noise floor of a gauge run is what other pictures do not repeat, at least what is stated of edges."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -7,36 +8,47 @@ import numpy as np
 import pytest
 
 from stages.calibrate.gauge.edges import Edges
+from stages.diagnose.gauge.answer import _fits
 from stages.diagnose.gauge.elimination import EDGE, RING
-from stages.diagnose.gauge.heldout import repeatability_px
+from stages.diagnose.gauge.heldout import _in_other_pictures, repeatability_px
+from stages.diagnose.gauge.linearise import ring_mm_per_px
 from stages.diagnose.residual import RingResidual
+from stages.diagnose.result import FitQuality
 
 PICTURES, EDGES, RINGS = 24, 160, 8
 
 
-def floor_px(stated_px: float, noise_px: float, left_px: float) -> float:
-    """Return the floor of fiducials whose instrument is off by up to ``left_px``; rings hardly count."""
+def floor_px(
+    stated_px: float, noise_px: float, left_px: float, pictures: int = PICTURES, rings: int = RINGS
+) -> float:
+    """Return the floor of fiducials whose instrument is off by up to ``left_px``; rings hardly count.
+
+    A ring of each of the last pictures has a noise of 0.3 px.
+    """
     random = np.random.default_rng(5)
-    count = PICTURES * EDGES
+    count = pictures * EDGES
     uv = random.uniform([300, 200], [900, 700], (count, 2))
     # Edges along and around the pipe.
     normal = np.where(random.random(count)[:, None] < 0.5, [1.0, 0.0], [0.0, 1.0])
-    frame = np.repeat(np.arange(PICTURES), EDGES)
+    frame = np.repeat(np.arange(pictures), EDGES)
     nowhere, none = np.zeros((count, 3)), np.zeros(count, np.int64)
     edges = Edges(frame, none, none, nowhere, nowhere, uv, normal, np.full(count, stated_px))
     left = left_px * np.sin(uv[:, 0] / 150) * normal[:, 0]
-    residual = np.r_[left + random.normal(0, noise_px, count), np.zeros(RINGS)]
+    way = np.ones((rings, 3))
+    of_rings = random.normal(0, 0.3, rings) * ring_mm_per_px(
+        cast(Any, SimpleNamespace(normal_c=way, per_px_c=way))
+    )
+    residual = np.r_[left + random.normal(0, noise_px, count), of_rings]
     equations = SimpleNamespace(
-        kind=np.repeat([EDGE, RING], [count, RINGS]), residual=residual,
-        weight=np.r_[np.full(count, stated_px**-2), np.full(RINGS, 1e-9)],
+        kind=np.repeat([EDGE, RING], [count, rings]), residual=residual,
+        weight=np.r_[np.full(count, stated_px**-2), np.full(rings, 1e-9)],
     )  # fmt: skip
-    way = np.ones((RINGS, 3))
-    rings = SimpleNamespace(
-        outward=np.ones((RINGS, 2)), frame=np.arange(RINGS), section=np.zeros(RINGS, np.int64)
+    seen = SimpleNamespace(
+        outward=np.ones((rings, 2)), frame=np.arange(rings), section=np.zeros(rings, np.int64)
     )
     linearised = SimpleNamespace(equations=equations, rings=SimpleNamespace(normal_c=way, per_px_c=way))
-    state = SimpleNamespace(T_pc=np.tile(np.eye(4), (PICTURES, 1, 1)))
-    run = SimpleNamespace(edges=edges, rings=rings)
+    state = SimpleNamespace(T_pc=np.tile(np.eye(4), (max(pictures, rings), 1, 1)))
+    run = SimpleNamespace(edges=edges, rings=seen)
     return repeatability_px(cast(Any, run), cast(Any, SimpleNamespace(linearised=linearised, state=state)))
 
 
@@ -46,7 +58,30 @@ def test_it_is_the_fiducials_own_noise_whatever_the_instrument_is_off_by(left_px
 
 
 def test_it_is_no_less_than_what_is_stated_of_fiducials() -> None:
-    assert floor_px(0.12, 0.09, 0.0) == pytest.approx(0.12)
+    assert floor_px(0.12, 0.09, 0.0) == pytest.approx(0.12, rel=1e-6)
+
+
+def test_a_kind_that_nothing_repeats_has_no_say_in_it() -> None:
+    assert floor_px(0.04, 0.09, 0.0, rings=1) == pytest.approx(0.09, rel=0.05)
+    for pictures in (0, 1):
+        assert floor_px(0.04, 0.09, 0.0, pictures, rings=900) == pytest.approx(0.3, rel=0.1)
+        assert np.isnan(floor_px(0.04, 0.09, 0.0, pictures, rings=1))
+
+
+@pytest.mark.parametrize("count", [0, 1])
+def test_fewer_than_two_edges_repeat_nothing(count: int) -> None:
+    edges = SimpleNamespace(
+        uv=np.zeros((count, 2)), normal=np.ones((count, 2)), frame=np.zeros(count, np.int64)
+    )
+    assert [len(of_pair) for of_pair in _in_other_pictures(cast(Any, edges))] == [0, 0]
+
+
+def test_where_the_noise_is_not_known_it_is_not_known_that_an_explanation_fits() -> None:
+    for floor, fits in ((0.09, True), (0.05, False), (np.nan, False)):
+        quality = FitQuality("px", 1.0, 0.09, 1.0, 0.1, floor)
+        assert _fits(cast(Any, SimpleNamespace(quality=quality))) is fits
+    not_tried = FitQuality("px", 1.0, 0.09, np.nan, np.nan, np.nan)
+    assert _fits(cast(Any, SimpleNamespace(quality=not_tried)))
 
 
 def of_rings(noise_px: float, left_px: float) -> RingResidual:
@@ -66,3 +101,8 @@ def test_an_inspections_floor_is_what_its_rings_do_not_repeat(left_px: float) ->
     seen = of_rings(0.07, left_px)
     assert seen.floor_px == pytest.approx(0.07, rel=0.05)
     assert (seen.rms_px > 0.2) == (left_px > 0)
+
+
+def test_one_ring_of_an_inspection_tells_no_floor() -> None:
+    seen = of_rings(0.07, 0.0)
+    assert np.isnan(replace(seen, usable=seen.frame == 7).floor_px)

@@ -79,9 +79,14 @@ def better_held_out(verdicts: Verdicts) -> tuple[Judged, ...]:
 
 
 def _fits(examined: Examined) -> bool:
-    """Return whether what had no say in the fit is predicted to about the noise, where that was tried."""
+    """Return whether what had no say in the fit is predicted to about the noise, where that was tried.
+
+    It is not known to be where the noise is not.
+    """
     quality = examined.quality
-    return quality is None or not quality.heldout_after > _MOST_OF_FLOOR * quality.noise_floor
+    if quality is None or np.isnan(quality.heldout_after):
+        return True
+    return bool(quality.heldout_after <= _MOST_OF_FLOOR * quality.noise_floor)
 
 
 def unknown_rivals(examined: Examined) -> tuple[str, ...]:

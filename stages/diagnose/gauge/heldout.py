@@ -89,39 +89,43 @@ def repeatability_px(run: GaugeRun, found: Fit) -> float:
     Of rings it is what two of them differ by at the same azimuth on other wall of the same bore, over √2; of
     fiducials what edges differ by that other pictures show at the same place of the image, or their stated σ
     where that is more: samples of one fiducial may err alike. An error of the instrument that is left is
-    alike in both, so that a bad fit makes no larger floor.
+    alike in both, so that a bad fit makes no larger floor. A kind that repeats nowhere is left out; NaN where
+    neither does.
     """
     about = found.linearised
     equations, per_px = about.equations, ring_mm_per_px(about.rings)
     ring, edge = equations.kind == RING, equations.kind == EDGE
     of_rings = np.where(np.isfinite(per_px), equations.weight[ring] * per_px**2, 0.0)
     of_edges = equations.weight[edge]
-    stated = float(of_edges @ run.edges.sigma_px**2)
-    edges = (
-        variance_of_pairs(equations.residual[edge], of_edges, *_in_other_pictures(run.edges)) * of_edges.sum()
-    )
+    stated = float(of_edges @ run.edges.sigma_px**2) / max(float(of_edges.sum()), 1e-300)
+    edges = variance_of_pairs(equations.residual[edge], of_edges, *_in_other_pictures(run.edges))
     along_mm = found.state.T_pc[run.rings.frame, 2, 3]
     azimuth = np.arctan2(run.rings.outward[:, 1], run.rings.outward[:, 0])
     pairs = on_other_wall(azimuth, run.rings.frame, along_mm, run.rings.section)
     rings = variance_of_pairs(equations.residual[ring] / per_px, of_rings, *pairs)
-    squares = of_rings.sum() * rings + max(edges, stated)
-    return float(np.sqrt(squares / (of_rings.sum() + of_edges.sum())))
+    # Without pairs NumPy's maximum stays NaN, where Python's may not.
+    variance = np.array([rings, np.maximum(edges, stated)])
+    weight = np.where(np.isfinite(variance), [of_rings.sum(), of_edges.sum()], 0.0)
+    return float(np.sqrt(weight @ np.nan_to_num(variance) / weight.sum())) if weight.any() else float("nan")
 
 
 def variance_of_pairs(value: Float, weight: Float, first: Int, second: Int) -> float:
-    """Return the variance that pairs (P,) of values (M,) show, whatever both have in common; 0 without pairs.
+    """Return the variance that pairs (P,) of values (M,) show, whatever both have in common.
 
-    With the product of weights independent errors come to just their weighted mean square.
+    It is NaN without pairs. With the product of weights independent errors come to just their weighted mean
+    square.
     """
     both = weight[first] * weight[second]
     used = both > 0
     if not used.any():
-        return 0.0
+        return float("nan")
     return float(np.average((value[second] - value[first])[used] ** 2, weights=both[used])) / 2
 
 
 def _in_other_pictures(edges: Edges) -> tuple[Int, Int]:
     """Return pairs (P,) of fiducials' edges of other pictures, at one place of the image and as steep."""
+    if len(edges.frame) < 2:
+        return np.zeros(0, np.int64), np.zeros(0, np.int64)
     place = np.concatenate([edges.uv / _SAME_PLACE_PX, edges.normal / _SAME_STEEPNESS_RAD], axis=1)
     apart, near = cKDTree(place).query(place, k=min(_NEIGHBOURS, len(place)))
     near = np.asarray(near)
