@@ -59,6 +59,7 @@ def test_a_named_effect_is_told_with_its_confirmations_and_pictures(tmp_path):
     assert "<b>ghost" not in page
     assert "understated by 0.21 mm: the pit is 1.01 ± 0.03 mm, not 0.80 mm" in page
     assert "below 10⁻⁹" in page
+    assert page.count("not known") == 2, "the noise floor, above and in the table"
 
 
 def test_the_first_lines_give_the_size_with_its_sigma_and_what_it_means_for_the_pipe(tmp_path):
