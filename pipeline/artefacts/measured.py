@@ -13,9 +13,8 @@ from enum import IntEnum
 
 import numpy as np
 
-from pipeline.adjustment.held_over import NOTHING_HELD, HeldOver
 from pipeline.arrays import Bool, Byte, Float, Float32, Int
-from pipeline.artefacts.wall_map import FixedToProbe, WallMap
+from pipeline.artefacts.wall_map import NOTHING_HELD, FixedToProbe, HeldOver, WallMap
 from pipeline.geometry.axis import PipeAxis
 
 
@@ -268,8 +267,7 @@ class PointCloud:
 class Wall:
     """Result of accumulation: cloud, radius map, and the axis both refer to.
 
-    ``fixed`` is what stays at one place of the image, None where nothing does; ``held`` is how alike its
-    rings are because a codec repeats light.
+    ``fixed`` is what stays at one place of the image, if anything; a codec has ``held`` its rings alike.
     """
 
     cloud: PointCloud

@@ -44,7 +44,7 @@ from pipeline.recording.bag_topics import (
     message_image,
 )
 from pipeline.recording.base import FrameTable, Planes, Recording, ascending, complete, decoded_ahead
-from pipeline.recording.checks import checked_encoder
+from pipeline.recording.encoder_checks import checked_encoder
 from pipeline.recording.folder import COMMON_KEYS, describe
 
 _KEYS = (*COMMON_KEYS, "topics", "illumination")

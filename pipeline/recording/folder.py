@@ -22,7 +22,8 @@ from pipeline.recording.base import (
     PlannedPiece,
     Recording,
 )
-from pipeline.recording.checks import checked_encoder, common_frames
+from pipeline.recording.checks import common_frames
+from pipeline.recording.encoder_checks import checked_encoder
 from pipeline.recording.images import ImageSequence, is_pattern, open_images
 from pipeline.recording.rounded_stamps import without_rounding
 from pipeline.recording.tables import read_encoder, read_frame_table, read_imu

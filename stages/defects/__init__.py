@@ -22,12 +22,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import ndtri
 
-from pipeline.adjustment.held_over import HeldOver
 from pipeline.arrays import Float, Float32
 from pipeline.artefacts.cloud_along import cloud_along
 from pipeline.artefacts.findings import Defect, Defects
 from pipeline.artefacts.measured import RingSamples, Trajectory, Wall, WallTexture
-from pipeline.artefacts.wall_map import FixedToProbe
+from pipeline.artefacts.wall_map import FixedToProbe, HeldOver
 from pipeline.errors import UnusableError
 from pipeline.instrument.probe import Probe
 from pipeline.machine.stage import Context, Stage

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 import pytest
 
-from pipeline.adjustment.held_over import HeldOver, held_over
+from pipeline.adjustment.held_over import held_over
 from pipeline.arrays import Float
+from pipeline.artefacts.wall_map import HeldOver
 from stages.accumulate import warn_of_held
 from stages.accumulate.grid import MapGrid, RingColumns, gridded
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -77,6 +78,11 @@ class Made:
     time_s: Float
     bore: Bore = ONE_BORE
     jump: None = None
+
+    @property
+    def texture(self) -> SimpleNamespace:
+        """Texture that most frames show."""
+        return SimpleNamespace(poses=SimpleNamespace(mostly_lost=False))
 
     def measured(self, window: Window, parameters: MotionParameters) -> Measurements:
         return replace(self.given.measured, encoder=self.encoder, probe=self.probe)

@@ -7,7 +7,7 @@ import pytest
 
 from pipeline.arrays import Float
 from pipeline.recording.base import Encoder, FrameTable
-from pipeline.recording.checks import checked_encoder
+from pipeline.recording.encoder_checks import checked_encoder
 
 FRAME = np.arange(300)
 FRAMES = FrameTable(FRAME, FRAME / 30, np.full(300, "led"))

@@ -1,0 +1,92 @@
+"""What of an encoder's readings cannot be: a counter that begins anew counts on, jumps are told."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from pipeline.arrays import Float, Int
+from pipeline.recording.base import Encoder, FrameTable
+
+# A step of the encoder is a jump when it is so long, and so many times the usual largest (this quantile of
+# the steps by which it moves at all) and what it moves by just before and after: the median of five steps, or
+# of two tenths of a second, since between readings of 30 a second others may have been put.
+_LARGEST, _JUMP_FACTOR, _BESIDE, _BESIDE_S, _JUMP_MM = 0.95, 10.0, 5, 0.2, 1.0
+
+
+def checked_encoder(encoder: Encoder | None, frames: FrameTable) -> tuple[Encoder | None, tuple[str, ...]]:
+    """Return an encoder that counts on, and what is suspicious: it covers a part only, pauses, or jumps."""
+    if encoder is None or frames.frame.size == 0:
+        return encoder, ()
+    encoder, began_anew = counted_on(encoder)
+    step_s, slack = np.diff(encoder.time_s), _slack_s(encoder, frames)
+    found = [*began_anew]
+    if encoder.time_s[0] > frames.time_s[0] + slack:
+        found.append(f"the encoder begins {encoder.time_s[0] - frames.time_s[0]:.2f} s after the first frame")
+    if encoder.time_s[-1] < frames.time_s[-1] - slack:
+        found.append(f"the encoder ends {frames.time_s[-1] - encoder.time_s[-1]:.2f} s before the last frame")
+    if np.any(step_s > 10 * slack):
+        found.append(f"the encoder is silent for up to {step_s.max():.2f} s")
+    return encoder, (*found, *_warned_of_jumps(encoder))
+
+
+def _slack_s(encoder: Encoder, frames: FrameTable) -> float:
+    """Return two periods of the slower of encoder and camera, s."""
+    periods = [np.median(np.diff(t)) for t in (encoder.time_s, frames.time_s) if t.size > 1]
+    return 2 * float(max(periods))
+
+
+def counted_on(encoder: Encoder) -> tuple[Encoder, tuple[str, ...]]:
+    """Return an encoder whose counter began anew on and on as if it had counted on, and what was noticed.
+
+    Such a counter jumps back, always by all that it can count. A wheel that slips goes on from where it is.
+    """
+    jumps = _jumps(encoder)
+    if not jumps.size:
+        return encoder, ()
+    step_mm, by_mm = np.diff(encoder.distance_mm), np.diff(encoder.distance_mm)[jumps]
+    moves_mm = step_mm[step_mm != 0]
+    usual_mm = float(np.median(moves_mm))
+    whole_mm = float(np.median(by_mm)) - usual_mm
+    near_mm = 2 * float(np.quantile(np.abs(moves_mm), _LARGEST))
+    counts = np.ptp(encoder.distance_mm) < abs(whole_mm) + near_mm and whole_mm * usual_mm < 0
+    if not counts or np.any(np.abs(by_mm - usual_mm - whole_mm) > near_mm):
+        return encoder, ()
+    begun = np.zeros(len(encoder.time_s))
+    begun[jumps + 1] = -whole_mm
+    return replace(encoder, distance_mm=encoder.distance_mm + np.cumsum(begun)), (
+        f"the encoder's counter begins anew {jumps.size} times, after {abs(whole_mm):.4g} mm each: taken "
+        "as if it had counted on",
+    )
+
+
+def _jumps(encoder: Encoder) -> Int:
+    """Return the readings (K,) after which the encoder jumps.
+
+    One that counts coarsely stands for most readings, and so does a probe that waits: only steps that move
+    tell what is usual, and setting out is no jump, since the encoder then goes on as fast.
+    """
+    step_mm = np.abs(np.diff(encoder.distance_mm))
+    if not step_mm.any():
+        return np.empty(0, np.int64)
+    usual_mm = float(np.quantile(step_mm[step_mm > 0], _LARGEST, method="lower"))
+    jumps = np.flatnonzero(step_mm > max(_JUMP_FACTOR * usual_mm, _JUMP_MM))
+    a_while = int(0.5 * _BESIDE_S / np.median(np.diff(encoder.time_s)))
+    return jumps[step_mm[jumps] > _JUMP_FACTOR * _median_around(step_mm, jumps, max(_BESIDE // 2, a_while))]
+
+
+def _median_around(values: Float, at: Int, beside: int) -> Float:
+    """Return the median (K,) of values (N,) ``at`` places (K,) and ``beside`` each, mirrored at the ends."""
+    last = len(values) - 1
+    index = np.abs(at[:, None] + np.arange(-beside, beside + 1))
+    return np.asarray(np.median(values[np.maximum(last - np.abs(last - index), 0)], axis=1))
+
+
+def _warned_of_jumps(encoder: Encoder) -> tuple[str, ...]:
+    jumps = _jumps(encoder)
+    if jumps.size == 0:
+        return ()
+    largest_mm = float(np.abs(np.diff(encoder.distance_mm)).max())
+    at = ", ".join(f"{encoder.time_s[j]:.2f} s" for j in jumps[:5])
+    return (f"the encoder jumps by up to {largest_mm:.4g} mm at {at} ({jumps.size} in all)",)
