@@ -14,8 +14,8 @@ import numpy as np
 from scipy.ndimage import uniform_filter1d
 
 from pipeline.adjustment.robust import robust_spread
+from pipeline.adjustment.shared_light import HeldOver
 from pipeline.arrays import Float, Int
-from pipeline.artefacts.wall_map import HeldOver
 
 # Samples of the running mean that is taken out: what is left is 1 mm long in a pipe of 100 mm with 1440
 # samples. The rings of open-1 and open-3, 1.2 and 0.5 mm apart, are alike by 0.05 and 0.16 in it.

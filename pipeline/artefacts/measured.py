@@ -13,8 +13,9 @@ from enum import IntEnum
 
 import numpy as np
 
+from pipeline.adjustment.shared_light import NOTHING_HELD, HeldOver
 from pipeline.arrays import Bool, Byte, Float, Float32, Int
-from pipeline.artefacts.wall_map import NOTHING_HELD, FixedToProbe, HeldOver, WallMap
+from pipeline.artefacts.wall_map import FixedToProbe, WallMap
 from pipeline.geometry.axis import PipeAxis
 
 

@@ -11,10 +11,11 @@ import numpy as np
 from pydantic import Field
 
 from pipeline.adjustment.held_over import held_over
+from pipeline.adjustment.shared_light import HeldOver
 from pipeline.arrays import Float, Int
 from pipeline.artefacts.findings import clock_of_azimuth
 from pipeline.artefacts.measured import RingPoints, RingSamples, RingValidity, Trajectory, Wall
-from pipeline.artefacts.wall_map import FixedPlace, FixedToProbe, HeldOver
+from pipeline.artefacts.wall_map import FixedPlace, FixedToProbe
 from pipeline.errors import UnusableError
 from pipeline.geometry.axis import frames_at
 from pipeline.instrument.probe import Probe

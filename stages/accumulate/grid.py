@@ -15,8 +15,8 @@ import numpy as np
 
 from pipeline.adjustment.local_spread import local_spread, running_median
 from pipeline.adjustment.robust import robust_spread
+from pipeline.adjustment.shared_light import HeldOver
 from pipeline.arrays import Float, Float32, Int
-from pipeline.artefacts.wall_map import HeldOver
 from pipeline.system.parallel import in_threads
 from stages.accumulate.survey import RingSurvey, WallSamples
 

@@ -7,9 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pipeline.adjustment.shared_light import HeldOver
 from pipeline.arrays import Bool, Float, Int
 from pipeline.artefacts.measured import PointCloud, RadiusMap, Wall
-from pipeline.artefacts.wall_map import FixedToProbe, HeldOver
+from pipeline.artefacts.wall_map import FixedToProbe
 from pipeline.geometry.axis import PipeAxis
 from pipeline.machine.scratch import Scratch
 from stages.accumulate.grid import WIDTH_IN_RINGS, MapGrid, gridded, rings_on_columns

@@ -22,11 +22,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import ndtri
 
+from pipeline.adjustment.shared_light import HeldOver
 from pipeline.arrays import Float, Float32
 from pipeline.artefacts.cloud_along import cloud_along
 from pipeline.artefacts.findings import Defect, Defects
 from pipeline.artefacts.measured import RingSamples, Trajectory, Wall, WallTexture
-from pipeline.artefacts.wall_map import FixedToProbe, HeldOver
+from pipeline.artefacts.wall_map import FixedToProbe
 from pipeline.errors import UnusableError
 from pipeline.instrument.probe import Probe
 from pipeline.machine.stage import Context, Stage

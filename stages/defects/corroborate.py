@@ -14,9 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import label
 
+from pipeline.adjustment.shared_light import NOTHING_HELD, HeldOver
 from pipeline.arrays import Bool, Float
 from pipeline.artefacts.measured import RingSamples, RingValidity, WallTexture
-from pipeline.artefacts.wall_map import NOTHING_HELD, HeldOver
 from stages.defects.depth import Depth
 from stages.defects.parallax import LitPictures
 from stages.defects.relief import Relief

@@ -162,7 +162,10 @@ def _every(seen: Seen, exposure: Exposure) -> Iterable[Claim]:
         yield from (_of_slip(s, travel) for s in travel.slips if is_found(s.p_value))
         yield from (_of_swing(line, seen, travel) for line in travel.lines if _is_swing(line))
     if seen.profile is not None:
-        yield from (_of_finding(f, seen.profile, seen.name) for f in seen.profile.found)
+        for f in seen.profile.found:
+            claim = _of_finding(f, seen.profile, seen.name)
+            too_long = f.effect == "motion_blur" and f.sizes and not exposure.has_time(seen, f.sizes[0])
+            yield replace(claim, beside=claim.beside + 1) if too_long else claim
 
 
 def _of_estimate(e: TravelEstimate, travel: TravelEvidence, exposure: Exposure) -> Claim:

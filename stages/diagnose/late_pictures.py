@@ -14,6 +14,8 @@ from stages.diagnose.profile.finding import Finding, Size
 from stages.diagnose.travel.evidence import TravelEstimate, TravelEvidence
 
 _EXPOSURE, _DELAY = "motion_blur", "time_offset"
+# So many σ beyond what a frame has time for, a width is not that of an exposure: by chance once in 700.
+_SURE = 3.0
 
 
 @dataclass(frozen=True)
@@ -51,10 +53,17 @@ class Exposure:
     def taken_off(self, seen: Seen | None) -> Seen | None:
         """Return a recording with the delay that is the encoder's own, if the width shows an exposure."""
         longer = next((f.sizes[0] for f in self.widths if f.found), None)
-        if seen is None or seen.travel is None or longer is None:
+        if seen is None or seen.travel is None or longer is None or not self.has_time(seen, longer):
             return seen
         each = (_less_half(e, longer) if e.effect == _DELAY else e for e in seen.travel.estimates)
         return replace(seen, travel=replace(seen.travel, estimates=tuple(each)))
+
+    def has_time(self, seen: Seen, longer: Size) -> bool:
+        """Return whether pictures can be exposed so much longer: each ends before the next one begins."""
+        if seen.travel is None or seen.travel.fit is None:
+            return True
+        left_s = seen.travel.fit.sight.frame_time_s - self.stated_s
+        return longer.value - _SURE * longer.sigma < left_s
 
     def alike(self, found: TravelEstimate, travel: TravelEvidence) -> tuple[str, ...]:
         """Return ``motion_blur`` where a longer exposure may be what makes an encoder's readings seem late.

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.ndimage import maximum_filter
 
+from pipeline.adjustment.shared_light import NOTHING_HELD, HeldOver
 from pipeline.artefacts.measured import RingSamples, RingValidity
-from pipeline.artefacts.wall_map import NOTHING_HELD, HeldOver
 from stages.defects import DefectParameters, find_defects
 from stages.defects.corroborate import Evidence, photo_stands_out
 from stages.defects.credibility import chance_of_depth, credibility_of, is_depth_known

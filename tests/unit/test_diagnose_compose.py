@@ -164,6 +164,15 @@ def test_the_width_in_one_recording_tells_of_the_delay_in_the_other(
     assert sizes(found) == pytest.approx(named)
 
 
+def test_a_width_that_no_exposure_has_time_for_is_no_sure_exposure_and_moves_no_delay(
+    real_probe: Probe, thirty_a_second: TravelFit
+) -> None:
+    """60 ms of 33 were named, and half of it was taken off a delay of 8 ms: -22 ms, as surely."""
+    found = answer(real_probe, None, late("gauge", thirty_a_second, 0.008, (60.0, 5.0)))
+    assert sizes(found).get("time_offset", 0.008) == pytest.approx(0.008)
+    assert all(e.probability < 0.6 for e in found.effects if e.name == "motion_blur")
+
+
 def test_the_encoders_own_delay_holds_what_the_width_leaves_open(
     real_probe: Probe, thirty_a_second: TravelFit
 ) -> None:

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from pipeline.adjustment.held_over import held_over
+from pipeline.adjustment.shared_light import HeldOver
 from pipeline.arrays import Float
-from pipeline.artefacts.wall_map import HeldOver
 from stages.accumulate import warn_of_held
 from stages.accumulate.grid import MapGrid, RingColumns, gridded
 

@@ -67,6 +67,8 @@ class LeftOver:
         """Return it in a plain sentence."""
         first, last = self.time_s
         off = f"Between {first:.2f} and {last:.2f} s the reading is off by {self.off_mm:+.2f} mm"
+        if self.by_slip and not self.stray:
+            return f"{off}, as after a slip of the wheel: record the passage again, slowly."
         if self.by_slip:
             return or_else(f"{off}: the wheel slipped", f"{self.stray} pictures in a row are stray")
         unless = f", unless {self.stray} pictures in a row are stray" if self.stray else ""
@@ -104,10 +106,14 @@ def left_over(fit: TravelFit, steps: Sequence[StepFound], count_mm: float) -> Le
     untold = _untold(fit, steps)
     off = _beside(fit, untold, noise)
     count = len(fit.sight.time_s)
-    p_value = _p_of_places(fit, off, noise) if fit.sight.placed else _p_of_way(fit, off)
+    p_value = _p_of(fit, off, noise)
     if p_value >= _NOISE:
         return None
     off = _simplest(fit, untold, noise, off)
+    # Beside a delay and a play that it does without, a stretch may be far larger than it is alone.
+    p_value = max(p_value, _p_of(fit, off, noise))
+    if p_value >= _NOISE:
+        return None
     length, time_s = off.end - off.first, fit.sight.time_s
     told = float(fisher.sf(off.misfit, count, max(count / 3, 1.0))) > _NOISE
     between_s = float(time_s[off.first]), float(time_s[off.end - 1])
@@ -160,9 +166,18 @@ def _strongest_stretch(rest: Whitened) -> _Stretch:
     return _Stretch(int(first), int(end), float(size), float(gain), misfit)
 
 
+def _p_of(fit: TravelFit, off: _Stretch, noise: DriftNoise) -> float:
+    """Return the chance of a stretch where fiducials place each picture, or by a way's random walk."""
+    return _p_of_places(fit, off, noise) if fit.sight.placed else _p_of_way(fit, off)
+
+
 def _p_of_places(fit: TravelFit, off: _Stretch, noise: DriftNoise) -> float:
-    """Return the chance of a stretch by errors of fiducials: neighbouring pictures share them."""
-    return min(1.0, _tries(fit) * float(2 * norm.sf(abs(off.size_mm) / noise.white_mm)))
+    """Return the chance of a stretch by errors of fiducials: neighbouring pictures share them.
+
+    The size is unsure by one picture's error at least, and by more where other effects look alike.
+    """
+    z = min(abs(off.size_mm) / noise.white_mm, np.sqrt(off.gain))
+    return min(1.0, _tries(fit) * float(2 * norm.sf(z)))
 
 
 def _p_of_way(fit: TravelFit, off: _Stretch) -> float:

@@ -1,0 +1,51 @@
+"""How alike rings are because a codec repeats light, and by how much less they say together.
+
+It is kept with the wall, which pages open: without SciPy.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipeline.arrays import Float
+
+# What is less alike counts as new: σ from the scatter of such rings is too small by 1 − √(1 − 0.1) = 5 %.
+_NOTHING = 0.1
+
+
+@dataclass(frozen=True)
+class HeldOver:
+    """How alike (L,) rings 0, 1, 2, ... apart are: 1 where nothing is new, 0 where all is."""
+
+    likeness: Float
+
+    @property
+    def rings(self) -> int:
+        """How many rings apart next to nothing is shared; as far as was looked, where there are none."""
+        below = self.likeness <= _NOTHING
+        return int(np.argmax(below)) if below.any() else len(self.likeness) - 1
+
+    def independent(self, count: int) -> int:
+        """Return by how many rings that share nothing so many in a row are outweighed, rounded.
+
+        The variance of their mean is Σ_ij ρ_(i−j) / n² of one's. Next to nothing shared counts as nothing.
+        """
+        apart = np.arange(1, min(len(self.likeness), count))
+        shared = np.where(self.likeness > _NOTHING, self.likeness, 0.0)[apart]
+        return round(count / (1 + 2 * float(shared @ (1 - apart / count)))) if count > 1 else count
+
+    def gain_in_mean(self, width: float) -> float:
+        """Return how many times the σ of a Gaussian mean over ``width`` ring spacings is that of other rings.
+
+        The variance of Σ w_i x_i is Σ_k ρ_k Σ_i w_i w_(i+k), and a Gaussian's Σ_i w_i w_(i+k) falls off as
+        exp(−k² / 4 w²).
+        """
+        apart = np.arange(1, len(self.likeness))
+        shared = np.exp(-((apart / (2 * width)) ** 2))
+        return float(np.sqrt(1 + 2 * self.likeness[1:] @ shared))
+
+
+NOTHING_HELD = HeldOver(np.ones(1))
+"""Of rings that share nothing."""
