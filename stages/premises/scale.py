@@ -177,6 +177,11 @@ class _Ratio:
     steps: int
     one_sign: float
 
+    @property
+    def tells_nothing(self) -> bool:
+        """Whether too few steps tell it, or encoder and wall go on and back apart, or the encoder stands."""
+        return self.steps < _LEAST_STEPS or self.one_sign < _ONE_SIGN
+
 
 def runs_forwards(encoder: Encoder | None, time_s: Float, steps: Steps) -> bool:
     """Return whether the wall's motion tells that the pictures are stored first to last.
@@ -231,7 +236,7 @@ def encoder_factor(
     if recording.encoder is None or not np.isfinite(radius_mm):
         return 1.0
     found = _ratio(recording.encoder, time_s, steps, radius_mm)
-    if found.steps < _LEAST_STEPS or found.one_sign < _ONE_SIGN:
+    if found.tells_nothing:
         return 1.0
     unit, size = _nearest_unit(abs(found.value))
     contradicts = max(abs(found.value) * size, 1 / max(abs(found.value) * size, 1e-9)) > _CONTRADICTS
@@ -269,10 +274,13 @@ def _ratio(encoder: Encoder, time_s: Float, steps: Steps, radius_mm: float) -> _
 
 
 def in_mm(encoder: Encoder | None, time_s: Float, steps: Steps, radius_mm: float) -> Encoder | None:
-    """Return the encoder brought to mm by the wall's motion; its sign is kept."""
+    """Return the encoder brought to mm by the wall's motion, where that tells it; its sign is kept."""
     if encoder is None or not np.isfinite(radius_mm):
         return encoder
-    _, size = _nearest_unit(abs(_ratio(encoder, time_s, steps, radius_mm).value))
+    found = _ratio(encoder, time_s, steps, radius_mm)
+    if found.tells_nothing:
+        return encoder
+    _, size = _nearest_unit(abs(found.value))
     return replace(encoder, distance_mm=encoder.distance_mm * size)
 
 

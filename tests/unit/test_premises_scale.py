@@ -234,3 +234,10 @@ def test_an_encoder_is_brought_to_mm_whichever_its_sign(unit_mm):
     read = replace(run.encoder, distance_mm=-run.encoder.distance_mm / unit_mm)
     brought = in_mm(read, run.table.time_s, run.steps, 50.0)
     np.testing.assert_allclose(brought.distance_mm, -run.encoder.distance_mm)
+
+
+def test_an_encoder_that_stands_beside_a_moving_wall_stays_as_it_is():
+    """It ended the run with a division by nothing."""
+    run = pulled(2)
+    stands = replace(run.encoder, distance_mm=np.full(len(run.encoder.time_s), 3.0))
+    assert in_mm(stands, run.table.time_s, run.steps, 50.0) is stands
