@@ -1,0 +1,135 @@
+"""Pictures exposed for longer are late: the line's width tells them from late readings, or none does."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pipeline.instrument.probe import Probe
+from pipeline.physics.catalogue import effect
+from stages.diagnose.agreement import Agreement
+from stages.diagnose.channels import Seen
+from stages.diagnose.profile.evidence import ProfileEvidence
+from stages.diagnose.profile.finding import Size, finding
+from stages.diagnose.result import Diagnosis, Verdict
+from stages.diagnose.travel.evidence import TravelEstimate
+from stages.diagnose.travel.model import TravelFit, fitted
+from tests.diagnosed import AGREES, DIFFERS, answer, seen
+from tests.travel_cases import read
+from tests.travel_cases import seen as sight
+
+
+@pytest.fixture(scope="module")
+def thirty_a_second() -> TravelFit:
+    """Any fit of pictures from 1/30 s to 1/30 s."""
+    return fitted(sight(np.random.default_rng(8), every=6), read(), (), None)
+
+
+def late(
+    source: str, fit: TravelFit, delay_s: float | None, width_ms: tuple[float, float] | None,
+    agreements: tuple[Agreement, ...] = (AGREES,),
+) -> Seen:  # fmt: skip
+    """Return a recording whose readings seem late, and whose line widens with its speed."""
+    estimates: tuple[TravelEstimate, ...] = ()
+    if delay_s is not None:
+        p = 1e-12 if abs(delay_s) > 5e-3 else 0.8
+        estimates = (
+            TravelEstimate("time_offset", "delay_s", delay_s, 2e-4, 1e-3, p, 0.01, (), (AGREES,)),
+        )  # fmt: skip
+    recording = seen(source, estimates=estimates, fit=fit)
+    if width_ms is None:
+        return recording
+    value, sigma = width_ms
+    size, z = Size("exposure_s", "s", 1e-3 * value, 1e-3 * sigma), value / sigma
+    blur = finding("motion_blur", z, 1e-12 if z > 6 else 0.5, (size,), "It widens.")
+    of_line = ProfileEvidence("toy", np.arange(9), (replace(blur, agreements=agreements),))
+    return replace(recording, profile=of_line)
+
+
+def sizes(found: Diagnosis) -> dict[str, float]:
+    return {e.name: e.parameters[effect(e.name).quantities[0].name].value for e in found.effects}
+
+
+@pytest.mark.parametrize(
+    ("delay_s", "width_ms", "named"),
+    [
+        (0.008, (0.0, 1.0), {"time_offset": 0.008}),
+        (0.008, (16.0, 1.0), {"motion_blur": 0.016}),
+        # What half of the exposure does not make is the encoder's own.
+        (0.018, (16.0, 1.0), {"motion_blur": 0.016, "time_offset": 0.010}),
+        (-0.010, (16.0, 1.0), {"motion_blur": 0.016, "time_offset": -0.018}),
+        # Readings that come early, and exposures longer than from picture to picture, are no exposures.
+        (-0.008, None, {"time_offset": -0.008}),
+        (0.05, None, {"time_offset": 0.05}),
+    ],
+)
+def test_pictures_that_are_late_by_half_an_exposure_are_told_from_late_readings(
+    real_probe: Probe, thirty_a_second: TravelFit, delay_s: float, width_ms: tuple[float, float] | None,
+    named: dict[str, float],
+) -> None:  # fmt: skip
+    found = answer(real_probe, None, late("gauge", thirty_a_second, delay_s, width_ms))
+    assert found.verdict is Verdict.NAMED
+    assert found.members == ()
+    assert sizes(found) == pytest.approx(named)
+
+
+@pytest.mark.parametrize("width_ms", [None, (16.0, 9.0)])
+def test_late_pictures_and_late_readings_are_a_class_where_the_width_does_not_tell(
+    real_probe: Probe, thirty_a_second: TravelFit, width_ms: tuple[float, float] | None
+) -> None:
+    found = answer(real_probe, None, late("gauge", thirty_a_second, 0.008, width_ms))
+    assert found.verdict is Verdict.CLASS
+    assert set(found.members) == {"time_offset", "motion_blur"}
+    assert sizes(found) == pytest.approx({"time_offset": 0.008})
+    assert 0.45 < found.effects[0].probability < 0.5
+    assert found.location is not None
+    assert (found.location.fixed_to, found.location.time) == (None, "speed")
+
+
+@pytest.mark.parametrize(
+    ("width_ms", "named"),
+    [((16.0, 1.0), {"motion_blur": 0.016, "time_offset": 0.007}), ((0.0, 1.0), {"time_offset": 0.015})],
+)
+def test_the_width_in_one_recording_tells_of_the_delay_in_the_other(
+    real_probe: Probe, thirty_a_second: TravelFit, width_ms: tuple[float, float], named: dict[str, float]
+) -> None:
+    field = late("field", thirty_a_second, 0.015, None)
+    found = answer(real_probe, field, late("gauge", thirty_a_second, None, width_ms))
+    assert found.verdict is Verdict.NAMED
+    assert sizes(found) == pytest.approx(named)
+
+
+def test_a_width_that_no_exposure_has_time_for_is_no_sure_exposure_and_moves_no_delay(
+    real_probe: Probe, thirty_a_second: TravelFit
+) -> None:
+    """60 ms of 33 were named, and half of it was taken off a delay of 8 ms: -22 ms, as surely."""
+    found = answer(real_probe, None, late("gauge", thirty_a_second, 0.008, (60.0, 5.0)))
+    assert sizes(found).get("time_offset", 0.008) == pytest.approx(0.008)
+    assert all(e.probability < 0.6 for e in found.effects if e.name == "motion_blur")
+
+
+def test_the_encoders_own_delay_holds_what_the_width_leaves_open(
+    real_probe: Probe, thirty_a_second: TravelFit
+) -> None:
+    named = answer(real_probe, None, late("gauge", thirty_a_second, 0.018, (16.0, 2.0)))
+    (own,) = (e for e in named.effects if e.name == "time_offset")
+    assert own.parameters["delay_s"].sd == pytest.approx(np.sqrt(0.2**2 + 1 + 1) * 1e-3)
+    within = answer(real_probe, None, late("gauge", thirty_a_second, 0.012, (16.0, 2.0)))
+    assert sizes(within) == pytest.approx({"motion_blur": 0.016})
+    # An exposure that the halves of the frames do not bear out leaves the delay open.
+    open_ = answer(real_probe, None, late("gauge", thirty_a_second, 0.018, (16.0, 2.0), (DIFFERS,)))
+    assert open_.verdict is Verdict.CLASS
+    assert set(open_.members) == {"time_offset", "motion_blur"}
+
+
+def test_an_exposure_leaves_no_more_of_the_time_to_the_next_picture_than_is_not_stated(
+    real_probe: Probe, thirty_a_second: TravelFit
+) -> None:
+    """33 ms from picture to picture, 28 ms of which a longer exposure would take."""
+    recording = late("gauge", thirty_a_second, 0.014, None)
+    assert answer(real_probe, None, recording).verdict is Verdict.CLASS
+    long = replace(real_probe, shutter=replace(real_probe.shutter, exposure_s=0.015))
+    assert sizes(answer(long, None, recording)) == pytest.approx({"time_offset": 0.014})
+    assert answer(long, None, recording).verdict is Verdict.NAMED
