@@ -98,8 +98,9 @@ class Claim:
 
     @property
     def may_go_otherwise(self) -> bool:
-        """Whether the name would be sure but for what it leaves, or for other courses in its place."""
-        return not self.sure and replace(self, fits_p=1.0, otherwise=0.0, beside=0).sure
+        """Whether what it leaves, or other courses in its place, are enough to make the name unsure."""
+        clear = replace(self, beside=0)
+        return not clear.sure and replace(clear, fits_p=1.0, otherwise=0.0).sure
 
     @property
     def _chance(self) -> float:

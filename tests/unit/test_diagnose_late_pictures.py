@@ -108,6 +108,9 @@ def test_a_width_that_no_exposure_has_time_for_is_no_sure_exposure_and_moves_no_
     found = answer(real_probe, None, late("gauge", thirty_a_second, 0.008, (60.0, 5.0)))
     assert sizes(found).get("time_offset", 0.008) == pytest.approx(0.008)
     assert all(e.probability < 0.6 for e in found.effects if e.name == "motion_blur")
+    alone = answer(real_probe, None, late("gauge", thirty_a_second, None, (60.0, 5.0)))
+    assert alone.verdict is Verdict.CLASS
+    assert "encoder" not in alone.identifiable, "the encoder showed nothing"
 
 
 def test_the_encoders_own_delay_holds_what_the_width_leaves_open(

@@ -235,6 +235,14 @@ def test_stray_pictures_apart_leave_nothing(placed):
     assert left_over(fit, steps_found(fit, read()), 0.05) is None
 
 
+@pytest.mark.parametrize("placed", [True, False])
+def test_a_stray_picture_beside_one_that_is_off_a_little_leaves_nothing(placed):
+    """Two of the same sign were taken for a row: "unless 1 pictures in a row are stray"."""
+    sight = strayed({20: 2.0, 21: 0.2}, placed=placed)
+    fit = with_events(sight, read())
+    assert left_over(fit, steps_found(fit, read()), 0.05) is None
+
+
 def test_noise_leaves_what_its_p_value_says(monkeypatch):
     """Drawn ways that are noise alone: the chance told of the strongest stretch is no less than it is."""
     monkeypatch.setattr("stages.diagnose.travel.left_over._NOISE", 2.0)

@@ -29,6 +29,8 @@ PLACED_SIGMA_MM = 0.05
 _NOISE = 1e-6
 # A stretch whose information is less than this share of the most says nothing.
 _TOLD = 1e-9
+# Neighbouring pictures are off alike where neither is off by more than so many times the other (chosen).
+_ALIKE = 2
 # What a stretch has of its own: begin, end and size.
 _OWN = 3
 
@@ -50,7 +52,8 @@ class LeftOver:
     p_value : float
         Of so much by chance, over all stretches that were tried.
     stray : int
-        So many pictures in a row were taken for stray ones; 0 where it lasts too long for that.
+        How many pictures in a row were taken for stray ones: all of the stretch, or all others; 0 where some
+        of them were not.
     by_slip : bool
         Whether one slip would explain it too.
     """
@@ -79,14 +82,20 @@ class LeftOver:
 class _Stretch:
     """Pictures from ``first`` to before ``end`` that are off by ``size_mm``.
 
-    ``gain`` is by how much it lowers χ², and ``misfit`` the χ² left for each degree of freedom.
+    ``gain`` is by how much it lowers χ²; χ² of ``left`` remains, with ``free`` degrees of freedom.
     """
 
     first: int
     end: int
     size_mm: float
     gain: float
-    misfit: float
+    left: float
+    free: int
+
+    @property
+    def misfit(self) -> float:
+        """The χ² that is left for each degree of freedom."""
+        return self.left / self.free
 
 
 def left_over(fit: TravelFit, steps: Sequence[StepFound], count_mm: float) -> LeftOver | None:
@@ -114,12 +123,21 @@ def left_over(fit: TravelFit, steps: Sequence[StepFound], count_mm: float) -> Le
     p_value = max(p_value, _p_of(fit, off, noise))
     if p_value >= _NOISE:
         return None
-    length, time_s = off.end - off.first, fit.sight.time_s
+    time_s = fit.sight.time_s
     told = float(fisher.sf(off.misfit, count, max(count / 3, 1.0))) > _NOISE
     between_s = float(time_s[off.first]), float(time_s[off.end - 1])
     by_slip = told and SLIP not in fit.without and off.end == count
-    stray = min(length, count - length) if untold else 0
+    stray = _stray_pictures(fit, untold, off)
     return LeftOver(off.size_mm, (off.first, off.end - 1), between_s, p_value, stray, by_slip)
+
+
+def _stray_pictures(fit: TravelFit, untold: list[int], off: _Stretch) -> int:
+    """Return how many pictures, all of a stretch or all others, were taken for stray; 0 where not all."""
+    events = (fit.events[k - len(SMOOTH)] for k in untold)
+    taken = {e.place for e in events if e.kind is EventKind.OUTLIER}
+    within = set(range(off.first, off.end))
+    rows = (within, set(range(len(fit.sight.time_s))) - within)
+    return next((len(row) for row in rows if row and row <= taken), 0)
 
 
 def _of_places(fit: TravelFit, count_mm: float) -> DriftNoise:
@@ -133,9 +151,10 @@ def _simplest(fit: TravelFit, untold: list[int], noise: DriftNoise, beside: _Str
     What is off for a while may have been taken for a delay or a play.
     """
     lags = [k for k in (DELAY, PLAY) if fit.values[k] != 0]
+    if not lags:
+        return beside
     alone = _beside(fit, [*lags, *untold], noise)
-    free = max(len(fit.sight.time_s) - len(fit.values), 1)
-    return alone if (alone.misfit - beside.misfit) * free < FAR_BETTER * len(lags) else beside
+    return alone if alone.left - beside.left < FAR_BETTER * len(lags) else beside
 
 
 def _beside(fit: TravelFit, untold: list[int], noise: DriftNoise) -> _Stretch:
@@ -161,9 +180,9 @@ def _strongest_stretch(rest: Whitened) -> _Stretch:
     score = np.where(tried, up_to - up_to[:, None], 0.0)
     first, end = np.unravel_index(np.argmax(score**2 / safe), both.shape)
     size, gain = score[first, end] / safe[first, end], score[first, end] ** 2 / safe[first, end]
-    free = len(rest.residual) - len(rest.estimate) - _OWN
-    misfit = max(float(rest.residual @ rest.weighted - gain), 0.0) / max(free, 1)
-    return _Stretch(int(first), int(end), float(size), float(gain), misfit)
+    left = max(float(rest.residual @ rest.weighted - gain), 0.0)
+    free = max(len(rest.residual) - len(rest.estimate) - _OWN, 1)
+    return _Stretch(int(first), int(end), float(size), float(gain), left, free)
 
 
 def _p_of(fit: TravelFit, off: _Stretch, noise: DriftNoise) -> float:
@@ -198,7 +217,8 @@ def _untold(fit: TravelFit, steps: Sequence[StepFound]) -> list[int]:
     for k, event in enumerate(fit.events):
         if event.kind is EventKind.OUTLIER:
             beside = (stray.get(event.place + way, 0.0) for way in (-1, 1))
-            is_told = not any(other * stray[event.place] > 0 for other in beside)
+            own = stray[event.place]
+            is_told = not any(other * own > max(other**2, own**2) / _ALIKE for other in beside)
         else:
             is_told = is_found(next(found).p_value)
         if not is_told:
