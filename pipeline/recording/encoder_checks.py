@@ -49,15 +49,16 @@ def counted_on(encoder: Encoder) -> tuple[Encoder, tuple[str, ...]]:
     moves_mm = step_mm[step_mm != 0]
     usual_mm = float(np.median(moves_mm))
     whole_mm = float(np.median(by_mm)) - usual_mm
-    near_mm = 2 * float(np.quantile(np.abs(moves_mm), _LARGEST))
+    near_mm = 2 * _usual_largest(step_mm)
     counts = np.ptp(encoder.distance_mm) < abs(whole_mm) + near_mm and whole_mm * usual_mm < 0
     if not counts or np.any(np.abs(by_mm - usual_mm - whole_mm) > near_mm):
         return encoder, ()
     begun = np.zeros(len(encoder.time_s))
     begun[jumps + 1] = -whole_mm
+    times = f"{jumps.size} time{'s' * (jumps.size > 1)}"
     return replace(encoder, distance_mm=encoder.distance_mm + np.cumsum(begun)), (
-        f"the encoder's counter begins anew {jumps.size} times, after {abs(whole_mm):.4g} mm each: taken "
-        "as if it had counted on",
+        f"the encoder's counter begins anew {times}, after {abs(whole_mm):.4g} mm each: taken as if it had "
+        "counted on",
     )
 
 
@@ -70,10 +71,18 @@ def _jumps(encoder: Encoder) -> Int:
     step_mm = np.abs(np.diff(encoder.distance_mm))
     if not step_mm.any():
         return np.empty(0, np.int64)
-    usual_mm = float(np.quantile(step_mm[step_mm > 0], _LARGEST, method="lower"))
+    usual_mm = _usual_largest(step_mm)
     jumps = np.flatnonzero(step_mm > max(_JUMP_FACTOR * usual_mm, _JUMP_MM))
-    a_while = int(0.5 * _BESIDE_S / np.median(np.diff(encoder.time_s)))
-    return jumps[step_mm[jumps] > _JUMP_FACTOR * _median_around(step_mm, jumps, max(_BESIDE // 2, a_while))]
+    step_s = np.diff(encoder.time_s)
+    a_while = int(0.5 * _BESIDE_S / np.median(step_s[step_s > 0])) if step_s.any() else 0
+    beside = min(max(_BESIDE // 2, a_while), len(step_mm))
+    return jumps[step_mm[jumps] > _JUMP_FACTOR * _median_around(step_mm, jumps, beside)]
+
+
+def _usual_largest(step_mm: Float) -> float:
+    """Return the usual largest, mm, of steps (N,) by which the encoder moves; a jump does not raise it."""
+    size_mm = np.abs(step_mm)
+    return float(np.quantile(size_mm[size_mm > 0], _LARGEST, method="lower"))
 
 
 def _median_around(values: Float, at: Int, beside: int) -> Float:

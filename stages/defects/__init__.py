@@ -66,7 +66,7 @@ _FEW_UNCONFIRMED, _MANY_FALSE = 3, 0.25
 _WALL_OR_NOT = 0.5
 # A limit of detection so many times what is asked for is told. Chosen; good ones are near what is asked for.
 _DEEPER = 2.0
-# The limit of detection is told for defects so long; by so many rings it is looked when two count as two.
+# Defects longer than the limit of detection is told for, mm, are warned of; so many rings are tried. Chosen.
 _SHORT_MM, _MOST_RINGS = 3.0, 40
 _UNSURE = "Its depth is not known to twice its σ"
 
@@ -230,10 +230,10 @@ def _warn_of_missed(smallest_mm: float, asked_mm: float, context: Context) -> No
     context.report("depth from which nine of ten defects of 3 mm × 3 mm are found", smallest_mm, "mm")
     if smallest_mm > _DEEPER * asked_mm:
         context.warn(
-            f"only from {smallest_mm:.2g} mm of depth on nine of ten defects of 3 mm × 3 mm are found; "
-            f"{asked_mm:.2g} mm are asked for, and the line is too unsteady here. Shallower ones are missed, "
-            "and so is any where the wall was not measured. What to do: record with less compression, a "
-            "sharper picture and a camera that sits tight"
+            f"defects of 3 mm × 3 mm must be {smallest_mm:.2g} mm deep for nine of ten to be found, where "
+            f"{asked_mm:.2g} mm are asked for: the laser's line is too unsteady here. Shallower ones may be "
+            "missed, and so is any where the wall was not measured. What to do: record with less "
+            "compression, a sharper picture and a camera that sits tight"
         )
 
 

@@ -29,7 +29,7 @@ class Pace:
         Midway between readings that differ, and at both ends. There a count is known to the width of a
         reading, however coarse it is; in between only that it goes on.
     grid_s, usual : (M,)
-        Usual advance per picture; 0 where the encoder stands.
+        Usual advance per picture, jitter of a standing encoder included.
     period_s, least : float
         From picture to picture, and the smallest advance over one that is no standing.
     """
@@ -42,8 +42,9 @@ class Pace:
     least: float
 
     @classmethod
-    def of(cls, encoder: Encoder | None, period_s: float, step_pictures: float) -> Pace | None:
-        """Return the pace of an encoder beside steps of so many pictures; None where it stands."""
+    def of(cls, encoder: Encoder | None, pictures_s: Float, step_pictures: float) -> Pace | None:
+        """Return the pace of an encoder beside pictures (F,), s, and steps of some; None where it stands."""
+        period_s = float(np.median(np.diff(pictures_s)))
         k = np.empty(0, np.int64) if encoder is None else np.flatnonzero(np.diff(encoder.distance_mm))
         if encoder is None or len(k) < _COUNTS:
             return None
@@ -51,13 +52,17 @@ class Pace:
             np.concatenate([v[:1], (v[k] + v[k + 1]) / 2, v[-1:]])
             for v in (encoder.time_s, encoder.distance_mm)
         )
-        grid_s = np.arange(time_s[0], time_s[-1], period_s)
+        # One reading may have a wild time.
+        beside_s = float(np.ptp(pictures_s)) + _SHIFTS[-1] * period_s
+        first_s, last_s = pictures_s[0] - beside_s, pictures_s[-1] + beside_s
+        grid_s = np.arange(max(time_s[0], first_s), min(time_s[-1], last_s), period_s)
         speed = np.diff(np.interp(grid_s, time_s, mm))
-        if len(speed) < _STEPS:
+        steady = np.abs(usual_speed(speed))
+        if len(speed) < _STEPS or not steady.any():
             return None
         slow = _COUNTS * float(np.median(np.diff(time_s))) / period_s
         usual = median_filter(speed, 2 * round(max(_STEPS * step_pictures, slow) / 2) + 1, mode="nearest")
-        least = float(np.abs(usual_speed(speed)[usual_speed(speed) != 0]).min(initial=np.inf))
+        least = float(steady[steady > 0].min())
         return cls(time_s, mm, grid_s[1:] - period_s / 2, usual, period_s, least)
 
     def excess(self, begin_s: float, end_s: float) -> Float:

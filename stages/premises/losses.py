@@ -22,7 +22,8 @@ _SIGMAS = 6.0
 _SIGMAS_LOST = 3.5
 # 0.9 quantile of normal errors in σ. It gives σ here, because errors of matching are not normal.
 _NINE_IN_TEN = 1.645
-# Steps on either side from which the usual speed is taken.
+# A step is compared where so many others are close by, and so many on either side (at the ends: see
+# `_has_neighbours`). Chosen.
 _AROUND_STEP, _ON_EACH_SIDE = 4, 2
 _LEAST_STEPS = 12
 # Steps that took more than so many usual times tell nothing of lost pictures: over 32 frames, of which 30
@@ -55,7 +56,7 @@ class _Leap:
 
 @dataclass(frozen=True)
 class Steps:
-    """Motion of the lit wall from picture ``start`` to ``end`` (K,): ``size`` in pipe radii."""
+    """Motion of the lit wall from picture ``start`` to ``end`` (K,): ``size`` in pipe radii or mm."""
 
     start: Int
     end: Int
@@ -133,12 +134,12 @@ def rows_by_motion(
     sigmas = np.where(over > 0, _SIGMAS_LOST, _SIGMAS_LOST if left > 0 else _SIGMAS)
     leaps = _leaps(steps, passed, rhythm, over, sigmas, one_bore, left)
     leaps = [leap for leap in leaps if not _knocked(leap, steps, rhythm, sway)]
-    pace = Pace.of(encoder, period, float(np.median(passed)))
+    pace = Pace.of(encoder, time, float(np.median(passed)))
     held_back = measured and _shows_more(encoder, time, steps)
-    spare = _in_spare_rows(leaps, left)
+    spare = set(_in_spare_rows(leaps, left))
     for leap in sorted(leaps, key=lambda one: one.step):
         start, end = int(steps.start[leap.step]), int(steps.end[leap.step])
-        between_s = row_times(table, out)[[start, end]]
+        between_s = row_times(table, out[[start, end]])
         skips = np.diff(row[start : end + 1]) - 1
         believed = leap.lost > 0 or skips.max() + leap.lost >= 0
         believed &= _encoder_bears_out(leap, pace, between_s, in_spare_rows=leap in spare)

@@ -75,7 +75,7 @@ def test_a_limit_of_detection_far_above_what_is_asked_for_is_told() -> None:
     limit = found(2, noise_mm=0.15, warned=noisy).smallest_depth_mm
     assert not [w for w in quiet if "nine of ten" in w]
     assert limit > 0.4
-    assert [w for w in noisy if f"only from {limit:.2g} mm of depth on" in w]
+    assert [w for w in noisy if f"must be {limit:.2g} mm deep for nine of ten" in w]
 
 
 def test_the_length_from_which_rings_confirm_a_defect_is_told_where_a_codec_repeats_light() -> None:

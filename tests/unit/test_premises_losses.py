@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipeline.recording.base import FrameTable
+from pipeline.recording.base import Encoder, FrameTable
 from stages.premises.losses import Steps, rows_by_motion
 from stages.premises.rhythm_of_steps import over_whole_periods
 from tests.hand_pulled import RADIUS_MM, Pulled, pulled
@@ -133,3 +133,30 @@ def test_memory_does_not_grow_with_the_square_of_a_run() -> None:
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     assert peak < 1000 * 8 * 8000
+
+
+def test_one_reading_with_a_wild_time_is_passed_over() -> None:
+    """A first reading at 0 before times of today asked for 380 GB."""
+    run = pulled(3)
+    assert run.encoder is not None
+    wild = replace(run.encoder, time_s=run.encoder.time_s + 1.7e9)
+    wild = replace(wild, time_s=np.append(0.0, wild.time_s), distance_mm=np.append(0.0, wild.distance_mm))
+    today = replace(run.table, time_s=run.table.time_s + 1.7e9)
+    assert replace(run, encoder=wild, table=today).invented() == 0
+
+
+@pytest.mark.parametrize("batch", [4, 8])
+def test_an_encoder_read_in_bursts_bears_no_loss_out(batch: int) -> None:
+    """No speed of it is known, and all leaps of a probe that was jerked counted as lost pictures."""
+    speed = np.ones(460)
+    speed[[110, 180, 250, 320, 380]] = 3.0
+    way, at = np.cumsum(speed), np.arange(400)
+    # Two readings a picture arrive together, a millisecond apart, and are stamped when they do.
+    read = np.arange(0, 459, 0.5)
+    arrived = np.ceil(read / batch) * batch
+    nth = np.arange(len(read)) - np.searchsorted(arrived, arrived)
+    encoder = Encoder(arrived / 30 + nth * 1e-3 - 1, np.interp(read, np.arange(460), way))
+    way = way[30:430]
+    table = FrameTable(at, at / 30, np.full(400, "led"))
+    row = rows_by_motion(at, Steps(at[:-1], at[1:], np.diff(way) / 50), 1, table, encoder, np.ones(400), 50.0)
+    np.testing.assert_array_equal(row, at)

@@ -67,3 +67,18 @@ def test_a_counter_that_begins_anew_counts_on(count_mm: float, stands: int) -> N
     assert len(found) == 1
     assert "begins anew 2 times" in found[0] or "begins anew 3 times" in found[0]
     np.testing.assert_allclose(encoder.distance_mm, way, atol=2 * max(count_mm, 0.3))
+
+
+def test_readings_that_share_their_times_are_checked() -> None:
+    """A logger that stamps three readings alike ended the run: between half of them no time passes."""
+    times = np.repeat(np.arange(100) / 10, 3)
+    assert checked_encoder(Encoder(times, 0.3 * np.arange(300)), FRAMES)[1] == ()
+
+
+def test_a_wheel_that_slips_back_in_a_short_run_is_no_counter_that_begins_anew() -> None:
+    """The slip itself counted among the usual steps, and the distances after it were changed."""
+    way = 0.2 * np.arange(15)
+    way = np.repeat(np.append(way, way[-1] - 2.1 + 0.2 * np.arange(3)), 30)
+    encoder, found = noticed(way, 54)
+    assert "jumps by up to 2.1 mm" in found[0]
+    np.testing.assert_array_equal(encoder.distance_mm, way)
