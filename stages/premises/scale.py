@@ -207,8 +207,8 @@ def runs_forwards(encoder: Encoder | None, time_s: Float, steps: Steps) -> bool:
     if _TWICE * backwards < as_it_is:
         raise UnusableError(
             "premises",
-            "the pictures are stored in reverse order, last first: the wall moves in them as the encoder does "
-            f"if it is read backwards in time: {as_it_is / max(backwards, 1e-9):.1f} times as well",
+            "the pictures are stored in reverse order, last first: the wall moves in them as the encoder "
+            f"does, read backwards in time, which fits {as_it_is / max(backwards, 1e-9):.1f} times as well",
             hint="turn the order of the pictures round, or find out what reversed the video",
         )
     return _TWICE * as_it_is < backwards
