@@ -176,7 +176,7 @@ def psnr_without_noise(found: Twin) -> str:
     if math.isnan(found.psnr_db):
         return "not compared"
     if math.isinf(found.psnr_noise_free_db):
-        return "all of it is noise"
+        return "no difference beyond the noise"
     return f"{found.psnr_noise_free_db:.1f} dB"
 
 

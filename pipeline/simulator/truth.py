@@ -43,7 +43,7 @@ class SceneTruth:
     motion : Motion
     odometer : Odometer or None
     frames : FrameTable
-        Numbers, times at the middle of the exposure (of the middle row), illumination.
+        Numbers, times at the middle of the stated exposure (of the middle row), illumination.
     frame_rate : float
     rendering : Rendering
     """
@@ -70,7 +70,7 @@ class SceneTruth:
         return instrument
 
     def late_s(self, instrument: TrueInstrument) -> float:
-        """Return how late frames are: the middle of a longer exposure from the same start is later."""
+        """Return by how many s frames are late: a longer exposure from one start has its middle later."""
         return 0.5 * (instrument.shutter.exposure_s - self.stated.shutter.exposure_s)
 
     def poses(self) -> Float:

@@ -10,8 +10,11 @@ from scipy.stats import norm
 
 from stages.diagnose.agreement import TELLING, same
 from stages.diagnose.channels import Seen
+from stages.diagnose.effects.library import LIBRARY
 from stages.diagnose.profile.finding import Finding, Size
 from stages.diagnose.travel.evidence import TravelEstimate, TravelEvidence
+from stages.diagnose.travel.model import TravelFit, second_predictions
+from stages.diagnose.travel.solve import DELAY
 
 _EXPOSURE, _DELAY = "motion_blur", "time_offset"
 # So many σ beyond what a frame has time for, a width is not that of an exposure: by chance once in 700.
@@ -55,7 +58,8 @@ class Exposure:
         longer = next((f.sizes[0] for f in self.widths if f.found), None)
         if seen is None or seen.travel is None or longer is None or not self.has_time(seen, longer):
             return seen
-        each = (_less_half(e, longer) if e.effect == _DELAY else e for e in seen.travel.estimates)
+        fit = seen.travel.fit
+        each = (_less_half(e, longer, fit) if e.effect == _DELAY else e for e in seen.travel.estimates)
         return replace(seen, travel=replace(seen.travel, estimates=tuple(each)))
 
     def has_time(self, seen: Seen, longer: Size) -> bool:
@@ -78,13 +82,15 @@ class Exposure:
         return (_EXPOSURE,) if 0 < exposure.value < longest and not told_apart else ()
 
 
-def _less_half(late: TravelEstimate, longer: Size) -> TravelEstimate:
-    """Return the delay less half of a longer exposure."""
+def _less_half(late: TravelEstimate, longer: Size, fit: TravelFit | None) -> TravelEstimate:
+    """Return the delay less half of a longer exposure, and what parts of the travel say of what is left."""
     value, sigma = late.value - longer.value / 2, float(np.hypot(late.sigma, longer.sigma / 2))
-    own = replace(late, value=value, sigma=sigma)
+    again = late.agreements if fit is None else second_predictions(fit, DELAY, known=longer.value / 2)
+    own = replace(late, value=value, sigma=sigma, agreements=again)
     if not np.isfinite(sigma):
         return own
-    return replace(own, p_value=float(2 * norm.sf(abs(value) / own.size_sigma)))
+    possible = LIBRARY[_DELAY].possible((), np.array([value]))
+    return replace(own, p_value=float(2 * norm.sf(abs(value) / own.size_sigma)) if possible else 1.0)
 
 
 def _another(exposure: Size, width: Size) -> bool:

@@ -90,12 +90,12 @@ def estimate_motion(
     trajectory = lay_route(trajectory, joined.turn_variance, recording, probe, context)
     events = find_events(recording.frames, trajectory, run.texture.poses, joined.slip, has_encoder)
     seen = SeenCentres(circles.centre_c, probe.laser.baseline_mm)
-    report_motion(context, estimate, run.texture, trajectory, seen, wider)
+    shakes = camera_trembles(trajectory, run.texture.poses, seen)
+    report_motion(context, estimate, run.texture, trajectory, shakes, wider)
     require_along_pipe(trajectory)
     loops.report(context)
     report_instrument(probe, trajectory, context)
-    steady, shaken = estimate.steady, camera_trembles(trajectory, run.texture.poses, seen)
-    trajectory = doubting_instrument(trajectory, probe, estimate.lasting, shaken)
+    steady, trajectory = estimate.steady, doubting_instrument(trajectory, probe, estimate.lasting, shakes)
     return replace(
         trajectory, events=events, image_scale=steady.scale, image_scale_sigma=steady.scale_sigma,
         radius_doubt=doubt,

@@ -92,19 +92,18 @@ def trajectory_of(run: JoinedRun, frames: FrameTable, probe: Probe, has_encoder:
     )
 
 
-def doubting_instrument(trajectory: Trajectory, probe: Probe, lasting: float, trembles: bool) -> Trajectory:
+def doubting_instrument(trajectory: Trajectory, probe: Probe, lasting: float, shakes: bool) -> Trajectory:
     """Return a trajectory whose instrument is as unsure as it was moved, where what moved it is in doubt.
 
     Where matches contradict the motion, they moved it by what they share: a lamp mirrored in a polished wall
-    made radii 0.3 mm too large. Where the camera ``trembles`` or the probe does not fit, the picture may move
+    made radii 0.3 mm too large. Where the camera ``shakes`` or the probe does not fit, the picture may move
     in place of the probe: shaken by 2 px at random, it made radii 0.06 mm too small.
     """
     if trajectory.instrument is None or trajectory.instrument_covariance is None:
         return trajectory
-    doubtful = trembles or lasting > _MOST_LASTING or _moved_by(trajectory, probe) > _TOO_FAR
-    if not doubtful:
-        return trajectory
     moved = trajectory.instrument - probe.parameters
+    if not (shakes or lasting > _MOST_LASTING or _farthest(moved, probe) > _TOO_FAR):
+        return trajectory
     return replace(
         trajectory, instrument_covariance=trajectory.instrument_covariance + np.outer(moved, moved)
     )
@@ -114,7 +113,8 @@ def report_instrument(probe: Probe, trajectory: Trajectory, context: Context) ->
     """Report how far the probe was moved, in its stated σ, and warn where it cannot have been right."""
     if trajectory.instrument is None:
         return
-    change, farthest = trajectory.instrument - probe.parameters, _moved_by(trajectory, probe)
+    change = trajectory.instrument - probe.parameters
+    farthest = _farthest(change, probe)
     context.report("instrument moved by the adjustment, at most", farthest, "stated σ")
     if farthest > _TOO_FAR:
         sigma = np.sqrt(np.diagonal(probe.covariance))
@@ -141,12 +141,13 @@ def report_motion(
     estimate: RunEstimate,
     texture: TrackedTexture,
     trajectory: Trajectory,
-    seen: SeenCentres,
+    shakes: bool,
     wider: float,
 ) -> None:
     """Report the figures of a motion, and warn where it may be off by more than its σ.
 
-    The rings' centres are those ``seen``. The pipe comes out ``wider`` than nominal by that share.
+    Whether the camera ``shakes`` is told by `camera_trembles`. The pipe comes out ``wider`` than nominal by
+    that share.
     """
     report_steps(context, estimate.trials, estimate.unsettled)
     context.report("landmarks", texture.store.landmarks, "")
@@ -156,7 +157,7 @@ def report_motion(
     context.report("reprojection error against the σ of matching", estimate.excess, "times")
     context.report("part of it that lasts from picture to picture", estimate.lasting, "times")
     _warn_of_texture(estimate.lasting, texture.poses, texture.store.spool.count, context)
-    _warn_of_trembling(trajectory, texture.poses, seen, context)
+    _warn_of_trembling(trajectory, texture.poses, shakes, context)
     context.report("pipe radius", trajectory.radius_mm, "mm")
     context.report("encoder scale", trajectory.encoder_scale, "")
     estimate.encoder.warn(context, wider)
@@ -213,9 +214,7 @@ def camera_trembles(trajectory: Trajectory, texture: TrackedPoses, seen: SeenCen
     return told and not seen.deny_trembling(trajectory, texture.frames)
 
 
-def _warn_of_trembling(
-    trajectory: Trajectory, texture: TrackedPoses, seen: SeenCentres, context: Context
-) -> None:
+def _warn_of_trembling(trajectory: Trajectory, texture: TrackedPoses, shakes: bool, context: Context) -> None:
     """Warn of a camera that trembles, or of matches that do; without texture neither is known."""
     shaken = trembling(trajectory.T_pc, trajectory.time_s, texture.frames)
     turn = float(shaken[3:5].max())
@@ -225,7 +224,7 @@ def _warn_of_trembling(
     moves = (
         f"from picture to picture it turns by {np.degrees(turn):.2g}° and moves by {shaken[:2].max():.2g} mm"
     )
-    if not camera_trembles(trajectory, texture, seen):
+    if not shakes:
         context.warn(
             f"by its texture the camera trembles: {moves} (1 σ). The laser's ring does not, so the camera "
             "stands firm and texture is matched wrongly: glints, reflections, blur or compression. Radii "
@@ -241,11 +240,8 @@ def _warn_of_trembling(
         )
 
 
-def _moved_by(trajectory: Trajectory, probe: Probe) -> float:
-    """Return how far the instrument was moved along a principal direction of its uncertainty, at most, σ."""
-    if trajectory.instrument is None:
-        return 0.0
-    change = trajectory.instrument - probe.parameters
+def _farthest(change: Float, probe: Probe) -> float:
+    """Return the longest part of a change (P,) along the principal directions of a probe's uncertainty, σ."""
     moved, *_ = np.linalg.lstsq(probe.principal_uncertainties(), change, rcond=None)
     return float(np.max(np.abs(moved), initial=0.0))
 

@@ -11,10 +11,12 @@ from pipeline.instrument.probe import Probe
 from pipeline.physics.catalogue import effect
 from stages.diagnose.agreement import Agreement
 from stages.diagnose.channels import Seen
+from stages.diagnose.late_pictures import Exposure
 from stages.diagnose.profile.evidence import ProfileEvidence
 from stages.diagnose.profile.finding import Size, finding
 from stages.diagnose.result import Diagnosis, Verdict
-from stages.diagnose.travel.evidence import TravelEstimate
+from stages.diagnose.travel.events import with_events
+from stages.diagnose.travel.evidence import TravelEstimate, _estimates
 from stages.diagnose.travel.model import TravelFit, fitted
 from tests.diagnosed import AGREES, DIFFERS, answer, seen
 from tests.travel_cases import read
@@ -136,3 +138,25 @@ def test_an_exposure_leaves_no_more_of_the_time_to_the_next_picture_than_is_not_
     long = replace(real_probe, shutter=replace(real_probe.shutter, exposure_s=0.015))
     assert sizes(answer(long, None, recording)) == pytest.approx({"time_offset": 0.014})
     assert answer(long, None, recording).verdict is Verdict.NAMED
+
+
+def sizes_told(estimate: TravelEstimate) -> list[float]:
+    """Return the delays, s, that confirmations quote: "... delay_s 0.018 ± ..."."""
+    told = (t for a in estimate.agreements for t in (a.confirmation.prediction, a.confirmation.measured))
+    return [float(t.split("delay_s ")[1].split()[0]) for t in told]
+
+
+def test_what_confirms_the_encoders_own_delay_speaks_of_it_and_not_of_the_whole(real_probe: Probe) -> None:
+    """Halves that agree on the whole delay confirmed what was left of it, and were told under its size."""
+    fit = with_events(sight(np.random.default_rng(8)), read(delay_s=0.018))
+    (whole,) = (e for e in _estimates("gauge", fit, 0.002, 0.05) if e.effect == "time_offset")
+    recording = late("gauge", fit, 0.018, (16.0, 1.0))
+    assert recording.travel is not None
+    recording = replace(recording, travel=replace(recording.travel, estimates=(whole,)))
+    own = Exposure.of(0.0, (recording,)).taken_off(recording)
+    assert own is not None
+    assert own.travel is not None
+    (estimate,) = own.travel.estimates
+    assert estimate.value == pytest.approx(whole.value - 0.008)
+    assert whole.agreements
+    assert sizes_told(estimate) == pytest.approx([s - 0.008 for s in sizes_told(whole)], abs=2e-4)

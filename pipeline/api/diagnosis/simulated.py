@@ -20,7 +20,7 @@ from pipeline.machine.configuration import resolve
 from pipeline.machine.display import Display
 from pipeline.machine.plan import Selection
 from pipeline.physics.catalogue import ALL_EFFECTS, effect
-from pipeline.physics.effect import CONSTANTLY, COURSES, Course, CourseKind
+from pipeline.physics.effect import CONSTANTLY, COURSES, Channel, Course, CourseKind
 from pipeline.simulator.effects.switch import Switch
 from stages.diagnose.channels import FIDUCIALS
 from stages.diagnose.drill.answer import NamedEffect, Value, read_answer
@@ -32,8 +32,6 @@ from stages.twin.gauge_line import GAUGE_LINE
 _SURE = 0.5
 """Probability from which an effect counts as found: it is likelier there than not."""
 _OF_LINE = ("laser", "camera", "window")
-_LATE = "motion_blur"
-"""What shows the line as it is a little later: poses, which are measured in the same pictures, follow it."""
 
 
 @dataclass(frozen=True)
@@ -65,7 +63,8 @@ class Switches:
 
 def moves_line(name: str) -> bool:
     """Return whether an effect changes where the line of a known bore lies in the picture."""
-    return name in ALL_EFFECTS and ALL_EFFECTS[name].family in _OF_LINE and name != _LATE
+    known = ALL_EFFECTS.get(name)
+    return known is not None and known.family in _OF_LINE and known.channel is Channel.RING
 
 
 def switches_of(file: Path) -> Switches:

@@ -222,12 +222,15 @@ def candidate_columns(sight: Sight, kind: EventKind, speed: Float) -> Float:
     return after if kind is EventKind.STEP else -after * speed[:, None]
 
 
-def second_predictions(fit: TravelFit, column: int, allowed: float = 0.0) -> tuple[Agreement, ...]:
+def second_predictions(
+    fit: TravelFit, column: int, allowed: float = 0.0, known: float = 0.0
+) -> tuple[Agreement, ...]:
     """Return what disjoint parts of the travel say of the effect of a column, those that tell enough.
 
-    ``allowed`` is 1 σ by which each part may be off for what is no noise of single readings.
+    ``allowed`` is 1 σ by which each part may be off for what is no noise of single readings; ``known`` is how
+    much of the size another effect makes, in the column's unit.
     """
-    each = [_compared(fit, column, words, first, allowed) for words, first in _splits(fit, column)]
+    each = [_compared(fit, column, words, first, allowed, known) for words, first in _splits(fit, column)]
     return tuple(a for a in each if a is not None)
 
 
@@ -256,9 +259,10 @@ def _turn(step: Float) -> Int:
 
 
 def _compared(
-    fit: TravelFit, column: int, where: tuple[str, str], first: Bool, allowed: float
+    fit: TravelFit, column: int, where: tuple[str, str], first: Bool, allowed: float, known: float
 ) -> Agreement | None:
     value, covariance = split(fit, column, first)
+    value = value - known
     covariance = covariance + allowed**2 * np.eye(2)
     if not np.all(np.isfinite(covariance)):
         return None
