@@ -164,7 +164,7 @@ def open_job(
     opened = open_recording(recording)
     file = probe or opened.probe_file
     if file is None:
-        noticed = "; ".join(("names no probe that is there", *opened.warnings))
+        noticed = "; ".join(("has no probe to measure with", *opened.warnings))
         raise InputError(recording, noticed, expected="a probe file", hint="give one with --probe FILE")
     believed, source = read_with_source(file)
     check_probe_fits(opened, believed)

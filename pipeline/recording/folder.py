@@ -154,7 +154,7 @@ def optional_file(section: Section, key: str) -> tuple[Path | None, tuple[str, .
         return None, ()
     file = inside(section, key)
     if not file.is_file():
-        return None, (f"{section.text(key)} is named as {key} but is not there: going on without",)
+        return None, (f"{section.text(key)} is named as {key} but is not there",)
     return file, ()
 
 

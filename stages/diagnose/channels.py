@@ -283,7 +283,7 @@ def _of_geometry(
     }
 
 
-LINE_PROFILE = Stage("line_profile", "1", Parameters, examine_line, "what the line's light says of effects")
+LINE_PROFILE = Stage("line_profile", "2", Parameters, examine_line, "what the line's light says of effects")
 FIDUCIALS = Stage(
     "fiducials", "1", GaugeParameters, measure_fiducials, "a gauge run's rings and fiducials", "gauge"
 )

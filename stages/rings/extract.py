@@ -17,13 +17,12 @@ from pipeline.instrument.probe import Probe
 from pipeline.machine.scratch import Scratch
 from pipeline.machine.stage import Context, Parameters
 from pipeline.recording.base import Illumination, Recording
-from pipeline.recording.one_field import OneField
 from stages.rings.expectation import warn_of_rings
 from stages.rings.glints import SAYING_RINGS
 from stages.rings.noise import QUANTISATION_VARIANCE, SURELY_UNCLIPPED, clip_level_of, noise_response
 from stages.rings.seam import seam_of, warn_of_seam
 from stages.rings.search import BAND_WIDTHS
-from stages.rings.sectors import Sectors, cut_sectors, with_even_rows_taken
+from stages.rings.sectors import Sectors, sectors_of
 from stages.rings.trace import RingTrace, trace_ring
 from stages.rings.validity import contradicted
 from stages.rings.wander import Wander, wander_of
@@ -80,9 +79,7 @@ def extract_rings(
     # Decoding goes on in the background from here.
     lasers = recording.read(recording.frames.of(Illumination.LASER), "grey")
     both = recording.read(recording.frames.of(Illumination.BOTH), "bgr")
-    sectors = cut_sectors(recording.source.image_size, probe.camera.centre_px, parameters.azimuths)
-    if isinstance(recording.source, OneField):
-        sectors = with_even_rows_taken(sectors)
+    sectors = sectors_of(recording.source, probe.camera.centre_px, parameters.azimuths)
     found = chain(_laser_traces(lasers, recording, sectors), _lit_traces(both, probe, sectors))
     samples, rings = _empty(frames, sectors, context.scratch), 0
     for done, (frame, trace) in enumerate(found, 1):

@@ -8,6 +8,8 @@ import numba
 import numpy as np
 
 from pipeline.arrays import Float, Float32, Int, Int32
+from pipeline.recording.base import FrameSource
+from pipeline.recording.one_field import OneField
 from stages.rings.kernels import first_at_least
 
 
@@ -72,6 +74,12 @@ def with_even_rows_taken(sectors: Sectors) -> Sectors:
     return replace(
         sectors, taken=Sectors(sectors.azimuth_rad, sectors.centre_px, sectors.image_size, start, *pixels)
     )
+
+
+def sectors_of(source: FrameSource, centre_px: Float | tuple[float, float], azimuths: int) -> Sectors:
+    """Return the sectors of pictures from a source; of interlaced ones with the rows that were taken."""
+    sectors = cut_sectors(source.image_size, np.asarray(centre_px), azimuths)
+    return with_even_rows_taken(sectors) if isinstance(source, OneField) else sectors
 
 
 def cut_sectors(image_size: tuple[int, int], centre_px: Float, azimuths: int) -> Sectors:

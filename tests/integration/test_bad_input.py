@@ -189,7 +189,7 @@ def test_frames_that_cannot_be_used_are_counted(
         (rewritten("frames.csv", lambda lines: [*lines, "24,0.8,laser\n"]), "the 24 in common"),
         (rewritten("encoder.csv", lambda lines: lines[: len(lines) // 2]), "encoder ends 0.38 s before"),
         (replaced("encoder.csv", "^0.4000,[^\n]*", "0.4000,99.0"), "the encoder jumps by up to"),
-        (without("encoder.csv"), "going on without"),
+        (without("encoder.csv"), "encoder.csv is named as encoder but is not there"),
     ],
     ids=["truncated", "short table", "long table", "encoder ends early", "encoder jumps", "encoder removed"],
 )

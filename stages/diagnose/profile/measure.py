@@ -14,7 +14,7 @@ from pipeline.artefacts.measured import RingSamples
 from pipeline.recording.base import Illumination, Planes, Recording
 from stages.rings.kernels import first_at_least
 from stages.rings.noise import clip_level_of
-from stages.rings.sectors import Sectors, cut_sectors
+from stages.rings.sectors import Sectors, sectors_of
 
 SECTORS = 72
 REACH_PX, STEP_PX = 60.0, 0.5
@@ -154,7 +154,8 @@ def measure_profiles(recording: Recording, rings: RingSamples) -> LineProfiles:
 
     Frames in which the wall is lit too are left out: its texture is brighter than what is looked for.
     """
-    sectors = cut_sectors(recording.source.image_size, rings.centre_px, len(rings.azimuth_rad))
+    sectors = sectors_of(recording.source, rings.centre_px, len(rings.azimuth_rad))
+    sectors = sectors.taken or sectors
     rows = np.flatnonzero(np.isin(rings.frame, recording.frames.of(Illumination.LASER)) & rings.valid.any(1))
     count, bins = len(rows), round(2 * REACH_PX / STEP_PX)
     light = np.zeros((count, SECTORS, bins), np.float32)
