@@ -77,6 +77,11 @@ class Mismatch:
     statement: str
     look: Look | None = None
 
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Each effect that may be the cause: more than one where they are not told apart."""
+        return tuple(self.name.split(" or "))
+
 
 @dataclass(frozen=True)
 class TwinView:

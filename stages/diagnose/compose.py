@@ -59,6 +59,7 @@ def composed(
     words = _identifiable(said, examined, any(c.may_go_otherwise for c in known))
     identifiable = " ".join(s for s in (words, *of_profile, *(u.sentence for u in of_travel)) if s)
     partly = said.verdict is Verdict.PARTLY
+    rest = Verdict.CLASS if said.members else Verdict.UNEXPLAINED
     found = Diagnosis(
         recording=field.name if field is not None else "",
         gauge=gauge.name if gauge is not None else "",
@@ -73,7 +74,7 @@ def composed(
         feasibility=examined.feasibility if examined is not None else (),
         candidates=of_gauge.candidates(examined) if examined is not None else (),
         shortcomings=tuple(s for seen in (field, gauge) if seen is not None for s in seen.shortcomings),
-        remainder=Remainder(_of_rest(said), None, said.members, identifiable) if partly else None,
+        remainder=Remainder(rest, None, said.members, identifiable) if partly else None,
     )
     return found.not_knowing(without)
 
@@ -85,10 +86,6 @@ class _Said:
     verdict: Verdict
     effects: tuple[EffectFound, ...]
     members: tuple[str, ...]
-
-
-def _of_rest(said: _Said) -> Verdict:
-    return Verdict.CLASS if said.members else Verdict.UNEXPLAINED
 
 
 def _said(

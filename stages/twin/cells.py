@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from typing import TypeVar
 
 import numba
 import numpy as np
@@ -17,6 +18,7 @@ from scipy.stats import t
 from pipeline.arrays import Bool, Byte, Float, Float32, Int
 from stages.twin.render import Region, TwinFrame
 
+Angle = TypeVar("Angle", float, Float)
 SECTORS = 36
 _FEWEST_PIXELS, _LEAST_RATIO = 60, 0.02
 """A sector counts with so many pixels; one with less than this share of the light foretold has none."""
@@ -196,8 +198,8 @@ def sector_azimuth_rad() -> Float:
     return np.asarray(-np.pi + 2 * np.pi * (np.arange(SECTORS) + 0.5) / SECTORS)
 
 
-def half_turn(angle_deg: float) -> float:
-    """Return an angle within half a turn of 0, from −180° on."""
+def half_turn(angle_deg: Angle) -> Angle:
+    """Return angles within half a turn of 0, from −180° on."""
     return (angle_deg + 180) % 360 - 180
 
 

@@ -17,7 +17,7 @@ from scipy.stats import binom, t
 from pipeline.arrays import Bool, Float, Float32
 from pipeline.artefacts.twin import Look, Mismatch, NamedFigure
 from pipeline.recording.base import Illumination
-from stages.twin.cells import sigmas
+from stages.twin.cells import half_turn, sigmas
 from stages.twin.compare import BLOCK_PX, of_blocks
 from stages.twin.locate import FALSE_ALARM
 from stages.twin.render import Region, TwinFrame
@@ -176,10 +176,10 @@ class SpotsOfFrames:
             said = f"About ({middle[0]:.0f}, {middle[1]:.0f}) of the image"
             return said, (*(NamedFigure(n, float(x), spread_px, "px") for n, x in at), wide)
         mm = self.ring.radius_mm / self.ring.radius_px
-        degrees = (np.degrees(middle[1] / self.ring.radius_px) + 180) % 360 - 180
+        degrees = float(half_turn(np.degrees(middle[1] / self.ring.radius_px)))
         distance = NamedFigure("distance_mm", float(middle[0]) * mm, spread_px * mm, "mm")
         azimuth = NamedFigure(
-            "azimuth_deg", float(degrees), float(np.degrees(spread_px / self.ring.radius_px)), "deg"
+            "azimuth_deg", degrees, float(np.degrees(spread_px / self.ring.radius_px)), "deg"
         )
         return f"At {distance.value:.0f} mm, azimuth {degrees:.0f}°, of the wall", (distance, azimuth)
 

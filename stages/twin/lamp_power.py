@@ -13,6 +13,7 @@ from __future__ import annotations
 from functools import partial
 
 import numpy as np
+from numpy.polynomial.polynomial import polyvander2d
 from scipy.stats import t
 
 from pipeline.adjustment.robust import left_out_sd
@@ -85,7 +86,8 @@ def _slowly(samples: BlockSamples) -> Float:
     """Return the light (N,) of blocks over that of their photo, what changes slowly over a picture alone."""
     light, out = samples.light_and_brightness[0], np.zeros(len(samples.frame))
     x, y = (2 * a / max(int(a.max()), 1) - 1 for a in (samples.column, samples.row))
-    terms = np.stack([x**i * y**j for i in range(_SLOWLY + 1) for j in range(_SLOWLY + 1 - i)], 1)
+    order = np.add.outer(range(_SLOWLY + 1), range(_SLOWLY + 1)).ravel()
+    terms = polyvander2d(x, y, [_SLOWLY, _SLOWLY])[:, order <= _SLOWLY]
     for frame in range(int(samples.frame.max()) + 1):
         own = samples.frame == frame
         out[own] = terms[own] @ np.linalg.lstsq(terms[own], light[own], rcond=None)[0]

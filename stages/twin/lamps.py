@@ -172,7 +172,7 @@ def flicker_of_measured(
         ("flicker", "LEDs", "intensity", None if state.lamp is None else state.lamp.gain),
         ("laser_flicker", "laser", "line", None if clipped or state.line is None else state.line.course),
     )
-    told = {name for m in found for name in m.name.split(" or ")}
+    told = {name for m in found for name in m.names}
     made = []
     for name, light, channel, course in courses:
         if course is None or name in told or len(course.frame) < _FEWEST_FRAMES:

@@ -8,7 +8,7 @@ import numpy as np
 
 from pipeline.arrays import Float
 from pipeline.instrument.probe import Lighting
-from stages.twin.cells import SECTORS, Cells, Law, drift, of_sectors, sector_azimuth_rad
+from stages.twin.cells import SECTORS, Cells, Law, drift, half_turn, of_sectors, sector_azimuth_rad
 from stages.twin.leds import even_light
 from stages.twin.scene import Ring
 
@@ -98,7 +98,7 @@ def _sector_patterns() -> tuple[Float, Float]:
     fine = (np.arange(SECTORS * _FINE) + 0.5) / _FINE * 360 / SECTORS - 180
     patterns, places = [], []
     for middle in np.arange(-180.0, 180.0, SECTOR_STEP_DEG):
-        away = np.abs((fine - middle + 180) % 360 - 180)
+        away = np.abs(half_turn(fine - middle))
         for width in _SECTOR_WIDTHS_DEG:
             shape = np.exp(-np.log(2) * (2 * away / width) ** 8).reshape(SECTORS, _FINE).mean(1)
             for lost in _SECTOR_LOSSES:

@@ -221,7 +221,7 @@ def beside_blur(
     """
     if not any(m.name in _BLURS for m in whole):
         return tuple(found), ()
-    unsure = tuple(m for m in found if "window_scatter" in m.name.split(" or "))
+    unsure = tuple(m for m in found if "window_scatter" in m.names)
     said = "{} But whole frames are blurred, which looks alike: it cannot be told."
     withdrawn = tuple(replace(m, statement=said.format(m.statement)) for m in unsure)
     return tuple(m for m in found if m not in unsure), withdrawn
@@ -237,7 +237,7 @@ def through_window(
     """
     return tuple(
         _or_window(m)
-        if "laser_sector" in m.name.split(" or ") and any(_same_azimuth(m, w, ring) for w in on_window)
+        if "laser_sector" in m.names and any(_same_azimuth(m, w, ring) for w in on_window)
         else m
         for m in found
     )

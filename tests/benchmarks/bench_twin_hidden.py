@@ -168,14 +168,14 @@ def _found(run: Opened, few: Few, change: Change) -> tuple[Mismatch, ...]:
 def _score(case: Hidden, found: tuple[Mismatch, ...]) -> Any:
     """Return located, named, size within 2 σ, sizes, and false alarms of a case."""
     right = [m for m in found if _is_there(case, m)]
-    named = [m for m in right if any(n in m.name.split(" or ") for n in case.names)]
+    named = [m for m in right if any(n in m.names for n in case.names)]
     told = named[0].parameters[0] if named and case.size is not None else None
     inside = told is not None and case.size is not None and abs(told.value - case.size) < 2 * told.sd
     # What a flicker or a step does to both lights may be told of each; charge leaks from clipped pixels.
     alike = {"flicker": ("laser_flicker",), "exposure_step": ("lamp_step", "laser_step"),
              "bloom": ("saturation",)}  # fmt: skip
     allowed = {a for n in case.names for a in (n, *alike.get(n, ()))}
-    false = [m for m in found if m not in right and not set(m.name.split(" or ")) & allowed]
+    false = [m for m in found if m not in right and not set(m.names) & allowed]
     return np.array([bool(right), bool(named), inside, told is not None, len(false)], int)
 
 
@@ -187,7 +187,7 @@ def _is_there(case: Hidden, found: Mismatch) -> bool:
         if not away <= max(tolerance, 2 * sd.get(name, 0.0)):
             return False
     # What is everywhere has no place: only its name tells that it was seen.
-    named = any(n in found.name.split(" or ") for n in case.names if n or case.fixed_to == found.fixed_to)
+    named = any(n in found.names for n in case.names if n or case.fixed_to == found.fixed_to)
     return named or (bool(case.place) and case.fixed_to in found.fixed_to)
 
 

@@ -10,7 +10,6 @@ from pipeline.artefacts.measured import RingValidity
 from pipeline.recording.base import Illumination
 from stages.twin.compare import BLOCK_PX, Comparison, block_ratios, exposure_of
 from stages.twin.lamp_light import Figure
-from stages.twin.line_light import LineSamples
 from stages.twin.locate import ImagePlace
 from stages.twin.name import _not_sharp, cannot_tell, clipped, left_over
 from stages.twin.noise import CameraNoise, black_and_white, photon_transfer, windows_of
@@ -18,7 +17,6 @@ from stages.twin.on_wall import unnamed
 from stages.twin.rays import wall_seen
 from stages.twin.reference import BlockSamples, in_image
 from stages.twin.render import Region, TwinFrame
-from stages.twin.scene import LineSight
 from stages.twin.state import PhotometricState, black_of_photo, clipped_line
 from stages.twin.sums import Sums
 from tests.synthetic_wall import plain_bore
@@ -248,29 +246,6 @@ def test_a_line_clips_where_its_strongest_channel_does_whatever_its_grey():
     picture[row, column] = [(60, 255, 3 * k) if k < 8 else (60, 200, 3 * k) for k in row]
     assert clipped_line(scene, [(1, picture), (2, None)]) == pytest.approx(8 / 20)
     assert clipped_line(scene, []) == 0.0
-
-
-def _sight(random, count=8000):
-    phi = np.linspace(-np.pi, np.pi, count, endpoint=False).astype(np.float32)
-    waves = [np.sin((3 + 4 * k) * phi + random.uniform(0, 6)) for k in range(3)]
-    colours = np.stack([100 + 60 * w for w in waves]).astype(np.float32)
-    offset = random.uniform(-4, 4, count).astype(np.float32)
-    unit, nowhere = np.ones(count, np.float32), np.zeros(count, int)
-    return LineSight(nowhere, np.arange(count), offset, 0.2 * unit, colours, unit, phi, unit, phi)
-
-
-@pytest.mark.parametrize("colour", [(0.1, 0.7, 0.2), (0.6, 0.1, 0.3)])
-def test_the_line_follows_the_colours_of_the_wall_by_the_shares_that_it_has(colour):
-    random, samples = np.random.default_rng(7), LineSamples(None, 0.0, np.inf, 0.15, 1.1)
-    for frame in range(6):
-        sight = _sight(random)
-        grey = np.array(colour) @ sight.reflectance * np.exp(-0.5 * (sight.offset_px / 1.1) ** 2)
-        noisy = grey + random.standard_normal(len(grey))
-        samples.add(frame, noisy.astype(np.float32)[None], sight)
-    light = samples.solve()
-    np.testing.assert_allclose(light.colour, colour, atol=0.03)
-    assert (np.abs(light.colour - colour) < 4 * light.colour_sd).all()
-    assert (light.colour_sd < 0.02).all()
 
 
 def test_what_nobody_named_is_a_map_only_where_frames_in_between_fit_better():
