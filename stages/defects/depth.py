@@ -51,6 +51,10 @@ class Depth:
     bias_mm: float
     peak: tuple[int, int]
 
+    def as_written(self) -> Depth:
+        """Return the depth rounded as in defects.json, lest report and table differ in their last digit."""
+        return replace(self, depth_mm=round(self.depth_mm, 4), sigma_mm=round(self.sigma_mm, 4))
+
 
 def measure_depth(
     region: Region, surface: Surface, clean: CleanWall, draws: int, random: np.random.Generator

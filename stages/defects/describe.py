@@ -82,6 +82,7 @@ class Scene:
 def describe(region: Region, depth: Depth, surface: Surface, scene: Scene) -> Defect:
     """Return the defect of a region with probability 1 and without a number; both are set later."""
     relief = surface.relief
+    depth = depth.as_written()
     features = features_of(relief, region, depth)
     likely = probabilities(features, region, relief.radius_mm)
     kind, share = next(iter(likely.items()))
@@ -193,8 +194,7 @@ def _a(kind: DefectKind) -> str:
 def _statement(features: Features, likely: dict[DefectKind, float], depth: Depth, darkness: float) -> str:
     """Say what it is and why it is classed so."""
     kinds = list(likely)
-    # Rounded as in defects.json, or the two would differ in their last digit.
-    words = f"{kinds[0].capitalize()}, {notation.depth(round(depth.depth_mm, 4), round(depth.sigma_mm, 4))}"
+    words = f"{kinds[0].capitalize()}, {notation.depth(depth.depth_mm, depth.sigma_mm)}"
     if kinds[0] is DefectKind.WELD:
         return f"{words}, {features.length_mm:.0f} mm along the pipe. Classed as weld: it goes all round."
     words += (

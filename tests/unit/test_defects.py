@@ -9,6 +9,7 @@ import pytest
 
 from pipeline.artefacts.findings import pof_class
 from pipeline.errors import UnusableError
+from pipeline.pages import notation
 from stages.defects import DefectParameters, find_defects
 from stages.defects.grow import millimetre_mean
 from tests.quiet import quiet_context
@@ -98,6 +99,10 @@ def test_a_weld_is_one_finding_all_round_with_a_pit_beside_it_apart():
     assert (first.kind, first.clock_from, first.clock_to) == ("weld", 0.0, 12.0)
     assert first.depth_mm == pytest.approx(-0.8, abs=0.1)
     assert (second.kind, second.pof_class) == ("pit", "pinhole")
+    # one dent was told as ± 0.029 in its sentence and in defects.json, as ± 0.030 in the report's table
+    for told in (first, second):
+        assert told.depth_sigma_mm == round(told.depth_sigma_mm, 4)
+        assert notation.depth(told.depth_mm, told.depth_sigma_mm) in told.statement
 
 
 @pytest.mark.parametrize("step_mm", [-8.0, 3.0])
