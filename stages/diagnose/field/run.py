@@ -15,7 +15,7 @@ from pipeline.instrument.probe import Probe
 from pipeline.machine.stage import Context
 from pipeline.recording.base import Recording
 from stages.diagnose.effects.base import ImagePoints
-from stages.diagnose.gauge.points import passing_mm_s, widths_at
+from stages.diagnose.gauge.points import passing_mm_s, rates, widths_at
 from stages.motion import (
     MATCH_BIASES,
     EncoderReadings,
@@ -175,7 +175,7 @@ def texture_points(run: FieldRun) -> ImagePoints:
 
 def speed_mm_s(run: FieldRun) -> Float:
     """Return the camera's speed (N,) along the pipe."""
-    return np.asarray(np.gradient(distance_mm(run), run.measured.time_s))
+    return rates(distance_mm(run)[:, None], run.measured.time_s)[:, 0]
 
 
 def distance_mm(run: FieldRun) -> Float:
@@ -196,5 +196,5 @@ def _wall_at(run: FieldRun, frame: Int, xyz_c: Float) -> tuple[Float, Float, Flo
 
 
 def _passing(run: FieldRun, frame: Int, xyz_c: Float) -> Float:
-    """Return how points (M, 3) of the wall pass in C, mm/s; the adjustment has smoothed the poses."""
-    return passing_mm_s(run.state.T_pc, run.measured.time_s, frame, xyz_c, smoothed=np.asarray)
+    """Return how points (M, 3) of the wall pass in C, mm/s."""
+    return passing_mm_s(run.state.T_pc, run.measured.time_s, frame, xyz_c)
