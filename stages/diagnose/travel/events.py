@@ -8,7 +8,7 @@ from scipy.stats import t as student
 from pipeline.recording.base import Encoder
 from stages.diagnose.travel.model import Event, EventKind, TravelFit, candidate_columns, fitted
 from stages.diagnose.travel.sight import Sight
-from stages.diagnose.travel.solve import DELAY, FAR_BETTER, PLAY, SMOOTH, DriftNoise, whitened_fit
+from stages.diagnose.travel.solve import DELAY, FAR_BETTER, PLAY, SMOOTH, DriftNoise
 
 # So many steps and stray pictures are taken up, one after the other.
 _MOST = 16
@@ -40,12 +40,10 @@ def with_events(sight: Sight, encoder: Encoder, without: tuple[str, ...] = ()) -
 
 def _cost(fit: TravelFit, noise: DriftNoise) -> float:
     """Return χ² of what is left, and what each thing that was taken up has to gain."""
-    path_mm, found = fit.sight.path_mm, fit.whitened
-    difference_mm = found.residual + fit.columns @ found.estimate
-    left = whitened_fit(difference_mm, fit.columns, noise.covariance(path_mm))
+    left = fit.with_columns(fit.columns, noise)
     taken_up = len(fit.events) + np.count_nonzero(fit.values[[DELAY, PLAY]])
     free = sum(e.during for e in fit.events)
-    return float(left.residual @ left.weighted + FAR_BETTER * taken_up + np.log(len(path_mm)) * free)
+    return float(left.residual @ left.weighted + FAR_BETTER * taken_up + np.log(len(left.residual)) * free)
 
 
 def _searched(sight: Sight, encoder: Encoder, without: tuple[str, ...]) -> TravelFit:

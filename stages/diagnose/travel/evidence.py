@@ -18,7 +18,7 @@ from stages.diagnose.travel.left_over import LeftOver, left_over
 from stages.diagnose.travel.lines import Line, find_lines
 from stages.diagnose.travel.model import TravelFit, second_predictions
 from stages.diagnose.travel.sight import Sight, quantum_mm
-from stages.diagnose.travel.solve import DELAY, OFFSET, PLAY, SCALE, SMOOTH, whitened_fit
+from stages.diagnose.travel.solve import DELAY, OFFSET, PLAY, SCALE, SMOOTH
 from stages.diagnose.travel.steps import StepFound, steps_found
 
 _LEAST_FRAMES = 16
@@ -241,9 +241,7 @@ def _goes_otherwise(fit: TravelFit, column: int) -> float:
     courses = {SCALE: way, DELAY: speed, PLAY: sight.direction, 4: way**2, 5: np.abs(speed)}
     others = [fit.columns[:, column], *(c for k, c in courses.items() if k != column)]
     found = [k for k in range(len(fit.values)) if k != column and (k == OFFSET or fit.values[k] != 0)]
-    difference = fit.whitened.residual + fit.columns @ fit.whitened.estimate
-    rest = whitened_fit(difference, fit.columns[:, found], fit.noise.covariance(sight.path_mm))
-    gain = rest.gain(np.stack(others, 1))[1] / max(fit.left_over, 1.0)
+    gain = fit.with_columns(fit.columns[:, found]).gain(np.stack(others, 1))[1] / max(fit.left_over, 1.0)
     return float(np.mean(np.exp(np.clip((gain[1:] - gain[0]) / 2, -_SURE_OF, _SURE_OF))))
 
 

@@ -6,21 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import f as fisher
 from scipy.stats import norm
 
 from stages.diagnose.travel.events import SLIP, chance, is_found
-from stages.diagnose.travel.model import EventKind, TravelFit
-from stages.diagnose.travel.solve import (
-    DELAY,
-    FAR_BETTER,
-    OFFSET,
-    PLAY,
-    SMOOTH,
-    DriftNoise,
-    Whitened,
-    whitened_fit,
-)
+from stages.diagnose.travel.model import EventKind, TravelFit, chance_of_noise
+from stages.diagnose.travel.solve import DELAY, FAR_BETTER, OFFSET, PLAY, SMOOTH, DriftNoise, Whitened
 from stages.diagnose.travel.steps import StepFound, or_else
 
 # 1 σ of a picture's place by fiducials, which may be put there wrongly. Debt: data/debts.md.
@@ -124,7 +114,7 @@ def left_over(fit: TravelFit, steps: Sequence[StepFound], count_mm: float) -> Le
     if p_value >= _NOISE:
         return None
     time_s = fit.sight.time_s
-    told = float(fisher.sf(off.misfit, count, max(count / 3, 1.0))) > _NOISE
+    told = chance_of_noise(off.misfit, count, count) > _NOISE
     between_s = float(time_s[off.first]), float(time_s[off.end - 1])
     by_slip = told and SLIP not in fit.without and off.end == count
     stray = _stray_pictures(fit, untold, off)
@@ -160,9 +150,7 @@ def _simplest(fit: TravelFit, untold: list[int], noise: DriftNoise, beside: _Str
 def _beside(fit: TravelFit, untold: list[int], noise: DriftNoise) -> _Stretch:
     """Return the strongest stretch beside all that was found but the ``untold`` columns."""
     held = [k for k in range(len(SMOOTH)) if k != OFFSET and fit.values[k] == 0]
-    difference = fit.whitened.residual + fit.columns @ fit.whitened.estimate
-    columns = np.delete(fit.columns, [*held, *untold], axis=1)
-    return _strongest_stretch(whitened_fit(difference, columns, noise.covariance(fit.sight.path_mm)))
+    return _strongest_stretch(fit.with_columns(np.delete(fit.columns, [*held, *untold], axis=1), noise))
 
 
 def _strongest_stretch(rest: Whitened) -> _Stretch:

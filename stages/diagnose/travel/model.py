@@ -117,6 +117,11 @@ class TravelFit:
         told = own > _TOLD * np.max(own)
         return self.whitened.weighted[told] / own[told], own[told] ** -0.5
 
+    def with_columns(self, columns: Float, noise: DriftNoise | None = None) -> Whitened:
+        """Return the fit of other columns (N, C) in place of its own, with another noise if one is given."""
+        difference_mm = self.whitened.residual + self.columns @ self.whitened.estimate
+        return whitened_fit(difference_mm, columns, (noise or self.noise).covariance(self.sight.path_mm))
+
     @property
     def left_over(self) -> float:
         """χ² of what is left for each degree of freedom; 1 where it is the measured noise."""
@@ -124,9 +129,9 @@ class TravelFit:
 
     @property
     def fits_p(self) -> float:
-        """Chance that noise leaves so much: medians tell it as well as a third of the pictures would."""
+        """Chance that noise leaves so much."""
         count = len(self.difference_mm)
-        return float(fisher.sf(self.left_over, max(count - len(self.values), 1), max(count / 3, 1.0)))
+        return chance_of_noise(self.left_over, count - len(self.values), count)
 
     @property
     def event_z2(self) -> Float:
@@ -167,6 +172,14 @@ def fitted(
         sight, events, values, covariance, noise, plain - np.median(plain), whitened, end.columns, told_apart,
         without,
     )  # fmt: skip
+
+
+def chance_of_noise(left_over: float, free: int, pictures: int) -> float:
+    """Return the chance that noise leaves so much χ² for each of its ``free`` degrees of freedom (F test).
+
+    The noise itself is measured by medians, which tell it as well as a third of the pictures would.
+    """
+    return float(fisher.sf(left_over, max(free, 1), max(pictures / 3, 1.0)))
 
 
 def _left_over(whitened: Whitened, fitted_values: int) -> float:
@@ -280,8 +293,7 @@ def split(fit: TravelFit, column: int, first: Bool) -> tuple[Float, Float]:
     step = np.diff(fit.columns[:, column])
     halves = [np.concatenate([[0.0], np.cumsum(np.where(mask, step, 0.0))]) for mask in (first, ~first)]
     design = np.column_stack([np.delete(fit.columns, column, 1), *halves])
-    difference = fit.whitened.residual + fit.columns @ fit.whitened.estimate
-    found = whitened_fit(difference, design, fit.noise.covariance(fit.sight.path_mm))
+    found = fit.with_columns(design)
     return found.estimate[-2:], found.covariance[-2:, -2:]
 
 

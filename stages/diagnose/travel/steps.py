@@ -14,7 +14,6 @@ from stages.diagnose.agreement import Agreement, Part, agreement
 from stages.diagnose.travel.events import LONGEST_S, SHORTEST_S, SIDE, chance
 from stages.diagnose.travel.model import EventKind, TravelFit, candidate_columns, fitted, moment
 from stages.diagnose.travel.sight import Sight, quantum_mm, readings_at
-from stages.diagnose.travel.solve import whitened_fit
 
 # Explanations whose χ² differs by less than this (3 σ squared) are both kept.
 _APART = 9.0
@@ -150,7 +149,6 @@ class StepFound:
     def doubt(self) -> str:
         """What else it may be, in a plain sentence with its time and size; empty where it is a slip."""
         words = {
-            EventKind.STEP: "",
             EventKind.OUTLIER: f"{self.stray} stray picture{'s' * (self.stray != 1)}",
             EventKind.LOST_TIME: "missing frames",
         }
@@ -197,11 +195,13 @@ def _judged(fit: TravelFit, place_in_list: int, encoder: Encoder) -> StepFound:
         even = _over_durations(fit, place_in_list)
         if even is not None:
             gain_mm, sigma = even[0], float(np.hypot(even[1], rounding))
+    # A slip that lasts may be stray pictures all along it, one near an end those up to the end.
+    stray = event.during + (beyond if beyond <= SIDE else 0)
     count = len(sight.time_s)
     z2 = float(fit.event_z2[place_in_list]) if np.isfinite(sigma) else 0.0
     return StepFound(
         event.place, time_s, within_s / np.sqrt(12), gain_mm, sigma, chance(z2, 2 * count, count), rivals,
-        lasting_s, () if again is None else (again,), event.during + beyond * (beyond <= SIDE) or 1,
+        lasting_s, () if again is None else (again,), max(stray, 1),
     )  # fmt: skip
 
 
@@ -214,9 +214,7 @@ def _over_durations(fit: TravelFit, place_in_list: int) -> tuple[float, float] |
     """
     own, event, sight = 4 + place_in_list, fit.events[place_in_list], fit.sight
     first = 4 + len(fit.events) + sum(e.during for e in fit.events[:place_in_list])
-    difference = fit.whitened.residual + fit.columns @ fit.whitened.estimate
-    others = np.delete(fit.columns, [own, *range(first, first + event.during)], axis=1)
-    rest = whitened_fit(difference, others, fit.noise.covariance(sight.path_mm))
+    rest = fit.with_columns(np.delete(fit.columns, [own, *range(first, first + event.during)], axis=1))
     steps = np.arange(int(np.ceil(LONGEST_S / sight.frame_time_s)) + 1)
     about_s = np.mean(sight.time_s[[event.place - event.during - 1, event.place]])
     middle = about_s + sight.frame_time_s * 0.5 * np.append(-steps[:0:-1], steps)
