@@ -15,6 +15,7 @@ from pipeline.machine.stage import Context, Parameters, Stage
 from pipeline.recording.base import FrameTable, Illumination, Recording
 from pipeline.recording.checks import CheckedFrames, withheld_frames
 from pipeline.recording.one_field import OneField
+from stages.premises.backwards import runs_forwards
 from stages.premises.changes import (
     Changes,
     LeftOut,
@@ -37,7 +38,6 @@ from stages.premises.scale import (
     radius_along_mm,
     radius_seen_mm,
     rings_seen_mm,
-    runs_forwards,
     warn_of_oval,
 )
 from stages.premises.stays import places_that_stay
@@ -293,6 +293,6 @@ def _report(pictures: Pictures, radius_mm: float, changes: Changes, context: Con
 
 
 PREMISES = Stage(
-    "premises", "23", PremisesParameters, check_premises,
+    "premises", "24", PremisesParameters, check_premises,
     "lights, times, encoder and diameter as stated, held against the pictures and mended",
 )  # fmt: skip

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.ndimage import median_filter
 
 from pipeline.arrays import Bool, Float, Int
 from stages.premises.light import Light, pattern_breaks
-from stages.premises.moving import lower_speed, wall_moves
+from stages.premises.moving import lower_speed, usual_speed
 from stages.premises.pictures import CLOSED, Pictures
 
 # In usual steps: two pictures exchanged go on by two, back by one, on by two. The middle between these and
@@ -16,8 +15,9 @@ _ON, _BACK, _ASTRAY = 1.5, -0.5, 0.5
 # Neighbours in two lights that were exchanged look like two losses, of which the wall shows nothing: it goes
 # on by 1 in place of 1.5 times the usual way at least.
 _NO_LOSS = 1.25
-_AROUND = 9
-_FEWEST = 12
+# Fewer pictures of the wall show no usual step. Those that were exchanged come back to their order within so
+# many pictures.
+_FEWEST, _BACK_WITHIN = 12, 9
 # Breaks that lie anywhere in a run follow each other within so many pictures n² / N times as often: there two
 # losses look like an exchange.
 _CLOSE_BY = 3
@@ -48,9 +48,8 @@ def out_of_order(pictures: Pictures, light: Int) -> Bool:
 
 def _in_usual_steps(size: Float) -> Float:
     """Return steps (K,) of the wall over those around them; 1 where it stands, which tells no order."""
-    usual = median_filter(size, _AROUND, mode="nearest")
-    moves = wall_moves(usual, size)
-    return np.where(moves, size / np.where(moves, usual, 1.0), 1.0)
+    usual = usual_speed(size)
+    return np.divide(size, usual, out=np.ones(len(size)), where=usual != 0)
 
 
 def _off_their_place(step: Float) -> Bool:
@@ -61,7 +60,7 @@ def _off_their_place(step: Float) -> Bool:
     """
     out, ahead = np.zeros(len(step), bool), np.cumsum(step - 1)
     for first in np.flatnonzero(step > _ON):
-        near = slice(first, first + _AROUND)
+        near = slice(first, first + _BACK_WITHIN)
         astray = np.abs(ahead[near] - ahead[first] + step[first] - 1) > _ASTRAY
         went_back = np.logical_or.accumulate(step[near] < _BACK)
         again = np.flatnonzero((step[near] > _ON) & went_back & ~astray)

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.ndimage import median_filter
 
 from pipeline.adjustment.circles import circles_through
-from pipeline.adjustment.robust import basis_of, ring_harmonics, root_mean_square, row_median
+from pipeline.adjustment.robust import basis_of, ring_harmonics, row_median
 from pipeline.arrays import Float
 from pipeline.artefacts.findings import clock_of_azimuth
 from pipeline.errors import UnusableError
@@ -31,13 +31,8 @@ _NEAR_UNIT = 1.25
 # Unrolled walls show motion to about a tenth, and a gauge's bores differ from their mean: neither makes two.
 _CONTRADICTS = 2.0
 _LEAST_STEPS, _ONE_SIGN = 8, 0.8
-# Motion that fits twice as well backwards in time is backwards: in 29 recordings that are not, open-1 to a12,
-# it fits 1.24 times as well at best, and in all 14 gauges when reversed 2.2 times or more. Few steps tell
-# nothing.
-_TWICE, _LEAST_TOLD = 2.0, 20
-# The encoder's clock may be off meanwhile, by a second here. With a tenth, of 60 drawn runs that stop and go
-# up to 15 were refused where it was off by more; with a second none, and all 120 that ran backwards were.
-_LATE_S = np.linspace(-1, 1, 161)
+# The pipe's radius at a picture is the median of so many rings about it: four wrong ones do not move it.
+_RINGS = 9
 _MAYBE_BACKWARDS = (
     "Or the pictures are stored last first, which the motion in this recording does not tell: then distances "
     "are wrong by as much as the speed varied. Look whether the video runs backwards. "
@@ -87,7 +82,7 @@ def radius_along_mm(pictures: Pictures, rings_mm: Float) -> Float:
     known = np.isfinite(ring_mm)
     if not known.any():
         return np.full(len(pictures.closed), np.nan)
-    smooth_mm = median_filter(ring_mm[known], _LEAST_STEPS + 1, mode="nearest")
+    smooth_mm = median_filter(ring_mm[known], _RINGS, mode="nearest")
     return np.interp(np.arange(len(pictures.closed)), place[known], smooth_mm)
 
 
@@ -183,42 +178,6 @@ class _Ratio:
         return self.steps < _LEAST_STEPS or self.one_sign < _ONE_SIGN
 
 
-def runs_forwards(encoder: Encoder | None, time_s: Float, steps: Steps) -> bool:
-    """Return whether the wall's motion tells that the pictures are stored first to last.
-
-    It may be too steady to tell, or too few steps are known.
-
-    Raises
-    ------
-    UnusableError
-        When the encoder read backwards in time fits twice as well as it does as it is, whichever its sign and
-        unit, and though its clock were a second off: who goes there and back looks alike both ways.
-    """
-    if encoder is None:
-        return False
-    mirrored_s = time_s[0] + time_s[-1] - time_s
-    ends_s = np.stack([t[place] for t in (time_s, mirrored_s) for place in (steps.start, steps.end)])
-    known = np.all((ends_s >= encoder.time_s[0]) & (ends_s <= encoder.time_s[-1]), axis=0)
-    if known.sum() < _LEAST_TOLD:
-        return False
-    late = (steps.by_encoder(encoder, time_s + by_s)[known] for by_s in _LATE_S)
-    as_it_is = min(_misfit(steps.size[known], shown) for shown in late)
-    backwards = _misfit(steps.size[known], steps.by_encoder(encoder, mirrored_s)[known])
-    if _TWICE * backwards < as_it_is:
-        raise UnusableError(
-            "premises",
-            "the pictures are stored in reverse order, last first: the wall moves in them as the encoder "
-            f"does, read backwards in time, which fits {as_it_is / max(backwards, 1e-9):.1f} times as well",
-            hint="turn the order of the pictures round, or find out what reversed the video",
-        )
-    return _TWICE * as_it_is < backwards
-
-
-def _misfit(wall: Float, shown: Float) -> float:
-    """Return by how much steps of the wall (K,) differ from those ``shown`` (K,), at the best ratio."""
-    return root_mean_square(wall - shown * float(wall @ shown) / max(float(shown @ shown), 1e-12))
-
-
 def encoder_factor(
     recording: Recording, time_s: Float, steps: Steps, radius_mm: float, forwards: bool, context: Context
 ) -> float:
@@ -274,7 +233,19 @@ def _ratio(encoder: Encoder, time_s: Float, steps: Steps, radius_mm: float) -> _
 
 
 def in_mm(encoder: Encoder | None, time_s: Float, steps: Steps, radius_mm: float) -> Encoder | None:
-    """Return the encoder brought to mm by the wall's motion, where that tells it; its sign is kept."""
+    """Return the encoder brought to mm by the wall's motion, where that tells it; its sign is kept.
+
+    Parameters
+    ----------
+    encoder
+        Its readings in an unknown unit of length.
+    time_s : (F,)
+        Times of the pictures, s, corrected.
+    steps
+        Of the wall between pictures, in radii of the pipe.
+    radius_mm
+        The pipe's radius; where it is NaN, nothing is told.
+    """
     if encoder is None or not np.isfinite(radius_mm):
         return encoder
     found = _ratio(encoder, time_s, steps, radius_mm)

@@ -10,8 +10,9 @@ import pytest
 
 from pipeline.errors import UnusableError
 from pipeline.recording.base import Encoder, FrameTable, PipeFacts
+from stages.premises.backwards import runs_forwards
 from stages.premises.losses import Steps
-from stages.premises.scale import encoder_factor, in_mm, runs_forwards, warn_of_oval
+from stages.premises.scale import encoder_factor, in_mm, warn_of_oval
 from tests.drawn_run import BASELINE, RADIUS
 from tests.hand_pulled import pulled
 from tests.premises_run import COUNT, STEP_MM, checked
