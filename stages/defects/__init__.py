@@ -10,6 +10,7 @@
 ends, or is rather false than real by what the same recording shows where nothing is, is set apart with the
 reason (`corroborate`, `credibility`).
 6. Kind from named features as a probability, with codes and words (`describe`).
+7. Dark lines that the photo alone shows, as cracks are, are set apart, too (`dark_lines`).
 
 A long wall is gone through in stretches with overlap; what is found does not depend on where they are cut.
 """
@@ -22,7 +23,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import ndtri
 
-from pipeline.adjustment.shared_light import HeldOver
 from pipeline.arrays import Float, Float32
 from pipeline.artefacts.cloud_along import cloud_along
 from pipeline.artefacts.findings import Defect, Defects
@@ -34,8 +34,8 @@ from pipeline.machine.stage import Context, Stage
 from pipeline.recording.base import Recording
 from pipeline.recording.checks import CheckedFrames
 from stages.defects.along import stretches
-from stages.defects.clean import clean_wall
-from stages.defects.corroborate import LEAST_RINGS, Evidence, Witnesses, evidence_for
+from stages.defects.clean import CleanWall, clean_wall
+from stages.defects.corroborate import Evidence, Witnesses, evidence_for
 from stages.defects.credibility import (
     COUNTED,
     MOST_SURE,
@@ -44,8 +44,9 @@ from stages.defects.credibility import (
     credibility_of,
     is_depth_known,
 )
+from stages.defects.dark_lines import dark_lines, lies_beside
 from stages.defects.depth import allowed_by_neighbours, measure_depth
-from stages.defects.describe import Scene, describe
+from stages.defects.describe import Scene, describe, describe_line
 from stages.defects.detect import Detection, detect
 from stages.defects.grow import footprint, grown
 from stages.defects.noise_tail import NoiseTail, noise_tail
@@ -55,19 +56,14 @@ from stages.defects.relief import smooth_shape_removed
 from stages.defects.segment import Region, regions_of
 from stages.defects.steps import IS_STEP, is_step
 from stages.defects.surface import MeasuredWall, Surface
+from stages.defects.told import report_found, report_unconfirmed, warn_of_missed, warn_of_short_ones
 
 __all__ = ["DEFECTS", "DefectParameters", "find_defects"]
 
 _MIN_CELLS, _MIN_CIRCLES, _HALF = 1000, 8, 0.5
-# Unconfirmed ones as few as these are looked at at once; a reader must know from where on one finding in four
-# is expected to be false.
-_FEW_UNCONFIRMED, _MANY_FALSE = 3, 0.25
-# Nothing says that what stays at one place of the image, or lies where the line ends, is rather the wall.
+# Nothing says that what stays at one place of the image, or lies where the line ends, is rather the wall, nor
+# whether a dark line is a crack or a mark.
 _WALL_OR_NOT = 0.5
-# A limit of detection so many times what is asked for is told. Chosen; good ones are near what is asked for.
-_DEEPER = 2.0
-# Defects longer than the limit of detection is told for, mm, are warned of; so many rings are tried. Chosen.
-_SHORT_MM, _MOST_RINGS = 3.0, 40
 _UNSURE = "Its depth is not known to twice its σ"
 
 
@@ -103,17 +99,22 @@ def find_defects(
     )
     cloud = cloud_along(wall.cloud)
     measured = MeasuredWall(relief, cloud, cloud.ring_spacing_mm())
-    found = tuple(_measured(measured, regions, seeds.score, scene, wall.fixed, parameters, context))
+    clean = clean_wall(measured, regions)
+    found = tuple(_measured(measured, regions, clean, seeds.score, scene, wall.fixed, parameters, context))
     tail = noise_tail(relief, seeds, known)
     credibility = _credibility(found, tail, measured)
     context.report("peaks of noise expected above the threshold", tail.above(seeds.threshold), "")
     confirmed, unconfirmed = _judged(found, credibility, parameters.min_depth_mm)
-    items, alone = _numbered(confirmed, 1), _numbered(unconfirmed, len(confirmed) + 1)
+    lines = list(_lines(measured, found, clean, scene, parameters, context))
+    items, alone = _numbered(confirmed, 1), _numbered([*unconfirmed, *lines], len(confirmed) + 1)
     expected = sum(1 - d.probability for d in items)
-    _report(items, alone, len(regions) - len(found), expected, context)
+    report_found(len(items), expected, context)
+    report_unconfirmed(len(items), len(unconfirmed), len(lines), context)
+    rejected = len(regions) - len(found)
+    context.report("rejected: shallower than the smallest depth or between rings", rejected, "detections")
     smallest_mm = _smallest_depth(seeds, parameters)
-    _warn_of_missed(smallest_mm, parameters.min_depth_mm, context)
-    _warn_of_short_ones(wall.held, measured.spacing_mm, context)
+    warn_of_missed(smallest_mm, parameters.min_depth_mm, context)
+    warn_of_short_ones(wall.held, measured.spacing_mm, context)
     return Defects(items, expected, smallest_mm, alone)
 
 
@@ -146,6 +147,7 @@ def _credibility(found: Sequence[_Found], tail: NoiseTail, wall: MeasuredWall) -
 def _measured(
     wall: MeasuredWall,
     regions: tuple[Region, ...],
+    clean: CleanWall,
     score: Float32,
     scene: Scene,
     fixed: FixedToProbe | None,
@@ -153,7 +155,6 @@ def _measured(
     context: Context,
 ) -> Iterator[_Found]:
     """Yield the regions that were measured and are as deep as is worth reporting."""
-    clean = clean_wall(wall, regions)
     for done, region in enumerate(regions, 1):
         # A region that the sure points do not show is measured once more with all points.
         for every_point in (False, True):
@@ -169,6 +170,24 @@ def _measured(
                 yield _Found(region, describe(here, depth, surface, scene), evidence, step)
                 break
         context.progress(len(regions) + done, 2 * len(regions))
+
+
+def _lines(
+    wall: MeasuredWall,
+    found: Sequence[_Found],
+    clean: CleanWall,
+    scene: Scene,
+    parameters: DefectParameters,
+    context: Context,
+) -> Iterator[Defect]:
+    """Yield the dark lines that the photo alone shows; one beside what rings show is a part of it."""
+    for region in dark_lines(scene.seen_by.texture, wall.relief):
+        beside = any(lies_beside(region, f.region, wall.relief) for f in found)
+        surface, here = wall.surface_about(region, every_point=True)
+        if not beside and _is_measured(surface, here):
+            depth = measure_depth(here, surface, clean, parameters.draws, context.random)
+            line = describe_line(here, depth, surface, scene)
+            yield replace(line, probability=_WALL_OR_NOT, confidence=_WALL_OR_NOT)
 
 
 def _fixed_in(region: Region, fixed: FixedToProbe | None) -> Float:
@@ -200,54 +219,6 @@ def _judged(
             words = f"{defect.statement} Not confirmed. {doubt}."
             unconfirmed.append(replace(defect, statement=words))
     return confirmed, unconfirmed
-
-
-def _report(
-    items: Sequence[Defect], alone: Sequence[Defect], rejected: int, expected: float, context: Context
-) -> None:
-    context.report("defects", len(items), "")
-    context.report("false findings expected among the defects", expected, "")
-    context.report(
-        "unconfirmed: one ring alone shows them, or rather false than real", len(alone), "detections"
-    )
-    context.report("rejected: shallower than the smallest depth or between rings", rejected, "detections")
-    if len(alone) > max(_FEW_UNCONFIRMED, len(items)):
-        context.warn(
-            f"{len(alone)} places show something in one ring alone or are rather false than real, beside "
-            f"{len(items)} defects: glints, splashes or compression are taken for the line. What to do: look "
-            "at the unconfirmed ones in the review; record again with less exposure of the laser, a clean "
-            "window or less compression"
-        )
-    if expected > _MANY_FALSE * max(len(items), 1) and len(items) > 1:
-        context.warn(
-            f"of {len(items)} defects {expected:.1f} are expected to be false. What to do: accept or reject "
-            "each in the review by its picture before any is counted"
-        )
-
-
-def _warn_of_missed(smallest_mm: float, asked_mm: float, context: Context) -> None:
-    """Warn where defects must be much deeper than asked for, to be found."""
-    context.report("depth from which nine of ten defects of 3 mm × 3 mm are found", smallest_mm, "mm")
-    if smallest_mm > _DEEPER * asked_mm:
-        context.warn(
-            f"defects of 3 mm × 3 mm must be {smallest_mm:.2g} mm deep for nine of ten to be found, where "
-            f"{asked_mm:.2g} mm are asked for: the laser's line is too unsteady here. Shallower ones may be "
-            "missed, and so is any where the wall was not measured. What to do: record with less "
-            "compression, a sharper picture and a camera that sits tight"
-        )
-
-
-def _warn_of_short_ones(held: HeldOver, ring_spacing_mm: float, context: Context) -> None:
-    """Warn where rings share so much light that a short defect has no two of them to show it."""
-    enough = (n for n in range(LEAST_RINGS, _MOST_RINGS) if held.independent(n) >= LEAST_RINGS)
-    rings = next(enough, _MOST_RINGS)
-    length_mm = rings * ring_spacing_mm
-    if length_mm > _SHORT_MM and rings > LEAST_RINGS:
-        context.warn(
-            f"the codec repeats so much light that {rings} rings in a row say no more than {LEAST_RINGS} of "
-            f"a good recording: defects shorter than {length_mm:.2g} mm along the pipe count only where the "
-            "photo shows them, too, and are unconfirmed elsewhere. What to do: record with less compression"
-        )
 
 
 def _is_measured(surface: Surface, region: Region) -> bool:
@@ -295,5 +266,5 @@ def _defects_of_run(
 
 
 DEFECTS = Stage(
-    "defects", "25", DefectParameters, _defects_of_run, "defects as instances with depth, clock and kind"
+    "defects", "26", DefectParameters, _defects_of_run, "defects as instances with depth, clock and kind"
 )

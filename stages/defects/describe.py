@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -117,6 +117,25 @@ def describe(region: Region, depth: Depth, surface: Surface, scene: Scene) -> De
         en13508_suggestion=en13508_suggestion(kind),
         statement=_statement(features, likely, depth, darkness(scene.seen_by.texture, relief, region))
         + (_ROUND if kind.is_metal_loss and _goes_round(relief, region) else ""),
+    )
+
+
+def describe_line(region: Region, depth: Depth, surface: Surface, scene: Scene) -> Defect:
+    """Return the defect of a dark line that the photo alone shows, with what the rings measure there."""
+    shown = describe(region, depth, surface, scene)
+    direction = features_of(surface.relief, region, depth).direction_rad
+    length = float(np.hypot(shown.length_mm, shown.width_mm))
+    rings = notation.depth(shown.depth_mm, shown.depth_sigma_mm)
+    return replace(
+        shown,
+        kind=str(DefectKind.CRACK),
+        wall_loss_percent=float("nan"),
+        pof_class="",
+        pacp_suggestion=pacp_suggestion(DefectKind.CRACK, direction),
+        en13508_suggestion=en13508_suggestion(DefectKind.CRACK),
+        statement=f"Dark line in the photo, about {length:.0f} mm long. It may be a crack, or a scratch, the "
+        f"edge of a stain or a shadow. Rings, which measure no width below 1 mm, show {rings}. Not "
+        "confirmed. The photo alone shows it.",
     )
 
 

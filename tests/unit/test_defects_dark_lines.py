@@ -1,0 +1,161 @@
+"""Dark lines of the wall's photo: cracks drawn on drawn patterns, and patterns without any."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import cv2
+import numpy as np
+import pytest
+
+from pipeline.artefacts.findings import DefectKind
+from pipeline.artefacts.measured import WallTexture
+from stages.defects import DefectParameters, find_defects
+from stages.defects.dark_lines import dark_lines, lies_beside, limit_of_weight
+from stages.defects.relief import smooth_shape_removed
+from stages.defects.segment import Region
+from tests.quiet import quiet_context
+from tests.synthetic_wall import bare_recording, smooth_noise, wall_of
+
+_RADIUS_MM = 25.0
+_DISTANCE = np.arange(0, 90, 0.5)
+_AZIMUTH = -np.pi + np.arange(720) * np.pi / 360
+_PX_MM = 0.15
+_AROUND = round(2 * np.pi * _RADIUS_MM / _PX_MM)
+
+
+def a_wall(seed: int = 0, dents_mm: float = 0.0):
+    """Return a wall with noise of .03 mm and, where asked for, a pit at 45 mm."""
+    rng = np.random.default_rng(seed)
+    noise = smooth_noise(rng, (len(_DISTANCE), len(_AZIMUTH)), 0.03, 2.0)
+    off = ((_DISTANCE[:, None] - 45) / 6) ** 2 + (_RADIUS_MM * (_AZIMUTH - 0.5) / 6) ** 2
+    return wall_of(_DISTANCE, _AZIMUTH, _RADIUS_MM + noise + dents_mm * np.exp(-off))
+
+
+def map_of(wall):
+    """Return the wall's relief."""
+    return smooth_shape_removed(wall.radius_map, DefectParameters())
+
+
+def picture(seed: int, rows: int = 600, fine: float = 3.0) -> np.ndarray:
+    """Return a mottled wall (rows, A), grey: patches of 5 mm and of .6 mm, and noise."""
+    rng = np.random.default_rng(seed)
+    patches = 0.25 * smooth_noise(rng, (rows, _AROUND), 1.0, 33.0)
+    grains = 0.12 * smooth_noise(rng, (rows, _AROUND), 1.0, 4.0)
+    return 110 * np.exp(patches + grains) + fine * rng.standard_normal((rows, _AROUND))
+
+
+def drawn(grey: np.ndarray, row_mm: float, azimuth_rad: float, turn_deg: float, times: float = 0.55) -> None:
+    """Draw a wavy line of 18 mm and .3 mm width, so many times as bright, beyond the seam if need be."""
+    t = np.linspace(-9, 9, 60)
+    side = 0.8 * np.sin(t)
+    c, s = np.cos(np.radians(turn_deg)), np.sin(np.radians(turn_deg))
+    i = (row_mm + c * t - s * side) / _PX_MM
+    j = (azimuth_rad + np.pi) * _RADIUS_MM / _PX_MM + (s * t + c * side) / _PX_MM
+    for turn in (-_AROUND, 0, _AROUND):
+        line = np.stack([j + turn, i], -1).round().astype(np.int32)
+        mask = np.zeros(grey.shape, np.uint8)
+        cv2.polylines(mask, [line], False, 1, 2)
+        grey[mask > 0] *= times
+
+
+def photo(grey: np.ndarray) -> WallTexture:
+    bgra = np.full((*grey.shape, 4), 255, np.uint8)
+    bgra[..., :3] = np.clip(grey, 0, 255)[..., None].astype(np.uint8)
+    return WallTexture(bgra, 0.0, _PX_MM, -np.pi, 2 * np.pi / _AROUND)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_a_wall_without_a_crack_has_none(seed: int) -> None:
+    assert dark_lines(photo(picture(seed)), map_of(a_wall())) == ()
+
+
+@pytest.mark.parametrize(("azimuth_rad", "turn_deg"), [(0.5, 0.0), (0.5, 90.0), (-2.0, 40.0), (np.pi, 90.0)])
+def test_a_crack_is_found_once_where_it_is(azimuth_rad: float, turn_deg: float) -> None:
+    grey = picture(3)
+    drawn(grey, 45.0, azimuth_rad, turn_deg)
+    (line,) = dark_lines(photo(grey), map_of(a_wall()))
+    i, j = np.nonzero(line.mask)
+    assert 0.5 * (line.row + i.mean()) == pytest.approx(45.0, abs=1.0)
+    off = _AZIMUTH[0] + np.radians(0.5) * (line.column + j.mean()) - azimuth_rad
+    assert abs((off + np.pi) % (2 * np.pi) - np.pi) * _RADIUS_MM < 1.0
+    size = np.hypot(0.5 * line.mask.shape[0], np.radians(0.5) * _RADIUS_MM * line.mask.shape[1])
+    assert size == pytest.approx(18.0, abs=2.5)
+
+
+def test_a_bright_line_is_no_crack() -> None:
+    grey = picture(3)
+    drawn(grey, 45.0, 0.5, 20.0, times=1.6)
+    assert dark_lines(photo(grey), map_of(a_wall())) == ()
+
+
+def test_a_wall_full_of_streaks_has_no_crack() -> None:
+    grey, rng = picture(3), np.random.default_rng(5)
+    for _ in range(40):
+        drawn(grey, rng.uniform(10, 80), rng.uniform(-3, 3), rng.uniform(0, 180), 1 - rng.uniform(-0.5, 0.5))
+    assert dark_lines(photo(grey), map_of(a_wall())) == ()
+
+
+def test_the_edge_of_what_was_photographed_is_no_line() -> None:
+    texture = photo(picture(4))
+    texture.bgra[200:400, 300:600] = 0
+    assert dark_lines(texture, map_of(a_wall())) == ()
+
+
+def test_a_photo_of_one_grey_has_no_line() -> None:
+    assert dark_lines(photo(np.full((600, _AROUND), 128.0)), map_of(a_wall())) == ()
+
+
+def test_a_crack_over_a_cut_of_a_long_photo_is_one() -> None:
+    grey = picture(6, 2300)
+    drawn(grey, 150.0, 0.5, 0.0)  # rows of the photo are cut at 1000 and 2000
+    drawn(grey, 299.0, 0.5, 0.0)
+    found = dark_lines(photo(grey), replace(map_of(a_wall())))
+    assert len(found) == 2
+
+
+def test_only_a_line_beside_a_finding_is_a_part_of_it() -> None:
+    wall = map_of(a_wall())
+    line = Region(100, -5, np.ones((1, 20), bool), 1.0)
+    assert lies_beside(line, Region(98, 718, np.ones((2, 12), bool), 1.0), wall)
+    assert not lies_beside(line, Region(60, 718, np.ones((2, 12), bool), 1.0), wall)
+    assert not lies_beside(line, Region(98, 200, np.ones((2, 12), bool), 1.0), wall)
+
+
+def test_the_limit_of_a_pattern_is_borne_out() -> None:
+    """Weights that fall off as a power pass the limit by chance as often as is asked for."""
+    rng = np.random.default_rng(0)
+    weights = np.sort(rng.pareto(4.0, (2000, 400)) + 1)[:, ::-1]
+    passed = [np.sum(w > limit_of_weight(w, 0.1)) for w in weights]
+    assert 0.05 < np.mean(passed) < 0.2
+    assert limit_of_weight(weights[0, :39], 0.1) == np.inf
+
+
+def searched(grey: np.ndarray, dents_mm: float = 0.0):
+    wall = a_wall(1, dents_mm)
+    return find_defects(
+        bare_recording(2 * _RADIUS_MM), wall, photo(grey), DefectParameters(), quiet_context()
+    )
+
+
+def test_a_crack_that_rings_do_not_show_is_listed_and_not_counted() -> None:
+    grey = picture(3)
+    drawn(grey, 45.0, 0.5, 0.0)
+    found = searched(grey)
+    assert found.items == ()
+    (line,) = found.unconfirmed
+    assert (line.kind, line.id) == (DefectKind.CRACK, 1)
+    assert line.pacp_suggestion.startswith("CL")
+    assert line.peak_clock == pytest.approx(3 + np.degrees(0.5) / 30, abs=0.2)
+    assert "The photo alone shows it" in line.statement
+    assert abs(line.depth_mm) < 3 * line.depth_sigma_mm
+    assert len(line.frames) > 20
+
+
+def test_a_dark_line_in_a_pit_is_a_part_of_the_pit() -> None:
+    grey = picture(3)
+    drawn(grey, 45.0, 0.5, 0.0)
+    found = searched(grey, dents_mm=1.0)
+    assert len(found.items) == 1
+    assert found.items[0].depth_mm == pytest.approx(1.0, abs=0.1)
+    assert found.unconfirmed == ()
