@@ -154,8 +154,8 @@ def _found(summary: RunSummary) -> Card:
     ]
     if defects.unconfirmed:
         lines.append(
-            f"{len(defects.unconfirmed)} more places were seen in one ring or are more likely false than "
-            "real: they are listed as unconfirmed and not counted"
+            f"{len(defects.unconfirmed)} more places were seen in one ring or in the photo alone, or are "
+            "more likely false than real: they are listed as unconfirmed and not counted"
         )
     if not defects.items:
         return Card("What was found", "no defect", tuple(lines))

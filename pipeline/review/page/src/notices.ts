@@ -32,7 +32,7 @@ export function unconfirmed(session: Session): HTMLElement | string {
   });
   const root = element("details", { class: "unconfirmed" },
     element("summary", {}, items.length === 1 ? "1 unconfirmed place" : `${items.length} unconfirmed places`),
-    element("p", { class: "quiet" }, "Each of these is shown by one laser ring alone and nothing in the photo confirms it, or recordings like this one hold more false findings of its kind than real ones. They are not counted as findings. If one is a defect, draw it with “Add defect”."),
+    element("p", { class: "quiet" }, "Each of these is shown by one laser ring alone or by the photo alone, or recordings like this one hold more false findings of its kind than real ones. They are not counted as findings. If one is a defect, draw it with “Add defect”."),
     element("ul", {}, ...rows));
   root.addEventListener("toggle", () => { if (root.open && !photo.layer) void photo.load("photo").then(() => draws.forEach((draw) => draw())).catch((e: Error) => session.say(e.message)); });
   return root;
