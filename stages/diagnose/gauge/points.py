@@ -19,9 +19,9 @@ from stages.calibrate.gauge.geometry import BoreRings
 from stages.calibrate.gauge.state import Unknowns
 from stages.diagnose.effects.base import ImagePoints
 
-# What a probe does faster than this is taken for noise of its poses: slower motion of f Hz loses (f / 5)⁴ of
-# its rate, 0.02 % of a sway of 0.6 Hz; 0.01 mm of noise at 30 frames/s becomes 0.1 mm/s.
-_FASTEST_HZ = 5.0
+# What a probe does faster than this is taken for noise of its poses: slower motion of f Hz loses (f / 3)⁴ of
+# its rate, 0.2 % of a sway of 0.6 Hz. A rolling shutter itself makes poses noisy: at 5 Hz that noise hid it.
+_FASTEST_HZ = 3.0
 _LEAST_FOR_SPLINE = 5
 BASELINE_SIGMA_PX = 0.01
 _RING_HARMONICS = (0, 1, 2, 3, 4)
