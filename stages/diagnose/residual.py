@@ -70,11 +70,20 @@ class RingResidual:
 
     @property
     def floor_px(self) -> float:
-        """R.m.s., px, of what rings do not repeat at one azimuth of the image on other wall; NaN: unknown."""
+        """R.m.s., px, of what rings do not repeat at one azimuth of the image on other wall; NaN: unknown.
+
+        It is the share that pairs do not repeat of all that is there. Rings near an end, where texture places
+        the camera worst, are in fewer pairs.
+        """
         own = np.flatnonzero(self.usable)
-        one_bore = np.zeros(len(own), np.int64)
+        value, one_bore = self.residual_px[own], np.zeros(len(own), np.int64)
         pairs = on_other_wall(self.azimuth_c_rad[own], self.frame[own], self.distance_mm[own], one_bore)
-        return float(np.sqrt(variance_of_pairs(self.residual_px[own], np.ones(len(own)), *pairs)))
+        if not len(pairs[0]):
+            return float("nan")
+        share = variance_of_pairs(value, np.ones(len(own)), *pairs) / np.mean(
+            value[np.concatenate(pairs)] ** 2
+        )
+        return float(np.sqrt(share)) * self.rms_px
 
     def over_frames(self, frames: Int) -> Float:
         """Return the mean residual, mm, over (F, `AZIMUTHS`) frames and azimuth in C; NaN where none is."""

@@ -84,12 +84,16 @@ def test_where_the_noise_is_not_known_it_is_not_known_that_an_explanation_fits()
     assert _fits(cast(Any, SimpleNamespace(quality=not_tried)))
 
 
-def of_rings(noise_px: float, left_px: float) -> RingResidual:
-    """Return an inspection's rings, the instrument off by up to ``left_px`` alike in all of them."""
+def of_rings(noise_px: float, left_px: float, louder_at_ends: float = 1.0) -> RingResidual:
+    """Return an inspection's rings, the instrument off by up to ``left_px`` alike in all of them.
+
+    The first and the last five are ``louder_at_ends``, as where texture has not yet placed the camera well.
+    """
     random = np.random.default_rng(6)
     frame, azimuth = (g.ravel() for g in np.mgrid[:40, -180:180:5])
     angle = np.radians(azimuth)
-    residual = left_px * np.cos(angle) + random.normal(0, noise_px, len(frame))
+    noise = noise_px * np.where((frame < 5) | (frame >= 35), louder_at_ends, 1.0)
+    residual = left_px * np.cos(angle) + random.normal(0, noise)
     return RingResidual(
         "field", frame, angle, angle, 2.0 * frame, np.zeros((len(frame), 2)), residual, residual,
         np.ones(len(frame), bool),
@@ -101,6 +105,11 @@ def test_an_inspections_floor_is_what_its_rings_do_not_repeat(left_px: float) ->
     seen = of_rings(0.07, left_px)
     assert seen.floor_px == pytest.approx(0.07, rel=0.05)
     assert (seen.rms_px > 0.2) == (left_px > 0)
+
+
+def test_rings_near_the_ends_count_as_much_in_the_floor_as_in_what_is_left() -> None:
+    seen = of_rings(0.07, 0.0, louder_at_ends=4.0)
+    assert seen.floor_px == pytest.approx(seen.rms_px, rel=0.03)
 
 
 def test_one_ring_of_an_inspection_tells_no_floor() -> None:
