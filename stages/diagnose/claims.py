@@ -13,7 +13,7 @@ from pipeline.physics.effect import Channel, FixedTo
 from stages.diagnose.agreement import Agreement, Part, agreement, chance_of_name
 from stages.diagnose.channels import Seen
 from stages.diagnose.inference import SURE
-from stages.diagnose.late_pictures import Exposure
+from stages.diagnose.late_pictures import Exposure, as_late_as_shown
 from stages.diagnose.profile.evidence import ProfileEvidence
 from stages.diagnose.profile.finding import Finding
 from stages.diagnose.result import CourseFound, EffectFound, Location, Value
@@ -131,6 +131,7 @@ class Claim:
 
 def claims_of(field: Seen | None, gauge: Seen | None, stated_exposure_s: float) -> list[Claim]:
     """Return what travel and profile show; of one effect the clearer, the other recording set beside it."""
+    recordings = field, gauge
     of_probe = Exposure.of(stated_exposure_s, (field, gauge)), Exposure.of(stated_exposure_s, (gauge, field))
     field, gauge = of_probe[0].taken_off(field), of_probe[1].taken_off(gauge)
     of_field, of_gauge = _of_recording(field, of_probe[0]), _of_recording(gauge, of_probe[1])
@@ -141,6 +142,8 @@ def claims_of(field: Seen | None, gauge: Seen | None, stated_exposure_s: float) 
             out.append(_borne_out(*sorted(each, key=lambda c: (c.of_gauge_alone, c.p_value))))
         else:
             out.append(_against(each[0], field if name in of_gauge else gauge))
+    if not any(c.name == "time_offset" and c.sure for c in out):
+        out = [replace(c, parameters=as_late_as_shown(c.parameters, recordings)) for c in out]
     return sorted((c for c in out if not _excluded(c, out)), key=lambda c: c.p_value)
 
 
@@ -165,8 +168,10 @@ def _every(seen: Seen, exposure: Exposure) -> Iterable[Claim]:
     if seen.profile is not None:
         for f in seen.profile.found:
             claim = _of_finding(f, seen.profile, seen.name)
-            too_long = f.effect == "motion_blur" and f.sizes and not exposure.has_time(seen, f.sizes[0])
-            yield replace(claim, beside=claim.beside + 1) if too_long else claim
+            if f.effect == "motion_blur" and f.sizes and not exposure.has_time(seen, f.sizes[0]):
+                words = exposure.said(seen, f.sizes[0], claim.statement)
+                claim = replace(claim, beside=claim.beside + 1, statement=words)
+            yield claim
 
 
 def _of_estimate(e: TravelEstimate, travel: TravelEvidence, exposure: Exposure) -> Claim:

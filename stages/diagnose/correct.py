@@ -64,8 +64,10 @@ def _shift(encoder: Encoder, true_mm: Float, effects: Sequence[EffectFound]) -> 
     travel = Travel(encoder.time_s, true_mm, np.gradient(true_mm, encoder.time_s))
     shift = np.zeros(len(true_mm))
     for e in effects:
-        size = np.array([e.parameters[_OF_ENCODER[e.name]].value])
-        shift += LIBRARY[e.name].reading_shift_mm(travel, _shape(e), size)
+        # Of a longer exposure only what the encoder shows of it: see `as_late_as_shown`.
+        late = e.parameters.get("late_s")
+        size = 2 * late.value if late is not None else e.parameters[_OF_ENCODER[e.name]].value
+        shift += LIBRARY[e.name].reading_shift_mm(travel, _shape(e), np.array([size]))
     return shift
 
 

@@ -12,6 +12,8 @@ from stages.diagnose.agreement import TELLING, same
 from stages.diagnose.channels import Seen
 from stages.diagnose.effects.library import LIBRARY
 from stages.diagnose.profile.finding import Finding, Size
+from stages.diagnose.result import Value
+from stages.diagnose.travel.events import is_found
 from stages.diagnose.travel.evidence import TravelEstimate, TravelEvidence
 from stages.diagnose.travel.model import TravelFit, second_predictions
 from stages.diagnose.travel.solve import DELAY
@@ -59,7 +61,11 @@ class Exposure:
         if seen is None or seen.travel is None or longer is None or not self.has_time(seen, longer):
             return seen
         fit = seen.travel.fit
-        each = (_less_half(e, longer, fit) if e.effect == _DELAY else e for e in seen.travel.estimates)
+        # Of an encoder in time nothing is taken off: stamps may be of the exposure's middle.
+        each = (
+            _less_half(e, longer, fit) if e.effect == _DELAY and is_found(e.p_value) else e
+            for e in seen.travel.estimates
+        )
         return replace(seen, travel=replace(seen.travel, estimates=tuple(each)))
 
     def has_time(self, seen: Seen, longer: Size) -> bool:
@@ -68,6 +74,14 @@ class Exposure:
             return True
         left_s = seen.travel.fit.sight.frame_time_s - self.stated_s
         return longer.value - _SURE * longer.sigma < left_s
+
+    def said(self, seen: Seen, longer: Size, statement: str) -> str:
+        """Return what is said of an exposure, and that no picture has time for it where none has."""
+        fit = seen.travel.fit if seen.travel is not None else None
+        if fit is None or self.has_time(seen, longer):
+            return statement
+        apart = f"{1e3 * fit.sight.frame_time_s:.1f} ms"
+        return f"{statement.rstrip('.')}, for which no picture has time: the next begins after {apart}."
 
     def alike(self, found: TravelEstimate, travel: TravelEvidence) -> tuple[str, ...]:
         """Return ``motion_blur`` where a longer exposure may be what makes an encoder's readings seem late.
@@ -80,6 +94,22 @@ class Exposure:
         longest = travel.fit.sight.frame_time_s - self.stated_s + exposure.sigma
         told_apart = any(_another(exposure, f.sizes[0]) for f in self.widths)
         return (_EXPOSURE,) if 0 < exposure.value < longest and not told_apart else ()
+
+
+def as_late_as_shown(size: dict[str, Value], recordings: Iterable[Seen | None]) -> dict[str, Value]:
+    """Return an effect's size, of an exposure with how late it makes pictures as far as an encoder shows it.
+
+    Stamps may be of the exposure's middle, so that half of it makes no picture late against its stamp.
+    """
+    if "exposure_s" not in size:
+        return size
+    half = Value(size["exposure_s"].value / 2, size["exposure_s"].sd / 2)
+    travels = (s.travel for s in recordings if s is not None and s.travel is not None)
+    shown = next((e for t in travels if (e := t.estimate(_DELAY)) is not None), None)
+    if shown is None or not is_found(shown.p_value):
+        return size | {"late_s": Value(0.0, half.sd)}
+    least = half if shown.value > half.value else Value(max(shown.value, 0.0), shown.size_sigma)
+    return size | {"late_s": least}
 
 
 def _less_half(late: TravelEstimate, longer: Size, fit: TravelFit | None) -> TravelEstimate:

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
+from typing import Any, cast
 
 import numpy as np
 import pytest
 
 from pipeline.instrument.probe import Probe
 from pipeline.physics.catalogue import effect
+from pipeline.recording.base import Encoder, Recording
 from stages.diagnose.agreement import Agreement
 from stages.diagnose.channels import Seen
+from stages.diagnose.correct import with_true_readings
 from stages.diagnose.late_pictures import Exposure
 from stages.diagnose.profile.evidence import ProfileEvidence
 from stages.diagnose.profile.finding import Size, finding
@@ -113,6 +117,24 @@ def test_a_width_that_no_exposure_has_time_for_is_no_sure_exposure_and_moves_no_
     alone = answer(real_probe, None, late("gauge", thirty_a_second, None, (60.0, 5.0)))
     assert alone.verdict is Verdict.CLASS
     assert "encoder" not in alone.identifiable, "the encoder showed nothing"
+    assert "no picture has time: the next begins after 33.3 ms" in alone.identifiable
+
+
+@pytest.mark.parametrize(("delay_s", "late_s"), [(0.0, 0.0), (0.0004, 0.0), (0.008, 0.008), (0.0085, 0.008)])
+def test_of_an_exposure_only_so_much_is_put_right_as_the_encoder_shows(
+    real_probe: Probe, thirty_a_second: TravelFit, delay_s: float, late_s: float
+) -> None:
+    """Stamps of the middle of 16 ms: -8 ms of "own delay" had been named, or all readings put 8 ms off."""
+    found = answer(real_probe, None, late("gauge", thirty_a_second, delay_s, (16.0, 1.0)))
+    assert sizes(found) == pytest.approx({"motion_blur": 0.016})
+    assert found.effects[0].parameters["late_s"].value == pytest.approx(late_s)
+    encoder = Encoder(np.arange(0.0, 8.0, 0.01), 20 * np.arange(0.0, 8.0, 0.01))
+    recording = Recording(
+        "r", "inspection", Path(), cast(Any, None), encoder, cast(Any, None), 30.0, cast(Any, None), None, ""
+    )  # fmt: skip
+    true = with_true_readings(recording, found.effects).encoder
+    assert true is not None
+    assert true.distance_mm - encoder.distance_mm == pytest.approx(20 * late_s, abs=1e-6)
 
 
 def test_the_encoders_own_delay_holds_what_the_width_leaves_open(

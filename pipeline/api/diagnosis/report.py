@@ -29,7 +29,10 @@ from stages.diagnose.result import (
 )
 
 # What the diagnosis measures of events beyond the numbers of their laws: meaning and unit.
-_OF_EVENTS = {"duration_s": ("how long it lasts", "s")}
+_OF_EVENTS = {
+    "duration_s": ("how long it lasts", "s"),
+    "late_s": ("by how much the encoder shows pictures to be late", "s"),
+}  # fmt: skip
 _HEADLINES = {
     Verdict.CONSISTENT: "The recording agrees with the stated instrument",
     Verdict.CLASS: "Something was left out; its kind is known, its name is not",
