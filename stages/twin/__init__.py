@@ -209,7 +209,7 @@ def compared_with(
     failed = any("led_dead" in m.name for m in over_time)
     whole, withdrawn = sums.named(samples, recording, failed)
     on_window, unsure = beside_blur(sums.on_window(samples), whole)
-    on_window, glints = told_apart(on_window, sums.glints())
+    on_window, glints = told_apart(on_window, sums.glints(whole))
     apart_mm, clear = ring_step_mm(rings, scene.trajectory), (*on_window, *glints)
     found: tuple[Mismatch, ...] = (
         *through_window(over_time, on_window, scene.ring), *on_window, *photometry.pixels,
@@ -279,7 +279,7 @@ PHOTOMETRY = Stage(
 )
 TWIN = Stage(
     "twin",
-    "27",
+    "28",
     TwinParameters,
     compare_with_twin,
     "recorded frames beside the same frames, re-rendered from what the run has measured",

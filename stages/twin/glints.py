@@ -35,6 +35,8 @@ _REACH_PX, _MORE, _FEWEST, _SURE = 16.0, 2, 3, 3.0
 which spots must come back more often on the wall than in the image, or less, to tell to which they are fixed;
 fewest frames; and σ by which other frames must bear it out."""
 
+_PALEST = 2.0
+"""Brightness of the palest wall over what nineteen of twenty places do not reach; chosen."""
 _OR_DROP = ", or a drop on the window bends light of the line to it"
 """A drop that is not told by lit wall, which it draws aside, may still show in the dark beside the line."""
 
@@ -117,9 +119,13 @@ class SpotsOfFrames:
             )
         return found
 
-    def found(self) -> tuple[Mismatch, ...]:
-        """Return the places where spots come back, and a count of the other spots."""
-        places, left = list[Mismatch](), list(self.spots)
+    def found(self, lit_wall: float = 0.0) -> tuple[Mismatch, ...]:
+        """Return the places where spots come back, and a count of the other spots.
+
+        ``lit_wall`` is how bright, in grey levels, other light makes wall that is dark in the twin: what is
+        not far brighter is the palest of the wall.
+        """
+        places, left = list[Mismatch](), [s for s in self.spots if s.grey > _PALEST * lit_wall]
         while left:
             tried = {order: _largest_group(left, order) for order in ("image", "wall")}
             count = {order: _frames_of(group) for order, group in tried.items()}

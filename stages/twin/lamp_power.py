@@ -71,7 +71,7 @@ def power_of_lamps(samples: BlockSamples | None, ring: Ring) -> tuple[Suspected,
         name, "intensity", "image", (), (NamedFigure("exponent", power, sd),), chance, nan, nan, said,
         ring.whole(int(samples.number[0])),
     )  # fmt: skip
-    law = partial(_to_power, samples.number, _other_light(samples))
+    law = partial(to_power, samples.number, by_block(samples, samples.light_and_brightness[0]))
     return (Suspected(found, law, samples.number, told, lambda mean: np.array([1 + mean[0] / mean[1]])),)
 
 
@@ -94,15 +94,26 @@ def _slowly(samples: BlockSamples) -> Float:
     return out
 
 
-def _other_light(samples: BlockSamples) -> Float32:
-    """Return the logarithm (F, rows, columns) of the light of blocks over that of their photo."""
+def by_block(samples: BlockSamples, values: Float) -> Float32:
+    """Return values (N,) of blocks as maps (F, rows, columns) of frames; 0 where there is no block."""
     out = np.zeros((samples.frame.max() + 1, samples.row.max() + 1, samples.column.max() + 1), np.float32)
-    out[samples.frame, samples.row, samples.column] = samples.light_and_brightness[0]
+    out[samples.frame, samples.row, samples.column] = values
     return out
 
 
-def _to_power(number: Int, light: Float32, shown: Shown, told: Float) -> Pair:
-    """Return a frame whose light departs from that of the photo to a power ``told``."""
+def to_power(number: Int, log_light: Float32, shown: Shown, told: Float) -> Pair:
+    """Return a frame in other light than its photo was made in, to a power.
+
+    Parameters
+    ----------
+    number : (F,)
+        Of the frames.
+    log_light : (F, rows, columns)
+        Logarithm of the light over that of the photo, of blocks.
+    shown : Shown
+    told : (1,)
+        1 more than the power: 1 leaves the frame as it is.
+    """
     level = shown.twin.level
-    more = full_size(light[int(np.searchsorted(number, shown.number))], level.shape, 0.0)
+    more = full_size(log_light[int(np.searchsorted(number, shown.number))], level.shape, 0.0)
     return Pair(level, level * np.exp(np.float32(told[0] - 1) * more), shown.wall, "scale")

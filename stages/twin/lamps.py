@@ -15,7 +15,7 @@ from pipeline.adjustment.robust import left_out_sd
 from pipeline.arrays import Float, Int
 from pipeline.artefacts.twin import Mismatch, NamedFigure
 from stages.twin.cells import SECTORS, centred, sector_azimuth_rad
-from stages.twin.compare import BLOCK_PX
+from stages.twin.dead_led import seen_from
 from stages.twin.gate import Suspected
 from stages.twin.lamp_light import LampLight
 from stages.twin.laws import LED_AZIMUTHS, dim_share
@@ -120,9 +120,7 @@ def _of_wall(found: Mismatch, size: float, sd: float) -> Mismatch:
 
 def _beside_wall(one: Suspected, lamp: LampLight, scene: Scene, samples: BlockSamples) -> tuple[float, float]:
     """Return which share of uneven lamps the same wall shows at several places of the image, and its 1 σ."""
-    rows, columns = (BLOCK_PX * (a.max() + 1) for a in (samples.row, samples.column))
-    middle = (slice(BLOCK_PX // 2, rows, BLOCK_PX), slice(BLOCK_PX // 2, columns, BLOCK_PX))
-    theta, phi = (np.nan_to_num(a[middle])[samples.row, samples.column] for a in scene.polar[:2])
+    theta, phi = seen_from(samples, scene)
     pattern = law = lamp.around(phi)
     if one.mismatch.name == "led_dead":  # and nothing that sends the same share to every polar angle
         lost, azimuth = one.told[0]

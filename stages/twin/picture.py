@@ -24,7 +24,7 @@ from stages.twin.locate import FALSE_ALARM
 from stages.twin.render import Region, TwinFrame
 from stages.twin.scene import Scene
 from stages.twin.second_ring import ring_profile, second_ring
-from stages.twin.switched import STEP, TILE, bloom, bounced, leaked, motion_blur, stray
+from stages.twin.switched import STEP, STRAY_NAMES, TILE, bloom, leaked, motion_blur, stray, stray_lights
 
 _SURE, FEWEST_FRAMES = 3.0, 6
 """σ by which laws are told apart; frames."""
@@ -55,8 +55,8 @@ class WholePictures:
     ----------
     scene : Scene
     blur, kept, stray, bloom, ghost : list
-        Of each frame: own and cross sums of both halves; share of the fine texture's energy; sizes of ambient
-        and bounced light, their levels and falls; leak along columns and rows; brightness over ln of the
+        Of each frame: own and cross sums of both halves; share of the fine texture's energy; sizes of the
+        `stray_lights`, their levels and falls; leak along columns and rows; brightness over ln of the
         ratio of radii in four quadrants.
     frame : dict of str to list of int
     """
@@ -115,8 +115,8 @@ class WholePictures:
         line = (twin.region == Region.LINE_CORE) | (twin.region == Region.LINE_FLANK)
         away = cv2.dilate(line.astype(np.uint8), np.ones((9, 9), np.uint8)) == 0
         known = away & (lit.region == Region.WALL) & free
-        glow = bounced(self.scene, twin, lit)
-        small = [of_blocks(np.where(known, a, 0)) for a in (np.ones_like(above), above, lit.level, glow)]
+        lights = stray_lights(self.scene, twin, lit)
+        small = [of_blocks(np.where(known, a, 0)) for a in (np.ones_like(above), above, *lights)]
         # Whole blocks alone, up to rounding.
         whole = small[0] > 0.99
         if whole.sum() < TILE**2:
@@ -210,9 +210,9 @@ class WholePictures:
         chance, share = chance_of(size[:, k]), float(size[:, k].mean())
         if chance > FALSE_ALARM or share * level[:, k].mean() < _LEAST_LEVEL:
             return None
-        names = ["ambient_light", "interreflection"]
-        told = sigmas(fall[:, k] - fall[:, 1 - k]) > _SURE
-        name, grey = (names[k] if told else " or ".join(names)), share * level[:, k]
+        others = [j for j, name in enumerate(STRAY_NAMES) if name != STRAY_NAMES[k]]
+        rivals = [STRAY_NAMES[j] for j in others if sigmas(fall[:, k] - fall[:, j]) < _SURE]
+        name, grey = " or ".join(sorted({STRAY_NAMES[k], *rivals})), share * level[:, k]
         sd = float(np.std(size[:, k])) / np.sqrt(len(size)) * float(level[:, k].mean())
         found = self._mismatch(
             name, "wall", NamedFigure("level", float(grey.mean()), sd, "grey levels"), chance, "stray",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -14,7 +14,8 @@ from pipeline.artefacts.twin import Mismatch
 from pipeline.recording.base import Illumination, Recording
 from stages.twin.cells import Cells, CellsOfFrames, sectors_of
 from stages.twin.compare import Comparison, exposure_of
-from stages.twin.gate import judged
+from stages.twin.dead_led import dead_led
+from stages.twin.gate import Suspected, judged
 from stages.twin.glints import SpotsOfFrames
 from stages.twin.lamp_power import power_of_lamps
 from stages.twin.lamps import parted_from_wall, uneven_lamps
@@ -25,7 +26,7 @@ from stages.twin.reference import BlockSamples, BlocksOfFrames, in_image
 from stages.twin.render import Renderer
 from stages.twin.scene import Scene
 from stages.twin.state import PhotometricState
-from stages.twin.switched import Shown
+from stages.twin.switched import STRAY_NAMES, Shown
 from stages.twin.window import WindowPlace
 
 _MOST_STRAY = 8
@@ -87,9 +88,11 @@ class Sums:
         judged = [w.judged(to) for w, to in zip(self.window, fixed_to, strict=True)]
         return told_once([m for m in judged if m is not None])
 
-    def glints(self) -> tuple[Mismatch, ...]:
-        """Return spots that are far brighter than foretold."""
-        return tuple(m for spots in self.spots for m in spots.found())
+    def glints(self, whole: Sequence[Mismatch]) -> tuple[Mismatch, ...]:
+        """Return spots that are far brighter than foretold, beside laws of ``whole`` pictures that stand."""
+        stray = [m.parameters[0].value for m in whole if set(m.names) & set(STRAY_NAMES)]
+        lit, laser = self.spots
+        return (*lit.found(), *laser.found(max(stray, default=0.0)))
 
     def cells(self) -> tuple[Cells | None, Cells | None]:
         """Return the sectors of lit frames and of the line, for steady lamps and an even, steady laser.
@@ -112,18 +115,34 @@ class Sums:
 
         An LED that failed during the run leaves the lamps' mean pattern uneven, too, and is not told twice.
         """
-        again, lamp = partial(self._shown, recording), self._state.lamp
-        uneven = uneven_lamps(lamp, self._scene, self.whole.frames_of("blur"))
-        uneven, of_wall = parted_from_wall(() if led_failed else uneven, lamp, self._scene, samples)
+        again = partial(self._shown, recording)
+        lamps, of_wall = self._lamps(samples, led_failed)
         first = (
             *self.whole.suspected(self._state.sharpness),
             *(() if self._state.black_in_photo else response_of(samples, self._scene.ring)),
             *power_of_lamps(samples, self._scene.ring),
-            *uneven,
+            *lamps,
         )
         kept, withdrawn = judged(first, again)
         focus, not_focus = judged(focus_of(self._state, self.whole, kept), again)
         return (*kept, *focus), (*withdrawn, *not_focus, *of_wall)
+
+    def _lamps(
+        self, samples: BlockSamples | None, led_failed: bool
+    ) -> tuple[tuple[Suspected, ...], tuple[Mismatch, ...]]:
+        """Return what makes the lamps uneven in all frames, and what wall seen twice does not bear out.
+
+        The run's own photo holds most of it, which then shows in how it changes over polar angle alone.
+        """
+        if led_failed:
+            return (), ()
+        lamp = self._state.lamp
+        uneven = uneven_lamps(lamp, self._scene, self.whole.frames_of("blur"))
+        uneven, of_wall = parted_from_wall(uneven, lamp, self._scene, samples)
+        if any("led_dead" in one.mismatch.names for one in uneven):
+            return uneven, of_wall
+        dim = dead_led(samples, self._scene)
+        return (dim, ()) if dim else (uneven, of_wall)
 
     def _shown(self, recording: Recording, frames: Int) -> Iterator[tuple[int, Shown]]:
         """Yield compared frames anew, with what renders them under other assumptions."""

@@ -35,6 +35,8 @@ the mean at its angle: more is no reflectance but an angle that hardly any wall 
 _NODES = ((-1.732051, 1 / 6), (0.0, 2 / 3), (1.732051, 1 / 6))
 """Gauss and Hermite's nodes: three displacements whose mean blurs as a normal curve does, to the fifth power
 of its width. Two rounds of them make nine."""
+STRAY_NAMES = ("ambient_light", "interreflection", "ambient_light")
+"""Of `stray_lights`."""
 _ON_RING = 0.05
 """Share of a second ring's peak from which pixels belong to it."""
 
@@ -143,11 +145,11 @@ def response(shown: Shown, told: Float) -> Pair:
 
 
 def stray(which: int) -> Law:
-    """Return the law of light on the wall while the LEDs are off: 0 as they light it, 1 as the line does."""
+    """Return the law of one of the `stray_lights`."""
 
     def law(shown: Shown, told: Float) -> Pair:
         lit, line = shown.lit(), _dilated(on_line(shown.twin))
-        column = (lit.level, bounced(shown.scene, shown.twin, lit))[which]
+        column = stray_lights(shown.scene, shown.twin, lit)[which]
         use = _inner(~line & (lit.region == Region.WALL) & shown.free)
         level = shown.twin.level
         return Pair(level, level + np.float32(told[which]) * column, use, "offset")
@@ -155,14 +157,22 @@ def stray(which: int) -> Law:
     return law
 
 
-def bounced(scene: Scene, twin: TwinFrame, lit: TwinFrame) -> Float32:
-    """Return light of the line bounced once in a round bore, up to a factor: brighter on paler wall."""
+def stray_lights(scene: Scene, twin: TwinFrame, lit: TwinFrame) -> tuple[Float32, Float32, Float32]:
+    """Return light (H, W) on the wall while the LEDs are off, up to factors; see `STRAY_NAMES`.
+
+    As the LEDs throw it, as the line does from wall to wall, and even light: brighter on paler wall alone.
+    """
+    paler = np.minimum(lit.level / _at_angle(scene.polar[0], lit), _MOST_PALE)
+    bounced = np.nan_to_num(_once_bounced(scene, twin, lit)) * paler
+    return lit.level, np.asarray(bounced, np.float32), np.asarray(100 * paler, np.float32)
+
+
+def _once_bounced(scene: Scene, twin: TwinFrame, lit: TwinFrame) -> Float32:
+    """Return light (H, W) of the line bounced once in a round bore of even paleness, up to a factor."""
     on = twin.distance_mm[twin.region == Region.LINE_CORE]
     middle = float(np.nanmedian(on)) if len(on) else np.nan
     x = np.abs(lit.distance_mm - np.float32(middle)) / np.float32(2 * scene.surface.mean_radius_mm)
-    share = 1 - x * (2 * x**2 + 3) / (2 * (x**2 + 1) ** 1.5)
-    paler = lit.level / _at_angle(scene.polar[0], lit)
-    return np.asarray(np.nan_to_num(100 * share) * np.minimum(paler, _MOST_PALE), np.float32)
+    return np.asarray(100 * (1 - x * (2 * x**2 + 3) / (2 * (x**2 + 1) ** 1.5)), np.float32)
 
 
 def _at_angle(theta_rad: Float32, lit: TwinFrame) -> Float32:

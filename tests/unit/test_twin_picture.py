@@ -205,6 +205,20 @@ def test_stray_light_is_named_for_what_it_falls_on():
     assert _named(laser=lambda p, r: p + 5) == []
 
 
+def test_even_light_on_wall_that_the_lamps_light_unevenly_is_ambient_light():
+    """Its law had been the lamps' own light, which falls off: it was named interreflection."""
+    random, whole, shown = np.random.default_rng(2), WholePictures(SCENE), {}
+    for frame in range(FRAMES):
+        wall, line = _lit(random), _line()
+        lit = _twin((wall.level * np.exp(-((AWAY / 80) ** 2))).astype(np.float32), wall.region)
+        seen = _noisy(line.level + 0.25 * wall.level, random)
+        whole.add_laser(frame, seen, line, seen < WHITE, lit)
+        shown[frame] = _shown(seen, line, lit, frame, whole)
+    kept, withdrawn = judged(whole.suspected(np.zeros(4)), lambda frames: [(f, shown[f]) for f in frames])
+    assert [m.name for m in kept] == ["ambient_light"]
+    assert not withdrawn
+
+
 def test_a_second_ring_is_found_and_a_glint_is_none():
     second = 150 * 0.1 * np.exp(-0.5 * ((AWAY - 92) / 1.5) ** 2)
     assert _named(laser=lambda p, r: p + second) == ["second_line"]

@@ -7,6 +7,7 @@ import cv2
 import numpy as np
 import pytest
 
+from pipeline.artefacts.twin import Mismatch, NamedFigure
 from pipeline.instrument.probe import Lighting
 from pipeline.recording.base import Illumination
 from stages.twin.glints import SpotsOfFrames
@@ -17,6 +18,7 @@ from stages.twin.on_wall import ring_step_mm, touching, unnamed
 from stages.twin.reference import BlockSamples, BlocksOfFrames
 from stages.twin.render import Region, TwinFrame
 from stages.twin.scene import Ring
+from stages.twin.sums import Sums
 from stages.twin.switched import share_at
 from tests.synthetic_wall import plain_bore
 
@@ -55,6 +57,17 @@ def test_a_lamp_that_is_mirrored_at_one_place_of_the_image_is_a_glint():
     u, v, _ = (p.value for p in found.place)
     assert np.hypot(u - 100, v - 60) < 4
     assert found.chi2_after < found.chi2_before / 2
+
+
+@pytest.mark.parametrize(("name", "glints"), [("ambient_light or interreflection", 0), ("bloom", 1)])
+def test_pale_wall_in_other_light_is_no_glint(name, glints):
+    spots = [SpotsOfFrames(kind, RING) for kind in (Illumination.LED, Illumination.LASER)]
+    for number in range(FRAMES):
+        twin = _twin(number, Region.DARK)
+        spots[1].add(number, twin.level + _spot(100, 60, grey=60.0), twin)
+    size = (NamedFigure("level", 35.0, 1.0, "grey levels"),)
+    light = Mismatch(name, "intensity", "wall", (), size, 0.0, 2.0, 1.0, "The wall is lit.")
+    assert len(Sums.glints(SimpleNamespace(spots=spots), (light,))) == glints
 
 
 def test_a_spot_of_the_laser_that_stays_in_the_image_may_be_a_drop():

@@ -1,0 +1,154 @@
+"""An LED that is dim throughout a recording, told although the wall's photo was made in its light.
+
+The run's own photo is darker where the dim LED shone: frames are foretold as dark as they are, and nothing
+differs around the picture. But an LED sends every polar angle another share of the light: of a near ring of
+wall one side is dark, far ahead all sides are, a little. The same wall is photographed once and seen at many
+polar angles as the probe goes on, which tells by how much the LED is dim. First and second harmonics around
+the picture are granted at every polar angle, whatever they are: lamps that lean, a lens or a bore that is no
+circle make those. Only what is narrower, as the light of one LED is, bears a name out.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+from scipy.stats import t
+
+from pipeline.adjustment.robust import left_out_sd
+from pipeline.arrays import Float, Int
+from pipeline.artefacts.twin import Mismatch, NamedFigure
+from stages.twin.cells import centred, half_turn
+from stages.twin.compare import BLOCK_PX
+from stages.twin.gate import Suspected
+from stages.twin.lamp_power import by_block, to_power
+from stages.twin.laws import LED_AZIMUTHS
+from stages.twin.locate import FALSE_ALARM
+from stages.twin.reference import BlockSamples
+from stages.twin.scene import Scene
+from stages.twin.switched import share_at
+
+_LEAST, _MOST, _SURE, _LOBE = 0.25, 1.0, 3.0, 0.15
+"""Least loss that is named: sound recordings tell up to 0.13. Most that an LED has; σ; relative 1 σ of a
+share for want of the LEDs' lobe, as in `stages.twin.causes`."""
+_PARTS, _FEWEST_FRAMES = 6, 6
+"""Parts of the frames of which each is left out once for a σ; fewest lit frames."""
+_FALLOFF_RAD, _HARMONIC_RAD = 0.1, 0.3
+"""Steps of polar angle between which falloff, and harmonics around the picture, are taken as straight."""
+_AS_DARK, _ALIKE = 0.999, 1e-6
+"""Of an LED's share that is taken for all of it: its logarithm stays finite. Relative size of columns that
+say what others do."""
+
+
+def seen_from(samples: BlockSamples, scene: Scene) -> tuple[Float, Float]:
+    """Return the polar angles and image azimuths (N,), rad, of the middles of blocks."""
+    rows, columns = (BLOCK_PX * (a.max() + 1) for a in (samples.row, samples.column))
+    middle = (slice(BLOCK_PX // 2, rows, BLOCK_PX), slice(BLOCK_PX // 2, columns, BLOCK_PX))
+    theta, phi = (np.nan_to_num(a[middle])[samples.row, samples.column] for a in scene.polar[:2])
+    return theta, phi
+
+
+def dead_led(samples: BlockSamples | None, scene: Scene) -> tuple[Suspected, ...]:
+    """Return the LED that is dim in all frames, if the same wall at several polar angles shows one."""
+    if samples is None or samples.frame.max() + 1 < _FEWEST_FRAMES:
+        return ()
+    angles = seen_from(samples, scene)
+    wide, narrow = (_Beside.harmonics(samples, *angles, k) for k in (1, 2))
+    tried = [_law_at(samples, scene, angles, k * 2 * np.pi / LED_AZIMUTHS) for k in range(LED_AZIMUTHS)]
+    law = max(tried, key=lambda one: wide.fall(one.log_light))
+    (size, sd), (alone, alone_sd) = (b.size(law.log_light) for b in (wide, narrow))
+    chance = LED_AZIMUTHS * float(2 * t.sf(alone / max(alone_sd, 1e-9), _PARTS - 1))
+    lost = law.lost(size)
+    lost_sd = float(np.hypot(law.lost(size + sd) - lost, _LOBE * lost))
+    if chance > FALSE_ALARM or min(lost, alone) < max(_LEAST, _SURE * alone_sd):
+        return ()
+    if lost > _MOST + _SURE * lost_sd:
+        return ()  # no LED loses more than it has
+    where = half_turn(float(np.degrees(law.azimuth_rad)))
+    place = (NamedFigure("azimuth_deg", where, 180 / LED_AZIMUTHS, "deg"),)
+    figure, nan = (NamedFigure("lost", lost, lost_sd, "share of the light"),), float("nan")
+    found = Mismatch(
+        "led_dead", "intensity", "image", place, figure, chance, nan, nan,
+        f"In all frames the LED at image azimuth {where:.0f}° sends {100 * lost:.0f} % less light: wall near "
+        "the lamps is too dark on that side, held against the same wall seen farther ahead.",
+        scene.ring.at(int(samples.number[0]), law.azimuth_rad),
+    )  # fmt: skip
+    switched_on = partial(to_power, samples.number, by_block(samples, law.log_light))
+    told = wide.products(law.log_light)
+    return (Suspected(found, switched_on, samples.number, told, lambda m: np.array([1 + m[0] / m[1]])),)
+
+
+@dataclass(frozen=True)
+class _Law:
+    """Logarithm (N,) of the light of blocks without an LED over that of their photo, and its azimuth.
+
+    ``most`` is the largest share of the light that it has in any block.
+    """
+
+    log_light: Float
+    azimuth_rad: float
+    most: float
+
+    def lost(self, size: float) -> float:
+        """Return which share of its light the LED has lost, for a size of the logarithm."""
+        return float((1 - (1 - _AS_DARK * self.most) ** max(size, 0.0)) / self.most)
+
+
+def _law_at(samples: BlockSamples, scene: Scene, angles: tuple[Float, Float], azimuth_rad: float) -> _Law:
+    theta, phi = (a.astype(np.float32) for a in angles)
+    share = share_at(scene, azimuth_rad, theta, phi).astype(float)
+    log_light = centred(np.log1p(-_AS_DARK * share), samples.orders["wall"], samples.frame)
+    return _Law(log_light, azimuth_rad, float(share.max()))
+
+
+@dataclass(frozen=True)
+class _Beside:
+    """Brightness (N,) of blocks, and columns (N, K), orthonormal, of what is granted beside a law.
+
+    Frames (N,) are counted from 0.
+    """
+
+    bright: Float
+    granted: Float
+    frame: Int
+
+    @classmethod
+    def harmonics(cls, samples: BlockSamples, theta_rad: Float, phi_rad: Float, most: int) -> _Beside:
+        """Grant light to any power, any falloff over polar angle, and harmonics that change with it."""
+        groups = samples.orders["wall"], samples.frame
+        waves = [f(m * phi_rad) for m in range(1, most + 1) for f in (np.cos, np.sin)]
+        columns = [samples.log_light, *_hats(theta_rad, _FALLOFF_RAD)]
+        columns += [hat * wave for hat in _hats(theta_rad, _HARMONIC_RAD) for wave in waves]
+        own = np.stack([centred(c, *groups) for c in columns], 1)
+        left, size, _ = np.linalg.svd(own, full_matrices=False)
+        return cls(centred(samples.log_change, *groups), left[:, size > _ALIKE * size[0]], samples.frame)
+
+    def _beyond(self, values: Float) -> Float:
+        return np.asarray(values - self.granted @ (self.granted.T @ values))
+
+    def products(self, law: Float) -> Float:
+        """Return of each frame (F, 2) the sums of law times brightness, and of its square."""
+        law, frames = self._beyond(law), int(self.frame.max()) + 1
+        bright = self._beyond(self.bright)
+        return np.stack([np.bincount(self.frame, law * a, frames) for a in (bright, law)], 1)
+
+    def fall(self, law: Float) -> float:
+        """Return by how much squares of brightness fall with a law, less than 0 with one of other sign."""
+        cross, own = self.products(law).sum(0)
+        return float(cross * abs(cross) / max(own, 1e-12))
+
+    def size(self, law: Float) -> tuple[float, float]:
+        """Return the size of a law and its 1 σ, parts of the frames left out in turns."""
+        each = self.products(law)
+        parts = np.arange(len(each)) * _PARTS // len(each)
+        sums = np.stack([np.bincount(parts, each[:, k], _PARTS) for k in (0, 1)], 1)
+        without = sums.sum(0) - sums
+        size, *others = (a[0] / max(a[1], 1e-12) for a in (sums.sum(0), *without))
+        return float(size), float(left_out_sd(np.array(others)))
+
+
+def _hats(angle_rad: Float, step_rad: float) -> list[Float]:
+    """Return hat functions (N,) of polar angles over all that are there."""
+    knots = np.arange(float(angle_rad.min()), float(angle_rad.max()) + step_rad, step_rad)
+    return [np.maximum(0.0, 1 - np.abs(angle_rad - k) / step_rad) for k in knots]
