@@ -211,9 +211,10 @@ def compared_with(
     on_window, unsure = beside_blur(sums.on_window(samples), whole)
     on_window, glints = told_apart(on_window, sums.glints(whole))
     apart_mm, clear = ring_step_mm(rings, scene.trajectory), (*on_window, *glints)
+    line_rad = float(np.arctan2(scene.ring.radius_mm, scene.ring.ahead_mm))
     found: tuple[Mismatch, ...] = (
         *through_window(over_time, on_window, scene.ring), *on_window, *photometry.pixels,
-        *unnamed(samples and samples.clear_of(clear), scene.surface, apart_mm), *whole, *glints,
+        *unnamed(samples and samples.clear_of(clear), scene.surface, apart_mm, line_rad), *whole, *glints,
         *clipped(rings, state.line_clipped, comparison.clipped_wall / max(comparison.lit, 1.0)),
     )  # fmt: skip
     fall, unnamed_map = left_over(None if samples is None else samples.seen_through(state.gain_map))

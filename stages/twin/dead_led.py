@@ -74,7 +74,10 @@ def dead_led(samples: BlockSamples | None, scene: Scene) -> tuple[Suspected, ...
         "the lamps is too dark on that side, held against the same wall seen farther ahead.",
         scene.ring.at(int(samples.number[0]), law.azimuth_rad),
     )  # fmt: skip
-    switched_on = partial(to_power, samples.number, by_block(samples, law.log_light))
+    # The photo is told from some polar angles more than from others: what it errs by there is no evidence.
+    of_wall = samples.log_change - centred(samples.log_change, samples.orders["wall"])
+    light, photo = (by_block(samples, values) for values in (law.log_light, of_wall))
+    switched_on = partial(to_power, samples.number, light, log_photo=photo)
     told = wide.products(law.log_light)
     return (Suspected(found, switched_on, samples.number, told, lambda m: np.array([1 + m[0] / m[1]])),)
 

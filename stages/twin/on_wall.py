@@ -29,13 +29,23 @@ _LEAST_SHINE, _LEAST_LEAN = 0.25, 0.03
 """Least relative brightening over a line's radius that counts as gloss, and least spread of the places, in
 radii of the line, from which it is told. Chosen."""
 
+_NEAREST_RAD = 0.2
+"""Least polar angle at which wall is taken to be seen: nearer the axis there are no whole blocks of it."""
 _NOISY = 3.0
 """Medians of the size of two normal errors that the largest of some hundred reaches: 2.8, rounded up."""
 
 
-def unnamed(samples: BlockSamples | None, surface: WallSurface, ring_step_mm: float) -> tuple[Mismatch, ...]:
-    """Return what is fixed to the wall, whose shape is ``surface`` by rings so far apart, or to rows."""
-    return () if samples is None else (*_regions_of_wall(samples, surface, ring_step_mm), *_banding(samples))
+def unnamed(
+    samples: BlockSamples | None, surface: WallSurface, ring_step_mm: float, line_rad: float
+) -> tuple[Mismatch, ...]:
+    """Return what is fixed to the wall, or to rows of single frames.
+
+    ``surface`` is the wall's shape by rings ``ring_step_mm`` apart; the line is seen at the polar angle
+    ``line_rad``.
+    """
+    if samples is None:
+        return ()
+    return (*_regions_of_wall(samples, surface, ring_step_mm, line_rad), *_banding(samples))
 
 
 def ring_step_mm(rings: RingSamples, trajectory: Trajectory) -> float:
@@ -45,7 +55,7 @@ def ring_step_mm(rings: RingSamples, trajectory: Trajectory) -> float:
 
 
 def _regions_of_wall(
-    samples: BlockSamples, surface: WallSurface, ring_step_mm: float
+    samples: BlockSamples, surface: WallSurface, ring_step_mm: float, line_rad: float
 ) -> tuple[Mismatch, ...]:
     """Return regions of the wall that differ from their photo, if frames bear it out.
 
@@ -71,7 +81,8 @@ def _regions_of_wall(
         size, told = _gloss_of(samples, use)
         shines = told > _SURE and size > _LEAST_SHINE
         value, spread = (shine, shine_sd) if shines else (mean, sd)
-        if _most(value, region) < tail * slope_error(surface, samples, region, ring_step_mm):
+        by_slope = _shine_of_slope(samples, use, line_rad) if shines else 1.0
+        if _most(value, region) < tail * by_slope * slope_error(surface, samples, region, ring_step_mm):
             continue
         if shines or samples.fixed_to(use) == "wall":
             gloss_sd = size / max(told, 1e-9) if shines else 0.0
@@ -154,6 +165,18 @@ def _gloss_of(samples: BlockSamples, use: Bool) -> tuple[float, float]:
     told = slope / max(sd, 1e-12)
     sure = min(halves) > slope / 2 and t.sf(told, len(frames) - 1) < FALSE_ALARM
     return slope, told if sure else 0.0
+
+
+def _shine_of_slope(samples: BlockSamples, use: Bool, line_rad: float) -> float:
+    """Return by how much blocks in ``use`` (N,) seem to brighten over a line's radius, per error of a slope.
+
+    Wall that leans toward the lamps by a small angle e more than foretold is brighter by e cot θ where it is
+    seen at θ, the lamps being next to the camera: much far ahead, and hardly beside them. As in an
+    equidistant lens, θ goes with the distance from the image's middle.
+    """
+    cell, theta = samples.orders["wall"][use], np.maximum(samples.away[use] * line_rad, _NEAREST_RAD)
+    lean, change = centred(samples.away[use], cell), centred(1 / np.tan(theta), cell)
+    return abs(float(lean @ change)) / max(float(lean @ lean), 1e-12)
 
 
 def _on_wall(

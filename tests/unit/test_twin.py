@@ -117,14 +117,14 @@ def test_what_stays_in_the_image_on_the_wall_and_in_rows_is_told_apart():
     place = (ImagePlace(20.5 * BLOCK_PX, 20.5 * BLOCK_PX, 16.0, 0.2, 0.01, 0.0),)
     on_window = _samples(lambda f, r, c, s: _near(r, 20, c, 20))
     assert in_image(on_window, place) == ("image",)
-    assert unnamed(on_window, plain_bore(), 0.5) == ()
+    assert unnamed(on_window, plain_bore(), 0.5, 1.1) == ()
     on_wall = _samples(lambda f, r, c, s: _near(s, 24, c, 20))
     assert in_image(on_wall, place) != ("image",)
-    (region,) = unnamed(on_wall, plain_bore(), 0.5)
+    (region,) = unnamed(on_wall, plain_bore(), 0.5, 1.1)
     assert region.fixed_to == "wall"
     assert region.place[0].value == pytest.approx(100 + 24.5 * 2.5, abs=1.5)
     assert region.parameters[0].value == pytest.approx(0.2, abs=0.03)
-    (bands,) = unnamed(_samples(lambda f, r, c, s: 0.03 * np.sin(r / 3 + 2.1 * f)), plain_bore(), 0.5)
+    (bands,) = unnamed(_samples(lambda f, r, c, s: 0.03 * np.sin(r / 3 + 2.1 * f)), plain_bore(), 0.5, 1.1)
     assert (bands.name, bands.fixed_to) == ("banding", "rows")
 
 
@@ -137,7 +137,7 @@ def test_what_stands_still_cannot_be_told_apart():
 def test_noise_is_fixed_to_nothing():
     place = (ImagePlace(20.5 * BLOCK_PX, 20.5 * BLOCK_PX, 16.0, 0.2, 0.01, 0.0),)
     noise = _samples(lambda f, r, c, s: 0.0)
-    assert unnamed(noise, plain_bore(), 0.5) == ()
+    assert unnamed(noise, plain_bore(), 0.5, 1.1) == ()
     assert in_image(noise, place) == ("",)
 
 

@@ -101,7 +101,7 @@ def _wall(change, surface=None, seed=3, rings_mm=0.5):
         aside = np.hypot(U - 160, V - 120) / 90
         noise = 2 * random.standard_normal(SHAPE).astype(np.float32)
         blocks.add(number, twin.level * (1 + change(patch, aside)).astype(np.float32) + noise, twin, 255.0)
-    return unnamed(blocks.samples(), surface or plain_bore(), rings_mm)
+    return unnamed(blocks.samples(), surface or plain_bore(), rings_mm, 1.1)
 
 
 def test_wall_that_shines_or_is_dark_is_told_and_has_no_name():
@@ -125,6 +125,16 @@ def test_steep_wall_is_as_bright_as_its_slope_is_known():
     assert _wall(lambda patch, aside: -0.15 * patch, plain)
     assert not _wall(lambda patch, aside: -0.15 * patch, steep)
     assert _wall(lambda patch, aside: -0.9 * patch, steep)
+
+
+@pytest.mark.parametrize(("shine", "told"), [(0.5, 0), (1.2, 1)])
+def test_a_slope_that_errs_makes_wall_seem_to_shine_by_more_than_its_error(shine, told):
+    """Beside the lamps it shows hardly, and far ahead much: a sound weld had been told to shine."""
+    plain = plain_bore()
+    s = np.broadcast_to(plain.distance_mm[:, None] - 100, plain.radius_mm.shape)
+    weld = replace(plain, along=(0.85 * s * np.exp(-0.5 * s**2)).astype(np.float32))
+    assert len(_wall(lambda patch, aside: shine * patch * (aside - 0.8), weld)) == told
+    assert len(_wall(lambda patch, aside: shine * patch * (aside - 0.8), plain)) == 1
 
 
 def test_wall_between_rings_far_apart_is_as_bright_as_straight_lines_between_them():
