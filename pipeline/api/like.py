@@ -197,8 +197,10 @@ def _seen_light(found: Photometry, offset: float, slope: float) -> dict[str, Any
     noise, line, lamp = state.noise, state.line, state.lamp
     sensor: dict[str, float] = {"black_level": max((noise.black.value - offset) / slope, 0.0)}
     if math.isfinite(noise.electrons_per_level.value):
-        sensor["full_well_e"] = max(255 * slope * noise.electrons_per_level.value, 20.0)
-        sensor["read_noise_e"] = max(noise.read_electrons.value, 0.0)
+        # Noise is drawn for each colour, and grey, the sum of all by their shares, has less of it.
+        less = float(np.linalg.norm(LUMA_BGR))
+        sensor["full_well_e"] = max(255 * slope * less**2 * noise.electrons_per_level.value, 20.0)
+        sensor["read_noise_e"] = max(less * noise.read_electrons.value, 0.0)
     values: dict[str, Any] = {"sensor": sensor}
     if line is not None:
         # A pixel alone blurs by 1/√12 px; the simulator's samples do that themselves.

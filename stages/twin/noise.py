@@ -32,7 +32,10 @@ _RANGE_FOR_GAMMA = 3.0
 
 @dataclass(frozen=True)
 class CameraNoise:
-    """Noise of one pixel.
+    """Noise of one pixel of the grey picture.
+
+    Where grey is made of three colours whose noise is apart, it has less noise than each of them, and its
+    electrons are those of all three together.
 
     Attributes
     ----------
@@ -95,10 +98,16 @@ class CameraNoise:
 
     @property
     def read_electrons(self) -> Figure:
-        """Read noise, 1 σ, in electrons."""
-        e, read = self.electrons_per_level.value, np.sqrt(self.read_variance.value)
-        sd = 0.5 * self.read_variance.sd / max(float(read), 1e-9)
-        return Figure(float(read * e), float(sd * e))
+        """Read noise, 1 σ, in electrons of the conversion above, rounding taken off; infinite as that is.
+
+        One fit gives read noise and conversion: what one gains the other loses, so that their σ add.
+        """
+        e, variance = self.electrons_per_level, max(self.read_variance.value - _LEAST_VARIANCE, 0.0)
+        if not np.isfinite(e.value):
+            return Figure(np.inf, np.inf)
+        read, sd = float(np.sqrt(variance)), self.read_variance.sd
+        own = min(0.5 * sd / max(read, 1e-9), float(np.sqrt(sd)))
+        return Figure(read * e.value, own * e.value + read * e.sd)
 
 
 @dataclass(frozen=True)

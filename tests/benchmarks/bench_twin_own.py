@@ -37,6 +37,7 @@ from pipeline.simulator.scene import Scene
 from stages.catalogue import PIPELINE
 from stages.texture import TEXTURE
 from stages.twin import PHOTOMETRY, TWIN
+from stages.twin.reflectance import LUMA_BGR
 from tests.simulated import SCENES, shipped, smaller
 
 _STAGES = (*PIPELINE[: PIPELINE.index(TEXTURE) + 1], PHOTOMETRY, TWIN)
@@ -82,6 +83,7 @@ class Case:
     also: tuple[str, ...] = ()
 
 
+_OF_COLOUR = float(np.linalg.norm(LUMA_BGR))  # noise of grey, in limited range, over that of each colour
 _EXACT = (("", "codec", "ffv1"),)  # a lossy codec takes fine noise away
 CASES = (
     Case("light_flicker", (0.08, 3.7), ("flicker", "laser_flicker")),
@@ -96,8 +98,8 @@ CASES = (
     Case("black_level", (12.0,), figure=("black_dn", 16 + 12 * 219 / 255)),  # of luma in limited range
     Case("defocus", (1.8, 0.0), ("defocus",), figure=("lens_blur_px", math.hypot(0.7, 1.8))),
     Case("defective_pixels", (2e-4, 0.5), ("defective_pixels",), 4e-4, changes=_EXACT),
-    Case("read_noise", (60.0,), figure=("read_e", math.hypot(15.0, 60.0)), changes=_EXACT),
-    Case("full_well", (3000.0,), figure=("gain_e_per_dn", 3000 / 255), changes=_EXACT),
+    Case("read_noise", (60.0,), figure=("read_e", math.hypot(15.0, 60.0) / _OF_COLOUR), changes=_EXACT),
+    Case("full_well", (3000.0,), figure=("gain_e_per_dn", 3000 / 219 / _OF_COLOUR**2), changes=_EXACT),
     Case("fixed_pattern", (0.03,), figure=("gain_pattern", 0.03), changes=_EXACT),
     Case("dark_pattern", (0.02,), figure=("dark_pattern_dn", 0.02 * 255), changes=_EXACT),
     Case("interreflection", (1.0,), ("interreflection", "ambient_light")),

@@ -1,16 +1,23 @@
 """A scene that refers to a measured pipe: its wall, its way, what is put in, and what is refused."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
-from pipeline.api.like import Changed, change, photo_as_reflectance
+from pipeline.api.like import Changed, _seen_light, change, photo_as_reflectance
 from pipeline.artefacts.measured import WallTexture
 from pipeline.errors import InputError
 from pipeline.geometry.axis import straight_axis
 from pipeline.simulator.build import plain_truth
+from pipeline.simulator.instrument import TrueSensor
 from pipeline.simulator.scene import scene_from
+from pipeline.simulator.sensor import exposed
 from pipeline.simulator.wall import MeasuredPipe, read_measured, write_measured
 from pipeline.simulator.wall.grid import Wall, WallGrid
+from stages.twin.lamp_light import Figure
+from stages.twin.noise import CameraNoise
+from stages.twin.reflectance import LUMA_BGR
 
 PROBE = {
     "camera": {
@@ -109,3 +116,24 @@ def test_what_the_photo_did_not_see_takes_the_mean_about_it():
     bgra[20:30, 20:30] = 0
     filled = photo_as_reflectance(WallTexture(bgra, 0.0, 0.2, -np.pi, 2 * np.pi / 80))
     np.testing.assert_allclose(filled, 100 / 255, atol=1e-3)
+
+
+@pytest.mark.parametrize("slope", [1.0, 219 / 255])
+def test_grey_of_the_rendered_camera_is_as_noisy_as_that_of_the_recorded_one(slope):
+    """The electrons of the grey picture had been given to each of its three colours: too little noise."""
+    dark, shot = 1.2, 0.02  # variance of recorded grey, and its growth per grey level
+    noise = CameraNoise(
+        Figure(0.0, 0.1),
+        255.0,
+        Figure(dark + 1 / 12, 0.1),
+        Figure(shot, 1e-3),
+        Figure(0.0, 0.0),
+        Figure(1.0, 0.1),
+    )
+    state = SimpleNamespace(noise=noise, line=None, lamp=None)
+    sensor = TrueSensor(**_seen_light(SimpleNamespace(state=state), 0.0, slope)["sensor"])
+    for level in (40.0, 120.0):
+        light = np.full((200, 200, 3), level / slope / 255, np.float32)
+        grey = slope * (exposed(light, sensor, 7, 1) @ LUMA_BGR)
+        rounded = (slope * np.linalg.norm(LUMA_BGR)) ** 2 / 12
+        assert grey.var() - rounded == pytest.approx(dark + shot * level, rel=0.05)

@@ -75,6 +75,28 @@ def test_photon_transfer_finds_the_noise_that_was_put_in():
     np.testing.assert_allclose(noise.variance(level), 1.5**2 + level / 40, rtol=0.05)
 
 
+def _dim_frames(random, read, electrons):
+    level = np.tile(np.linspace(20, 60, 240, dtype=np.float32), (96, 1))
+    for _ in range(6):
+        first, second = (
+            random.standard_normal((2, *level.shape)) * np.sqrt(read**2 + level / electrons)
+        ).astype(np.float32)
+        yield windows_of(first, second, level, level > 0)
+
+
+def test_read_noise_in_electrons_is_no_surer_than_their_number():
+    """Its σ had left the conversion's out: one true value in four lay within two of them."""
+    made = [
+        photon_transfer(list(_dim_frames(np.random.default_rng(k), 1.0, 40.0)), BLACK, 255.0)
+        for k in range(20)
+    ]
+    read = [n.read_electrons for n in made if np.isfinite(n.electrons_per_level.value)]
+    assert len(read) > 12
+    assert np.mean([abs(f.value - np.sqrt(1 - 1 / 12) * 40) < 2 * f.sd for f in read]) >= 0.85
+    unknown = replace(made[0], variance_per_level=Figure(0.0, 0.01)).read_electrons
+    assert np.isinf(unknown.value), "in electrons nothing is known without shot noise"
+
+
 def test_other_noise_gives_another_answer():
     quiet, loud = (photon_transfer(list(_noisy_frames(1.0, e)), BLACK, 255.0) for e in (200.0, 20.0))
     assert loud.variance_per_level.value > 5 * quiet.variance_per_level.value
