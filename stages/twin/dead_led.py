@@ -17,7 +17,7 @@ import numpy as np
 from scipy.stats import t
 
 from pipeline.adjustment.robust import left_out_sd
-from pipeline.arrays import Float, Int
+from pipeline.arrays import Float, Float32, Int
 from pipeline.artefacts.twin import Mismatch, NamedFigure
 from stages.twin.cells import centred, half_turn
 from stages.twin.compare import BLOCK_PX
@@ -41,7 +41,7 @@ _AS_DARK, _ALIKE = 0.999, 1e-6
 say what others do."""
 
 
-def seen_from(samples: BlockSamples, scene: Scene) -> tuple[Float, Float]:
+def seen_from(samples: BlockSamples, scene: Scene) -> tuple[Float32, Float32]:
     """Return the polar angles and image azimuths (N,), rad, of the middles of blocks."""
     rows, columns = (BLOCK_PX * (a.max() + 1) for a in (samples.row, samples.column))
     middle = (slice(BLOCK_PX // 2, rows, BLOCK_PX), slice(BLOCK_PX // 2, columns, BLOCK_PX))
@@ -98,9 +98,8 @@ class _Law:
         return float((1 - (1 - _AS_DARK * self.most) ** max(size, 0.0)) / self.most)
 
 
-def _law_at(samples: BlockSamples, scene: Scene, angles: tuple[Float, Float], azimuth_rad: float) -> _Law:
-    theta, phi = (a.astype(np.float32) for a in angles)
-    share = share_at(scene, azimuth_rad, theta, phi).astype(float)
+def _law_at(samples: BlockSamples, scene: Scene, angles: tuple[Float32, Float32], azimuth_rad: float) -> _Law:
+    share = share_at(scene, azimuth_rad, *angles).astype(float)
     log_light = centred(np.log1p(-_AS_DARK * share), samples.orders["wall"], samples.frame)
     return _Law(log_light, azimuth_rad, float(share.max()))
 
@@ -117,12 +116,13 @@ class _Beside:
     frame: Int
 
     @classmethod
-    def harmonics(cls, samples: BlockSamples, theta_rad: Float, phi_rad: Float, most: int) -> _Beside:
+    def harmonics(cls, samples: BlockSamples, theta_rad: Float32, phi_rad: Float32, most: int) -> _Beside:
         """Grant light to any power, any falloff over polar angle, and harmonics that change with it."""
         groups = samples.orders["wall"], samples.frame
-        waves = [f(m * phi_rad) for m in range(1, most + 1) for f in (np.cos, np.sin)]
-        columns = [samples.log_light, *_hats(theta_rad, _FALLOFF_RAD)]
-        columns += [hat * wave for hat in _hats(theta_rad, _HARMONIC_RAD) for wave in waves]
+        theta, phi = (np.asarray(a, float) for a in (theta_rad, phi_rad))
+        waves = [f(m * phi) for m in range(1, most + 1) for f in (np.cos, np.sin)]
+        columns = [samples.log_light, *_hats(theta, _FALLOFF_RAD)]
+        columns += [hat * wave for hat in _hats(theta, _HARMONIC_RAD) for wave in waves]
         own = np.stack([centred(c, *groups) for c in columns], 1)
         left, size, _ = np.linalg.svd(own, full_matrices=False)
         return cls(centred(samples.log_change, *groups), left[:, size > _ALIKE * size[0]], samples.frame)

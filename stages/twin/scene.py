@@ -162,7 +162,12 @@ class Scene:
         if self.outside is None:
             return self._all_rays
         far = cv2.erode(self.outside.astype(np.uint8), np.ones((4 * _STEP_PX + 1,) * 2, np.uint8)) > 0
-        hidden = far[_STEP_PX // 2 :: _STEP_PX, _STEP_PX // 2 :: _STEP_PX]
+        # The last node of a side may lie beyond it.
+        row, column = (
+            np.minimum(np.arange(n) * _STEP_PX + _STEP_PX // 2, side - 1)
+            for n, side in zip(self._all_rays.shape[:2], far.shape, strict=True)
+        )
+        hidden = far[np.ix_(row, column)]
         return np.where(hidden[..., None], np.nan, self._all_rays)
 
     @cached_property

@@ -1,0 +1,26 @@
+"""Which rays of a picture are followed, whatever its size."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from stages.twin.scene import Scene
+
+
+@pytest.mark.parametrize("width", [40, 41, 42, 43])
+@pytest.mark.parametrize("height", [36, 37, 39])
+def test_pictures_of_any_size_follow_the_rays_that_see_wall(width, height):
+    """A picture whose side is one more than a multiple of four ended the twin."""
+
+    def unproject(uv):
+        ray = np.concatenate([uv / 50, np.ones((*uv.shape[:2], 1))], -1)
+        return SimpleNamespace(ray=ray, valid=np.ones(uv.shape[:2], bool))
+
+    camera = SimpleNamespace(image_size=(width, height), unproject=unproject)
+    outside = np.zeros((height, width), bool)
+    outside[:, 30:] = True
+    rays = Scene(SimpleNamespace(camera=camera), None, None, None, outside)._rays
+    assert rays.shape == (-(-height // 4), -(-width // 4), 3)
+    assert np.isfinite(rays[:, :7]).all()
+    assert np.isnan(rays[:, -1]).all()
