@@ -314,7 +314,9 @@ def landmark_steps(
     """Return the steps (L, 3) of the eliminated landmarks."""
     moved = rows.change_by_view(frame_step, border_step)
     pull = np.einsum("mij,mi->mj", rows.by_point, moved * rows.weight[:, None])
-    total = np.add.reduceat(pull, rows.start[:-1], axis=0) if len(pull) else np.zeros((0, 3))
+    total, seen = np.zeros((len(right), 3)), np.flatnonzero(np.diff(rows.start))
+    if len(seen):  # reduceat gives a landmark without views the first row of the next one, or fails
+        total[seen] = np.add.reduceat(pull, rows.start[seen], axis=0)
     surface = rows.surface_weight * (rows.surface_by_border @ border_step)
     return np.asarray(
         np.einsum("lij,lj->li", inverse, right - total - surface[:, None] * rows.surface_by_point)
