@@ -19,6 +19,7 @@ from pipeline.machine.stage import Context, Parameters
 from pipeline.recording.base import Illumination, Recording
 from stages.rings.expectation import warn_of_rings
 from stages.rings.glints import SAYING_RINGS
+from stages.rings.lattice import lattices_of, take_out, warn_of_lattices
 from stages.rings.noise import QUANTISATION_VARIANCE, SURELY_UNCLIPPED, clip_level_of, noise_response
 from stages.rings.seam import seam_of, warn_of_seam
 from stages.rings.search import BAND_WIDTHS
@@ -94,6 +95,9 @@ def extract_rings(
             hint="is the laser on, the probe inside the pipe, and the exposure long enough?",
         )  # fmt: skip
     _compare_rings(samples)
+    lattices = lattices_of(samples)
+    take_out(lattices, samples)
+    warn_of_lattices(lattices, context)
     wander = wander_of(_some(samples))
     typical = _typical(samples, wander)
     _report(context, samples, typical)

@@ -1,0 +1,191 @@
+"""Errors of the line that repeat with the picture's rows and columns: coarser pixels, or a codec's blocks.
+
+Where pictures were enlarged from fewer pixels, or a codec works in blocks, the line is drawn towards the same
+part of each of them. Where the ring runs along rows or columns, this is alike from ring to ring and as broad
+as a defect: neither the rings' scatter nor their number tells it from the wall. What tells it is its period:
+the wall does not know where the picture's rows are.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.fft import rfft, rfftfreq
+
+from pipeline.adjustment.robust import robust_spread
+from pipeline.arrays import Bool, Float
+from pipeline.artefacts.measured import RingSamples
+from pipeline.machine.stage import Context
+
+# Harmonics of a ring's own smooth shape, times it is fitted anew, and spreads from which values are cut off.
+_HARMONICS, _ROUNDS, _MOST = 6, 5, 4.0
+# Periods that are looked for, px: finer ones are the pixels' own, and codecs work in blocks of 16 at most.
+_SHORTEST, _LONGEST = 1.5, 17.0
+# Steps of place, px, and of frequency, 1/px: rows at either end of a picture of 1000 px are in step by it.
+_PLACE, _STEP = 0.1, 1e-4
+# The line's direction is that of rows or columns where its normal's part is as large as this (chosen).
+_ALONG = 0.9
+# Share of the line's variance that repeats. In open-1 and open-3 as they are, half as large, with a temporal
+# filter, by VP9 and by HEVC it is .003 to .029; .037 to .22 by MPEG-2 and JPEG, .11 to .47 enlarged.
+_REPEATS = 0.033
+# Degrees from a row or column between which the error has one size, and overtones of its period.
+_SLANTS_DEG = np.array([0.0, 3.0, 6.0, 10.0, 15.0, 21.0, 28.0, 36.0, 45.0])
+_OVERTONES = 3
+# Periods that are taken out of one axis: pixels enlarged by 5/2 repeat by themselves and by two of them.
+_PERIODS = 3
+# Rings that are looked at, and worked on at a time: 27,000 samples along rows tell a share of .001.
+_RINGS = 96
+_FEWEST = 200
+
+
+@dataclass(frozen=True)
+class Lattice:
+    """How the line's place repeats along one axis of the picture.
+
+    Attributes
+    ----------
+    axis : int
+        0 with columns, 1 with rows.
+    period_px : float
+    share : float
+        Of the line's variance where it runs along them.
+    size_px : (2 T, 2 K)
+        Of cosine and sine of K overtones, for T directions of the line on either side of the picture.
+    """
+
+    axis: int
+    period_px: float
+    share: float
+    size_px: Float
+
+    def error_px(self, samples: RingSamples, rings: slice) -> Float:
+        """Return by how much the radii (n, A) of some rings are too large."""
+        across = _across(samples, self.axis)
+        waves = _waves(_place(samples, self.axis, rings), self.period_px)
+        error = np.sign(across) * np.einsum("fak,ak->fa", waves, self.size_px[_slant(across)])
+        return np.where(np.isfinite(error), error, 0.0)
+
+
+def lattices_of(samples: RingSamples) -> tuple[Lattice, ...]:
+    """Return what repeats with columns and with rows, where it is more than in sound recordings."""
+    count = len(samples.frame)
+    some = slice(None, None, max(count // _RINGS, 1))
+    if not samples.valid[some].any():
+        return ()
+    off, found = _off_smooth(samples, some), []
+    for axis in (0, 1):
+        for _ in range(_PERIODS):
+            lattice = _lattice(samples, some, off, axis)
+            if lattice is None:
+                break
+            found.append(lattice)
+            off = off - lattice.error_px(samples, some)
+    return tuple(found)
+
+
+def take_out(lattices: tuple[Lattice, ...], samples: RingSamples) -> None:
+    """Take what repeats out of the radii of all rings, in place, some rings at a time."""
+    for first in range(0, len(samples.frame) if lattices else 0, _RINGS):
+        rings = slice(first, first + _RINGS)
+        for each in lattices:
+            samples.radius_px[rings] -= each.error_px(samples, rings).astype(np.float32)
+
+
+def warn_of_lattices(lattices: tuple[Lattice, ...], context: Context) -> None:
+    """Warn of pictures of coarser pixels or of blocks."""
+    if not lattices:
+        return
+    most = max(lattices, key=lambda each: each.share)
+    size_px = float(np.hypot(most.size_px[0, 0], most.size_px[0, _OVERTONES]))
+    context.warn(
+        f"the line's place repeats every {most.period_px:.3g} px along the picture's "
+        f"{('rows', 'columns')[most.axis]}, by {size_px:.2f} px to either side: the pictures were enlarged "
+        "from fewer pixels, or a codec works in blocks of that size. What repeats is taken out, yet "
+        "fine detail is lost: small defects may be missed, and those along the picture's rows or columns be "
+        "false. What to do: export the pictures in the size in which the camera took them, with less "
+        "compression"
+    )
+
+
+def _lattice(samples: RingSamples, rings: slice, off: Float, axis: int) -> Lattice | None:
+    """Return what repeats along an axis in how far some rings are ``off`` their smooth shape (n, A), px."""
+    across, place = _across(samples, axis), _place(samples, axis, rings)
+    signed = off * np.sign(across)
+    along = (np.abs(across) > _ALONG) & np.isfinite(signed)
+    if along.sum() < _FEWEST:
+        return None
+    period, share = _period(place[along], signed[along])
+    if share < _REPEATS:
+        return None
+    waves, slant = _waves(place, period), np.broadcast_to(_slant(across), off.shape)
+    known = np.isfinite(signed)
+    sizes = [_fitted(waves, signed, known & (slant == k)) for k in range(2 * len(_SLANTS_DEG))]
+    return Lattice(axis, period, share, np.array(sizes))
+
+
+def _fitted(waves: Float, signed: Float, use: Bool) -> Float:
+    """Return the sizes (2 K,) of waves (F, A, 2 K) in some samples, beside what is there of a wall.
+
+    0 where there are too few samples.
+    """
+    if use.sum() < _FEWEST:
+        return np.zeros(waves.shape[-1])
+    design = np.column_stack([waves[use], np.ones(int(use.sum()))])
+    return np.asarray(np.linalg.lstsq(design, signed[use], rcond=None)[0][:-1])
+
+
+def _period(place: Float, value: Float) -> tuple[float, float]:
+    """Return the period by which values (n,) at places (n,) repeat most, and its share of their variance."""
+    first = float(place.min())
+    cell = np.rint((place - first) / _PLACE).astype(np.int64)
+    total = np.bincount(cell, value - value.mean())
+    size = max(round(1 / (_PLACE * _STEP)), len(total))
+    frequency = rfftfreq(size, _PLACE)
+    looked = (frequency > 1 / _LONGEST) & (frequency < 1 / _SHORTEST)
+    power = np.where(looked, np.abs(rfft(total, size)) ** 2, 0.0)
+    best = int(power.argmax())
+    return float(1 / frequency[best]), float(2 * power[best] / len(value) ** 2 / value.var())
+
+
+def _waves(place: Float, period: float) -> Float:
+    """Return cosines and sines (..., 2 K) of a place (...), in overtones of a period."""
+    turn = 2 * np.pi * place[..., None] / period * np.arange(1, _OVERTONES + 1)
+    return np.concatenate([np.cos(turn), np.sin(turn)], -1)
+
+
+def _place(samples: RingSamples, axis: int, rings: slice) -> Float:
+    """Return the column (axis 0) or row of some rings' samples (n, A)."""
+    radius = samples.radius_px[rings].astype(float)
+    return np.asarray(samples.centre_px[axis] + radius * _across(samples, axis))
+
+
+def _across(samples: RingSamples, axis: int) -> Float:
+    """Return the part (A,) of a ring's outward direction that is along an axis of the picture."""
+    return np.asarray((np.cos, np.sin)[axis](samples.azimuth_rad))
+
+
+def _slant(across: Float) -> Float:
+    """Return the number (A,) of the line's direction, beyond 45° the last, of either side of the picture.
+
+    Sides are far apart: a period that is off by little is out of step between them.
+    """
+    slant = np.degrees(np.arccos(np.minimum(np.abs(across), 1.0)))
+    number = np.searchsorted(_SLANTS_DEG, slant, side="right") - 1
+    return np.asarray(number + len(_SLANTS_DEG) * (across > 0))
+
+
+def _off_smooth(samples: RingSamples, rings: slice) -> Float:
+    """Return how far some rings (n, A) are off their own smooth shape, px, cut off at `_MOST` spreads."""
+    n, azimuth = np.arange(1, _HARMONICS + 1), samples.azimuth_rad[:, None]
+    shape = np.concatenate([np.ones_like(azimuth), np.cos(n * azimuth), np.sin(n * azimuth)], 1)
+    inverse = np.linalg.pinv(shape)
+    radius = np.where(samples.valid, samples.radius_px, np.nan)[rings].astype(float)
+    known = np.isfinite(radius)
+    filled = np.where(known, radius, np.nanmedian(radius))
+    for _ in range(_ROUNDS):
+        smooth = filled @ inverse.T @ shape.T
+        off = radius - smooth
+        most = _MOST * robust_spread(off[known])
+        filled = smooth + np.where(known, np.clip(off, -most, most), 0.0)
+    return np.where(known, np.clip(off, -most, most), np.nan)
