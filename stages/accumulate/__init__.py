@@ -108,10 +108,6 @@ def _around(probe: Probe, rings: RingSamples, row: int, azimuth_p: Float, roll: 
 
 __all__ = ["ACCUMULATE", "AccumulateParameters", "accumulate_wall"]
 
-# Likeness of neighbouring rings in open-1 and open-3: 0.05 and 0.16; in 7 copies at crf 30, by HEVC and with
-# all spoilings 0.36 to 0.79, of which two told a false finding with probabilities of 0.89 and 0.98.
-_MOST_ALIKE = 0.3
-
 # Rows that the report's medians are taken of.
 _REPORTED_ROWS = 2000
 # A branch, step or collapse may take half of the radius somewhere, not from most of a pipe. Not measured.
@@ -193,13 +189,14 @@ def warn_of_held(held: HeldOver, context: Context) -> None:
     """Report how alike the finest structure of neighbouring rings is, and warn of a codec that repeats it."""
     alike = float(held.likeness[1:2].sum())
     context.report("likeness of neighbouring rings in their finest structure", alike, "")
-    if alike > _MOST_ALIKE:
+    if held.more_than_usual:
         context.warn(
             f"neighbouring rings share {100 * alike:.0f} % of the line's finest structure, where good "
-            "recordings share 16 % at most: the codec repeats light of earlier pictures. The σ of radii "
-            "includes this, and such rings count together where they confirm a finding; yet single findings "
-            "may be false, and small pits too shallow or missed. What to do: look at the picture of every "
-            "finding, record with less compression"
+            "recordings share 16 % at most: the codec, or a filter against noise, repeats light of earlier "
+            "pictures. The σ of radii includes this, and such rings count together where they confirm a "
+            "finding; yet single findings may be false, and small pits too shallow, which their σ includes, "
+            "or missed. What to do: look at the picture of every finding, record with less compression and "
+            "without noise reduction"
         )
 
 
@@ -271,7 +268,7 @@ def _report(context: Context, wall: Wall, spread: CalibrationSpread) -> None:
 
 ACCUMULATE = Stage(
     "accumulate",
-    "10",
+    "11",
     AccumulateParameters,
     accumulate_wall,
     "point cloud and radius map about the pipe's own axis, with σ",

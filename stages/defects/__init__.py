@@ -4,8 +4,7 @@
    is known where the defects are.
 2. Matched filters over scales, threshold from a wished number of false alarms (`detect`).
 3. Hysteresis (`grow`) to instances with outlines; all-round beads are welds (`segment`).
-4. Depth as the extreme of a 1 mm mean of the points (`surface`), without what noise adds to it, ± 1 σ
-(`depth`).
+4. Depth as the extreme of a 1 mm mean (`surface`), without what noise adds, ± 1 σ (`depth`, `smear`).
 5. What neither a second ring nor the photo confirms, stays at one place of the image, lies where the line
 ends, or is rather false than real by what the same recording shows where nothing is, is set apart with the
 reason (`corroborate`, `credibility`).
@@ -54,6 +53,7 @@ from stages.defects.parallax import LitPictures
 from stages.defects.parameters import DefectParameters
 from stages.defects.relief import smooth_shape_removed
 from stages.defects.segment import Region, regions_of
+from stages.defects.smear import flattened
 from stages.defects.steps import IS_STEP, is_step
 from stages.defects.surface import MeasuredWall, Surface
 from stages.defects.told import report_found, report_unconfirmed, warn_of_missed, warn_of_short_ones
@@ -162,7 +162,7 @@ def _measured(
             if not _is_measured(surface, here):
                 continue
             depth = measure_depth(here, surface, clean, parameters.draws, context.random)
-            depth = allowed_by_neighbours(depth, here, surface)
+            depth = flattened(allowed_by_neighbours(depth, here, surface), here, surface, scene.seen_by.held)
             if region.sign * depth.depth_mm >= parameters.min_depth_mm:
                 top = float(region.cut(score.astype(float))[region.mask].max())
                 evidence = evidence_for(here, depth, surface, scene.seen_by, _fixed_in(region, fixed), top)
