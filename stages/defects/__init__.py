@@ -126,11 +126,12 @@ def _numbered(found: Sequence[Defect], first: int) -> tuple[Defect, ...]:
 class _Found:
     """A region that is deep enough to be reported, described as if it were surely there.
 
-    It may be a ``step`` of the bore.
+    ``by_noise`` is the same with the σ that noise alone makes. It may be a ``step`` of the bore.
     """
 
     region: Region
     defect: Defect
+    by_noise: Defect
     evidence: Evidence
     step: bool
 
@@ -162,12 +163,13 @@ def _measured(
             if not _is_measured(surface, here):
                 continue
             depth = measure_depth(here, surface, clean, parameters.draws, context.random)
-            depth = flattened(allowed_by_neighbours(depth, here, surface), here, surface, scene.seen_by.held)
+            depth = allowed_by_neighbours(depth, here, surface)
             if region.sign * depth.depth_mm >= parameters.min_depth_mm:
                 top = float(region.cut(score.astype(float))[region.mask].max())
                 evidence = evidence_for(here, depth, surface, scene.seen_by, _fixed_in(region, fixed), top)
                 step = is_step(region, depth.depth_mm, wall.relief.radius_map)
-                yield _Found(region, describe(here, depth, surface, scene), evidence, step)
+                told = describe(here, flattened(depth, here, surface, scene.seen_by.held), surface, scene)
+                yield _Found(region, told, replace(told, depth_sigma_mm=depth.sigma_mm), evidence, step)
                 break
         context.progress(len(regions) + done, 2 * len(regions))
 
@@ -205,16 +207,16 @@ def _judged(
     confirmed: list[Defect] = []
     unconfirmed: list[Defect] = []
     for f in found:
-        deep = chance_of_depth(f.defect, min_depth_mm)
+        deep = chance_of_depth(f.by_noise, min_depth_mm)
         real = deep if f.region.all_round else deep * credibility.chance_against_clutter(f.evidence)
         real = min(real, MOST_SURE) * (1.0 if f.evidence.on_wall else _WALL_OR_NOT)
         real = 0.0 if f.step else real
-        counts = f.evidence.corroborated and real >= COUNTED and is_depth_known(f.defect)
+        counts = f.evidence.corroborated and real >= COUNTED and is_depth_known(f.by_noise)
         defect = replace(f.defect, probability=real, confidence=f.defect.confidence * real)
         if counts:
             confirmed.append(defect)
         else:
-            doubt = f.evidence.doubt if is_depth_known(defect) or not f.evidence.corroborated else _UNSURE
+            doubt = f.evidence.doubt if is_depth_known(f.by_noise) or not f.evidence.corroborated else _UNSURE
             doubt = IS_STEP if f.step else doubt
             words = f"{defect.statement} Not confirmed. {doubt}."
             unconfirmed.append(replace(defect, statement=words))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -10,20 +10,23 @@ import cv2
 import numpy as np
 import pytest
 
+from pipeline.arrays import Float
 from pipeline.artefacts.measured import Trajectory
 from pipeline.geometry.axis import straight_axis
 from stages.accumulate import AccumulateParameters, accumulate_wall
 from stages.motion import MotionParameters, estimate_motion
 from stages.motion.bore import ONE_BORE, Bore
+from stages.motion.bundle_adjustment.equations import Measurements
 from stages.motion.bundle_adjustment.image_scale import ScaleDrift, drift_of_scale
 from stages.motion.bundle_adjustment.solver import estimate_state
 from stages.motion.tracking.landmarks import TrackedPoses
 from stages.motion.trajectory import doubting_instrument
+from stages.motion.windows import steady_scale
 from stages.motion.windows.steady_scale import SteadyRun, with_steady_scale
 from stages.motion.windows.submaps import Window
 from stages.triangulate import TriangulateParameters, triangulate_rings
 from tests.drawn_run import RADIUS, DrawnRun, drawn_run
-from tests.motion_scene import scene
+from tests.motion_scene import Scene, scene
 from tests.quiet import quiet_context
 from tests.ring_images import MemorySource
 
@@ -106,6 +109,50 @@ def test_without_texture_a_picture_that_grows_may_be_a_pipe_that_widens() -> Non
     assert not lost.drift.told
     assert lost.drift.ambiguous
     assert lost.scale_sigma is not None
+
+
+FEW = 16
+WHOLE = Window(0, FEW)
+
+
+@dataclass(frozen=True)
+class WholeRun:
+    """A run in one bore, measured as a scene is."""
+
+    made: Scene
+    image_scale: Float | None = None
+    bore: Bore = ONE_BORE
+    whole: Window = WHOLE
+
+    @property
+    def time_s(self) -> Float:
+        return self.made.measured.time_s
+
+    @property
+    def texture(self) -> SimpleNamespace:
+        none_lost = np.zeros(FEW, bool)
+        return SimpleNamespace(poses=TrackedPoses(np.arange(FEW), self.made.truth.T_pc, none_lost))
+
+    def measured(self, window: Window, parameters: MotionParameters) -> Measurements:
+        return self.made.measured
+
+
+@pytest.mark.parametrize(("again", "taken_out"), [(1.0, True), (0.1, False)])
+def test_a_drift_that_is_not_found_again_is_not_taken_out(
+    again: float, taken_out: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Behind a filter against noise one of .55 % was taken out, and .07 % were found then."""
+    made, parameters = scene(FEW, 100, noise=0.1, picture_grows=GROWS), MotionParameters()
+    estimate = estimate_state(made.truth, made.measured, parameters)
+    drift, found = drift_of_scale(estimate, made.measured), iter([1.0, 1.0, again])
+    monkeypatch.setattr(
+        steady_scale, "drift_of_scale", lambda *_: replace(drift, at_frames=next(found) * drift.at_frames)
+    )
+    monkeypatch.setattr(steady_scale, "estimate_state", lambda *_: estimate)
+    run = WholeRun(made)
+    steady = with_steady_scale(cast(Any, run), WHOLE, estimate, made.measured, parameters, cast(Any, None))
+    assert steady.taken_out == steady.drift.told == (steady.scale is not None) == taken_out
+    assert steady.scale_sigma is not None
 
 
 @pytest.mark.parametrize(("course", "told"), [((-1, 0.5, 1), True), ((-1, 1, -0.5), False)])
