@@ -19,6 +19,7 @@ from stages.diagnose.gauge.elimination import RING
 from stages.diagnose.gauge.fit import Fit, fit
 from stages.diagnose.gauge.heldout import on_other_wall, variance_of_pairs
 from stages.diagnose.gauge.linearise import ring_mm_per_px
+from stages.diagnose.gauge.points import Moving
 from stages.diagnose.gauge.points import ring_points as gauge_points
 from stages.diagnose.gauge.run import GaugeRun, Term
 
@@ -154,7 +155,8 @@ def rings_against_fiducials(
 def _gauge_residual(run: GaugeRun, found: Fit, frames: Int) -> RingResidual:
     equations = found.linearised.equations
     residual = equations.residual[equations.kind == RING]
-    points = gauge_points(found.state, run.rings, run.time_s, run.width_px)
+    moving = Moving.of(found.state.T_pc, run.time_s)
+    points = gauge_points(found.state, run.rings, run.time_s, moving, run.width_px)
     assert points.distance_mm is not None
     usable = run.ring_weight > _OUTLIER * np.median(run.ring_weight)
     seen = np.unique(run.edges.frame)

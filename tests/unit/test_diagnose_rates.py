@@ -2,9 +2,11 @@
 
 import numpy as np
 import pytest
+from scipy.interpolate import make_smoothing_spline
 
 from pipeline.geometry.rigid import rotation_from_vector
-from stages.diagnose.gauge.points import passing_mm_s, rates
+from stages.diagnose.gauge import points
+from stages.diagnose.gauge.points import Moving, rates
 
 
 def swaying(time_s: np.ndarray) -> np.ndarray:
@@ -34,7 +36,7 @@ def passing_exactly(time_s: np.ndarray, xyz_c: np.ndarray) -> np.ndarray:
 def test_the_wall_passes_as_fast_as_the_poses_move(rate_hz: float, lost: tuple[int, ...]) -> None:
     time_s = np.delete(np.arange(80) / rate_hz, lost)
     xyz_c = np.random.default_rng(1).normal(0, 30, (len(time_s), 3))
-    found = passing_mm_s(swaying(time_s), time_s, np.arange(len(time_s)), xyz_c)
+    found = Moving.of(swaying(time_s), time_s).passing_mm_s(np.arange(len(time_s)), xyz_c)
     wrong = (found - passing_exactly(time_s, xyz_c))[4:-4]
     assert np.sqrt(np.mean(wrong**2, axis=0)) == pytest.approx(np.zeros(3), abs=0.02)
 
@@ -49,3 +51,18 @@ def test_noise_of_poses_is_not_taken_for_motion() -> None:
 def test_of_few_frames_the_rate_is_that_of_differences(count: int) -> None:
     time_s = np.arange(count) / 10
     assert rates(3 * time_s[:, None], time_s)[:, 0] == pytest.approx(np.full(count, 3.0 if count > 1 else 0))
+
+
+def test_the_spline_is_set_up_once_for_all_that_moves(monkeypatch: pytest.MonkeyPatch) -> None:
+    made: list[int] = []
+
+    def counted(x: np.ndarray, y: np.ndarray, lam: float) -> object:
+        made.append(y.shape[1])
+        return make_smoothing_spline(x, y, lam=lam)
+
+    monkeypatch.setattr(points, "make_smoothing_spline", counted)
+    time_s = np.arange(40) / 10
+    T = swaying(time_s)
+    moving = Moving.of(T, time_s)
+    assert made == [6]
+    assert moving.speed_mm_s == pytest.approx(rates(T[:, 2:3, 3], time_s)[:, 0], rel=1e-12)

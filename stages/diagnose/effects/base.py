@@ -100,6 +100,13 @@ class ImagePoints:
         return ring_geometry(self.probe, self.xyz_c, self.normal_c, self.uv)
 
     @cached_property
+    def camera_distance_mm(self) -> Float:
+        """(M,) distance of the camera, not of the wall point, along the pipe; 0 where that is not known."""
+        if self.distance_mm is None:
+            return np.zeros(len(self.uv))
+        return np.asarray(self.distance_mm - np.sum(self.xyz_c * self.along_c, axis=1))
+
+    @cached_property
     def radius_mm(self) -> Float:
         """(M,) distance from the optical axis."""
         return np.asarray(np.hypot(self.xyz_c[:, 0], self.xyz_c[:, 1]))

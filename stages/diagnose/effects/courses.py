@@ -109,13 +109,9 @@ class Coursed(Product):
 
     def factored(self, points: ImagePoints, shape: Shape) -> Factored:
         """Return the course's factor, of a swing its sine's and its cosine's, and the law."""
-        way = np.zeros(len(points.uv))
-        if points.distance_mm is not None:
-            # Of the camera, not of the wall point.
-            way = points.distance_mm - np.sum(points.xyz_c * points.along_c, axis=1)
         swings = self.kind is CourseKind.SINUSOID
         courses = [(shape[0], phase) for phase in (0.0, 90.0)] if swings else [shape]
-        at = points.time_s, way, points.speed_mm_s
+        at = points.time_s, points.camera_distance_mm, points.speed_mm_s
         return tuple(Course(self.kind, c).factor(*at) for c in courses), self.static, self.own
 
     def _swing(self, amplitude: Float) -> tuple[Float, float]:

@@ -156,7 +156,7 @@ def examine(
             searched = searched.watched(partial(progress, 2, _PARTS))
             # Effects that the library lacks move rings and fiducials as well.
             swung = swings(searched.run, searched.nothing, stated)
-            beyond = patterns_by_chance(searched.run, searched.nothing, stated, swung)
+            beyond = patterns_by_chance(searched.nothing, stated, swung)
             seen = Examined(searched, None, (), table, patterns_by_chance=beyond)
             if seen.global_p > DETECTED:
                 return replace(seen, quality=_quality_of_stated(searched, stated))

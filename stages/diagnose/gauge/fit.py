@@ -15,6 +15,7 @@ from pipeline.arrays import Float, Int
 from pipeline.geometry.rigid import from_parts, rotation_from_vector
 from stages.calibrate.gauge.state import ENCODER, Unknowns
 from stages.diagnose.effects.base import EffectModel, Shape
+from stages.diagnose.effects.nameless import VOCABULARY
 from stages.diagnose.gauge.elimination import ENCODER as ENCODER_ROW
 from stages.diagnose.gauge.elimination import (
     Equations,
@@ -83,6 +84,12 @@ class Fit:
     def reduced(self) -> Reduced:
         """The equations with the poses eliminated."""
         return eliminate_poses(self.linearised.equations, self.linearised.motion, len(self.state.T_pc))
+
+    @cached_property
+    def of_patterns(self) -> Evidence:
+        """What the run says of the terms and of all patterns without a cause that are not among them."""
+        own = {(t.model, t.shape) for t in self.terms}
+        return evidence(self.run, self, [p for p in VOCABULARY if p not in own])[0]
 
 
 def fit(run: GaugeRun, start: Unknowns, terms: Sequence[Term], iterations: int = _ITERATIONS) -> Fit:

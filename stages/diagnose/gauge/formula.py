@@ -74,7 +74,8 @@ def empirical(run: GaugeRun, before: Fit, stated: Stated, swung: Sequence[Scored
     """
     swinging = [s for s in swung if s.p_value * len(SWINGS) < _NEEDED]
     words = [*VOCABULARY, *((s.model, s.shape) for s in swinging)]
-    about = evidence(run, before, words)[0]
+    has_patterns = any(isinstance(t.model, Nameless) for t in before.terms)
+    about = evidence(run, before, words)[0] if swinging or has_patterns else before.of_patterns
     own = [(t.model, t.shape) for t in before.terms]
     chosen: list[tuple[EffectModel, Shape, Score]] = []
     for _ in range(_MOST_TERMS):
@@ -98,10 +99,10 @@ def swings(run: GaugeRun, found: Fit, stated: Stated) -> list[Scored]:
     return scan(run, found, {model.name: model for model in SWINGS}, stated)
 
 
-def patterns_by_chance(run: GaugeRun, nothing: Fit, stated: Stated, swung: Sequence[Scored]) -> float:
+def patterns_by_chance(nothing: Fit, stated: Stated, swung: Sequence[Scored]) -> float:
     """Return how often that which patterns and swings take up is expected when nothing is hidden."""
     swinging = min((s.p_value for s in swung), default=1.0) * len(SWINGS)
-    return 2 * min(_by_chance(evidence(run, nothing, VOCABULARY)[0], nothing.terms, stated), swinging)
+    return 2 * min(_by_chance(nothing.of_patterns, nothing.terms, stated), swinging)
 
 
 def says_the_same(run: GaugeRun, formula: Fit, named: Fit) -> bool:

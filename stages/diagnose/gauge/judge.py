@@ -9,7 +9,7 @@ import numpy as np
 
 from pipeline.arrays import Bool, Float
 from stages.diagnose.effects.base import EffectModel, Shape
-from stages.diagnose.effects.nameless import VOCABULARY, Nameless
+from stages.diagnose.effects.nameless import Nameless
 from stages.diagnose.gauge.fit import Fit, evidence, fit
 from stages.diagnose.gauge.formula import adequacy, empirical, is_more, says_the_same, swings
 from stages.diagnose.gauge.hypotheses import Judged, Regime, judged_of, regimes_of
@@ -139,12 +139,17 @@ def judge(
         return judged_of(run, found, regimes, stated, ratio, _beforehand(run, found, laws))
 
     judged = [weighed(f) for f in _distinct([searched.nothing, searched.found, *searched.rivals, formula])]
-    for _ in range(_ROUNDS):
+    former: Judged | None = None
+    for rounds_left in reversed(range(_ROUNDS)):
         ranked, allowed = _ranked(run, judged, formula)
-        best = ranked[0]
-        left, sets = _near(run, best, searched.steps[-1].scores, laws, stated, ratio)
+        best, is_new = ranked[0], ranked[0] is not former
+        former = best
+        if is_new:
+            left, sets = _near(run, best, searched.steps[-1].scores, laws, stated, ratio)
         near = _unfitted(sets, ranked)
-        more = _better(run, best, near) or _with_patterns(run, best, left, stated)
+        more = _better(run, best, near) if rounds_left else None
+        if more is None and rounds_left and is_new:
+            more = _with_patterns(run, best, left, stated)
         if more is None:
             break
         judged.append(weighed(more))
@@ -194,8 +199,7 @@ def _near(
     own = {(t.model, t.shape) for t in best.fit.terms}
     asked = [(m.model, m.shape) for m in members if (m.model, m.shape) not in own]
     about = evidence(run, best.fit, asked, with_spread=False)[0]
-    of_patterns = evidence(run, best.fit, [p for p in VOCABULARY if p not in own])[0]
-    return adequacy(of_patterns, best.fit.terms, stated), Sets.of(about, members, stated, ratio)
+    return adequacy(best.fit.of_patterns, best.fit.terms, stated), Sets.of(about, members, stated, ratio)
 
 
 def _unfitted(sets: Sets, ranked: Sequence[Judged]) -> list[Unfitted]:

@@ -29,11 +29,11 @@ from stages.diagnose.gauge.elimination import EDGE, POSE, RING, Equations, of_no
 from stages.diagnose.gauge.elimination import ENCODER as ENCODER_ROW
 from stages.diagnose.gauge.points import (
     BASELINE_SIZE,
+    Moving,
     edge_baseline,
     edge_points,
     ring_baseline,
     ring_points,
-    speed_along,
 )
 from stages.diagnose.gauge.run import GaugeRun, Linearised, Term
 
@@ -46,8 +46,11 @@ _ENCODER_CELL = 8
 def linearise(run: GaugeRun, state: Unknowns, terms: Sequence[Term]) -> Linearised:
     """Return the equations with columns for globals and terms."""
     run.watch()
-    edges, edge_at = _without_edge_shift(run, state, terms)
-    ring_at = ring_points(state, _on_bore(run, state), run.time_s, run.width_px)
+    moving = Moving.of(state.T_pc, run.time_s)
+    edges, edge_at = _without_edge_shift(run, state, moving, terms)
+    ring_at = ring_points(state, _on_bore(run, state), run.time_s, moving, run.width_px)
+    # The camera's distance and speed along the gauge, by which the encoder's readings are predicted.
+    travel = Travel(run.time_s, state.T_pc[:, 2, 3], moving.speed_mm_s)
     each = (ring_shift_px(t.model, ring_at, *t.at(t.amplitude)) for t in terms)
     shift = sum(each, np.zeros(len(run.rings.uv)))
     rings = replace(run.rings, uv=run.rings.uv - shift[:, None] * run.rings.outward)
@@ -55,12 +58,12 @@ def linearise(run: GaugeRun, state: Unknowns, terms: Sequence[Term]) -> Linearis
     parts = [_edge_part(run, state, edges, edge_at, terms)]
     parts.append(_ring_part(run, state, rings, ring_at, residual, terms))
     if run.encoder is not None:
-        parts.append(_encoder_part(run, run.encoder, state, terms))
+        parts.append(_encoder_part(run, run.encoder, state, travel, terms))
     arrays = [f.name for f in fields(Equations) if f.name != "edges"]
     joined = {name: np.concatenate([getattr(p, name) for p in parts]) for name in arrays}
     smooth = smooth_motion_rows(state.T_pc, run.time_s, run.motion_sigma, 0)
     motion = replace(smooth, by_frame=np.ascontiguousarray(smooth.by_frame[..., :POSE]))
-    return Linearised(Equations(**joined, edges=state.layout.marker), motion, ring_at, edge_at)
+    return Linearised(Equations(**joined, edges=state.layout.marker), motion, ring_at, edge_at, travel)
 
 
 def beside(run: GaugeRun, state: Unknowns, at: Linearised, model: EffectModel, shape: Shape) -> Linearised:
@@ -96,25 +99,19 @@ def _ask(
 ) -> None:  # fmt: skip
     """Write the derivatives of the residuals by the effects' amplitudes into ``out`` (M, Q)."""
     edges, rings = len(at.edges.uv), len(at.edges.uv) + len(at.rings.uv)
-    travel = travel_of(run, state) if run.encoder is not None else None
     first = 0
     for model, shape in asked:
         own = slice(first, first + len(model.amplitudes))
         out[:edges, own] = _across(texture_columns(model, at.edges, shape), run.edges)
         out[edges:rings, own] = -mm_per_px[:, None] * columns(model, at.rings, shape)
-        if travel is not None:
-            out[rings:, own] = state.encoder[0] * reading_columns(model, travel, shape)
+        if run.encoder is not None:
+            out[rings:, own] = state.encoder[0] * reading_columns(model, at.travel, shape)
         first = own.stop
 
 
 def _across(shift: Float, edges: Edges) -> Float:
     """Return shifts (E, 2, ...) of edges along their normals."""
     return np.asarray(np.einsum("mi...,mi->m...", shift, edges.normal))
-
-
-def travel_of(run: GaugeRun, state: Unknowns) -> Travel:
-    """Return the camera's distance and speed along the gauge at the frames' times."""
-    return Travel(run.time_s, state.T_pc[:, 2, 3], speed_along(state, run.time_s))
 
 
 def _baseline(run: GaugeRun, at: Linearised, mm_per_px: Float) -> Float:
@@ -144,8 +141,10 @@ def _on_bore(run: GaugeRun, state: Unknowns) -> BoreRings:
     return rings
 
 
-def _without_edge_shift(run: GaugeRun, state: Unknowns, terms: Sequence[Term]) -> tuple[Edges, ImagePoints]:
-    points = edge_points(state, run.edges, run.time_s)
+def _without_edge_shift(
+    run: GaugeRun, state: Unknowns, moving: Moving, terms: Sequence[Term]
+) -> tuple[Edges, ImagePoints]:
+    points = edge_points(state, run.edges, run.time_s, moving)
     # Where they are predicted, for the same reason as rings.
     points = replace(points, uv=points.projected_uv)
     uv = run.edges.uv
@@ -222,10 +221,11 @@ def _term_slope(term: Term, shift_of: Callable[[Float], Float]) -> Float:
     return np.stack(out, -1)
 
 
-def _encoder_part(run: GaugeRun, encoder: Encoder, state: Unknowns, terms: Sequence[Term]) -> Equations:
+def _encoder_part(
+    run: GaugeRun, encoder: Encoder, state: Unknowns, travel: Travel, terms: Sequence[Term]
+) -> Equations:
     count = len(run.time_s)
     scale, offset, delay = state.encoder
-    travel = travel_of(run, state)
     reading = np.interp(run.time_s - delay, encoder.time_s, encoder.distance_mm)
     for t in terms:
         reading = reading - t.model.reading_shift_mm(travel, *t.at(t.amplitude))

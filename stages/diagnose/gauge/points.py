@@ -7,6 +7,8 @@ on the recordings). They are unknowns of the recording, so that no effect is see
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from scipy.interpolate import make_smoothing_spline
 
@@ -53,18 +55,50 @@ def _patterns(points: ImagePoints, harmonics: tuple[int, ...]) -> Float:
     return np.stack([w * g for g in (np.ones_like(psi), 2 * tilt) for w in waves], -1)
 
 
-def ring_points(state: Unknowns, rings: BoreRings, time_s: Float, width_px: Float) -> ImagePoints:
+@dataclass(frozen=True)
+class Moving:
+    """How the camera moves at each frame, noise of its poses smoothed.
+
+    Attributes
+    ----------
+    turning_c, velocity_c : (N, 3)
+        In C, rad/s and mm/s.
+    speed_mm_s : (N,)
+        Along the pipe.
+    """
+
+    turning_c: Float
+    velocity_c: Float
+    speed_mm_s: Float
+
+    @staticmethod
+    def of(T_pc: Float, time_s: Float) -> Moving:
+        """Return it of poses (N, 4, 4) at times (N,)."""
+        steps = vector_from_rotation(np.swapaxes(T_pc[:-1, :3, :3], -1, -2) @ T_pc[1:, :3, :3])
+        turned = np.concatenate([np.zeros((1, 3)), np.cumsum(steps, axis=0)])
+        # In one call, which sets up the spline once: that takes far longer than to use it.
+        turning_c, velocity_p = np.split(rates(np.hstack([turned, T_pc[:, :3, 3]]), time_s), 2, axis=1)
+        return Moving(turning_c, np.einsum("nij,ni->nj", T_pc[:, :3, :3], velocity_p), velocity_p[:, 2])
+
+    def passing_mm_s(self, frame: Int, xyz_c: Float) -> Float:
+        """Return how points (M, 3) of the wall, seen in frames (M,), pass in C, mm/s."""
+        return np.asarray(-self.velocity_c[frame] - np.cross(self.turning_c[frame], xyz_c))
+
+
+def ring_points(
+    state: Unknowns, rings: BoreRings, time_s: Float, moving: Moving, width_px: Float
+) -> ImagePoints:
     """Return the ring bins, their wall points as probe and poses of the state place them."""
     T = state.T_pc[rings.frame]
     xyz_c = state.probe.triangulate(rings.uv)
     xyz_p = transform(T, xyz_c)
     normal_c, along_c = _wall_directions(xyz_p, T)
     along_ray = way_per_px(state.probe, rings.uv, rings.outward)
-    passing = passing_mm_s(state.T_pc, time_s, rings.frame, xyz_c)
+    passing = moving.passing_mm_s(rings.frame, xyz_c)
     rate = np.einsum("mi,mi->m", normal_c, passing) / np.einsum("mi,mi->m", normal_c, along_ray)
     return ImagePoints(
         state.probe, rings.frame, time_s[rings.frame] - time_s[0], rings.uv, xyz_c, normal_c, along_c,
-        rate[:, None] * rings.outward, speed_along(state, time_s)[rings.frame], True, width_px,
+        rate[:, None] * rings.outward, moving.speed_mm_s[rings.frame], True, width_px,
         np.arctan2(xyz_p[:, 1], xyz_p[:, 0]), xyz_p[:, 2], per_px_c=along_ray,
     )  # fmt: skip
 
@@ -75,16 +109,16 @@ def way_per_px(probe: Probe, uv: Float, outward: Float) -> Float:
     return np.asarray((farther - nearer) / (2 * _APART))
 
 
-def edge_points(state: Unknowns, edges: Edges, time_s: Float) -> ImagePoints:
+def edge_points(state: Unknowns, edges: Edges, time_s: Float, moving: Moving) -> ImagePoints:
     """Return the points of fiducial borders."""
     T = state.T_pc[edges.frame]
     xyz_c = transform(inverse(T), edges.xyz_p)
     normal_c, along_c = _wall_directions(edges.xyz_p, T)
-    passing = passing_mm_s(state.T_pc, time_s, edges.frame, xyz_c)
+    passing = moving.passing_mm_s(edges.frame, xyz_c)
     by_c = state.probe.camera.project_jacobian(xyz_c).by_point
     return ImagePoints(
         state.probe, edges.frame, time_s[edges.frame] - time_s[0], edges.uv, xyz_c, normal_c, along_c,
-        np.einsum("mij,mj->mi", by_c, passing), speed_along(state, time_s)[edges.frame], False,
+        np.einsum("mij,mj->mi", by_c, passing), moving.speed_mm_s[edges.frame], False,
         np.full(len(edges.uv), np.nan), np.arctan2(edges.xyz_p[:, 1], edges.xyz_p[:, 0]), edges.xyz_p[:, 2],
     )  # fmt: skip
 
@@ -107,23 +141,10 @@ def widths_at(source: RingSamples, index: Int, frame: Int, outward: Float) -> Fl
     return np.where(seen, width, np.median(width[seen]) if seen.any() else 1.0)
 
 
-def speed_along(state: Unknowns, time_s: Float) -> Float:
-    """Return the camera's speed (N,) along the pipe, mm/s."""
-    return rates(state.T_pc[:, 2:3, 3], time_s)[:, 0]
-
-
 def _wall_directions(xyz_p: Float, T_pc: Float) -> tuple[Float, Float]:
     radius = np.hypot(xyz_p[:, 0], xyz_p[:, 1])
     normal_p = np.stack([xyz_p[:, 0] / radius, xyz_p[:, 1] / radius, 0 * radius], -1)
     return np.einsum("mij,mi->mj", T_pc[:, :3, :3], normal_p), T_pc[:, 2, :3]
-
-
-def passing_mm_s(T_pc: Float, time_s: Float, frame: Int, xyz_c: Float) -> Float:
-    """Return how points (M, 3) of the wall pass in C, mm/s, by poses (N, 4, 4) at times (N,)."""
-    turned = vector_from_rotation(np.swapaxes(T_pc[:-1, :3, :3], -1, -2) @ T_pc[1:, :3, :3])
-    turning_c = rates(np.concatenate([np.zeros((1, 3)), np.cumsum(turned, axis=0)]), time_s)
-    velocity_c = np.einsum("nij,ni->nj", T_pc[:, :3, :3], rates(T_pc[:, :3, 3], time_s))
-    return np.asarray(-velocity_c[frame] - np.cross(turning_c[frame], xyz_c))
 
 
 def rates(value: Float, time_s: Float) -> Float:

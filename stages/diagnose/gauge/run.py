@@ -11,7 +11,7 @@ from pipeline.files.codec import NOT_STORED
 from pipeline.recording.base import Encoder
 from stages.calibrate.gauge.edges import Edges
 from stages.calibrate.gauge.geometry import BoreRings
-from stages.diagnose.effects.base import Amplitude, EffectModel, ImagePoints, Shape
+from stages.diagnose.effects.base import Amplitude, EffectModel, ImagePoints, Shape, Travel
 from stages.diagnose.gauge.elimination import Equations
 
 
@@ -88,3 +88,4 @@ class Linearised:
     motion: Rows
     rings: ImagePoints
     edges: ImagePoints
+    travel: Travel

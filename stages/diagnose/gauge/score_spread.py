@@ -10,7 +10,7 @@ dependence", 1999).
 from __future__ import annotations
 
 import numpy as np
-from scipy.fft import irfft2, next_fast_len, rfft2
+from scipy.fft import next_fast_len, rfft2
 
 from pipeline.adjustment.normal_equations import Marginal
 from pipeline.adjustment.robust import cluster_variance, degrees_of, two_way_variance
@@ -163,9 +163,21 @@ def _alike(weight: Float, left: Float, square: Int, shape: Int) -> Float:
 
 def _correlated(grids: Float) -> Float:
     """Return (K, 9, 9) the products of grids (K, X, Y) with themselves displaced as in `_REACH`."""
-    along, around = (next_fast_len(n + _TO_A_SIDE, real=True) for n in grids.shape[1:])
-    power = np.abs(rfft2(grids, (along, around))) ** 2
-    return np.asarray(irfft2(power, (along, around))[:, _REACH[:, None] % along, _REACH % around])
+    shape = along, around = [next_fast_len(n + _TO_A_SIDE, real=True) for n in grids.shape[1:]]
+    spectrum = rfft2(grids, shape)
+    power = spectrum.real**2 + spectrum.imag**2
+    # All displacements would take an inverse transform; a power is even, so that few are sums of cosines.
+    frequency = np.arange(power.shape[2])
+    twice = np.where((frequency == 0) | (2 * frequency == around), 1.0, 2.0)[:, None]
+    (cos_x, sin_x), (cos_y, sin_y) = (_waves(np.arange(along), along), _waves(frequency, around))
+    even, odd = power @ (twice * cos_y.T), power @ (twice * sin_y.T)
+    return np.asarray((cos_x @ even - sin_x @ odd) / (along * around))
+
+
+def _waves(frequency: Int, length: int) -> tuple[Float, Float]:
+    """Return cosine and sine (9, F) of whole frequencies in ``length`` at the displacements."""
+    phase = 2 * np.pi / length * np.outer(_REACH, frequency)
+    return np.cos(phase), np.sin(phase)
 
 
 def _within(columns: Float, alike: Float) -> Float:

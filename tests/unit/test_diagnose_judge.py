@@ -1,0 +1,51 @@
+"""What the judge of a gauge run's hypotheses looks at, and how often."""
+
+from collections import Counter
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from stages.diagnose.gauge import judge as judging
+
+
+def hypothesis(name: str, surprise: float) -> Any:
+    fit = SimpleNamespace(terms=(), name=name)
+    return SimpleNamespace(fit=fit, surprise=surprise, beforehand=0.0, named=True, library_terms=())
+
+
+def test_a_rival_of_patterns_is_weighed_once_while_the_likeliest_stays(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    asked: Counter[str] = Counter()
+    surprise = {"nothing": 50.0, "tilt": 0.0, "tilt and pattern": 1.0}
+
+    def near(*_: Any) -> tuple[float, None]:
+        asked["near"] += 1
+        return 1e-9, None
+
+    def with_patterns(*_: Any) -> Any:
+        asked["patterns"] += 1
+        return SimpleNamespace(terms=(), name="tilt and pattern")
+
+    def ranked(run: None, judged: list[Any], formula: Any) -> tuple[tuple[Any, ...], list[bool]]:
+        return tuple(sorted(judged, key=lambda j: j.surprise)), [True] * len(judged)
+
+    stand_ins = {
+        "regimes_of": lambda run: (), "evidence": lambda *_: (None,), "believed": lambda *_: 1.0,
+        "empirical": lambda *_: None, "_of": lambda *_: None, "_beforehand": lambda *_: 0.0,
+        "_distinct": lambda fits: [f for f in fits if f is not None], "_ranked": ranked, "_near": near,
+        "judged_of": lambda run, found, *_: hypothesis(found.name, surprise[found.name]),
+        "_unfitted": lambda *_: [], "_better": lambda *_: None, "_with_patterns": with_patterns,
+        "replace": lambda best, **_: best,
+    }  # fmt: skip
+    for name, stand_in in stand_ins.items():
+        monkeypatch.setattr(judging, name, stand_in)
+    nothing, tilt = (SimpleNamespace(terms=(), name=n) for n in ("nothing", "tilt"))
+    searched: Any = SimpleNamespace(
+        run=None, nothing=nothing, found=tilt, rivals=(), alike=1.0, steps=[SimpleNamespace(scores=())]
+    )
+    stated: Any = None
+    verdicts = judging.judge(searched, {}, stated, ())
+    assert [j.fit.name for j in verdicts.judged] == ["tilt", "tilt and pattern", "nothing"]
+    assert asked == {"near": 1, "patterns": 1}
