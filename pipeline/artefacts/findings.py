@@ -108,9 +108,10 @@ class Defect:
     wall_loss_percent : float
         Depth over wall thickness for metal loss; NaN where it has no meaning or the thickness is unknown.
     probability : float
-        That something is there: from how many rings show it, against how many false ones such footage makes.
+        That something is there: from how many rings show it, against how many false ones such footage makes;
+        NaN where the photo alone shows it.
     confidence : float
-        Probability that the defect is there and of this kind.
+        Probability that the defect is there and of this kind; NaN as above.
     frames : (N,) int
         Frames whose ring touched it.
     outline : (V, 2)

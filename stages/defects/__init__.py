@@ -61,8 +61,7 @@ from stages.defects.told import report_found, report_unconfirmed, warn_of_missed
 __all__ = ["DEFECTS", "DefectParameters", "find_defects"]
 
 _MIN_CELLS, _MIN_CIRCLES, _HALF = 1000, 8, 0.5
-# Nothing says that what stays at one place of the image, or lies where the line ends, is rather the wall, nor
-# whether a dark line is a crack or a mark.
+# Nothing says that what stays at one place of the image, or lies where the line ends, is rather the wall.
 _WALL_OR_NOT = 0.5
 _UNSURE = "Its depth is not known to twice its σ"
 
@@ -188,8 +187,7 @@ def _lines(
         surface, here = wall.surface_about(region, every_point=True)
         if not beside and _is_measured(surface, here):
             depth = measure_depth(here, surface, clean, parameters.draws, context.random)
-            line = describe_line(here, depth, surface, scene)
-            yield replace(line, probability=_WALL_OR_NOT, confidence=_WALL_OR_NOT)
+            yield describe_line(here, depth, surface, scene)
 
 
 def _fixed_in(region: Region, fixed: FixedToProbe | None) -> Float:
@@ -268,5 +266,5 @@ def _defects_of_run(
 
 
 DEFECTS = Stage(
-    "defects", "26", DefectParameters, _defects_of_run, "defects as instances with depth, clock and kind"
+    "defects", "27", DefectParameters, _defects_of_run, "defects as instances with depth, clock and kind"
 )

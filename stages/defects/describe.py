@@ -121,7 +121,10 @@ def describe(region: Region, depth: Depth, surface: Surface, scene: Scene) -> De
 
 
 def describe_line(region: Region, depth: Depth, surface: Surface, scene: Scene) -> Defect:
-    """Return the defect of a dark line that the photo alone shows, with what the rings measure there."""
+    """Return a dark line that the photo alone shows as a defect, with what the rings measure there.
+
+    Nothing tells how probable it is that it is a crack.
+    """
     shown = describe(region, depth, surface, scene)
     direction = features_of(surface.relief, region, depth).direction_rad
     length = float(np.hypot(shown.length_mm, shown.width_mm))
@@ -130,6 +133,8 @@ def describe_line(region: Region, depth: Depth, surface: Surface, scene: Scene) 
         shown,
         kind=str(DefectKind.CRACK),
         wall_loss_percent=float("nan"),
+        probability=float("nan"),
+        confidence=float("nan"),
         pof_class="",
         pacp_suggestion=pacp_suggestion(DefectKind.CRACK, direction),
         en13508_suggestion=en13508_suggestion(DefectKind.CRACK),

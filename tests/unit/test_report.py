@@ -133,7 +133,7 @@ def test_shows_the_pit_with_pictures_clock_and_wall_loss(summary):
 
 def test_a_probability_is_stated_no_finer_than_it_was_shown(summary):
     (pit,) = summary.defects.items
-    for stated, told in ((0.99, "above 90 %"), (0.64, "about 64 %")):
+    for stated, told in ((0.99, "above 90 %"), (0.64, "about 64 %"), (np.nan, "not known")):
         defects = replace(summary.defects, items=(replace(pit, probability=stated),))
         (finding,) = page_of(replace(summary, defects=defects)).findings
         assert finding.probability == told

@@ -136,6 +136,8 @@ def _wall_loss(defect: Defect) -> str:
 
 def _probability(probability: float) -> str:
     """Return a probability in words, no finer than its calibration on drawn recordings allows."""
+    if np.isnan(probability):
+        return "not known"
     return "above 90 %" if probability > _TOLD_APART else f"about {100 * probability:.0f} %"
 
 
