@@ -105,8 +105,11 @@ class SpotsOfFrames:
     def _spots(self, frame: int, beyond: Bool, more: Float32, twin: TwinFrame) -> list[Spot]:
         joined = cv2.morphologyEx(beyond.astype(np.uint8), cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8))
         count, label, stats, centre = cv2.connectedComponentsWithStats(joined)
+        line = np.isin(twin.region, (Region.LINE_CORE, Region.LINE_FLANK)).astype(np.uint8)
+        # What joins the line is the line: drawn aside where the wall is elsewhere, or wide where it clips.
+        of_line = set(np.unique(label[cv2.dilate(line, np.ones((3, 3), np.uint8)) > 0]).tolist())
         found = []
-        for k in range(1, count):
+        for k in sorted(set(range(1, count)) - of_line):
             left, top, width, height, area = (int(x) for x in stats[k])
             if not _PIXELS[0] <= area <= _PIXELS[1]:
                 continue

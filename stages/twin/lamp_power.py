@@ -4,8 +4,8 @@ Lamps that come nearer to a side of the bore brighten it as the inverse square o
 in which the same wall, and the same place of the image, is lit more or less strongly tell the power p to
 which brightness follows that light: 1 for a linear camera and direct light. A response grey = light^p gives p
 itself, whatever the photo was made with. Light that bounces about the bore hardly changes when the lamps
-move, so that a share q of it gives 1 − q. The lamps' lobe depends on the place in the image alone, and takes
-no part.
+move, so that a share q of it gives 1 − q. The lamps' lobe depends mostly on the place in the image alone, and
+takes little part; of lobes from even to that of the cosine the middle one is taken.
 """
 
 from __future__ import annotations
@@ -28,11 +28,12 @@ from stages.twin.switched import Pair, Shown
 _LEAST, _SURE = 0.25, 3.0
 """Least departure of the power from 1, also by three of its σ: a pale bore throws back some tenths of its
 light, and what the lamps' lobe and the wall's gloss change is below a tenth."""
-_OF_LIGHT, _OF_LOBE, _FEWEST_FRAMES = 0.02, 0.03, 6
-"""1 σ of a power for want of knowing the black level: one grey level of fifty changes it by so much. For want
-of the lamps' lobe: ten rings of LEDs, 11 and 16 mm wide, 8 mm behind to 5 mm ahead of the camera, in bores of
-76 and 102 mm, change it by .052, r.m.s., if they shine as the cosine; lobes from even to that are alike
-likely: over √3. Fewest lit frames. Light that bounces is no part of it."""
+_OF_LIGHT, _BY_COSINE, _FEWEST_FRAMES = 0.02, 0.04, 6
+"""1 σ of a power for want of knowing the black level: one grey level of fifty changes it by so much. By how
+much LEDs that shine as the cosine raise it, held against LEDs that shine alike in all directions: five drawn
+recordings in bores of 76 and 102 mm by .032 to .051, and ten rings of LEDs, 11 and 16 mm wide, 8 mm behind to
+5 mm ahead of the camera, by .052, r.m.s. Half of it is taken off, and is 1 σ. Fewest lit frames. Light that
+bounces is no part of it."""
 _SLOWLY = 3
 """Degree of the polynomial in row and column that slow light is: of lamps aside, most is linear."""
 _LEAST_WANDER = 1e-3
@@ -47,9 +48,9 @@ def lamp_power(samples: BlockSamples | None) -> tuple[NamedFigure, ...]:
     if told[:, 1].sum() < _LEAST_WANDER**2 * len(samples.change):
         return ()
     whole, without = told.sum(0), told.sum(0) - told
-    power = 1 + float(whole[0] / whole[1])
+    power = (1 + float(whole[0] / whole[1])) / (1 + _BY_COSINE / 2)
     spread = float(left_out_sd(without[:, 0] / np.maximum(without[:, 1], 1e-12)))
-    return (NamedFigure("lamp_power", power, float(np.linalg.norm([spread, _OF_LIGHT, _OF_LOBE]))),)
+    return (NamedFigure("lamp_power", power, float(np.linalg.norm([spread, _OF_LIGHT, _BY_COSINE / 2]))),)
 
 
 def power_of_lamps(samples: BlockSamples | None, ring: Ring) -> tuple[Suspected, ...]:

@@ -231,8 +231,8 @@ def cannot_tell(state: PhotometricState) -> tuple[str, ...]:
         "Vignetting cannot be told from the LEDs' lobe: both change brightness with the polar angle alone.",
         "A power response cannot be told from the wall's contrast: the photo has it, too; gamma is read "
         "off the noise, which a video codec changes: it is no proof of a response that is not linear.",
-        "Lamps that are uneven in all frames are told from wall that is paler on one side only as far as the "
-        "probe rolls.",
+        "Lamps that are uneven in all frames, otherwise than by one dim LED, are told from wall that is "
+        "paler on one side only as far as the probe rolls.",
     ]
     if np.isnan(state.photo_black):
         said.append(

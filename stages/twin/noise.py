@@ -21,7 +21,8 @@ _WINDOW_PX = 12
 """Side of a window: the variance of 144 pixels is known to some 12 %, also where neighbours are alike."""
 _MOST_ALIKE = 0.5
 """Share of a window's variance that may come back in the next frame: noise alone gives 0 ± 0.08."""
-_LEVELS, _FEWEST = 14, 40
+_LEVELS, _FEWEST, _FEWEST_CELLS = 14, 40, 3
+"""Most cells of grey level, windows that each has, and fewest cells: noise has three figures."""
 _LEAST_VARIANCE = 1 / 12
 """Of rounding to whole grey levels."""
 _PILE = 16
@@ -155,10 +156,10 @@ def windows_of(left_over: Float32, again: Float32, level: Float32, use: Bool) ->
 def photon_transfer(windows: list[NoiseWindows], black: Figure, white: float) -> CameraNoise:
     """Return the noise that windows of several frames show; σ from leaving out one frame at a time."""
     whole = _fitted(windows)
-    if len(windows) < 2:
+    others = [windows[:k] + windows[k + 1 :] for k in range(len(windows))]
+    if min((sum(len(w.level) for w in some) for some in others), default=0) < _FEWEST_CELLS * _FEWEST:
         return _camera_noise(whole, np.full(4, np.inf), black, white)
-    without = np.array([_fitted(windows[:k] + windows[k + 1 :]) for k in range(len(windows))])
-    return _camera_noise(whole, left_out_sd(without), black, white)
+    return _camera_noise(whole, left_out_sd(np.array([_fitted(some) for some in others])), black, white)
 
 
 def _camera_noise(value: Float, sd: Float, black: Figure, white: float) -> CameraNoise:
@@ -172,11 +173,12 @@ def _fitted(windows: list[NoiseWindows]) -> Float:
     """Return read variance, variance per level, unevenness and γ."""
     level = np.concatenate([w.level for w in windows])
     variance = np.concatenate([w.variance for w in windows])
-    if len(level) < _FEWEST:
+    cells = min(_LEVELS, len(level) // _FEWEST)
+    if cells < _FEWEST_CELLS:
         return np.array([_LEAST_VARIANCE, 0.0, 0.0, np.nan])
-    edges = np.quantile(level, np.linspace(0, 1, _LEVELS + 1))
-    cell = np.clip(np.searchsorted(edges, level) - 1, 0, _LEVELS - 1)
-    used = [k for k in range(_LEVELS) if (cell == k).sum() >= _FEWEST // 2]
+    edges = np.quantile(level, np.linspace(0, 1, cells + 1))
+    cell = np.clip(np.searchsorted(edges, level) - 1, 0, cells - 1)
+    used = [k for k in range(cells) if (cell == k).sum() >= _FEWEST // 2]
     x = np.array([level[cell == k].mean() for k in used])
     # Where black cuts noise off, windows show none at all.
     y = np.array([max(float(variance[cell == k].mean()), _LEAST_VARIANCE) for k in used])

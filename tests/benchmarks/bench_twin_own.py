@@ -83,7 +83,7 @@ class Case:
     also: tuple[str, ...] = ()
 
 
-_OF_COLOUR = float(np.linalg.norm(LUMA_BGR))  # noise of grey, in limited range, over that of each colour
+_OF_COLOUR = float(np.linalg.norm(LUMA_BGR))  # noise of grey over that of each colour
 _EXACT = (("", "codec", "ffv1"),)  # a lossy codec takes fine noise away
 CASES = (
     Case("light_flicker", (0.08, 3.7), ("flicker", "laser_flicker")),
@@ -99,7 +99,7 @@ CASES = (
     Case("defocus", (1.8, 0.0), ("defocus",), figure=("lens_blur_px", math.hypot(0.7, 1.8))),
     Case("defective_pixels", (2e-4, 0.5), ("defective_pixels",), 4e-4, changes=_EXACT),
     Case("read_noise", (60.0,), figure=("read_e", math.hypot(15.0, 60.0) / _OF_COLOUR), changes=_EXACT),
-    Case("full_well", (3000.0,), figure=("gain_e_per_dn", 3000 / 219 / _OF_COLOUR**2), changes=_EXACT),
+    Case("full_well", (3000.0,), figure=("gain_e_per_dn", 3000 / 255 / _OF_COLOUR**2), changes=_EXACT),
     Case("fixed_pattern", (0.03,), figure=("gain_pattern", 0.03), changes=_EXACT),
     Case("dark_pattern", (0.02,), figure=("dark_pattern_dn", 0.02 * 255), changes=_EXACT),
     Case("interreflection", (1.0,), ("interreflection", "ambient_light")),

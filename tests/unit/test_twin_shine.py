@@ -59,6 +59,17 @@ def test_a_lamp_that_is_mirrored_at_one_place_of_the_image_is_a_glint():
     assert found.chi2_after < found.chi2_before / 2
 
 
+@pytest.mark.parametrize(("away_px", "glints"), [(0, 0), (14, 1)])
+def test_what_joins_the_line_is_no_glint(away_px, glints):
+    """A line drawn aside at a defect, or wide where it clips, had been told as a glint or a droplet."""
+    spots = SpotsOfFrames(Illumination.LASER, RING)
+    for number in range(FRAMES):
+        twin = _twin(number, Region.DARK)
+        twin.region[100:106] = Region.LINE_FLANK
+        spots.add(number, twin.level + _spot(150, 111 + away_px), twin)
+    assert len(spots.found()) == glints
+
+
 @pytest.mark.parametrize(("name", "glints"), [("ambient_light or interreflection", 0), ("bloom", 1)])
 def test_pale_wall_in_other_light_is_no_glint(name, glints):
     spots = [SpotsOfFrames(kind, RING) for kind in (Illumination.LED, Illumination.LASER)]

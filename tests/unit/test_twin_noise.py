@@ -1,0 +1,76 @@
+"""The camera's noise, from windows of drawn frames."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from stages.twin.lamp_light import Figure
+from stages.twin.noise import photon_transfer, windows_of
+
+BLACK = Figure(16.0, 0.1)
+
+
+def _noisy_frames(read, electrons, frames=4):
+    random = np.random.default_rng(5)
+    level = np.tile(np.linspace(10, 180, 480, dtype=np.float32), (360, 1))
+    whole = np.ones(level.shape, bool)
+    of_wall = 5 * np.sin(np.arange(480) / 5.0) * (np.arange(360) % 90 < 40)[:, None]
+    for _ in range(frames):
+        first, second = (
+            (of_wall + random.standard_normal(level.shape) * np.sqrt(read**2 + level / electrons)).astype(
+                np.float32
+            )
+            for _ in range(2)
+        )
+        yield windows_of(first, second, level, whole)
+
+
+def test_photon_transfer_finds_the_noise_that_was_put_in():
+    noise = photon_transfer(list(_noisy_frames(1.5, 40.0)), BLACK, 255.0)
+    assert noise.electrons_per_level.value == pytest.approx(40.0, rel=0.12)
+    assert noise.read_electrons.value == pytest.approx(60.0, rel=0.15)
+    level = np.array([20.0, 90.0, 170.0], np.float32)
+    np.testing.assert_allclose(noise.variance(level), 1.5**2 + level / 40, rtol=0.05)
+
+
+def _dim_frames(random, read, electrons, rows=96):
+    level = np.tile(np.linspace(20, 60, 240, dtype=np.float32), (rows, 1))
+    for _ in range(6):
+        first, second = (
+            random.standard_normal((2, *level.shape)) * np.sqrt(read**2 + level / electrons)
+        ).astype(np.float32)
+        yield windows_of(first, second, level, level > 0)
+
+
+def test_read_noise_in_electrons_is_no_surer_than_their_number():
+    """Its σ had left the conversion's out: one true value in four lay within two of them."""
+    made = [
+        photon_transfer(list(_dim_frames(np.random.default_rng(k), 1.0, 40.0)), BLACK, 255.0)
+        for k in range(20)
+    ]
+    read = [n.read_electrons for n in made if np.isfinite(n.electrons_per_level.value)]
+    assert len(read) > 12
+    assert np.mean([abs(f.value - np.sqrt(1 - 1 / 12) * 40) < 2 * f.sd for f in read]) >= 0.85
+    unknown = replace(made[0], variance_per_level=Figure(0.0, 0.01)).read_electrons
+    assert np.isinf(unknown.value), "in electrons nothing is known without shot noise"
+
+
+@pytest.mark.parametrize("rows", [12, 60])
+def test_few_windows_tell_little_of_the_noise_and_say_so(rows):
+    """With some hundred windows each part alone was too few, all parts told the same nothing, and σ was 0."""
+    windows = list(_dim_frames(np.random.default_rng(1), 1.0, 10.0, rows=rows))
+    noise = photon_transfer(windows, BLACK, 255.0)
+    assert noise.variance_per_level.sd > 0.01
+    assert noise.variance_per_level.sd == np.inf or abs(noise.variance_per_level.value - 0.1) < 0.05
+
+
+def test_other_noise_gives_another_answer():
+    quiet, loud = (photon_transfer(list(_noisy_frames(1.0, e)), BLACK, 255.0) for e in (200.0, 20.0))
+    assert loud.variance_per_level.value > 5 * quiet.variance_per_level.value
+
+
+def test_pictures_whose_dark_shows_no_noise_have_that_of_rounding():
+    black = np.zeros((120, 240), np.float32)
+    noise = photon_transfer([windows_of(black, black, black, black == 0)] * 2, BLACK, 255.0)
+    assert noise.read_variance.value == pytest.approx(1 / 12)
