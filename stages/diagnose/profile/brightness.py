@@ -105,7 +105,7 @@ def _fitted(grey: Float, light: Float, theta: Float) -> Regression:
     design = np.concatenate([slopes, levels], axis=-1)
     with np.errstate(invalid="ignore"):
         value = np.log(grey)
-    return regress(design.reshape(-1, design.shape[-1]), value.ravel(), np.repeat(group, len(theta)))
+    return regress(design, value, group)
 
 
 def dust_finding(rings: RingSamples, profiles: LineProfiles, cells: Cells) -> Finding:
@@ -160,13 +160,10 @@ def stray_finding(profiles: LineProfiles, geometry: LineGeometry) -> Finding:
 def decentre_finding(geometry: LineGeometry, cells: Cells) -> Finding:
     """Return the finding of `beam_decentre` by the brightness' first harmonic, fixed in C."""
     psi = np.broadcast_to(geometry.azimuth_rad, geometry.height.shape)
-    group = np.full(len(geometry.steady), -1)
-    for k, rows in enumerate(cells.frames):
-        group[rows] = k
-    log = np.log(geometry.height)
+    group = cells.block_of_frames(len(psi))
     blocks = [(group == k)[:, None] * np.ones_like(psi) for k in range(len(cells.frames))]
     design = np.stack([np.cos(psi), np.sin(psi), np.log(geometry.radius_mm), *blocks], axis=-1)
-    fit = regress(design.reshape(-1, design.shape[-1]), log.ravel(), np.repeat(group, psi.shape[1]))
+    fit = regress(design, np.log(geometry.height), group)
     if not np.isfinite(fit.sigma[0]):
         return untestable("beam_decentre", "The line's brightness is not seen all round.")
     size = float(np.hypot(*fit.coefficient[:2]))

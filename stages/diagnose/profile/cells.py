@@ -158,6 +158,13 @@ class Cells:
             self.radius_mm[k], self.height[k], self.frames[first:end],
         )  # fmt: skip
 
+    def block_of_frames(self, count: int) -> Int:
+        """Return the block (F,) of each of ``count`` frames; −1 for those of no block."""
+        block = np.full(count, -1)
+        for k, rows in enumerate(self.frames):
+            block[rows] = k
+        return block
+
     def less(self, light: Float) -> Cells:
         """Return the cells without a light (M, B), over the line's height, in those that are whole."""
         profile, rest = self.profile.copy(), self.rest.copy()

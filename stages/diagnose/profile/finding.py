@@ -36,11 +36,15 @@ class Regression:
 
 
 def regress(design: Float, value: Float, group: Int) -> Regression:
-    """Fit ``value`` (M,) by ``design`` (M, K) with biweights; σ by the jackknife over ``group`` (M,).
+    """Fit ``value`` (...) by ``design`` (..., K) with biweights; σ by the jackknife over ``group`` (...).
 
-    The groups must be far enough apart to err independently. Rows that are not finite, or of a negative
-    group, are left out.
+    The groups must be far enough apart to err independently; those of the first axes alone hold for all the
+    others. What is not finite, or of a negative group, is left out.
     """
+    group = np.broadcast_to(
+        group.reshape(*group.shape, *[1] * (value.ndim - group.ndim)), value.shape
+    ).ravel()
+    design, value = design.reshape(-1, design.shape[-1]), value.ravel()
     known = (group >= 0) & np.isfinite(value) & np.isfinite(design).all(1)
     x, y, g = design[known], value[known], group[known]
     names = np.unique(g)

@@ -65,8 +65,7 @@ def scale_law(cells: Cells, geometry: LineGeometry, probe: Probe) -> Regression:
     """Regress width², px², on the stated line's and on 1: (σ / stated)², blur², fixed patterns."""
     stated = stated_variance(geometry, probe)
     design = np.stack([stated, np.ones_like(stated), *_fixed_patterns(geometry)], axis=-1)
-    width2 = (geometry.width_px**2).ravel()
-    return regress(design.reshape(-1, design.shape[-1]), width2, _groups(cells, geometry))
+    return regress(design, geometry.width_px**2, cells.block_of_frames(len(stated)))
 
 
 def blur_finding(cells: Cells, geometry: LineGeometry, probe: Probe) -> Finding:
@@ -84,7 +83,7 @@ def blur_finding(cells: Cells, geometry: LineGeometry, probe: Probe) -> Finding:
     width2 = geometry.width_px**2
     known = np.isfinite(width2) & np.isfinite(design).all(-1)
     design, width2 = _without_frame_means(design, known), _without_frame_means(width2[..., None], known)
-    fit = regress(design.reshape(-1, design.shape[-1]), width2.ravel(), _groups(cells, geometry))
+    fit = regress(design, width2[..., 0], cells.block_of_frames(len(width2)))
     if not np.isfinite(fit.sigma[0]):
         return untestable("motion_blur", "The line does not move enough for its width to tell the exposure.")
     exposure2, own = float(fit.coefficient[0]), probe.shutter.exposure_s
@@ -102,14 +101,6 @@ def _fixed_patterns(geometry: LineGeometry) -> list[Float]:
     """Return patterns that stay with the camera: a tilted sheet's false radius, pixels seen askew."""
     psi = np.broadcast_to(geometry.azimuth_rad, geometry.px_per_mm.shape)
     return [f(order * psi) for order in (1, 2, 4) for f in (np.cos, np.sin)]
-
-
-def _groups(cells: Cells, geometry: LineGeometry) -> Int:
-    """Return the block (F · S,) of every sector of every frame; −1 for frames of no block."""
-    group = np.full(len(geometry.steady), -1)
-    for k, rows in enumerate(cells.frames):
-        group[rows] = k
-    return np.repeat(group, len(geometry.azimuth_rad))
 
 
 def _without_frame_means(values: Float, known: Bool) -> Float:
@@ -133,8 +124,7 @@ def locking_finding(rings: RingSamples, profiles: LineProfiles, cells: Cells) ->
     rough = np.where(valid, rings.radius_px[rows] - smooth, np.nan)
     phase = 2 * np.pi * smooth
     parts = [np.where(valid, f(phase) - _smoothed(f(phase), valid), np.nan) for f in (np.sin, np.cos)]
-    design = np.stack(parts, axis=-1).reshape(-1, 2)
-    fit = regress(design, rough.ravel(), np.repeat(group, rough.shape[1]))
+    fit = regress(np.stack(parts, axis=-1), rough, group)
     if not np.isfinite(fit.sigma[0]):
         return untestable("pixel_locking", "The line keeps to one place of its pixels.")
     size = float(np.hypot(*fit.coefficient))
