@@ -269,6 +269,12 @@ def places_of(evidence: Evidence, model: EffectModel, shape: Shape) -> Int:
     return np.array([evidence.place[c] for c in columns if c in evidence.place], np.int64)
 
 
+def places_of_all(evidence: Evidence, asked: Sequence[tuple[EffectModel, Shape]]) -> Int:
+    """Return the places of the columns of several effects, one after the other."""
+    each = [places_of(evidence, model, shape) for model, shape in asked]
+    return np.concatenate([np.zeros(0, np.int64), *each])
+
+
 @dataclass(frozen=True)
 class Estimate:
     """Posterior of the columns: ``value`` (K,), ``covariance`` (K, K), and minus twice the log evidence."""

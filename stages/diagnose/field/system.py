@@ -108,13 +108,9 @@ def _ring_rows(run: FieldRun, known: Int, asked: Asked, size: int) -> Rows:
     normal = residuals.surface(run.state, transform(T, points.xyz_c))[1]
     normal_c = np.einsum("mi,mij->mj", normal, T[:, :3, :3])
     by_shift = -np.einsum("mi,mij,mj->m", normal_c, by_pixel, points.outward)
-    named = np.zeros((len(rows.residual), size))
-    named[:, : len(known)] = np.einsum("mj,mjp->mp", normal_c, by_parameters[:, :, known])
-    first = len(known) + 1
-    for model, shape in asked:
-        count = len(model.amplitudes)
-        named[:, first : first + count] = by_shift[:, None] * columns(model, points, shape)
-        first += count
+    of_probe = np.einsum("mj,mjp->mp", normal_c, by_parameters[:, :, known])
+    of_effects = [by_shift[:, None] * columns(model, points, shape) for model, shape in asked]
+    named = np.concatenate([of_probe, np.zeros((len(of_probe), 1)), *of_effects], axis=1)
     return _usable(_widened(rows, run.state, size), named)
 
 
@@ -124,15 +120,15 @@ def _texture_rows(run: FieldRun, known: Int, asked: Asked, size: int) -> Landmar
     tracks = run.measured.tracks
     xyz_c = transform(inverse(run.state.T_pc[tracks.frame]), run.state.xyz_p[tracks.landmark])
     by_parameters = camera.project_jacobian(xyz_c).by_parameters
-    named = np.zeros((len(rows.residual), 2, size))
-    of_camera = known[known < by_parameters.shape[2]]
-    named[:, :, : len(of_camera)] = by_parameters[:, :, of_camera]
-    first = len(known) + 1
-    for model, shape in asked:
-        count = len(model.amplitudes)
-        if model.name not in OWN:
-            named[:, :, first : first + count] = texture_columns(model, points, shape)
-        first += count
+    of_camera = by_parameters[:, :, known[known < by_parameters.shape[2]]]
+    of_others = np.zeros((*of_camera.shape[:2], len(known) + 1 - of_camera.shape[2]))
+    of_effects = [
+        np.zeros((len(points.uv), 2, len(model.amplitudes)))
+        if model.name in OWN
+        else texture_columns(model, points, shape)
+        for model, shape in asked
+    ]
+    named = np.concatenate([of_camera, of_others, *of_effects], axis=2)
     bad = ~np.isfinite(named).all((1, 2)) | ~rows.by_pose.any((1, 2))
     named[bad] = 0.0
     surface = np.zeros((len(rows.surface_residual), _own_size(run.state) + size))
@@ -161,14 +157,10 @@ def _encoder_rows(
     state = run.state
     steady = replace(state, globals=np.append(state.globals[:3], 1.0), slip=np.zeros(len(state.slip)))
     reading, creep = residuals.encoder_rows(steady, encoder, run.parameters.encoder_slip_sigma_mm)
-    named = np.zeros((len(reading.residual), size))
-    named[:, scale_at] = encoder.distance_mm
     travel = Travel(run.measured.time_s, distance_mm(run), speed_mm_s(run))
-    first = scale_at + 1
-    for model, shape in asked:
-        count = len(model.amplitudes)
-        named[:, first : first + count] = reading_columns(model, travel, shape)
-        first += count
+    of_probe = np.zeros((len(reading.residual), scale_at))
+    of_effects = [reading_columns(model, travel, shape) for model, shape in asked]
+    named = np.concatenate([of_probe, encoder.distance_mm[:, None], *of_effects], axis=1)
     reading.by_border[:, 3] = 0.0
     sigma = creep.sigma.copy()
     sigma[np.clip(slips - 1, 0, len(sigma) - 1)] = _SLIPPED_MM

@@ -32,6 +32,7 @@ from stages.diagnose.inference import (
     eliminated,
     instrument_places,
     places_of,
+    places_of_all,
 )
 
 _MOST_TERMS = 4
@@ -79,7 +80,7 @@ def empirical(run: GaugeRun, before: Fit, stated: Stated, swung: Sequence[Scored
     own = [(t.model, t.shape) for t in before.terms]
     chosen: list[tuple[EffectModel, Shape, Score]] = []
     for _ in range(_MOST_TERMS):
-        given = _places(about, [*own, *((m, s) for m, s, _ in chosen)])
+        given = places_of_all(about, [*own, *((m, s) for m, s, _ in chosen)])
         left = [w for w in words if w not in [(m, s) for m, s, _ in chosen]]
         best = _next(about, stated, given, left)
         if best is None:
@@ -131,7 +132,7 @@ def adequacy(about: Evidence, terms: Sequence[Term], stated: Stated) -> float:
 
 
 def _by_chance(about: Evidence, terms: Sequence[Term], stated: Stated) -> float:
-    given = _places(about, [(t.model, t.shape) for t in terms])
+    given = places_of_all(about, [(t.model, t.shape) for t in terms])
     each = _scores(about, stated, given, VOCABULARY)
     single = min((s.p_value for s in each if s is not None), default=1.0) * len(VOCABULARY)
     return float(2 * min(single, joint_p(about, stated, given)))
@@ -142,7 +143,7 @@ def joint_p(about: Evidence, stated: Stated, given: Int) -> float:
 
     Scores are taken along the principal directions of their information, each over its true spread.
     """
-    block = _places(about, VOCABULARY)
+    block = places_of_all(about, VOCABULARY)
     free = np.union1d(instrument_places(about), given).astype(np.int64)
     own, right, _ = eliminated(about, stated, block, free)
     a = about.information
@@ -173,8 +174,3 @@ def _scores(
     around = Around.of(about, stated, given)
     places = [places_of(about, model, shape) for model, shape in words]
     return [around.score(block) if not np.isin(block, given).any() else None for block in places]
-
-
-def _places(about: Evidence, asked: Sequence[tuple[EffectModel, Shape]]) -> Int:
-    each = [places_of(about, model, shape) for model, shape in asked]
-    return np.concatenate([np.zeros(0, np.int64), *each]).astype(np.int64)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import fields, replace
-from functools import partial
 
 import numpy as np
 from scipy.linalg import block_diag
@@ -158,7 +157,7 @@ def _ring_part(
     terms: Sequence[Term],
 ) -> Equations:  # fmt: skip
     mm_per_px = ring_mm_per_px(points)
-    shift = [_term_slope(t, partial(_ring_shift, t, points)) for t in terms]
+    shift = [_slope(t, lambda model, *at: ring_shift_px(model, points, *at)) for t in terms]
     rows, _ = ring_rows(_without_edges(state), rings, residual, points.uv)
     return _with_effects(
         rows, -mm_per_px[:, None], shift, run.ring_weight, wall_cells(rings.wall_mm), RING, rings.wall_mm
@@ -173,10 +172,10 @@ def _without_edges(state: Unknowns) -> Unknowns:
 def _edge_part(
     run: GaugeRun, state: Unknowns, edges: Edges, points: ImagePoints, terms: Sequence[Term]
 ) -> Equations:
-    def texture_shift(term: Term, amplitude: Float) -> Float:
-        return _across(texture_shift_px(term.model, points, *term.at(amplitude)), edges)
+    def texture_shift(model: EffectModel, shape: Shape, amplitude: Float) -> Float:
+        return _across(texture_shift_px(model, points, shape, amplitude), edges)
 
-    shift = [_term_slope(t, partial(texture_shift, t)) for t in terms]
+    shift = [_slope(t, texture_shift) for t in terms]
     # Cells of fiducials, one an edge, count on where those of wall end.
     number, at = 4 * edges.marker + edges.side, state.layout.marker
     rows = edge_rows(state, edges)
@@ -203,21 +202,17 @@ def _with_effects(
     )  # fmt: skip
 
 
-def _reading_shift(term: Term, travel: Travel, amplitude: Float) -> Float:
-    return term.model.reading_shift_mm(travel, *term.at(amplitude))
-
-
-def _ring_shift(term: Term, points: ImagePoints, amplitude: Float) -> Float:
-    return ring_shift_px(term.model, points, *term.at(amplitude))
-
-
-def _term_slope(term: Term, shift_of: Callable[[Float], Float]) -> Float:
+def _slope(term: Term, shift_of: Callable[[EffectModel, Shape, Float], Float]) -> Float:
     """Return (M, Q) derivatives of a shift by the term's amplitudes, where they are."""
+
+    def shift(amplitude: Float) -> Float:
+        return shift_of(term.model, *term.at(amplitude))
+
     out = []
     for k, amplitude in enumerate(term.amplitudes):
         step = np.zeros(len(term.amplitude))
         step[k] = 0.05 * amplitude.plausible
-        out.append((shift_of(term.amplitude + step) - shift_of(term.amplitude - step)) / (2 * step[k]))
+        out.append((shift(term.amplitude + step) - shift(term.amplitude - step)) / (2 * step[k]))
     return np.stack(out, -1)
 
 
@@ -233,7 +228,7 @@ def _encoder_part(
     by_pose[:, 2] = 1
     by_border = np.zeros((count, _without_edges(state).border_size))
     by_border[:, :ENCODER] = np.stack([-reading, -np.ones(count), travel.speed_mm_s], -1)
-    shift = [_term_slope(t, partial(_reading_shift, t, travel)) for t in terms]
+    shift = [_slope(t, lambda model, *at: model.reading_shift_mm(travel, *at)) for t in terms]
     by_global = np.concatenate([by_border, *[scale * s for s in shift]], 1)
     cell = -10_000_000 - np.arange(count) // _ENCODER_CELL
     # The weight is small: the encoder is examined separately, and a slip must not move the poses.

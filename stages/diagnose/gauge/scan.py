@@ -12,7 +12,7 @@ from pipeline.physics.effect import CourseKind
 from stages.diagnose.effects.base import EffectModel, Shape
 from stages.diagnose.gauge.fit import Fit, evidence, fit
 from stages.diagnose.gauge.run import GaugeRun, Term
-from stages.diagnose.inference import Around, Score, Stated, places_of, stated_belief
+from stages.diagnose.inference import Around, Score, Stated, places_of, places_of_all, stated_belief
 from stages.diagnose.result import Value
 
 # More shapes than this are first tried on a thinned run.
@@ -85,10 +85,7 @@ def _best(
     best: dict[str, Scored] = {}
     for part in _portions(asked):
         here = evidence(run, found, part, with_spread=with_spread)[0]
-        given = np.concatenate(
-            [np.zeros(0, np.int64), *[places_of(here, t.model, t.shape) for t in found.terms]]
-        ).astype(np.int64)
-        around = Around.of(here, stated, given)
+        around = Around.of(here, stated, places_of_all(here, [(t.model, t.shape) for t in found.terms]))
         for model, shape in part:
             result = around.score(places_of(here, model, shape))
             if result is None or not _some_size_is_possible(model, shape, result.amplitude):
@@ -200,9 +197,7 @@ def _gains(run: GaugeRun, found: Fit, place: int) -> tuple[Float, Float]:
     asked: list[tuple[EffectModel, tuple[float, ...]]] = [(term.model, (float(t),)) for t in time_s]
     about = evidence(run, reduced, asked, with_spread=False)[0]
     stated = stated_belief(found.state.stated)
-    given = [places_of(about, t.model, t.shape) for t in others]
-    free = np.concatenate([np.zeros(0, np.int64), *given]).astype(np.int64)
-    around = Around.of(about, stated, free)
+    around = Around.of(about, stated, places_of_all(about, [(t.model, t.shape) for t in others]))
     each = [around.score(places_of(about, m, s)) for m, s in asked]
     return time_s, np.array([0.0 if one is None else one.gain for one in each])
 
