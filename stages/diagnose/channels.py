@@ -117,7 +117,7 @@ class LineProfile:
     def limits(self) -> tuple[str, ...]:
         """Sentences on what it does not tell, and why."""
         if self.problem:
-            return (f"The line's profile tells nothing: {self.problem}.",)
+            return (f"The profile of the laser line was not examined: {self.problem}.",)
         return self.evidence.uncovered if self.evidence is not None else ()
 
     def known_light(self, without: Collection[str]) -> ProfileEvidence | None:
@@ -239,7 +239,7 @@ def examine_gauge(
         except UnusableError as error:
             problem = error.problem
     if problem:
-        missing += (f"Rings and fiducials of the gauge run tell nothing: {problem}.",)
+        missing += (f"Rings and fiducials of the gauge run were not examined: {problem}.",)
     return Seen(recording.name, geometry, travel, light, missing)
 
 
@@ -283,7 +283,7 @@ def _of_geometry(
     }
 
 
-LINE_PROFILE = Stage("line_profile", "2", Parameters, examine_line, "what the line's light says of effects")
+LINE_PROFILE = Stage("line_profile", "3", Parameters, examine_line, "what the line's light says of effects")
 FIDUCIALS = Stage(
     "fiducials", "1", GaugeParameters, measure_fiducials, "a gauge run's rings and fiducials", "gauge"
 )

@@ -33,8 +33,8 @@ _IN_PROFILE = Location(str(Channel.PROFILE), None, None)
 _UNKNOWN = "a cause that the library does not have, such as {}"
 _OF_ENCODER = "an error of the encoder that depends on distance or speed in another way"
 _AGAIN = (
-    "To see what the pattern goes with, record the gauge again: rolled by 90° (probe or gauge), at another "
-    "speed (time), after warming up (drift)."
+    "To see what the pattern depends on, record the gauge run again: with probe or gauge rolled by 90°, at "
+    "another speed, and after warming up."
 )
 _FORMAT = 1
 

@@ -140,8 +140,8 @@ def _by_correction(
 
 
 _NOT_CORRECTED = (
-    "The probe file is written as it was stated: with what was found put in, rings that had no say in it fit "
-    "worse."
+    "The probe file is written as it was stated: with what was found put in, rings that had no part in the "
+    "fit lie farther from where they are expected."
 )
 
 
@@ -163,15 +163,15 @@ def _without_scale(seen: Seen, unsaid: Sequence[str]) -> Seen:
         return seen
     kept = tuple(e for e in seen.travel.estimates if e.effect != "encoder_scale")
     words = (
-        f"The encoder's scale was not looked at in the inspection: a probe file has no place for "
-        f"{' and '.join(unsaid)}, so its motion was found with an instrument that is partly wrong."
+        f"The encoder's scale was not examined in the inspection: a probe file cannot express "
+        f"{' and '.join(unsaid)}, so that the motion was found with an instrument that is partly wrong."
     )
     travel = replace(seen.travel, estimates=kept)
     return replace(seen, travel=travel, shortcomings=(*seen.shortcomings, words))
 
 
 DIAGNOSIS = Stage(
-    "diagnosis", "18", DiagnosisParameters, diagnose,
+    "diagnosis", "19", DiagnosisParameters, diagnose,
     "what physics was left out, where it shows, and what bears it out",
 )  # fmt: skip
 _OF_FIELD = (PREMISES, RINGS, TRIANGULATE, LINE_PROFILE, FREE_MOTION, FIELD_EVIDENCE)

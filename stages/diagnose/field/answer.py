@@ -37,7 +37,7 @@ DETECTED = 1e-4
 # recording's own unknowns absorb nearly the same of each. Debt: data/debts.md.
 _ALMOST, _APART = 0.1, 20.0
 _SHOWN = 4
-_BY_FIELD = "The field, by itself, shows: "
+_BY_FIELD = "The inspection alone shows: "
 # The field confirms or contradicts only when its 1 σ is below this share of the effect's size.
 # Debt: data/debts.md.
 _TELLING = 0.33
@@ -72,7 +72,7 @@ class FieldAnswer:
     def next(self) -> str:
         """Return what to record: a gauge run, and what tells the members apart."""
         more = record_next([s.model.name for s in self.shown]) if self.shown else ""
-        return f"A gauge run with this probe: known bores, driven off-centre, rolled and reversed. {more}"
+        return f"A gauge run with this probe, off the axis of known bores, rolled, to and fro. {more}"
 
 
 def field_answer(found: FieldEvidence, library: Mapping[str, EffectModel], stated: Stated) -> FieldAnswer:
@@ -157,7 +157,7 @@ def _met(found: Diagnosis, met: Mapping[str, Confirmation | None]) -> Diagnosis:
     withdrawn = [e for e in effects if e.name in against]
     if found.verdict not in (Verdict.NAMED, Verdict.PARTLY) or not withdrawn:
         return found
-    note = "The field contradicts what the gauge run names: see the confirmations."
+    note = "The inspection contradicts what the gauge run names: see the second predictions of each effect."
     found = replace(found, identifiable="; ".join(e.statement for e in withdrawn), notes=(*found.notes, note))
     kept = tuple(e for e in effects if e.name not in against)
     return _beside(replace(found, effects=kept or effects), kept, classes_of([e.name for e in withdrawn]))
@@ -188,9 +188,9 @@ def _confirmed(effect: EffectFound, met: Confirmation | None) -> EffectFound:
 def _alone(found: Diagnosis, alone: FieldAnswer, field: FieldEvidence, with_gauge: bool) -> Diagnosis:
     """Return the class that the field alone shows, beside whatever other channels say."""
     note = (
-        "The gauge run shows nothing of it: it came or went in between, or does not act there."
+        "The gauge run shows none of it: it came or went between the recordings, or does not act in a gauge."
         if with_gauge
-        else "One pipe of unknown size gives a class of causes, not a name."
+        else "In one pipe of unknown size several causes look alike: it gives a class, not a name."
     )
     said = [text for text in (found.identifiable, _BY_FIELD + alone.identifiable) if text]
     certain = found.effects if found.verdict in (Verdict.NAMED, Verdict.PARTLY) else ()
@@ -231,8 +231,8 @@ def confirm_in_field(
     if own is None or np.sqrt(np.trace(own.covariance)) > _TELLING * size:
         return None
     return Confirmation(
-        f"in the field, from the gauge: {sized(model, shape, amplitude, covariance)}",
-        f"field alone: {sized(model, shape, own.amplitude, own.covariance)}",
+        f"in the inspection, by the gauge run: {sized(model, shape, amplitude, covariance)}",
+        f"inspection alone: {sized(model, shape, own.amplitude, own.covariance)}",
         same(amplitude, own.amplitude, own.covariance + covariance, size),
     )
 

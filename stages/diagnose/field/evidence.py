@@ -47,8 +47,8 @@ def _diameter(run: FieldRun) -> tuple[str, ...]:
     if abs(found / nominal - 1) < _DIAMETER_SHARE:
         return ()
     return (
-        f"The rings show a pipe of {found:.1f} mm, not of {nominal:.1f} mm as stated: either the statement "
-        "or the baseline or the lens is wrong, which a pipe of unknown size does not tell.",
+        f"The rings show a pipe of {found:.1f} mm, not of {nominal:.1f} mm as stated: the stated diameter, "
+        "the baseline or the lens is wrong; an inspection alone cannot tell which.",
     )  # fmt: skip
 
 
@@ -66,13 +66,13 @@ def _length(run: FieldRun) -> tuple[str, ...]:
     if lit < _FEWEST_LIT:
         return (
             f"Only {lit} pictures show the lit wall, where {_FEWEST_LIT} are needed to follow the probe: "
-            "drift and relief of the wall are not told from errors of the instrument.",
+            "drift and relief of the wall cannot be told from errors of the instrument.",
         )  # fmt: skip
     if way > _SHORTEST_MM:
         return ()
     return (
-        f"The probe travels only {way:.0f} mm: relief of the wall is not told from errors of the instrument, "
-        "nor drift from the pipe's own shape.",
+        f"The probe travels only {way:.0f} mm: relief of the wall cannot be told from errors of the "
+        "instrument, nor a drift of the instrument from the pipe's own shape.",
     )  # fmt: skip
 
 
@@ -82,8 +82,8 @@ def _texture(run: FieldRun) -> tuple[str, ...]:
     if lost < _LOST_SHARE:
         return ()
     return (
-        f"In {100 * lost:.0f} % of the lit frames there is too little texture: poses lean on the rings "
-        "there, which take up what tilt and decentring do.",
+        f"In {100 * lost:.0f} % of the lit frames there is too little texture: poses rest on the rings there "
+        "and follow what a tilted or decentred sheet does to these, so that it hardly shows.",
     )  # fmt: skip
 
 
@@ -93,22 +93,22 @@ def _sweep(run: FieldRun) -> tuple[str, ...]:
     across = float(np.sqrt(np.mean(np.var(T[:, :2, 3], axis=0))))
     if across < _LEAST_OFFSET_MM:
         out.append(
-            f"The probe moves across the pipe by only {across:.2f} mm (1 σ): a shifted image is hardly told "
-            "from a tilted or decentred sheet."
+            f"The probe moves across the pipe by only {across:.2f} mm (1 σ): a shifted image can hardly be "
+            "told from a tilted or decentred sheet."
         )
     roll = np.unwrap(np.arctan2(T[:, 1, 0], T[:, 0, 0]))
     if float(np.ptp(roll)) < _LEAST_ROLL_RAD:
         out.append(
-            f"The probe rolls by only {np.degrees(np.ptp(roll)):.1f}°: what has two waves around the ring is "
-            "not told from an oval pipe."
+            f"The probe rolls by only {np.degrees(np.ptp(roll)):.1f}°: an error with two waves around "
+            "the ring cannot be told from an oval pipe."
         )
     return tuple(out)
 
 
 def _one_bore() -> tuple[str, ...]:
     return (
-        "One pipe of unknown diameter does not tell cone, focal length, pupil and windows apart, and hides "
-        "the baseline but for encoder and texture.",
+        "In one pipe of unknown diameter, errors of cone, focal length, pupil and windows look alike, and an "
+        "error of the baseline shows only against encoder and texture.",
     )
 
 
@@ -144,13 +144,15 @@ class FieldEvidence:
 def nothing_said(recording: Recording, problem: str) -> FieldEvidence:
     """Return empty evidence of a recording whose motion rings and texture do not determine, and why."""
     lit = len(recording.frames.of(Illumination.LED, Illumination.BOTH))
-    why = problem or "its equations leave the motion open"
-    sentences = [f"The field recording tells nothing of the instrument by itself: {why}."]
+    why = problem or "they do not determine the motion"
+    sentences = [f"Rings and texture of the inspection say nothing about the instrument: {why}."]
     if not lit:
         sentences.append(
-            "No frame of the field shows the wall's texture, so nothing but the rings places the probe."
+            "No frame of the inspection shows the wall's texture, so that the rings alone place the probe."
         )
-    sentences.append("A pose that only the ring gives takes up what the sheet or the lens do to it.")
+    sentences.append(
+        "A pose that rests on the ring alone follows what the sheet or the lens do to the ring, and hides it."
+    )
     none = Evidence((), np.zeros((0, 0)), np.zeros(0), np.zeros((0, 0)), 0.0, np.zeros(0))
     return FieldEvidence(None, none, tuple(sentences))
 

@@ -42,7 +42,7 @@ def vignetting_finding(recording: Recording, probe: Probe) -> Finding:
     """
     frames = recording.frames.of(Illumination.LED)
     if recording.kind == "gauge" or len(frames) < 2 * _GROUPS:
-        return untestable("vignetting", "Needs lit frames of a pipe of one bore.")
+        return untestable("vignetting", "It takes lit frames of a pipe of one bore.")
     theta = np.radians(np.arange(_LOW_DEG, _HIGH_DEG, _STEP_DEG) + _STEP_DEG / 2)
     grey = _grey_by_theta(recording, probe, frames[:: max(1, len(frames) // _FRAMES)], theta)
     light = _log_light(probe, recording.pipe.nominal_diameter_mm / 2, theta)
@@ -175,7 +175,7 @@ def decentre_finding(geometry: LineGeometry, cells: Cells) -> Finding:
         test.z,
         test.p_value,
         (),
-        f"Brightness varies around the ring by ±{100 * size:.0f} %, most at {direction:.0f}° of the camera.",
+        f"Brightness varies around the ring by ±{100 * size:.0f} %, and is largest at {direction:.0f}°.",
     )
 
 
@@ -193,12 +193,12 @@ def clip_finding(profiles: LineProfiles, cells: Cells, geometry: LineGeometry) -
     clipped = float(np.mean(profiles.clipped[geometry.steady])) if geometry.steady.any() else 0.0
     # One cell in twenty (chosen): with less, the spill's slope rests on few frames.
     if clipped < 0.05 or not np.isfinite(fit.sigma[3]):
-        return untestable("saturation", f"{100 * clipped:.1f} % of the line clips: too little to test bloom.")
+        return untestable("saturation", f"{100 * clipped:.1f} % of the line is clipped: too little to test.")
     test = tested(float(fit.coefficient[3]), float(fit.sigma[3]), 2 * STRAY_FLOOR, fit.groups)
     return finding(
         "saturation", test.z, test.p_value, (),
-        f"{100 * clipped:.0f} % of the line clips; its foot is {100 * fit.coefficient[3]:+.2f} % higher "
-        "along the sensor's columns where it does.", alike=("gamma",),
+        f"{100 * clipped:.0f} % of the line is clipped; there its foot is {100 * fit.coefficient[3]:+.2f} % "
+        "of its height brighter along the sensor's columns than all round.", alike=("gamma",),
     )  # fmt: skip
 
 

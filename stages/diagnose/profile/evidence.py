@@ -115,8 +115,8 @@ class ProfileEvidence:
     def uncovered(self) -> tuple[str, ...]:
         """Sentences on how these pictures differ from all on which the tests' p-values were shown."""
         return tuple(
-            f"The {c.words} is {c.value:.3g} in {self.source}. The p-values of the line's profile were not "
-            f"shown on pictures like these: false alarms were counted from {c.low:.3g} to {c.high:.3g}."
+            f"The {c.words} is {c.value:.3g} in {self.source}. How often the line's profile raises "
+            f"false alarms is known from {c.low:.3g} to {c.high:.3g}: here no name rests on it by itself."
             for c in self.conditions
             if not c.covered
         )

@@ -152,7 +152,7 @@ def ghost_findings(cells: Cells, geometry: LineGeometry, probe: Probe) -> tuple[
     The bounced line also measures the sheet's tilt and cone, whatever the camera's errors are.
     """
     if cells.whole.sum() < _LEAST_CELLS:
-        why = "The line's middle is hardly ever seen unclipped: no fainter line can be compared with it."
+        why = "The line's middle is clipped almost everywhere: no fainter line can be compared with it."
         return untestable("ghost_ring", why), untestable("tube_ghost", why)
     found = responses(cells)
     ring, copy = bounced(found, cells, BOUNCED_FLOOR), copied(found, cells, COPIED_FLOOR)

@@ -87,7 +87,7 @@ def skew_findings(cells: Cells, geometry: LineGeometry, probe: Probe) -> tuple[F
     coefficient = cell_skewness(cells)
     mean = regress(np.ones((len(coefficient), 1)), coefficient, cells.block)
     if not np.isfinite(mean.sigma[0]):
-        why = "The line's middle clips or is not seen: its skewness cannot be told."
+        why = "The line's middle is clipped or not seen: its skewness cannot be measured."
         return untestable("line_skew", why), untestable("subsurface", why)
     hermite = float(mean.coefficient[0])
     test = tested(hermite, float(mean.sigma[0]), HERMITE_FLOOR, mean.groups)
@@ -155,17 +155,18 @@ def _judged(tail: _Tail, test: Tested) -> tuple[Finding, Finding]:
     """Return both findings; one that the widths rule out keeps p = 1."""
     z, p = test.z, test.p_value
     side = "outside" if tail.sign > 0 else "inside"
-    seen = f"The line has a longer tail on its {side}, {z:.1f} σ beyond compression."
+    seen = f"The line has a longer tail on its {side}, {z:.1f} σ beyond what compression leaves."
     width = tail.scale
     sheet_only, wall_only = tail.fits_sheet and not tail.fits_wall, tail.fits_wall and not tail.fits_sheet
     sheet = finding(
         "line_skew", z, 1.0 if wall_only else p, (tail.skewness,),
-        f"{seen} Skewness {tail.skewness.value:+.2f} of the sheet; variance {width:.2f} of the stated.",
+        f"{seen} The sheet's skewness would be {tail.skewness.value:+.2f}; the line's variance is "
+        f"{width:.2f} of the stated one.",
         alike=() if sheet_only else ("subsurface",),
     )  # fmt: skip
     wall = finding(
         "subsurface", z, 1.0 if sheet_only else p, (tail.transport,),
-        f"{seen} A tail {tail.tau_mm:.3f} mm long adds to it; variance {width:.2f} of the stated.",
+        f"{seen} It is {tail.tau_mm:.3f} mm long; the line's variance is {width:.2f} of the stated one.",
         alike=() if wall_only else ("line_skew",),
     )  # fmt: skip
     return sheet, wall

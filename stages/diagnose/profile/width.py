@@ -117,7 +117,7 @@ def locking_finding(rings: RingSamples, profiles: LineProfiles, cells: Cells) ->
     """
     rows = np.concatenate([profiles.row[b] for b in cells.frames]) if cells.frames else np.empty(0, int)
     if not len(rows):
-        return untestable("pixel_locking", "No steady frames.")
+        return untestable("pixel_locking", "The ring never keeps its size for long enough.")
     group = np.repeat(np.arange(len(cells.frames)), [len(b) for b in cells.frames])
     valid = rings.valid[rows]
     smooth = _smoothed(rings.radius_px[rows].astype(float), valid)
@@ -126,7 +126,7 @@ def locking_finding(rings: RingSamples, profiles: LineProfiles, cells: Cells) ->
     parts = [np.where(valid, f(phase) - _smoothed(f(phase), valid), np.nan) for f in (np.sin, np.cos)]
     fit = regress(np.stack(parts, axis=-1), rough, group)
     if not np.isfinite(fit.sigma[0]):
-        return untestable("pixel_locking", "The line keeps to one place of its pixels.")
+        return untestable("pixel_locking", "The line lies at the same fraction of a pixel everywhere.")
     size = float(np.hypot(*fit.coefficient))
     random = float(np.sqrt(np.trace(fit.covariance) / 2))
     test = tested(size, random, LOCKING_FLOOR_PX, fit.groups)
@@ -150,7 +150,7 @@ def pattern_finding(profiles: LineProfiles, image_size: tuple[int, int]) -> Find
     tiles = _tiles(image_size)
     fit = _in_common(rough, seen, tiles, 0)
     if fit is None:
-        return untestable("fixed_pattern", "The line does not come back to the same pixels.")
+        return untestable("fixed_pattern", "No pixels show the line in both halves of the frames.")
     variance = float(fit.coefficient[0]) * 1.5
     apart = [one for rows in _ROWS_APART if (one := _in_common(rough, seen, tiles, rows)) is not None]
     shared = max((abs(float(one.coefficient[0])) for one in apart), default=0.0)

@@ -169,8 +169,8 @@ def travel_evidence(
         return TravelEvidence(source, (), (), (), lines, None, missing)
     sight = _covered(sight, encoder)
     if len(sight.frame) < _LEAST_FRAMES:
-        missing = (*missing, f"The encoder of the {source} covers too few of its frames to be compared.")
-        return TravelEvidence(source, (), (), (), lines, None, missing)
+        few = f"The encoder of the {_in_words(source)} covers too few of its frames to be compared."
+        return TravelEvidence(source, (), (), (), lines, None, (*missing, few))
     fit = with_events(sight, encoder, tuple(without))
     steps = steps_found(fit, encoder)
     slips = tuple(s for s in steps if not s.rivals)
@@ -255,9 +255,9 @@ def _where(column: Float) -> tuple[int, int] | None:
 
 
 def _shortcomings(source: str, recording: Recording, sight: Sight) -> tuple[str, ...]:
-    out = []
+    out, source = [], _in_words(source)
     if recording.encoder is None:
-        out.append(f"The {source} has no encoder: its scale, slips, play and delay cannot be told.")
+        out.append(f"The {source} has no encoder, whose scale, slips, play and delay could be told.")
     if len(sight.frame) < _LEAST_FRAMES:
         out.append(
             f"Only {len(sight.frame)} frames of the {source} show where the camera is along the pipe: motion "
@@ -271,13 +271,17 @@ def _shortcomings(source: str, recording: Recording, sight: Sight) -> tuple[str,
     return tuple(out)
 
 
+def _in_words(source: str) -> str:
+    return source.replace("field", "inspection").replace("gauge", "gauge run")
+
+
 def _blind(estimates: Sequence[TravelEstimate], sight: Sight) -> tuple[str, ...]:
     """Return the effects that this motion does not determine, or determines only together."""
     out = []
     for e in estimates:
         if not np.isfinite(e.sigma):
             why = "" if sight.reverses or e.effect != "encoder_backlash" else ": the probe never turns back"
-            out.append(f"This motion tells nothing of {e.effect}{why}.")
+            out.append(f"The motion of the probe does not show {e.effect}{why}.")
         for other, correlation in e.alike:
-            out.append(f"This motion does not tell {e.effect} from {other} (correlation {correlation:+.2f}).")
+            out.append(f"In this motion {e.effect} and {other} look alike (correlation {correlation:+.2f}).")
     return tuple(out)
