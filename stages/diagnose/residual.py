@@ -74,7 +74,8 @@ class RingResidual:
         """R.m.s., px, of what rings do not repeat at one azimuth of the image on other wall; NaN: unknown.
 
         It is the share that pairs do not repeat of all that is there. Rings near an end, where texture places
-        the camera worst, are in fewer pairs.
+        the camera worst, are in fewer pairs. Not in it is where texture alone has the middle of a ring, which
+        errs slowly: 0.05 to 0.08 px in four sound inspections, where its σ is 0.09 to 0.11 px.
         """
         own = np.flatnonzero(self.usable)
         value, one_bore = self.residual_px[own], np.zeros(len(own), np.int64)
