@@ -46,6 +46,7 @@ from stages.twin.state import (
     Sampled,
     black_of_photo,
     clipped_line,
+    clipped_pixels,
     estimate_state,
     sample_frames,
 )
@@ -56,6 +57,8 @@ from stages.twin.worst import maps_of, worst_places
 _EVERY = 10
 _COLOURED = 3
 """Laser frames whose colours are looked at for clipping, which takes three times as long to decode."""
+_CLIPPED_FRAMES = 8
+"""Compared laser frames, at least, whose colours tell what leaks from clipped pixels."""
 _ROUNDS = 3
 """Times that texture is looked for where the round before has drawn it: the second finds a third of what the
 first did, the fourth hardly any."""
@@ -195,7 +198,11 @@ def compared_with(
     if frames.withheld is None:
         context.warn(_NONE_WITHHELD)
     light = dict(zip(frames.frame.tolist(), frames.illumination.tolist(), strict=True))
-    sums = Sums(scene, photometry.state, (*photometry.places, *photometry.blurred))
+    laser = [n for n in compared.tolist() if light[n] == Illumination.LASER]
+    step = max(len(laser) // _CLIPPED_FRAMES, 1) if photometry.state.line_clipped else len(laser) + 1
+    colour = recording.read(np.array(laser[step - 1 :: step], np.int64), "bgr")
+    places = (*photometry.places, *photometry.blurred)
+    sums = Sums(scene, photometry.state, places, clipped_pixels(colour))
     for done, (frame, image) in enumerate(recording.read(compared, "grey")):
         context.progress(done, len(compared))
         if image is not None:
@@ -280,7 +287,7 @@ PHOTOMETRY = Stage(
 )
 TWIN = Stage(
     "twin",
-    "29",
+    "30",
     TwinParameters,
     compare_with_twin,
     "recorded frames beside the same frames, re-rendered from what the run has measured",

@@ -55,10 +55,15 @@ def dead_led(samples: BlockSamples | None, scene: Scene) -> tuple[Suspected, ...
         return ()
     angles = seen_from(samples, scene)
     wide, narrow = (_Beside.harmonics(samples, *angles, k) for k in (1, 2))
-    tried = [_law_at(samples, scene, angles, k * 2 * np.pi / LED_AZIMUTHS) for k in range(LED_AZIMUTHS)]
-    law = max(tried, key=lambda one: wide.fall(one.log_light))
+    step = 2 * np.pi / LED_AZIMUTHS
+    law = max(
+        (_law_at(samples, scene, angles, k * step) for k in range(LED_AZIMUTHS)),
+        key=lambda one: wide.fall(one.log_light),
+    )
+    beside = [_law_at(samples, scene, angles, law.azimuth_rad + k * step / 2) for k in (-1, 1)]
+    law = max((law, *beside), key=lambda one: wide.fall(one.log_light))
     (size, sd), (alone, alone_sd) = (b.size(law.log_light) for b in (wide, narrow))
-    chance = LED_AZIMUTHS * float(2 * t.sf(alone / max(alone_sd, 1e-9), _PARTS - 1))
+    chance = 2 * LED_AZIMUTHS * float(2 * t.sf(alone / max(alone_sd, 1e-9), _PARTS - 1))
     lost = law.lost(size)
     lost_sd = float(np.hypot(law.lost(size + sd) - lost, _LOBE * lost))
     if chance > FALSE_ALARM or min(lost, alone) < max(_LEAST, _SURE * alone_sd):
@@ -66,7 +71,7 @@ def dead_led(samples: BlockSamples | None, scene: Scene) -> tuple[Suspected, ...
     if lost > _MOST + _SURE * lost_sd:
         return ()  # no LED loses more than it has
     where = half_turn(float(np.degrees(law.azimuth_rad)))
-    place = (NamedFigure("azimuth_deg", where, 180 / LED_AZIMUTHS, "deg"),)
+    place = (NamedFigure("azimuth_deg", where, 90 / LED_AZIMUTHS, "deg"),)
     figure, nan = (NamedFigure("lost", lost, lost_sd, "share of the light"),), float("nan")
     found = Mismatch(
         "led_dead", "intensity", "image", place, figure, chance, nan, nan,

@@ -233,6 +233,8 @@ def cannot_tell(state: PhotometricState) -> tuple[str, ...]:
         "off the noise, which a video codec changes: it is no proof of a response that is not linear.",
         "Lamps that are uneven in all frames, otherwise than by one dim LED, are told from wall that is "
         "paler on one side only as far as the probe rolls.",
+        "Frames that all move alike while they are exposed leave their blur in the wall's photo, too: motion "
+        "blur is told only of frames that are more blurred than the others.",
     ]
     if np.isnan(state.photo_black):
         said.append(
@@ -247,8 +249,7 @@ def cannot_tell(state: PhotometricState) -> tuple[str, ...]:
     if state.line_is_clipped:
         said.append(
             f"The line is clipped in {100 * state.line_clipped:.0f} % of its middle: whether the laser's "
-            "power changes over time or around the sheet cannot be told, nor whether charge leaks from "
-            "pixels of which one colour alone is clipped."
+            "power changes over time or around the sheet cannot be told."
         )
     if state.lamp is None:
         said.append("No lit frame could be used: nothing is known of lamps, vignetting and photon transfer.")

@@ -179,6 +179,11 @@ def clipped_line(scene: Scene, frames: Iterable[tuple[int, Byte | None]]) -> flo
     return float(np.median(found)) if found else 0.0
 
 
+def clipped_pixels(frames: Iterable[tuple[int, Byte | None]]) -> dict[int, Bool]:
+    """Return by number which pixels (H, W) of colour pictures (H, W, 3) have a channel at full scale."""
+    return {n: np.asarray((image >= _FULL_SCALE).any(-1)) for n, image in frames if image is not None}
+
+
 def black_of_photo(frames: Iterable[tuple[int, Byte | None]]) -> float:
     """Return the grey level of the darkest tenth of laser frames in colour, whose range the photo has.
 

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any
 
 import numpy as np
 
-from pipeline.arrays import Float32, Image, Int
+from pipeline.arrays import Bool, Float32, Image, Int
 from pipeline.artefacts.twin import Mismatch
 from pipeline.recording.base import Illumination, Recording
 from stages.twin.cells import Cells, CellsOfFrames, sectors_of
@@ -34,10 +34,17 @@ _MOST_STRAY = 8
 
 
 class Sums:
-    """What is kept of the compared frames: χ², blocks, places of dirt, and brightness in sectors."""
+    """What is kept of the compared frames: χ², blocks, places of dirt, and brightness in sectors.
 
-    def __init__(self, scene: Scene, state: PhotometricState, places: tuple[ImagePlace, ...]) -> None:
+    ``clipped`` holds, by number, which pixels (H, W) of some frames clip in one colour at least.
+    """
+
+    def __init__(
+        self, scene: Scene, state: PhotometricState, places: tuple[ImagePlace, ...],
+        clipped: Mapping[int, Bool] | None = None,
+    ) -> None:  # fmt: skip
         scene = replace(scene, outside=state.outside)
+        self._clipped = {} if clipped is None else clipped
         self._scene, self._state, self._light = scene, state, dict[int, Illumination]()
         self._renderer = Renderer(scene, state)
         self.comparison = Comparison()
@@ -56,7 +63,7 @@ class Sums:
         gain, aside = self._state.gain_map, self._state.aside
         bent = before.drawn_aside(aside)
         after = bent if gain is None else bent.brighter(gain, noise)
-        free = above < white
+        free = self._free(frame, above)
         if kind != Illumination.LASER:
             self.lit.add(frame, above, after, white, self._sector)
         if kind == Illumination.LASER:
@@ -81,6 +88,11 @@ class Sums:
             self.whole.add_laser(frame, above, after, free, lit)
         self.whole.add_clipped(frame, above, after, free)
         self.comparison.add(frame, kind, above, before, after, noise)
+
+    def _free(self, frame: int, above: Float32) -> Bool:
+        """Return which pixels (H, W) of a frame clip neither in grey nor in a colour, where that is known."""
+        free = np.asarray(above < self._state.noise.full_scale)
+        return free & ~self._clipped[frame] if frame in self._clipped else free
 
     def on_window(self, samples: BlockSamples | None) -> tuple[Mismatch, ...]:
         """Return what is on the window or the lens; places that frames do not bear out are withdrawn."""
@@ -157,7 +169,7 @@ class Sums:
             yield (
                 frame,
                 Shown(
-                    above, twin.brighter(exposure, noise), above < noise.full_scale,
+                    above, twin.brighter(exposure, noise), self._free(frame, above),
                     self._scene, partial(self._again, frame, exposure),
                     partial(self._renderer.frame, frame, Illumination.LED), self.whole.direction(frame),
                     frame,

@@ -184,7 +184,6 @@ def test_a_line_that_is_clipped_tells_nothing_of_the_laser_and_that_is_said():
         )
         assert Sums.cells(SimpleNamespace(_state=state, lit=cells, line=cells)) == ("some", seen)
         assert any("80 %" in said for said in cannot_tell(state)) == (seen is None)
-        assert any("charge leaks" in said for said in cannot_tell(state)) == (seen is None)
 
 
 def test_a_photo_that_holds_the_black_level_tells_no_response():
