@@ -141,7 +141,8 @@ def _write_mirrored(
     """Write first hit, second hit and direction between them (N, 9) of rays (N, 6) mirrored at the wall."""
     o, R, normal = room[0], room[1:4], room[4]
     for n in range(rays.shape[0]):
-        ray[:] = rays[n]
+        for k in range(6):  # a slice may overlap, and numba would make an array for it
+            ray[k] = rays[n, k]
         if not np.isfinite(ray.sum()) or not first_hit(surface, ray, s, _CLOSE_MM, o, R, hit):
             continue
         normal_at(surface, hit, R, normal)

@@ -82,6 +82,14 @@ def test_a_dead_led_takes_its_own_light_and_darkens_its_side():
     assert np.array_equal(renderer_of(truth).light(LASER), renderer_of(small_truth()).light(LASER))
 
 
+def test_a_ghost_ring_adds_light_beside_the_line():
+    """Its kernel did not compile, so that no recording could be given one."""
+    with_it, plain = (renderer_of(t).light(LASER) for t in (truth_with("ghost_ring", 0.1), small_truth()))
+    more = (with_it - plain).astype(float)
+    assert more.min() > -1e-5
+    assert 0.02 < more.sum() / plain.sum(dtype=float) < 0.3
+
+
 def test_a_blocked_sector_of_the_laser_has_its_place_and_width():
     truth = truth_with("laser_sector", 0.8, 60.0, 20.0)
     change, away = ratio(truth, LASER), azimuth_deg() - 60
