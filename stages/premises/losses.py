@@ -43,6 +43,8 @@ _ROUNDS = 2
 _MORE = 1.1
 # Errors of matching beyond whole periods are told from lost pictures where nine in ten are below this part of
 # a period: if they were anything, they would be spread evenly over half a period, and .45 would be the part.
+# A step that is so far from any number of lost pictures is no loss: a filter against noise holds the texture
+# back, and lets go of it.
 _TOLD_APART = 1 / 3
 
 
@@ -219,6 +221,7 @@ def _leaps(
         & (np.abs(excess) > sigmas * (np.maximum(error, by_speed) / _NINE_IN_TEN + 1e-9))
         & (lost != 0)
         & (error < _TOLD_APART * rhythm)
+        & ((over > 0) | (np.abs(excess - lost) < _TOLD_APART * np.maximum(np.abs(lost), rhythm)))
     )
     # Where most breaks of the rhythm are losses, the others are likely to be losses, too.
     breaks = (over > 0) & moves

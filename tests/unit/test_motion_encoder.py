@@ -1,14 +1,18 @@
 """An encoder is believed only where it covers the frames and the wall's texture does not contradict it."""
 
 from dataclasses import dataclass, replace
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
 
 from pipeline.recording.base import Encoder, FrameTable
+from stages.motion.bore import ONE_BORE
 from stages.motion.bundle_adjustment.encoder_scale import EncoderScale
 from stages.motion.encoder import EncoderReadings, contradicted, encoder_at_frames
 from stages.motion.tracking.landmarks import TrackedPoses
+from stages.motion.windows import first_window
 from tests.quiet import quiet_context
 
 RATE = 30.0
@@ -154,3 +158,19 @@ def test_texture_that_is_not_trusted_contradicts_no_encoder(scale: float) -> Non
     doubted = found.without_trust_in_texture()
     assert not doubted.contradicted
     assert doubted.sigma >= abs(scale - 1)
+
+
+@pytest.mark.parametrize(("lost", "doubted"), [(0, False), (4, False), (8, True), (19, True)])
+def test_texture_lost_in_many_pictures_speaks_against_no_encoder(
+    lost: int, doubted: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """By VP9 half of the pictures had no texture, the rest a way 4.8 % short: the encoder was thrown out."""
+    found = EncoderScale(0.99, 0.005, 0.002)
+    monkeypatch.setattr(first_window, "scale_of_encoder", lambda *_: found)
+    poses = TrackedPoses(np.arange(20), np.zeros((20, 4, 4)), np.arange(20, 0, -1) <= lost)
+    run = SimpleNamespace(bore=ONE_BORE, texture=SimpleNamespace(poses=poses))
+    first = SimpleNamespace(run=run, estimate=None, measured=None)
+    _, scale, unsure = first_window.with_scale(cast(Any, first), 0.001)
+    assert scale is not None
+    assert (scale.sigma > found.sigma) == doubted
+    assert unsure == (scale.sigma if doubted else 0.001)
