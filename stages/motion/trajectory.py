@@ -28,6 +28,8 @@ _TOO_FAR = 5.0
 """A right probe moves farther than so many σ along one of its ten or so directions once in 10⁵ recordings."""
 _MOST_LOST = 0.05
 """Share of the lit frames without enough texture that is told; good recordings have none. Not measured."""
+_RING = 72
+"""Places around the pipe of which its radius is taken, 5° apart, as a calibration's errors are elsewhere."""
 _FEWEST_CENTRES = 16
 """Rings of which the trembling of their centres is known, as that of poses is."""
 _MOST_LASTING = 0.57
@@ -98,15 +100,35 @@ def doubting_instrument(trajectory: Trajectory, probe: Probe, lasting: float, sh
     Where matches contradict the motion, they moved it by what they share: a lamp mirrored in a polished wall
     made radii 0.3 mm too large. Where the camera ``shakes`` or the probe does not fit, the picture may move
     in place of the probe: shaken by 2 px at random, it made radii 0.06 mm too small.
+    Distances are as unsure as the pipe's radius is by that: a wrong probe scales both alike.
     """
     if trajectory.instrument is None or trajectory.instrument_covariance is None:
         return trajectory
     moved = trajectory.instrument - probe.parameters
     if not (shakes or lasting > _MOST_LASTING or _farthest(moved, probe) > _TOO_FAR):
         return trajectory
+    wider = _wider_by(moved, probe, trajectory.radius_mm)
+    way = np.zeros((len(trajectory.T_pc), 6))
+    way[:, :3] = wider * (trajectory.T_pc[:, :3, 3] - trajectory.T_pc[0, :3, 3])
+    length_mm = float(np.ptp(distance_along(trajectory.axis, trajectory.T_pc)))
     return replace(
-        trajectory, instrument_covariance=trajectory.instrument_covariance + np.outer(moved, moved)
+        trajectory,
+        covariance=trajectory.covariance + way[:, :, None] * way[:, None, :],
+        distance_sigma_mm=float(np.hypot(trajectory.distance_sigma_mm, wider * length_mm)),
+        instrument_covariance=trajectory.instrument_covariance + np.outer(moved, moved),
     )
+
+
+def _wider_by(moved: Float, probe: Probe, radius_mm: float) -> float:
+    """Return by which share a pipe comes out wider with a probe whose parameters were moved so (P,)."""
+    psi = np.linspace(-np.pi, np.pi, _RING, endpoint=False)
+    ring = np.stack([radius_mm * np.cos(psi), radius_mm * np.sin(psi), 0 * psi + probe.laser.baseline_mm], -1)
+    uv, found = (
+        probe.camera.project(ring).uv,
+        probe.with_parameters(probe.parameters + moved, probe.covariance),
+    )
+    stated, with_it = (np.nanmean(np.linalg.norm(p.triangulate(uv)[:, :2], axis=1)) for p in (probe, found))
+    return float(with_it / stated - 1)
 
 
 def report_instrument(probe: Probe, trajectory: Trajectory, context: Context) -> None:

@@ -82,7 +82,7 @@ class Made:
     @property
     def texture(self) -> SimpleNamespace:
         """Texture that most frames show."""
-        return SimpleNamespace(poses=SimpleNamespace(mostly_lost=False))
+        return SimpleNamespace(poses=SimpleNamespace(mostly_lost=False, lost=np.zeros(2, bool)))
 
     def measured(self, window: Window, parameters: MotionParameters) -> Measurements:
         return replace(self.given.measured, encoder=self.encoder, probe=self.probe)

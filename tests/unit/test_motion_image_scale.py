@@ -243,3 +243,18 @@ def test_a_probe_moved_by_what_is_in_doubt_is_as_unsure_as_it_was_moved(
     found = doubting_instrument(got, run.probe, lasting, trembles).instrument_covariance
     assert found is not None
     np.testing.assert_allclose(found, 1e-4 * np.eye(len(moved)) + doubted * np.outer(moved, moved))
+
+
+def test_distances_are_as_unsure_as_the_pipe_is_wider_by_a_probe_in_doubt() -> None:
+    """A view that drifted by 3 px moved the probe by 12 σ: distances were off by 2.2 to 2.8 of their σ."""
+    run = drawn_run(0.9 * np.arange(4), np.zeros(4))
+    moved = np.zeros(len(run.probe.parameters))
+    moved[run.probe.parameter_names.index("baseline_mm")] = 0.01 * run.probe.laser.baseline_mm
+    plain = Trajectory(
+        np.arange(4), np.arange(4) / 30, run.T_pc, np.zeros((4, 6, 6)), straight_axis(-50.0, 150.0), RADIUS,
+        1, 0, 0, (), run.probe.parameters + moved, 1e-4 * np.eye(len(moved)),
+    )  # fmt: skip
+    sound = replace(plain, distance_sigma_mm=0.01)
+    doubted = doubting_instrument(sound, run.probe, 0.5, shakes=True)
+    assert doubted.distance_sigma_mm == pytest.approx(np.hypot(0.01, 0.01 * 2.7), rel=0.01)
+    assert np.sqrt(doubted.covariance[:, 2, 2]) == pytest.approx(0.01 * 0.9 * np.arange(4), abs=1e-4)
