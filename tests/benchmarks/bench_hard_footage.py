@@ -29,6 +29,7 @@ from tests.benchmarks.hard_files import (
     CODED,
     DAMAGED,
     EXCHANGED,
+    FILTERED,
     FROZEN,
     KINDS,
     LOST,
@@ -72,6 +73,8 @@ def make(kind: str, source: Path, folder: Path, frames: int, seed: int) -> None:
     random, video = np.random.default_rng(seed), folder / "frames.mkv"
     if kind in PAINTED or kind in FROZEN:
         repaint(folder, PAINTED.get(kind) or held_still(FROZEN[kind]), seed)
+    if kind in FILTERED:
+        repaint(folder, FILTERED[kind](), seed)
     if kind in EXCHANGED:
         repaint(folder, unspoilt, seed, taken=EXCHANGED[kind])
     if kind in LOST:

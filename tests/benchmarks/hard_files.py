@@ -1,8 +1,9 @@
 """Kinds of hard footage: pictures held, exchanged, lost or coded hastily, and other files changed.
 
-`FROZEN` are frames that all show the picture before them, `EXCHANGED` pictures in another's place, `LOST`
-which pictures are left when some are lost and the table of frames does not know, `CODED` codecs; one of
-`REWRITTEN` changes other files of the recording, one of `DAMAGED` the video's bytes.
+`FROZEN` are frames that all show the picture before them, `FILTERED` filters against noise, `EXCHANGED`
+pictures in another's place, `LOST` which pictures are left when some are lost and the table of frames does
+not know, `CODED` codecs; one of `REWRITTEN` changes other files of the recording, one of `DAMAGED`
+the video's bytes.
 """
 
 from __future__ import annotations
@@ -31,6 +32,23 @@ def held_still(frames: range) -> Paint:
         if k not in frames:
             shown[:] = [image]
         return shown[0]
+
+    return paint
+
+
+def filtered(keep: float, edges: float) -> Paint:
+    """Return a filter against noise that keeps a share of the picture before in the same light.
+
+    Where a picture differs by ``edges`` grey levels or more, less of it is kept.
+    """
+    shown: dict[bool, Image] = {}
+
+    def paint(image: Image, laser: bool, k: int, random: np.random.Generator) -> Image:
+        if laser in shown:
+            change = shown[laser] - image
+            image = image + keep * np.exp(-((change / edges) ** 2)) * change
+        shown[laser] = image
+        return image
 
     return paint
 
@@ -130,6 +148,8 @@ def _relabel(folder: Path, wrong_of: Callable[[int], NDArray[np.bool_]]) -> None
 
 # Frames whose pictures all are the one before the first of them.
 FROZEN = {"frozen-picture": range(90, 99), "frozen-second": range(60, 90)}
+# Filters against noise: one that mixes pictures by halves, and one that lets edges through.
+FILTERED = {"pictures-mixed": partial(filtered, 0.5, 1e4), "noise-filtered": partial(filtered, 0.75, 32.0)}
 REWRITTEN = {
     "half-size": half_size_probe, "late-stamps": late_stamps, "clock-jump": clock_jump,
     "labels-swapped": labels_swapped, "labels-wrong": labels_wrong,
@@ -151,10 +171,12 @@ _HEVC = {
         (30, "superfast"),
         (30, "ultrafast"),
         (32, "fast"),
+        (34, "veryfast"),
     )
 }
 CODED = {name: ("libx265", options) for name, options in _HEVC.items()} | {
-    "mpeg-2": ("mpeg2video", {"b": "1M"})
+    "mpeg-2": ("mpeg2video", {"b": "1M"}),
+    "vp9": ("libvpx-vp9", {"b": "500k", "deadline": "realtime", "cpu-used": "6"}),
 }
 # Pictures that change places, laser against led and led against led.
 _PAIRS = {
@@ -162,4 +184,4 @@ _PAIRS = {
     "lit-exchanged": [(k, k + 2) for k in (41, 77, 113)],
 }
 EXCHANGED = {n: {a: b for p in pairs for a, b in (p, p[::-1])} for n, pairs in _PAIRS.items()}
-KINDS = sorted({*PAINTED, *FROZEN, *EXCHANGED, *LOST, *REWRITTEN, *DAMAGED, *CODED})
+KINDS = sorted({*PAINTED, *FROZEN, *FILTERED, *EXCHANGED, *LOST, *REWRITTEN, *DAMAGED, *CODED})

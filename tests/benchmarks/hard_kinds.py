@@ -228,6 +228,29 @@ def half_size(image: Image, laser: bool, k: int, random: np.random.Generator) ->
     return np.asarray(cv2.resize(image, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA), np.float32)
 
 
+def enlarged(image: Image, laser: bool, k: int, random: np.random.Generator) -> Image:
+    """A careless export: made smaller to a fifth, which is coarser than the line, and enlarged again."""
+    small = cv2.resize(image, None, fx=0.2, fy=0.2, interpolation=cv2.INTER_AREA)
+    return np.asarray(cv2.resize(small, image.shape[1::-1], interpolation=cv2.INTER_CUBIC), np.float32)
+
+
+def sharpened(image: Image, laser: bool, k: int, random: np.random.Generator) -> Image:
+    """The camera sharpens: one and a half of what is finer than two pixels is added."""
+    return np.asarray(image + 1.5 * (image - cv2.GaussianBlur(image, (0, 0), 2)), np.float32)
+
+
+def white_balance_drifts(image: Image, laser: bool, k: int, random: np.random.Generator) -> Image:
+    """Red grows by 30 % over 170 frames, blue falls by as much."""
+    share = 0.3 * k / 170
+    return image * np.array([1 - share, 1, 1 + share], np.float32)
+
+
+def view_drifts(image: Image, laser: bool, k: int, random: np.random.Generator) -> Image:
+    """The camera comes loose: the picture moves aside by three pixels over 170 frames."""
+    move = np.float32([[1, 0, 3 * k / 170], [0, 1, 0]])
+    return np.asarray(cv2.warpAffine(image, move, image.shape[1::-1], flags=cv2.INTER_CUBIC), np.float32)
+
+
 def outside_first(image: Image, laser: bool, k: int, random: np.random.Generator) -> Image:
     """The first 24 pictures show a room: the probe is not in the pipe yet, its lamps and laser are on."""
     if k >= 24:
@@ -267,6 +290,7 @@ PAINTED: dict[str, Paint] = {
         hot_pixels, static_reflection, droplet, banding, interlaced, dim_sector, second_ring, sliding_drop,
         text_overlay, clock_and_logo, cable, debris, black_frames, fog, grey_camera, standing_water, shake,
         dark_edges, exposure_pumping, fouled_lens, greasy_half, lamp_out, laser_flicker, mirrored, half_size,
-        scale_shrinks, scale_grows, scale_settles, outside_first,
+        scale_shrinks, scale_grows, scale_settles, outside_first, enlarged, sharpened,
+        white_balance_drifts, view_drifts,
     )
 }  # fmt: skip
