@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from pipeline.adjustment.robust import robust_spreads
 from stages.diagnose.diagnose import SheetByRings, against_rings
 from stages.diagnose.profile.cells import Cells
 from stages.diagnose.profile.finding import FOUND_P, FOUND_Z, Size, finding
 from stages.diagnose.profile.ghost import bounced
-from stages.diagnose.profile.matched_filter import responses
+from stages.diagnose.profile.matched_filter import NOISE_FLOOR, responses
 
 BLOCKS, SECTORS, WIDTH_PX = 10, 72, 1.4
 OFFSET = np.arange(-59.75, 60.0, 0.5)
@@ -91,3 +94,34 @@ def test_rings_contradict_a_second_line(seen):
     told = against_rings(ghost(0.3, 0.5, 0.0), rings(*seen))
     assert told is not None
     assert not told.confirmation.agrees
+
+
+def plainly_matched(cells: Cells, row: int, distance_px: np.ndarray) -> np.ndarray:
+    """Return scores (D,) of one cell by least squares of whole arrays, the kernel's reference."""
+    noise = np.hypot(robust_spreads(cells.rest - np.median(cells.rest, axis=0), axis=0), NOISE_FLOOR)
+    x = (OFFSET - cells.centre_px[row]) / cells.width_px[row]
+    near = np.abs(x) < 3.5
+    basis = np.exp(-0.5 * x**2) * near * np.stack([np.ones_like(x), x, x**2])
+    out = []
+    for d in distance_px:
+        ghost = np.exp(-0.5 * ((OFFSET - cells.centre_px[row] - d) / cells.width_px[row]) ** 2)
+        template = ghost - np.linalg.lstsq(basis[:, near].T, ghost[near])[0] @ basis
+        weighted = template / noise**2
+        out.append((weighted @ cells.rest[row], weighted @ template))
+    return np.array(out).T
+
+
+def test_the_matched_filter_is_that_of_plain_least_squares():
+    drawn = cells(0.03, 0.002, 3)
+    drawn = replace(drawn, centre_px=np.linspace(-0.7, 0.7, len(drawn.rest)))
+    found = responses(drawn)
+    for row in (0, 301, len(drawn.rest) - 1):
+        score, information = plainly_matched(drawn, row, found.distance_px)
+        seen = information > 1e-6 * information.max()
+        np.testing.assert_allclose(
+            found.information[row], information, rtol=1e-8, atol=1e-9 * information.max()
+        )
+        opposite = (score / information)[::-1] * information
+        np.testing.assert_allclose(
+            found.score[row][seen], (score - opposite)[seen], rtol=1e-6, atol=1e-8 * np.abs(score).max()
+        )

@@ -14,6 +14,8 @@ from stages.diagnose.profile.cells import Cells
 REACH_PX, STEP_PX = 45.0, 0.5
 # Beyond so many widths a Gaussian is below 0.3 %, and is left out.
 _REACH_WIDTHS = 3.5
+# Beyond so many a Gaussian of height 1 is below the rounding of 1: exp(−8.6² / 2) = 9e-17.
+_NOTHING_WIDTHS = 8.6
 # Least noise of a bin, as a part of the line's height; chosen, not measured (data/debts.md).
 NOISE_FLOOR = 3e-4
 
@@ -61,7 +63,7 @@ def responses(cells: Cells) -> Responses:
 @numba.njit(cache=True, nogil=True)
 def _match(rest, offset, centre, width, weight, distance, score, information):  # type: ignore[no-untyped-def]
     bins = offset.size
-    basis, cross = np.zeros((3, bins)), np.zeros(3)
+    basis, cross, ghost = np.zeros((3, bins)), np.zeros(3), np.zeros(bins)
     gram = np.zeros((3, 3))
     for n in range(rest.shape[0]):
         for b in range(bins):
@@ -73,15 +75,25 @@ def _match(rest, offset, centre, width, weight, distance, score, information):  
                 gram[i, j] = np.sum(basis[i] * basis[j])
         inverse = np.linalg.inv(gram)
         for d in range(distance.size):
-            ghost = np.exp(-0.5 * ((offset - centre[n] - distance[d]) / width[n]) ** 2)
-            inside = np.abs(offset - centre[n]) < _REACH_WIDTHS * width[n]
-            for i in range(3):
-                cross[i] = np.sum(basis[i] * ghost * inside)
+            _draw_ghost(offset, centre[n] + distance[d], width[n], basis, ghost, cross)
             taken = inverse @ cross
             for b in range(bins):
+                if (ghost[b] == 0.0 and basis[0, b] == 0.0) or np.isnan(rest[n, b]):
+                    continue
                 template = ghost[b]
                 for i in range(3):
                     template -= taken[i] * basis[i, b]
-                if not np.isnan(rest[n, b]):
-                    score[n, d] += weight[b] * template * rest[n, b]
-                    information[n, d] += weight[b] * template * template
+                score[n, d] += weight[b] * template * rest[n, b]
+                information[n, d] += weight[b] * template * template
+
+
+@numba.njit(cache=True, nogil=True)
+def _draw_ghost(offset, centre, width, basis, ghost, cross):  # type: ignore[no-untyped-def]
+    """Write a Gaussian of height 1 at the bins (B,), and its products with the basis (3, B) summed."""
+    cross[:] = 0.0
+    for b in range(offset.size):
+        x = (offset[b] - centre) / width
+        ghost[b] = np.exp(-0.5 * x**2) if abs(x) < _NOTHING_WIDTHS else 0.0
+        if ghost[b] != 0.0 and basis[0, b] != 0.0:
+            for i in range(3):
+                cross[i] += basis[i, b] * ghost[b]
