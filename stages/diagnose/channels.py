@@ -25,8 +25,7 @@ from stages.diagnose.field.run import FieldRun, field_run
 from stages.diagnose.gauge.examine import Examined, examine
 from stages.diagnose.profile.evidence import ProfileEvidence, profile_evidence
 from stages.diagnose.travel.evidence import TravelEvidence, travel_evidence
-from stages.diagnose.travel.left_over import PLACED_SIGMA_MM
-from stages.diagnose.travel.sight import sight_of_poses
+from stages.diagnose.travel.sight import PLACED_SIGMA_MM, sight_of_poses
 from stages.motion import EncoderReadings, Equations, Measurements, MotionParameters, State
 
 _MOST_OF_RING = 0.5

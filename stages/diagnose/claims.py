@@ -168,8 +168,9 @@ def _every(seen: Seen, exposure: Exposure) -> Iterable[Claim]:
     if seen.profile is not None:
         for f in seen.profile.found:
             claim = _of_finding(f, seen.profile, seen.name)
-            if f.effect == "motion_blur" and f.sizes and not exposure.has_time(seen, f.sizes[0]):
-                words = exposure.said(seen, f.sizes[0], claim.statement)
+            too_long = exposure.too_long(seen, f)
+            if too_long:
+                words = claim.statement.rstrip(".") + too_long
                 claim = replace(claim, beside=claim.beside + 1, statement=words)
             yield claim
 
@@ -181,7 +182,7 @@ def _of_estimate(e: TravelEstimate, travel: TravelEvidence, exposure: Exposure) 
     fixed_to, time = places.pop() if len(places) == 1 else None, times.pop() if len(times) == 1 else None
     # Stray pictures are as likely as a slip where a step is in doubt.
     beside = bool(travel.unsettled) + (travel.unexplained is not None)
-    beside += e.effect == "time_offset" and exposure.doubted
+    beside += exposure.leaves_open(e)
     return Claim(
         e.effect, {e.quantity: Value(e.value, e.size_sigma)}, e.statement, e.p_value, alike, travel.source,
         stretch(travel, e.where, fixed_to, time), e.agreements,

@@ -47,13 +47,12 @@ class Exposure:
         told = (f for p in profiles for f in p.findings if f.effect == _EXPOSURE and f.sizes)
         return cls(stated_s, tuple(told))
 
-    @property
-    def doubted(self) -> bool:
-        """Whether a width shows a longer exposure that nothing bears out: what it adds is open then."""
+    def leaves_open(self, found: TravelEstimate) -> bool:
+        """Return whether it is a delay of which a width, which nothing bears out, makes an unsure part."""
         shown = next((f for f in self.widths if f.found), None)
-        return shown is not None and not (
-            shown.agreements and all(a.confirmation.agrees for a in shown.agreements)
-        )
+        if found.effect != _DELAY or shown is None:
+            return False
+        return not (shown.agreements and all(a.confirmation.agrees for a in shown.agreements))
 
     def taken_off(self, seen: Seen | None) -> Seen | None:
         """Return a recording with the delay that is the encoder's own, if the width shows an exposure."""
@@ -75,13 +74,13 @@ class Exposure:
         left_s = seen.travel.fit.sight.frame_time_s - self.stated_s
         return longer.value - _SURE * longer.sigma < left_s
 
-    def said(self, seen: Seen, longer: Size, statement: str) -> str:
-        """Return what is said of an exposure, and that no picture has time for it where none has."""
+    def too_long(self, seen: Seen, found: Finding) -> str:
+        """Return what is said of an exposure that no picture has time for; nothing of any other finding."""
         fit = seen.travel.fit if seen.travel is not None else None
-        if fit is None or self.has_time(seen, longer):
-            return statement
+        if found.effect != _EXPOSURE or not found.sizes or fit is None or self.has_time(seen, found.sizes[0]):
+            return ""
         apart = f"{1e3 * fit.sight.frame_time_s:.1f} ms"
-        return f"{statement.rstrip('.')}, for which no picture has time: the next begins after {apart}."
+        return f", for which no picture has time: the next begins after {apart}."
 
     def alike(self, found: TravelEstimate, travel: TravelEvidence) -> tuple[str, ...]:
         """Return ``motion_blur`` where a longer exposure may be what makes an encoder's readings seem late.

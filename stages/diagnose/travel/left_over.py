@@ -9,12 +9,20 @@ import numpy as np
 from scipy.stats import norm
 
 from stages.diagnose.travel.events import SLIP, chance, is_found
-from stages.diagnose.travel.model import EventKind, TravelFit, chance_of_noise
-from stages.diagnose.travel.solve import DELAY, FAR_BETTER, OFFSET, PLAY, SMOOTH, DriftNoise, Whitened
+from stages.diagnose.travel.model import EventKind, TravelFit
+from stages.diagnose.travel.sight import PLACED_SIGMA_MM
+from stages.diagnose.travel.solve import (
+    DELAY,
+    FAR_BETTER,
+    OFFSET,
+    PLAY,
+    SMOOTH,
+    DriftNoise,
+    Whitened,
+    chance_of_noise,
+)
 from stages.diagnose.travel.steps import StepFound, or_else
 
-# 1 σ of a picture's place by fiducials, which may be put there wrongly. Debt: data/debts.md.
-PLACED_SIGMA_MM = 0.05
 # What is left of the reading is noise unless its chance is below this. Debt: data/debts.md.
 _NOISE = 1e-6
 # A stretch whose information is less than this share of the most says nothing.

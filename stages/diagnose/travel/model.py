@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
-from scipy.stats import f as fisher
 
 from pipeline.arrays import Bool, Float, Int
 from pipeline.pages import notation
@@ -26,6 +25,7 @@ from stages.diagnose.travel.solve import (
     Asked,
     DriftNoise,
     Whitened,
+    chance_of_noise,
     estimated_noise,
     nearest_start,
     refined,
@@ -172,14 +172,6 @@ def fitted(
         sight, events, values, covariance, noise, plain - np.median(plain), whitened, end.columns, told_apart,
         without,
     )  # fmt: skip
-
-
-def chance_of_noise(left_over: float, free: int, pictures: int) -> float:
-    """Return the chance that noise leaves so much χ² for each of its ``free`` degrees of freedom (F test).
-
-    The noise itself is measured by medians, which tell it as well as a third of the pictures would.
-    """
-    return float(fisher.sf(left_over, max(free, 1), max(pictures / 3, 1.0)))
 
 
 def _left_over(whitened: Whitened, fitted_values: int) -> float:

@@ -13,6 +13,8 @@ from pipeline.recording.base import Encoder, Illumination, Recording
 from stages.diagnose.effects.base import Travel
 from stages.diagnose.effects.library import LIBRARY
 
+# 1 σ of a picture's place by fiducials, which may be put there wrongly. Debt: data/debts.md.
+PLACED_SIGMA_MM = 0.05
 _END_READINGS = 20
 _ROUNDING_MM, _WHOLE = 2e-4, 0.02
 

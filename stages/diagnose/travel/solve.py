@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
+from scipy.stats import f as fisher
 
 from pipeline.adjustment.robust import spread_about_median
 from pipeline.arrays import Float, Int
@@ -255,3 +256,11 @@ def whitened_fit(difference_mm: Float, columns: Float, covariance: Float) -> Whi
     projector = cho_solve(factor, np.eye(len(residual))) - weighted_columns @ inverse @ weighted_columns.T
     inverse[hidden, hidden] = np.inf
     return Whitened(estimate, inverse, residual, cho_solve(factor, residual), projector)
+
+
+def chance_of_noise(left_over: float, free: int, pictures: int) -> float:
+    """Return the chance that noise leaves so much χ² for each of its ``free`` degrees of freedom (F test).
+
+    The noise itself is measured by medians, which tell it as well as a third of the pictures would.
+    """
+    return float(fisher.sf(left_over, max(free, 1), max(pictures / 3, 1.0)))
