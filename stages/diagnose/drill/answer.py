@@ -15,19 +15,19 @@ Verdict = Literal["consistent", "named", "partly", "class", "unexplained", "not_
 Number = Annotated[float, BeforeValidator(lambda v: float("nan") if v is None else v)]
 
 
-class Value(BaseModel):
-    """A number and its 1 σ; NaN where it is not known."""
+class _Read(BaseModel):
+    model_config = ConfigDict(frozen=True, populate_by_name=True)
 
-    model_config = ConfigDict(frozen=True)
+
+class Value(_Read):
+    """A number and its 1 σ; NaN where it is not known."""
 
     value: Number
     sd: Number
 
 
-class NamedEffect(BaseModel):
+class NamedEffect(_Read):
     """One effect that a diagnosis names; ``course`` is None for one that is constant."""
-
-    model_config = ConfigDict(frozen=True)
 
     name: str
     probability: float = Field(ge=0, le=1)
@@ -36,20 +36,16 @@ class NamedEffect(BaseModel):
     course: dict[str, Any] | None = None
 
 
-class Location(BaseModel):
+class Location(_Read):
     """Where a diagnosis says the mismatch is."""
-
-    model_config = ConfigDict(frozen=True)
 
     channel: str = ""
     fixed_to: str = ""
     time: str = ""
 
 
-class Fit(BaseModel):
+class Fit(_Read):
     """Residuals before and after the diagnosis' model; NaN where they are not known."""
-
-    model_config = ConfigDict(frozen=True)
 
     rms_before: Number
     rms_after: Number
@@ -58,7 +54,7 @@ class Fit(BaseModel):
     noise_floor: Number
 
 
-class Feasibility(BaseModel):
+class Feasibility(_Read):
     """What a diagnosis says beforehand that the recording could show of one effect.
 
     Attributes
@@ -69,23 +65,19 @@ class Feasibility(BaseModel):
         Share of its information that is left when its closest rival is free.
     """
 
-    model_config = ConfigDict(frozen=True)
-
     name: str
     detectable: float | None
     left: float | None = 1.0
 
 
-class Remainder(BaseModel):
+class Remainder(_Read):
     """What a diagnosis leaves beside effects that are sure: a class, or what nothing explains."""
-
-    model_config = ConfigDict(frozen=True, populate_by_name=True)
 
     verdict: Literal["class", "unexplained"]
     members: tuple[str, ...] = Field((), alias="class")
 
 
-class Answer(BaseModel):
+class Answer(_Read):
     """What is read of a diagnosis.json; further keys are left alone.
 
     Attributes
@@ -106,8 +98,6 @@ class Answer(BaseModel):
         What to record to tell more; empty where nothing is asked for.
     """
 
-    model_config = ConfigDict(frozen=True, populate_by_name=True)
-
     verdict: Verdict
     global_p: float | None = None
     location: Location | None = None
@@ -119,10 +109,8 @@ class Answer(BaseModel):
     record_next: str = ""
 
 
-class Concealed(BaseModel):
+class Concealed(_Read):
     """An effect that a recording conceals: its name and its numbers in the catalogue's order."""
-
-    model_config = ConfigDict(frozen=True)
 
     name: str
     values: tuple[float, ...]

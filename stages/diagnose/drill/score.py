@@ -60,8 +60,9 @@ class Trial:
         """
         if not self.concealed:
             return False
-        likes = [_left_of(c.name, self.answer) for c in self.concealed]
-        return self.snr is not None and all(self.snr * np.sqrt(left) >= _STANDS_OUT for left in likes)
+        told = {f.name: f.left for f in self.answer.feasibility if f.left is not None}
+        left = (told.get(c.name, 1.0) for c in self.concealed)
+        return self.snr is not None and all(self.snr * np.sqrt(share) >= _STANDS_OUT for share in left)
 
     @property
     def truth(self) -> frozenset[str]:
@@ -278,10 +279,6 @@ def calibration(trials: Iterable[Trial]) -> list[tuple[float, Rate]]:
 def _feasible_snr(concealed: Concealed, answer: Answer) -> float | None:
     least = next((f.detectable for f in answer.feasibility if f.name == concealed.name), None)
     return _STANDS_OUT * abs(concealed.values[0]) / least if least and concealed.values else None
-
-
-def _left_of(name: str, answer: Answer) -> float:
-    return next((f.left for f in answer.feasibility if f.name == name and f.left is not None), 1.0)
 
 
 def _located(trial: Trial, what: str) -> bool:
