@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+from pipeline.arrays import Float
 from pipeline.errors import InputError
 from pipeline.recording.base import Encoder, FrameTable, Illumination, Imu
 from pipeline.recording.checks import refuse_backward
@@ -67,16 +68,7 @@ def read_encoder(file: Path) -> Encoder:
 
 def encoder_readings(file: Path, text: str) -> Encoder:
     """Return the readings that ``text`` of a file holds; raises as `read_encoder`."""
-    rows = [
-        (_finite(file, line, "time_s", time), _finite(file, line, "distance_mm", distance))
-        for line, (time, distance) in _rows(file, text, ENCODER_COLUMNS)
-    ]
-    if len(rows) < 2:
-        raise InputError(
-            file, f"has {len(rows)} readings", expected="at least 2",
-            hint="take the key encoder out of recording.yaml to run without one",
-        )  # fmt: skip
-    table = np.array(rows)
+    table = _readings(file, text, ENCODER_COLUMNS, "encoder")
     refuse_backward(file, table[:, 0].tolist(), "time_s", strictly=False)
     return Encoder(table[:, 0], table[:, 1])
 
@@ -94,20 +86,25 @@ def read_imu(file: Path) -> Imu:
 
 def imu_readings(file: Path, text: str) -> Imu:
     """Return the readings that ``text`` of a file holds; raises as `read_imu`."""
-    rows = [
-        [_finite(file, line, name, cell) for name, cell in zip(IMU_COLUMNS, cells, strict=True)]
-        for line, cells in _rows(file, text, IMU_COLUMNS)
-    ]
-    if len(rows) < 2:
-        raise InputError(
-            file, f"has {len(rows)} readings", expected="at least 2",
-            hint="take the key imu out of recording.yaml to run without one",
-        )  # fmt: skip
-    table = np.array(rows)
+    table = _readings(file, text, IMU_COLUMNS, "imu")
     refuse_backward(file, table[:, 0].tolist(), "time_s", strictly=True)
     imu = Imu(table[:, 0], table[:, 1:4], table[:, 4:])
     refuse_other_units(file, imu)
     return imu
+
+
+def _readings(file: Path, text: str, columns: Sequence[str], key: str) -> Float:
+    """Return the numbers (N, K) of a table that a recording names by ``key``, at least two lines of them."""
+    rows = [
+        [_finite(file, line, name, cell) for name, cell in zip(columns, cells, strict=True)]
+        for line, cells in _rows(file, text, columns)
+    ]
+    if len(rows) < 2:
+        raise InputError(
+            file, f"has {len(rows)} readings", expected="at least 2",
+            hint=f"take the key {key} out of recording.yaml to run without one",
+        )  # fmt: skip
+    return np.array(rows)
 
 
 def refuse_other_units(file: Path, imu: Imu) -> None:
@@ -166,7 +163,9 @@ def _column(file: Path, header: list[str], name: str) -> int:
     parted_by = next((word for mark, word in _OTHER_SEPARATORS.items() if mark in first), "")
     hint = f"is {near[0]} meant?" if near else f"add the column; the first line is {first[:80]!r}"
     if parted_by:
-        hint = f"columns are parted by {parted_by}: save the file with commas between, and points in decimals"
+        hint = (
+            f"columns are separated by {parted_by}: save the file with commas between, and points in decimals"
+        )
     raise InputError(
         file, f"has no column {name}", place="line 1", expected="a first line that names the columns",
         hint=hint,

@@ -200,14 +200,11 @@ def rings_against_texture(
     by_pixel = run.probe.triangulate_jacobian(points.uv)[0]
     mm_per_px = np.einsum("mi,mij,mj->m", points.normal_c, by_pixel, points.outward)
     frame, weight = run.recording.frames.frame[run.measured.rings.frame], run.equations.rings.weight
-    usable = (weight > _OUTLIER * np.median(weight)) & _between_lit(run, frame)
+    usable = weight > _OUTLIER * np.median(weight)
+    lit = run.recording.frames.of(Illumination.LED, Illumination.BOTH)
+    usable &= (frame >= lit[0]) & (frame <= lit[-1])
     residual = residual - np.mean(residual[usable])
     return RingResidual(
         "field", frame, points.azimuth_rad, points.azimuth_p_rad, points.distance_mm, points.uv,
         residual, residual / mm_per_px, usable,
     )  # fmt: skip
-
-
-def _between_lit(run: FieldRun, frame: Int) -> Bool:
-    lit = run.recording.frames.of(Illumination.LED, Illumination.BOTH)
-    return np.asarray((frame >= lit[0]) & (frame <= lit[-1]))

@@ -29,11 +29,6 @@ def classes_of(names: Sequence[str]) -> tuple[str, ...]:
     return tuple(name for name in EFFECTS if name in members)
 
 
-def alike(first: str, second: str) -> bool:
-    """Return whether two effects share a class or the catalogue calls one like the other."""
-    return second in class_of(first) or second in effect(first).alike or first in effect(second).alike
-
-
 def record_next(names: Sequence[str]) -> str:
     """Return a sentence on what to record so that these effects can be told apart, or one confirmed."""
     wanted = _without_repeats([part for name in names for part in _recordings(effect(name).told_apart_by)])

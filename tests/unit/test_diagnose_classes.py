@@ -3,7 +3,7 @@
 import pytest
 
 from pipeline.physics.catalogue import CLASSES, EFFECTS
-from stages.diagnose.result import Diagnosis, Verdict, alike, class_of, classes_of, record_next
+from stages.diagnose.result import Diagnosis, Verdict, class_of, classes_of, record_next
 
 
 @pytest.mark.parametrize("name", EFFECTS)
@@ -16,12 +16,6 @@ def test_classes_join_in_the_catalogues_order():
     joined = classes_of(["principal_point", "laser_cone"])
     assert set(joined) == {*CLASSES[0], *CLASSES[2]}
     assert list(joined) == [name for name in EFFECTS if name in joined]
-
-
-def test_likeness_goes_both_ways():
-    assert alike("laser_rocking", "probe_vibration")
-    assert alike("probe_vibration", "laser_rocking")
-    assert not alike("laser_tilt", "laser_cone")
 
 
 def test_what_to_record_next_names_each_recording_once():

@@ -222,7 +222,7 @@ SPOILED = {
     ),
     "video missing": ("recording.yaml", "video: 'frames.mkv'", "video: x.mkv", r"x.mkv: is missing, yet"),
     "no columns": ("frames.csv", "frame,time_s,illumination\n", "", r"line 1: has no column frame"),
-    "semicolons": ("encoder.csv", "time_s,distance_mm", "time_s;distance_mm", r"parted by semicolons: save"),
+    "semicolons": ("encoder.csv", "time_s,distance_mm", "time_s;distance_mm", "separated by semicolons"),
     "mistyped column": ("frames.csv", "illumination", "ilumination", r"is ilumination meant"),
     "table empty": ("frames.csv", None, "", r"has no column frame"),
     "frames past the end": ("frames.csv", None, "frame,time_s,illumination\n16,0.1,led\n", r"only 16 images"),

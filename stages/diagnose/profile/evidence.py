@@ -50,12 +50,11 @@ def with_halves(findings: tuple[Finding, ...], tests: Sequence[Test], cells: Cel
     middle = count // 2
     if middle < _LEAST_BLOCKS_OF_HALF:
         return findings
-    halves = [_of_half(cells.of_blocks(*ends), tests) for ends in ((0, middle), (middle, count))]
+    halves = [
+        {f.effect: f for test in tests for f in test(half)}
+        for half in (cells.of_blocks(0, middle), cells.of_blocks(middle, count))
+    ]
     return tuple(replace(f, agreements=_halves_agree(f, *halves)) if f.found else f for f in findings)
-
-
-def _of_half(half: Cells, tests: Sequence[Test]) -> dict[str, Finding]:
-    return {f.effect: f for test in tests for f in test(half)}
 
 
 def _halves_agree(

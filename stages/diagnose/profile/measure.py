@@ -170,7 +170,7 @@ def measure_profiles(recording: Recording, rings: RingSamples) -> LineProfiles:
         tiles.append(_tile_means(image))
         line, width = _line(rings, rows[k])
         slope = (np.roll(line, -_SLOPE_SECTORS) - np.roll(line, _SLOPE_SECTORS)) / (2 * _SLOPE_SECTORS * step)
-        beside[k] = _far_level(image, sectors, line)
+        beside[k] = float(image.ravel()[sectors.pixels_near(line, 40.0, REACH_PX)].mean())
         stack_frame(
             image.ravel(), sectors.start, sectors.pixel, sectors.radius_px, sectors.offset_rad, line, slope,
             width, rings.valid[rows[k]], beside[k], trusted, FIT_WIDTHS, CORE_WIDTHS, REACH_PX, STEP_PX,
@@ -214,10 +214,6 @@ def _dark_level(tiles: list[Float32]) -> tuple[float, float]:
     dark = float(np.percentile(mean, _DARK_PERCENT))
     darkest = stack[:, mean <= np.median(mean)]
     return dark, float(-norm.ppf(_DARK_PERCENT / 100) * np.median(darkest.std(0)))
-
-
-def _far_level(image: Image, sectors: Sectors, line: Float) -> float:
-    return float(image.ravel()[sectors.pixels_near(line, 40.0, REACH_PX)].mean())
 
 
 def _clip_level(recording: Recording, rings: RingSamples, rows: Int, sectors: Sectors) -> float:

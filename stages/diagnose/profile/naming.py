@@ -113,15 +113,10 @@ def _renamed(found: Finding, names: tuple[str, ...], clearest: Finding, fitting:
     if name not in names:
         return withdrawn(found)
     rivals = tuple(n for n in names if n != name)
-    shape = _shape_of(name, fitting)
+    shape = next(f for f in fitting if (f.shape is Shape.COPY) == (name == "tube_ghost"))
     if shape.shape is Shape.HALO:
         return _halo(name, shape, clearest, rivals)
     return replace(found, z=clearest.z, p_value=clearest.p_value, alike=rivals)
-
-
-def _shape_of(name: str, fitting: Sequence[Fitted]) -> Fitted:
-    of_copy = [f for f in fitting if (f.shape is Shape.COPY) == (name == "tube_ghost")]
-    return of_copy[0]
 
 
 def _halo(name: str, halo: Fitted, clearest: Finding, rivals: tuple[str, ...]) -> Finding:
