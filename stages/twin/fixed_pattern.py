@@ -52,7 +52,7 @@ def fixed_pattern(frames: Sequence[tuple[Float32, Float32, Bool]]) -> FixedPatte
     # A frame takes part in several pairs: there are as many independent ones as frames.
     sd = each.std(0, ddof=1) / np.sqrt(len(frames))
     one = np.sqrt(mean)
-    each_sd = np.hypot(sd / (2 * np.sqrt(np.maximum(mean, sd))), _OF_PHOTO * one)
+    each_sd = np.hypot(sd / (2 * np.sqrt(np.maximum(np.maximum(mean, sd), 1e-12))), _OF_PHOTO * one)
     dark, gain = (Figure(float(v), float(s)) for v, s in zip(one, each_sd, strict=True))
     return FixedPattern(dark, gain)
 

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import cv2
 import numpy as np
 
+from pipeline.adjustment.robust import robust_spread
 from pipeline.arrays import Bool, Byte, Int
 from pipeline.artefacts.twin import Look, Mismatch, NamedFigure
 
@@ -14,6 +15,9 @@ _LEAST_GREY, _AROUND_PX, _MOST_PIXELS, _FEWEST_FRAMES = 12, 5, 3, 6
 """Grey levels by which a pixel differs from the median of five by five about it, in every frame: wall moves
 and noise changes. More pixels side by side are no defect of single ones, but dirt, a scratch or text. Fewest
 lit frames. Chosen."""
+_BEYOND = 6.0
+"""Spreads of what pixels keep over all frames by which a defective one stands out: of a pattern of normal
+offsets, which is no defect, one pixel in 10⁹ does."""
 
 
 def defective_pixels(images: Sequence[Byte], lit: Sequence[bool], seen: Bool) -> tuple[Mismatch, ...]:
@@ -22,11 +26,14 @@ def defective_pixels(images: Sequence[Byte], lit: Sequence[bool], seen: Bool) ->
         return ()
     most = np.iinfo(np.int16).max
     more, less = (np.full(seen.shape, most, np.int16) for _ in range(2))
+    total = np.zeros(seen.shape, np.int32)
     for image, shows_wall in zip(images, lit, strict=True):
         beyond = image.astype(np.int16) - np.asarray(cv2.medianBlur(image, _AROUND_PX), np.int16)
+        total += beyond
         more = np.minimum(more, beyond)
         less = np.minimum(less, -beyond) if shows_wall else less
-    hot, dead = (_single((a >= _LEAST_GREY) & seen) for a in (more, less))
+    kept = robust_spread(total[seen] / len(images)) if seen.any() else 0.0
+    hot, dead = (_single((a >= max(_LEAST_GREY, _BEYOND * kept)) & seen) for a in (more, less))
     both = np.concatenate([hot, dead])
     if not len(both):
         return ()
