@@ -14,19 +14,29 @@ def hypothesis(name: str, surprise: float) -> Any:
     return SimpleNamespace(fit=fit, surprise=surprise, beforehand=0.0, named=True, library_terms=())
 
 
-def test_a_rival_of_patterns_is_weighed_once_while_the_likeliest_stays(
-    monkeypatch: pytest.MonkeyPatch,
+@pytest.mark.parametrize(
+    ("likelier", "with_pattern", "ranked_as"),
+    [
+        ([], 1.0, ["tilt", "tilt and pattern", "nothing"]),
+        # By its equations tilt and cone had seemed likelier; fitted, it is not.
+        (["tilt and cone"], 1.0, ["tilt", "tilt and pattern", "tilt and cone", "nothing"]),
+        (["tilt and cone"], -20.0, ["tilt and pattern", "tilt", "tilt and cone", "nothing"]),
+    ],
+)
+def test_patterns_are_weighed_once_beside_each_likeliest_also_where_a_likelier_set_loses(
+    monkeypatch: pytest.MonkeyPatch, likelier: list[str], with_pattern: float, ranked_as: list[str]
 ) -> None:
     asked: Counter[str] = Counter()
-    surprise = {"nothing": 50.0, "tilt": 0.0, "tilt and pattern": 1.0}
+    surprise = {"nothing": 50.0, "tilt": 0.0, "tilt and cone": 3.0, "tilt and pattern": with_pattern}
+    sets = [SimpleNamespace(terms=(), name=n) for n in likelier]
 
     def near(*_: Any) -> tuple[float, None]:
         asked["near"] += 1
         return 1e-9, None
 
-    def with_patterns(*_: Any) -> Any:
-        asked["patterns"] += 1
-        return SimpleNamespace(terms=(), name="tilt and pattern")
+    def with_patterns(run: None, best: Any, *_: Any) -> Any:
+        asked[f"patterns beside {best.fit.name}"] += 1
+        return None if best.fit.name != "tilt" else SimpleNamespace(terms=(), name="tilt and pattern")
 
     def ranked(run: None, judged: list[Any], formula: Any) -> tuple[tuple[Any, ...], list[bool]]:
         return tuple(sorted(judged, key=lambda j: j.surprise)), [True] * len(judged)
@@ -36,8 +46,8 @@ def test_a_rival_of_patterns_is_weighed_once_while_the_likeliest_stays(
         "empirical": lambda *_: None, "_of": lambda *_: None, "_beforehand": lambda *_: 0.0,
         "_distinct": lambda fits: [f for f in fits if f is not None], "_ranked": ranked, "_near": near,
         "judged_of": lambda run, found, *_: hypothesis(found.name, surprise[found.name]),
-        "_unfitted": lambda *_: [], "_better": lambda *_: None, "_with_patterns": with_patterns,
-        "replace": lambda best, **_: best,
+        "_unfitted": lambda *_: [], "_better": lambda *_: sets.pop() if sets else None,
+        "_with_patterns": with_patterns, "replace": lambda best, **_: best,
     }  # fmt: skip
     for name, stand_in in stand_ins.items():
         monkeypatch.setattr(judging, name, stand_in)
@@ -47,5 +57,6 @@ def test_a_rival_of_patterns_is_weighed_once_while_the_likeliest_stays(
     )
     stated: Any = None
     verdicts = judging.judge(searched, {}, stated, ())
-    assert [j.fit.name for j in verdicts.judged] == ["tilt", "tilt and pattern", "nothing"]
-    assert asked == {"near": 1, "patterns": 1}
+    assert [j.fit.name for j in verdicts.judged] == ranked_as
+    assert asked["patterns beside tilt"] == 1
+    assert asked["near"] == 1 + (ranked_as[0] != "tilt")

@@ -140,6 +140,7 @@ def judge(
 
     judged = [weighed(f) for f in _distinct([searched.nothing, searched.found, *searched.rivals, formula])]
     former: Judged | None = None
+    patterned: Judged | None = None
     for rounds_left in reversed(range(_ROUNDS)):
         ranked, allowed = _ranked(run, judged, formula)
         best, is_new = ranked[0], ranked[0] is not former
@@ -148,7 +149,8 @@ def judge(
             left, sets = _near(run, best, searched.steps[-1].scores, laws, stated, ratio)
         near = _unfitted(sets, ranked)
         more = _better(run, best, near) if rounds_left else None
-        if more is None and rounds_left and is_new:
+        if more is None and rounds_left and patterned is not best:
+            patterned = best
             more = _with_patterns(run, best, left, stated)
         if more is None:
             break
