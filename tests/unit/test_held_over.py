@@ -128,3 +128,25 @@ def test_rings_that_share_light_count_together() -> None:
     assert [coded.independent(count) for count in (1, 2, 3, 9, 40)] == [1, 1, 1, 2, 5]
     means = [rings_of(0.8, (9, 1), seed).mean() for seed in range(3000)]
     assert round(1 / float(np.var(means))) == coded.independent(9)
+
+
+@pytest.mark.parametrize("same", [0.0, 0.65])
+@pytest.mark.parametrize("held", [0.0, 0.6, 0.9])
+def test_what_is_the_same_in_all_rings_is_not_handed_on(held: float, same: float) -> None:
+    """Rows of a sensor beside new noise made likeness .29, .29, .29, ...: all was told to be handed on."""
+    values = rings_of(held, (120, 720)) + same * np.random.default_rng(2).standard_normal(720)
+    found = held_over([values], 1.2 * np.arange(120), SAMPLE_MM)
+    assert found.more_than_usual == (held + same > 0)
+    assert found.handed_on == pytest.approx(held, abs=0.05)
+
+
+@pytest.mark.parametrize("likeness", [[1.0], [1, 0.25], [1, 1], [1, 0.3, 0.3], [1, 0.21, 0.2], [1, 1, 1, 1]])
+def test_less_than_all_is_handed_on(likeness: list[float]) -> None:
+    assert 0 <= HeldOver(np.array(likeness)).handed_on < 1
+
+
+def test_new_noise_hides_nothing_of_what_is_handed_on() -> None:
+    likeness = np.r_[1.0, 0.4 * 0.8 ** np.arange(16)]
+    assert HeldOver(likeness).handed_on == pytest.approx(0.8, abs=0.03)
+    # A codec that repeats most of a picture once, and no more.
+    assert HeldOver(np.array([1, 0.79, 0.3, 0.1, 0.05, 0])).handed_on == pytest.approx(0.79, abs=0.03)
