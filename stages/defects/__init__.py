@@ -266,5 +266,5 @@ def _defects_of_run(
 
 
 DEFECTS = Stage(
-    "defects", "27", DefectParameters, _defects_of_run, "defects as instances with depth, clock and kind"
+    "defects", "28", DefectParameters, _defects_of_run, "defects as instances with depth, clock and kind"
 )

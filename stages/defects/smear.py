@@ -1,7 +1,7 @@
 """Depths that a noise filter or a codec flattened: each picture holds some of those before it.
 
 Such a picture shows a mean of the wall over the way that the probe went meanwhile. What that took off a
-finding's depth is told by what it would take off once more.
+finding's depth is told by what it would take off once more: as from a bell that loses as much then.
 """
 
 from __future__ import annotations
@@ -12,12 +12,16 @@ import numpy as np
 from scipy.signal import lfilter
 
 from pipeline.adjustment.shared_light import HeldOver
+from pipeline.arrays import Float
 from stages.defects.depth import Depth
 from stages.defects.segment import Region
 from stages.defects.surface import Surface
 
-# No more of a depth is taken to be lost than a third: its bell is hardly known any more (chosen).
-_MOST_LOST = 1 / 3
+# No finding is taken to have been narrower than the millimetre whose mean a depth is: 1 σ of a bell that is
+# 1 mm wide at half its height, mm.
+_SHARPEST_MM = 0.42
+# Bells are tried up to so many ways over which a picture is held: the widest lose 1 / 450 of their height.
+_WIDEST, _BELLS = 30.0, 40
 
 
 def flattened(depth: Depth, region: Region, surface: Surface, held: HeldOver) -> Depth:
@@ -26,21 +30,39 @@ def flattened(depth: Depth, region: Region, surface: Surface, held: HeldOver) ->
     A codec holds the fine structure of the line and shows a step of the wall anew, a noise filter flattens
     both: likeness does not tell which, so that the depth itself is left as it is.
     """
-    if not held.more_than_usual:
+    if not held.handed_on:
         return depth
     shown = region.cut(surface.all_mm if region.all_round else surface.local_mm)[:, depth.peak[1]]
     profile = np.fmax(np.sign(depth.depth_mm) * shown, 0.0)
-    share = float(held.handed_on ** (surface.relief.cell_mm[0] / surface.points.spacing_mm))
-    once_more = lfilter([1 - share], [1, -share], profile).max(initial=0.0)
-    lost = abs(depth.depth_mm) * _lost(float(once_more / max(profile.max(initial=0.0), 1e-9)))
+    cell_mm = surface.relief.cell_mm[0]
+    share = float(held.handed_on ** (cell_mm / surface.points.spacing_mm))
+    lost = abs(depth.depth_mm) * _lost(profile, share, cell_mm)
     return replace(depth, sigma_mm=float(np.hypot(depth.sigma_mm, lost)))
 
 
-def _lost(kept: float) -> float:
-    """Return which part of a depth, as it is now, was lost, if this part of it is ``kept`` once more.
+def _lost(profile: Float, share: float, cell_mm: float) -> float:
+    """Return how many times the height that a ``profile`` (H,) still has it lost.
 
-    Each time a bell's variance along the pipe grows by as much, and its height falls by the root of it: from
-    v − d to v to v + d, so that heights are as √(2 − 1 / kept²) to 1 to kept.
+    It is what a bell lost of which once more takes off as much. Where even the sharpest keeps more, a finding
+    is taken to have been as sharp: the loss is then at most as large.
     """
-    before = 2 - 1 / max(kept, 0.1) ** 2
-    return min(before**-0.5 - 1, _MOST_LOST) if before > 0 else _MOST_LOST
+    held = 1 / (1 - share)
+    sharpest = _SHARPEST_MM / cell_mm
+    kept, height = [], []
+    for width in np.geomspace(sharpest, sharpest + _WIDEST * held, _BELLS):
+        along = np.arange(-np.ceil(4 * width), np.ceil(4 * width + 8 * held) + 1)
+        bell = _held_over(np.exp(-0.5 * (along / width) ** 2), share)
+        kept.append(_kept(bell, share))
+        height.append(float(bell.max()))
+    return 1 / float(np.interp(_kept(profile, share), kept, height)) - 1
+
+
+def _kept(profile: Float, share: float) -> float:
+    """Return which part of a profile's height (H,) is left once more, whichever way the probe went."""
+    left = min(float(_held_over(p, share).max(initial=0.0)) for p in (profile, profile[::-1]))
+    return left / max(float(profile.max(initial=0.0)), 1e-9)
+
+
+def _held_over(profile: Float, share: float) -> Float:
+    """Return a profile (H,) of which each cell holds such a share of the one before."""
+    return np.asarray(lfilter([1 - share], [1, -share], profile))
