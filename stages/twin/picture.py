@@ -37,6 +37,10 @@ OF_LAW = 0.2
 second derivative."""
 _LEAST_LEVEL = 1.0
 """Least stray light that is named, grey levels: what rounding alone cannot make."""
+_OF_MEAN = (0.3, 0.6, 0.3)
+"""Share by which the wall's mean brightness may miss what each of the `stray_lights` foretells from the
+wall's pattern. Chosen: drawn light that is even, or the lamps' own, misses .00 to .08 of it, a glow that is
+not quite that of light bounced once .03 to .25; a pattern without light, as a codec leaves it, misses all."""
 _FINE_PX, _KEPT = 9, 1.0
 """Window that fine texture is held against, and share of its energy above which nothing is blurred."""
 _DIRECTIONS = ("even", "across", "slanted", "radial")
@@ -56,8 +60,8 @@ class WholePictures:
     scene : Scene
     blur, kept, stray, bloom, ghost : list
         Of each frame: own and cross sums of both halves; share of the fine texture's energy; sizes of the
-        `stray_lights`, their levels and falls; leak along columns and rows; brightness over ln of the
-        ratio of radii in four quadrants.
+        `stray_lights`, their levels, falls and means, and by how much the wall's mean above what sees no wall
+        is more; leak along columns and rows; brightness over ln of the ratio of radii in four quadrants.
     frame : dict of str to list of int
     """
 
@@ -122,12 +126,20 @@ class WholePictures:
         if whole.sum() < TILE**2:
             return
         value, *columns = (a[whole].astype(float) for a in small[1:])
-        self.stray.append(np.array([_size_beside_one(value, c) for c in columns]))
+        sizes = np.array([_size_beside_one(value, c) for c in columns])
+        sizes[:, -1] -= self._level_outside(above, free & (twin.region != Region.EDGE))
+        self.stray.append(sizes)
         self.frame["stray"].append(frame)
         around = ring_profile(self.scene.ring, above, twin, free & (twin.region != Region.EDGE))
         if around is not None:
             self.ghost.append(around)
             self.frame["ghost"].append(frame)
+
+    def _level_outside(self, above: Float32, use: Bool) -> float:
+        """Return the mean level of what sees no wall; NaN where the picture has no such place."""
+        outside = self.scene.outside
+        dark = above[use & outside] if outside is not None else above[:0]
+        return float(dark.mean(dtype=float)) if dark.size >= TILE**2 else float("nan")
 
     def add_clipped(self, frame: int, above: Float32, twin: TwinFrame, free: Bool) -> None:
         """Take any frame: what leaks from clipped pixels along columns, and along rows for comparison."""
@@ -205,10 +217,13 @@ class WholePictures:
     def _stray(self) -> Suspected | None:
         if len(self.stray) < FEWEST_FRAMES:
             return None
-        size, level, fall = np.moveaxis(np.stack(self.stray), -1, 0)
+        size, level, fall, mean, more = np.moveaxis(np.stack(self.stray), -1, 0)
         k = int(np.argmax(fall.sum(0)))
-        chance, share = chance_of(size[:, k]), float(size[:, k].mean())
+        # The best of several laws is surer by chance than one alone.
+        chance, share = min(len(STRAY_NAMES) * chance_of(size[:, k]), 1.0), float(size[:, k].mean())
         if chance > FALSE_ALARM or share * level[:, k].mean() < _LEAST_LEVEL:
+            return None
+        if not _brings_light(k, mean[:, k], more[:, k]):
             return None
         others = [j for j, name in enumerate(STRAY_NAMES) if name != STRAY_NAMES[k]]
         rivals = [STRAY_NAMES[j] for j in others if sigmas(fall[:, k] - fall[:, j]) < _SURE]
@@ -251,8 +266,24 @@ def _blur_of(own: Float, cross: Float) -> Float:
     return np.asarray(blur - moved)
 
 
+def _brings_light(law: int, mean: Float, more: Float) -> bool:
+    """Return whether the wall is as bright as a law's pattern on it foretells, where a picture can tell.
+
+    ``mean`` (F,) is foretold, ``more`` by how much the wall is brighter than that: NaN without a place that
+    sees no wall, from which black is known. The camera's own black would hold even light, not light that
+    falls off.
+    """
+    if np.isnan(more).any():
+        return STRAY_NAMES[law] != "ambient_light"
+    sd = float(np.std(more, ddof=1) / np.sqrt(len(more)))
+    return abs(float(more.mean())) < max(_SURE * sd, _OF_MEAN[law] * abs(float(mean.mean())))
+
+
 def _size_beside_one(value: Float, column: Float) -> Float:
-    """Return the size of a column (N,) beside a constant, its level where it is brightest, and χ²'s fall."""
+    """Return the size of a column (N,) beside a constant, its level where it is brightest, and χ²'s fall.
+
+    Last are the mean level that it makes, and what is brighter beside it.
+    """
     use, size, c = np.ones(len(value), bool), 0.0, column
     for _ in range(_TRIMMED):  # a second line or a glint is no light on the wall
         c = (column - column[use].mean()) * use
@@ -260,4 +291,6 @@ def _size_beside_one(value: Float, column: Float) -> Float:
         rest = value - size * column
         away = np.abs(rest - np.median(rest))
         use = away < _SURE * max(robust_spread(away), _LEAST_SPREAD)
-    return np.array([size, float(np.quantile(column, 0.95)), size**2 * float(c @ c)])
+    mean = size * float(column[use].mean())
+    more = float(value[use].mean()) - mean
+    return np.array([size, float(np.quantile(column, 0.95)), size**2 * float(c @ c), mean, more])

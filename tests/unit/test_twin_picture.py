@@ -6,6 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
+from stages.twin.cells import chance_of
 from stages.twin.falls import over_frames
 from stages.twin.gate import _borne_out, judged
 from stages.twin.lamp_light import Figure
@@ -20,10 +21,12 @@ from stages.twin.switched import Shown
 SHAPE, FRAMES, WHITE = (240, 320), 8, 200.0
 V, U = np.mgrid[0 : SHAPE[0], 0 : SHAPE[1]].astype(np.float32)
 AWAY, PHI = np.hypot(V - 120, U - 160), np.arctan2(V - 120, U - 160)
+OUTSIDE = AWAY > 180
+"""Corners of the picture, which see no wall."""
 RING = Ring((160.0, 120.0), 70.0, 50.0, 25.0)
 LINE_LIGHT = _plain_line(0.1, 2.4)
 SCENE = SimpleNamespace(
-    polar=(AWAY / 70, PHI, AWAY > 0), ring=RING, surface=SimpleNamespace(mean_radius_mm=50.0)
+    polar=(AWAY / 70, PHI, AWAY > 0), ring=RING, surface=SimpleNamespace(mean_radius_mm=50.0), outside=OUTSIDE
 )
 
 
@@ -37,7 +40,7 @@ def _lit(random):
     fine = cv2.GaussianBlur(random.standard_normal(SHAPE).astype(np.float32), (0, 0), 2.5)
     wide = cv2.GaussianBlur(random.standard_normal(SHAPE).astype(np.float32), (0, 0), 12)
     level = 90 + 20 * fine / fine.std() + 15 * wide / wide.std()
-    return _twin(np.clip(level, 15, 180).astype(np.float32), np.full(SHAPE, Region.WALL))
+    return _twin(np.clip(level, 15, 180).astype(np.float32), np.where(OUTSIDE, Region.DARK, Region.WALL))
 
 
 def _line():
@@ -65,7 +68,7 @@ def _named(lit=lambda p, r: p, laser=lambda p, r: p, of_sharpness=0.0, judge=Non
         whole.add_clipped(frame, seen, twin, free)
         blocks.add(frame, seen, twin, WHITE)
         shown[frame] = _shown(seen if judge is None else judge(twin.level, random), twin, twin, frame, whole)
-        seen = _noisy(laser(line.level, random), random)
+        seen = _noisy(np.where(OUTSIDE, 0, laser(line.level, random)), random)
         whole.add_laser(FRAMES + frame, seen, line, seen < WHITE, twin)
         shown[FRAMES + frame] = _shown(seen, line, twin, FRAMES + frame, whole)
     state = SimpleNamespace(sharpness=np.full(4, of_sharpness), lamp=True, line=None)
@@ -205,18 +208,42 @@ def test_stray_light_is_named_for_what_it_falls_on():
     assert _named(laser=lambda p, r: p + 5) == []
 
 
-def test_even_light_on_wall_that_the_lamps_light_unevenly_is_ambient_light():
-    """Its law had been the lamps' own light, which falls off: it was named interreflection."""
-    random, whole, shown = np.random.default_rng(2), WholePictures(SCENE), {}
+def _stray_names(light, scene=SCENE):
+    """Names that stand of light that the wall's reflectance, 1 on average, throws back with the LEDs off."""
+    random, whole, shown = np.random.default_rng(2), WholePictures(scene), {}
     for frame in range(FRAMES):
         wall, line = _lit(random), _line()
         lit = _twin((wall.level * np.exp(-((AWAY / 80) ** 2))).astype(np.float32), wall.region)
-        seen = _noisy(line.level + 0.25 * wall.level, random)
+        seen = _noisy(line.level + np.where(OUTSIDE, 0, light(wall.level / 90)), random)
         whole.add_laser(frame, seen, line, seen < WHITE, lit)
         shown[frame] = _shown(seen, line, lit, frame, whole)
     kept, withdrawn = judged(whole.suspected(np.zeros(4)), lambda frames: [(f, shown[f]) for f in frames])
-    assert [m.name for m in kept] == ["ambient_light"]
     assert not withdrawn
+    return [m.name for m in kept]
+
+
+def test_even_light_on_wall_that_the_lamps_light_unevenly_is_ambient_light():
+    """Its law had been the lamps' own light, which falls off: it was named interreflection."""
+    assert _stray_names(lambda pale: 22 * pale) == ["ambient_light"]
+
+
+@pytest.mark.parametrize("haze", [0.0, 20.0, -6.0])
+def test_texture_that_a_codec_keeps_of_lit_frames_is_no_light(haze):
+    """A pattern whose mean is 0, or not its own, had been ambient light at a chance of 1e-15."""
+    assert _stray_names(lambda pale: 6 * (pale - 1) + haze) == []
+
+
+def test_without_a_place_that_sees_no_wall_even_light_is_not_told():
+    blind = SimpleNamespace(**{**vars(SCENE), "outside": None})
+    assert _stray_names(lambda pale: 22 * pale, blind) == []
+
+
+def test_the_best_of_three_laws_has_three_times_the_chance():
+    whole = WholePictures(SCENE)
+    size = np.array([1.0, 0.7, 1.3, 0.9, 1.1, 0.8, 1.2, 1.0])
+    whole.stray = [np.array([[0.1, 100, 0, 9, 0], [0.1, 100, 0, 9, 0], [s, 100, 5, 90 * s, 0]]) for s in size]
+    whole.frame["stray"] = list(range(len(size)))
+    assert whole._stray().mismatch.probability == pytest.approx(3 * chance_of(size))
 
 
 def test_a_second_ring_is_found_and_a_glint_is_none():
