@@ -7,11 +7,13 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.arrays import Float
+from pipeline.arrays import Float, Int
 from pipeline.artefacts.measured import PointCloud
 
 # Points in a chunk: some MB, for memory's sake.
 _AT_ONCE = 1 << 16
+# Rings less than this part of the usual way apart are of a probe that stands, as in premises (chosen).
+_MOVES = 0.25
 
 
 @dataclass(frozen=True)
@@ -39,7 +41,27 @@ class CloudAlong:
         return PointCloud(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
 
     def ring_spacing_mm(self) -> float:
-        """Return the median distance between neighbouring rings."""
+        """Return the median distance between neighbouring rings, where a probe moved that mostly stood."""
+        apart = np.diff(np.sort(self._rings()[1]))
+        stands = apart <= _MOVES * usual_way(self.ways_mm())
+        if 2 * stands.sum() > len(stands) and not stands.all():
+            apart = apart[~stands]
+        return float(np.median(apart)) if len(apart) else 0.0
+
+    def ways_mm(self) -> Float:
+        """Return how far the probe went to each frame's ring (F,) since the ring before, in order of time.
+
+        It is 0 of frames without a ring, and behind such as are missing.
+        """
+        frame, middle = self._rings()
+        ways = np.zeros(int(frame.max(initial=-1)) + 1)
+        apart = np.diff(frame)
+        follows = apart <= np.median(apart) if len(apart) else apart > 0
+        ways[frame[1:][follows]] = np.abs(np.diff(middle))[follows]
+        return ways
+
+    def _rings(self) -> tuple[Int, Float]:
+        """Return the frames (R,) that show a ring, and how far along the pipe the middle of each lies."""
         frames = int(self.cloud.frame.max(initial=-1)) + 1
         count, total = np.zeros(frames), np.zeros(frames)
         for first in range(0, len(self.cloud.frame), _AT_ONCE):
@@ -47,8 +69,18 @@ class CloudAlong:
             frame = self.cloud.frame[rows]
             count += np.bincount(frame, minlength=frames)
             total += np.bincount(frame, self.cloud.distance_mm[rows], minlength=frames)
-        middle = np.sort(total[count > 0] / count[count > 0])
-        return float(np.median(np.diff(middle))) if len(middle) > 1 else 0.0
+        seen = np.flatnonzero(count)
+        return seen, total[seen] / count[seen]
+
+
+def usual_way(ways: Float) -> float:
+    """Return the step in which, or in longer ones, a half of all the way (n,) was gone; 0 without any.
+
+    A probe that stands adds pictures and no way, so that its pictures do not count.
+    """
+    ways = np.sort(ways)
+    gone = np.cumsum(ways)
+    return float(ways[np.searchsorted(gone, gone[-1] / 2)]) if gone.size else 0.0
 
 
 def cloud_along(cloud: PointCloud) -> CloudAlong:

@@ -167,7 +167,8 @@ def _measured(
                 top = float(region.cut(score.astype(float))[region.mask].max())
                 evidence = evidence_for(here, depth, surface, scene.seen_by, _fixed_in(region, fixed), top)
                 step = is_step(region, depth.depth_mm, wall.relief.radius_map)
-                told = describe(here, flattened(depth, here, surface, scene.seen_by.held), surface, scene)
+                widened = flattened(depth, here, surface, scene.seen_by.held, wall.ways_mm)
+                told = describe(here, widened, surface, scene)
                 yield _Found(region, told, replace(told, depth_sigma_mm=depth.sigma_mm), evidence, step)
                 break
         context.progress(len(regions) + done, 2 * len(regions))
@@ -266,5 +267,5 @@ def _defects_of_run(
 
 
 DEFECTS = Stage(
-    "defects", "28", DefectParameters, _defects_of_run, "defects as instances with depth, clock and kind"
+    "defects", "29", DefectParameters, _defects_of_run, "defects as instances with depth, clock and kind"
 )

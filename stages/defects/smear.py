@@ -13,6 +13,7 @@ from scipy.signal import lfilter
 
 from pipeline.adjustment.shared_light import HeldOver
 from pipeline.arrays import Float
+from pipeline.artefacts.cloud_along import usual_way
 from stages.defects.depth import Depth
 from stages.defects.segment import Region
 from stages.defects.surface import Surface
@@ -24,18 +25,20 @@ _SHARPEST_MM = 0.42
 _WIDEST, _BELLS = 30.0, 40
 
 
-def flattened(depth: Depth, region: Region, surface: Surface, held: HeldOver) -> Depth:
+def flattened(depth: Depth, region: Region, surface: Surface, held: HeldOver, ways_mm: Float) -> Depth:
     """Return a depth with a σ that holds what pictures which ``held`` earlier ones may have taken off it.
 
+    ``ways_mm`` (F,) is how far the probe went to each frame's ring since the one before.
     A codec holds the fine structure of the line and shows a step of the wall anew, a noise filter flattens
     both: likeness does not tell which, so that the depth itself is left as it is.
     """
-    if not held.handed_on:
+    way_mm = usual_way(ways_mm[np.unique(surface.near.frame)])
+    if not held.handed_on or not way_mm:
         return depth
     shown = region.cut(surface.all_mm if region.all_round else surface.local_mm)[:, depth.peak[1]]
     profile = np.fmax(np.sign(depth.depth_mm) * shown, 0.0)
     cell_mm = surface.relief.cell_mm[0]
-    share = float(held.handed_on ** (cell_mm / surface.points.spacing_mm))
+    share = float(held.handed_on ** (cell_mm / way_mm))
     lost = abs(depth.depth_mm) * _lost(profile, share, cell_mm)
     return replace(depth, sigma_mm=float(np.hypot(depth.sigma_mm, lost)))
 

@@ -6,6 +6,7 @@ Its 1 mm mean is taken from the points themselves, without what the map's smooth
 from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
+from functools import cached_property
 
 import numba
 import numpy as np
@@ -129,6 +130,11 @@ class MeasuredWall:
     relief: WallRelief
     cloud: CloudAlong
     spacing_mm: float
+
+    @cached_property
+    def ways_mm(self) -> Float:
+        """How far the probe went to each frame's ring (F,) since the ring before."""
+        return self.cloud.ways_mm()
 
     def with_margin(self, rows: slice) -> Stretch:
         """Return rows with those about them that have a say in their surface."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import fields, replace
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, cast
 
@@ -12,7 +12,9 @@ from scipy.signal import lfilter
 
 from pipeline.adjustment.shared_light import NOTHING_HELD, HeldOver
 from pipeline.arrays import Float
+from pipeline.artefacts.cloud_along import cloud_along
 from pipeline.artefacts.findings import Defect
+from pipeline.artefacts.measured import PointCloud
 from stages.defects import DefectParameters, find_defects
 from stages.defects.depth import Depth
 from stages.defects.segment import Region
@@ -26,12 +28,24 @@ if TYPE_CHECKING:
 RADIUS, HELD = 38.0, 0.8
 DISTANCE = np.arange(0, 80, 0.5)
 AZIMUTH = -np.pi + np.arange(480) * 2 * np.pi / 480
+NOWHERE, EVERY_HALF_MM = np.empty(0), np.full(20, 0.5)
 
 
-def found_on(wall_mm: np.ndarray, held: HeldOver) -> Defect:
-    """Return the one finding on a noisy wall that departs so far from its bore."""
+def cloud_of(places_mm: Float) -> PointCloud:
+    """Return a point of the wall for each ring, which were taken in this order."""
+    n, flat = len(places_mm), np.zeros((len(places_mm), 3))
+    psi = np.zeros(n)
+    return PointCloud(flat, flat, np.full(n, 0.03), np.full(n, RADIUS), places_mm, psi, np.arange(n))
+
+
+def found_on(wall_mm: np.ndarray, held: HeldOver, also_at: Float = NOWHERE) -> Defect:
+    """Return the one finding on a noisy wall that departs so far from its bore, with more rings there."""
     noise = smooth_noise(np.random.default_rng(1), wall_mm.shape, 0.02, 2.0)
     wall = replace(wall_of(DISTANCE, AZIMUTH, RADIUS + wall_mm + noise, 0.02), held=held)
+    more = cloud_of(also_at)
+    more = replace(more, frame=more.frame + len(DISTANCE))
+    columns = ((getattr(c, f.name) for c in (wall.cloud, more)) for f in fields(PointCloud))
+    wall = replace(wall, cloud=PointCloud(*(np.concatenate(list(c)) for c in columns)))
     found = find_defects(
         bare_recording(2 * RADIUS), wall, grey_texture(wall), DefectParameters(), quiet_context()
     )
@@ -60,16 +74,19 @@ def test_rings_that_share_as_much_as_usual_widen_nothing() -> None:
     assert usual.depth_sigma_mm == none.depth_sigma_mm
 
 
-def told_sigma(seen_mm: Float, held: HeldOver, spacing_mm: float = 0.5) -> float:
-    """Return the σ that a depth of ± .03 mm gets, of which ``seen_mm`` (H,) is seen every .5 mm."""
+def told_sigma(seen_mm: Float, held: HeldOver, ways_mm: Float = EVERY_HALF_MM) -> float:
+    """Return the σ that a depth of ± .03 mm gets, of which ``seen_mm`` (H,) is seen every .5 mm.
+
+    So far (F,) the probe went from ring to ring.
+    """
     region = Region(0, 0, np.ones((len(seen_mm), 1), bool), 1.0)
     surface = SimpleNamespace(
         local_mm=seen_mm[:, None],
         relief=SimpleNamespace(cell_mm=(0.5, 0.5)),
-        points=SimpleNamespace(spacing_mm=spacing_mm),
+        near=SimpleNamespace(frame=np.arange(len(ways_mm))),
     )
     depth = Depth(float(seen_mm.max()), 0.03, 0.0, (0, 0))
-    return flattened(depth, region, cast("Surface", surface), held).sigma_mm
+    return flattened(depth, region, cast("Surface", surface), held, ways_mm).sigma_mm
 
 
 @pytest.mark.parametrize("backwards", [False, True])
@@ -86,3 +103,34 @@ def test_sigma_holds_what_bells_of_any_size_lost_to_filters_of_any_strength(
     sigma = told_sigma(found, HeldOver(share ** np.arange(12)))
     assert 1 - height < 1.3 * sigma
     assert sigma < 1.3 * (1 - height) + 0.03
+
+
+STANDS = np.full(400, 79.0) + 1e-6 * np.arange(400)
+
+
+def test_a_probe_that_stands_for_most_of_a_run_flattens_no_less_where_it_moves() -> None:
+    """The median distance of its rings is 0: σ was not widened, or divided by 0."""
+    drawn = DrawnDefect("pit", 40.0, 1.0, 7.0, 7.0, 1.0)
+    true = relief(drawn, DISTANCE, AZIMUTH, RADIUS, np.random.default_rng(0))
+    filtered = lfilter([1 - HELD], [1, -HELD], true, axis=0)
+    held = HeldOver(HELD ** np.arange(12))
+    moves, stood = (found_on(filtered, held, also_at) for also_at in (STANDS[:0], STANDS))
+    assert stood.depth_sigma_mm == pytest.approx(moves.depth_sigma_mm, rel=0.1)
+
+
+@pytest.mark.parametrize(
+    "places_mm",
+    [DISTANCE, np.r_[DISTANCE, STANDS], np.r_[DISTANCE, DISTANCE[::-1] + 0.1], np.r_[STANDS, DISTANCE]],
+    ids=["goes on", "stands then", "goes back", "stands first"],
+)
+def test_the_way_from_ring_to_ring_is_that_in_order_of_time(places_mm: Float) -> None:
+    ways = cloud_along(cloud_of(places_mm)).ways_mm()
+    bell = np.exp(-0.5 * (np.arange(-50, 51) * 0.5) ** 2)
+    sigma = told_sigma(bell, HeldOver(HELD ** np.arange(12)), ways)
+    assert sigma == pytest.approx(told_sigma(bell, HeldOver(HELD ** np.arange(12))))
+
+
+def test_rings_that_are_missing_make_no_long_way() -> None:
+    ways = cloud_along(replace(cloud_of(DISTANCE[[0, 1, 2, 90]]), frame=np.array([0, 2, 4, 180]))).ways_mm()
+    assert ways[[2, 4, 180]] == pytest.approx([0.5, 0.5, 0.0])
+    assert not cloud_along(cloud_of(DISTANCE[:1])).ways_mm().any()
