@@ -42,6 +42,9 @@ _TIMES = 32
 _EDGE = 1 / 14
 _SHARES = (0.1, 0.2, 0.4, 0.8, 1.6)
 _SPEED_MM_S, _DISTANCE_MM = 20.0, 100.0
+# A probe stands that is slower than this part of its fastest: after a sudden stop `rates` of
+# `stages.diagnose.gauge.points` go back by up to .08 of it, unless the stop is in the last ten frames.
+_STANDS = 0.1
 _WORDS: Mapping[CourseKind, str] = {
     CourseKind.STEP: "a step at {time_s:.2f} s: before it there is none of it",
     CourseKind.RAMP: "growing evenly from nothing at the first frame to this at {time_s:.1f} s",
@@ -111,7 +114,10 @@ class Coursed(Product):
         """Return the course's factor, of a swing its sine's and its cosine's, and the law."""
         swings = self.kind is CourseKind.SINUSOID
         courses = [(shape[0], phase) for phase in (0.0, 90.0)] if swings else [shape]
-        at = points.time_s, points.camera_distance_mm, points.speed_mm_s
+        speed = points.speed_mm_s
+        if self.kind is CourseKind.REVERSAL:
+            speed = np.where(np.abs(speed) < _STANDS * np.max(np.abs(speed), initial=0.0), 0.0, speed)
+        at = points.time_s, points.camera_distance_mm, speed
         return tuple(Course(self.kind, c).factor(*at) for c in courses), self.static, self.own
 
     def _swing(self, amplitude: Float) -> tuple[Float, float]:

@@ -12,9 +12,11 @@ from pipeline.arrays import Float
 from pipeline.physics.effect import CourseKind
 from stages.diagnose.agreement import TELLING, drawn, same, sized
 from stages.diagnose.effects.base import Shape
+from stages.diagnose.effects.library import ring_shift_px
 from stages.diagnose.gauge.elimination import EDGE, RING, Part
-from stages.diagnose.gauge.fit import evidence
+from stages.diagnose.gauge.fit import Fit, evidence
 from stages.diagnose.gauge.hypotheses import Judged, Regime
+from stages.diagnose.gauge.points import SHARP, Moving, moved
 from stages.diagnose.gauge.run import GaugeRun, Term
 from stages.diagnose.gauge.scan import change_time, freed
 from stages.diagnose.gauge.sets import prior_sigma
@@ -179,18 +181,30 @@ def sizes_of(run: GaugeRun, judged: Judged, stated: Stated, alike: float) -> tup
     free = freed(run, judged.fit)
     whole = judged.evidence if free is judged.fit else evidence(run, free, ())[0]
     about = replace(judged, fit=free, evidence=whole)
-    sized = [_sized(about, term, stated) for term in free.terms]
+    sized = [_sized(run, about, term, stated) for term in free.terms]
     return tuple(
         replace(s, time_s=change_time(run, free, k, alike)) if s.term.model.kind is CourseKind.STEP else s
         for k, s in enumerate(sized)
     )
 
 
-def _sized(judged: Judged, term: Term, stated: Stated) -> Sized:
+def _sized(run: GaugeRun, judged: Judged, term: Term, stated: Stated) -> Sized:
     part = partial_of("all", judged.evidence, judged, term, stated)
     covariance = part.covariance if part is not None else np.zeros((len(term.amplitude),) * 2)
-    by_law = term.model.law_sigma**2 * np.outer(term.amplitude, term.amplitude)
-    return Sized(term, covariance + by_law)
+    share = np.hypot(term.model.law_sigma, lost_motion(run, judged.fit, term))
+    return Sized(term, covariance + share**2 * np.outer(term.amplitude, term.amplitude))
+
+
+def lost_motion(run: GaugeRun, found: Fit, term: Term) -> float:
+    """Return what part of a term's size fast motion adds that rates over many frames lose.
+
+    A law c of the motion, of which k is kept, comes out ⟨c, k⟩ / ⟨k, k⟩ times too large. For c stand rates
+    over few frames: noise of poses, independent from frame to frame, adds to both products the same.
+    """
+    points = found.at(run).rings
+    sharp = moved(points, Moving.of(found.state.T_pc, run.time_s, SHARP), run.rings.outward)
+    kept, whole = (ring_shift_px(term.model, p, *term.at(term.amplitude)) for p in (points, sharp))
+    return float(abs(1 - kept @ kept / (whole @ kept))) if whole @ kept else 0.0
 
 
 def quantities(sized: Sized) -> dict[str, Value]:

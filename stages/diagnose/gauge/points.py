@@ -7,10 +7,9 @@ on the recordings). They are unknowns of the recording, so that no effect is see
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.interpolate import make_smoothing_spline
 
 from pipeline.arrays import Float, Int
 from pipeline.artefacts.measured import RingSamples
@@ -21,10 +20,15 @@ from stages.calibrate.gauge.geometry import BoreRings
 from stages.calibrate.gauge.state import Unknowns
 from stages.diagnose.effects.base import ImagePoints
 
-# What a probe does faster than this is taken for noise of its poses: slower motion of f Hz loses (f / 3)⁴ of
-# its rate, 0.2 % of a sway of 0.6 Hz. A rolling shutter itself makes poses noisy: at 5 Hz that noise hid it.
-_FASTEST_HZ = 3.0
-_LEAST_FOR_SPLINE = 5
+# Rates of a gauge run are taken over several frames, for poses are noisy, the more so by a rolling shutter.
+# 11 frames leave of this noise what differences over two frames, smoothed over nine, had left (up to a tenth
+# more), and lose less of the motion. Below 30 frames/s noise makes slower rates: a third of a second, or 7
+# frames, leave at most .10 mm/s of poses that err by .01 mm, and lose .5 % of a sway of .6 Hz at 10 frames/s.
+# 5 lose 1.2 % at an eighth of the frame rate. The adjustment of an inspection has smoothed its poses before.
+_FEWEST, _MOST, _SMOOTHED_S = 7, 11, 1 / 3
+SHARP, AS_ADJUSTED = 5, 3
+# Of the polynomial: where frames were lost, times are uneven, and a cubic errs by the fourth order.
+_DEGREE = 4
 BASELINE_SIGMA_PX = 0.01
 _RING_HARMONICS = (0, 1, 2, 3, 4)
 _EDGE_HARMONICS = (0, 1, 2)
@@ -57,7 +61,7 @@ def _patterns(points: ImagePoints, harmonics: tuple[int, ...]) -> Float:
 
 @dataclass(frozen=True)
 class Moving:
-    """How the camera moves at each frame, noise of its poses smoothed.
+    """How the camera moves at each frame.
 
     Attributes
     ----------
@@ -72,12 +76,12 @@ class Moving:
     speed_mm_s: Float
 
     @staticmethod
-    def of(T_pc: Float, time_s: Float) -> Moving:
-        """Return it of poses (N, 4, 4) at times (N,)."""
+    def of(T_pc: Float, time_s: Float, frames: int | None = None) -> Moving:
+        """Return it of poses (N, 4, 4) at times (N,), by so many ``frames``; None: `smoothed`."""
         steps = vector_from_rotation(np.swapaxes(T_pc[:-1, :3, :3], -1, -2) @ T_pc[1:, :3, :3])
         turned = np.concatenate([np.zeros((1, 3)), np.cumsum(steps, axis=0)])
-        # In one call, which sets up the spline once: that takes far longer than to use it.
-        turning_c, velocity_p = np.split(rates(np.hstack([turned, T_pc[:, :3, 3]]), time_s), 2, axis=1)
+        both = rates(np.hstack([turned, T_pc[:, :3, 3]]), time_s, frames or smoothed(time_s))
+        turning_c, velocity_p = np.split(both, 2, axis=1)
         return Moving(turning_c, np.einsum("nij,ni->nj", T_pc[:, :3, :3], velocity_p), velocity_p[:, 2])
 
     def passing_mm_s(self, frame: Int, xyz_c: Float) -> Float:
@@ -94,13 +98,22 @@ def ring_points(
     xyz_p = transform(T, xyz_c)
     normal_c, along_c = _wall_directions(xyz_p, T)
     along_ray = way_per_px(state.probe, rings.uv, rings.outward)
-    passing = moving.passing_mm_s(rings.frame, xyz_c)
-    rate = np.einsum("mi,mi->m", normal_c, passing) / np.einsum("mi,mi->m", normal_c, along_ray)
-    return ImagePoints(
+    points = ImagePoints(
         state.probe, rings.frame, time_s[rings.frame] - time_s[0], rings.uv, xyz_c, normal_c, along_c,
-        rate[:, None] * rings.outward, moving.speed_mm_s[rings.frame], True, width_px,
+        rings.outward, moving.speed_mm_s[rings.frame], True, width_px,
         np.arctan2(xyz_p[:, 1], xyz_p[:, 0]), xyz_p[:, 2], per_px_c=along_ray,
     )  # fmt: skip
+    return moved(points, moving, rings.outward)
+
+
+def moved(points: ImagePoints, moving: Moving, outward: Float) -> ImagePoints:
+    """Return a gauge run's points of the line, found ``outward`` (M, 2), with what moves them."""
+    assert points.per_px_c is not None
+    passing = moving.passing_mm_s(points.frame, points.xyz_c)
+    rate = np.einsum("mi,mi->m", points.normal_c, passing)
+    rate /= np.einsum("mi,mi->m", points.normal_c, points.per_px_c)
+    speed = moving.speed_mm_s[points.frame]
+    return replace(points, velocity_px=rate[:, None] * outward, speed_mm_s=speed)
 
 
 def way_per_px(probe: Probe, uv: Float, outward: Float) -> Float:
@@ -147,14 +160,25 @@ def _wall_directions(xyz_p: Float, T_pc: Float) -> tuple[Float, Float]:
     return np.einsum("mij,mi->mj", T_pc[:, :3, :3], normal_p), T_pc[:, 2, :3]
 
 
-def rates(value: Float, time_s: Float) -> Float:
-    """Return the rates (N, K) of noisy values (N, K) at times (N,) that rise, by a smoothing spline.
+def smoothed(time_s: Float) -> int:
+    """Return over how many frames noise of a gauge run's poses at times (N,) is smoothed."""
+    step_s = float(np.ptp(time_s)) / max(len(time_s) - 1, 1)
+    return 2 * int(np.clip(np.round(_SMOOTHED_S / max(2 * step_s, 1e-9)), _FEWEST // 2, _MOST // 2)) + 1
 
-    Differences over two frames, smoothed over nine, lost up to 5 % of a sway at 10 frames/s; a spline that
-    gives up ∫f″² for closeness passes a wave of angular frequency ω with the share 1 / (1 + λ Δt ω⁴).
+
+def rates(value: Float, time_s: Float, frames: int) -> Float:
+    """Return the rates (N, K) of noisy values (N, K) at ascending times (N,), by ``frames`` about each.
+
+    They are slopes of the polynomial of degree 4 that fits these values best (Savitzky & Golay 1964), of one
+    through them where they are fewer. Times may be uneven; near an end the frames are the first or last.
     """
-    if len(time_s) < _LEAST_FOR_SPLINE:
-        return np.asarray(np.gradient(value, time_s, axis=0)) if len(time_s) > 1 else np.zeros_like(value)
-    step_s = float(np.median(np.diff(time_s)))
-    smoothness = 1 / (step_s * (2 * np.pi * _FASTEST_HZ) ** 4)
-    return np.asarray(make_smoothing_spline(time_s, value, lam=smoothness)(time_s, 1))
+    count = min(frames, len(time_s))
+    if count < 2:
+        return np.zeros_like(value)
+    first = np.clip(np.arange(len(time_s)) - count // 2, 0, len(time_s) - count)
+    near = first[:, None] + np.arange(count)
+    apart = time_s[near] - time_s[:, None]
+    span = np.maximum(np.abs(apart).max(axis=1), 1e-9)
+    powers = (apart / span[:, None])[..., None] ** np.arange(min(_DEGREE, count - 1) + 1)
+    slope = np.linalg.pinv(powers)[:, 1] / span[:, None]
+    return np.asarray(np.einsum("nw,nwk->nk", slope, value[near]))
