@@ -183,7 +183,7 @@ def _lines(
     context: Context,
 ) -> Iterator[Defect]:
     """Yield the dark lines that the photo alone shows; one beside what rings show is a part of it."""
-    for region in dark_lines(scene.seen_by.texture, wall.relief):
+    for region in dark_lines(scene.seen_by.texture, wall.relief, context.scratch):
         beside = any(lies_beside(region, f.region, wall.relief) for f in found)
         surface, here = wall.surface_about(region, every_point=True)
         if not beside and _is_measured(surface, here):
@@ -267,5 +267,5 @@ def _defects_of_run(
 
 
 DEFECTS = Stage(
-    "defects", "29", DefectParameters, _defects_of_run, "defects as instances with depth, clock and kind"
+    "defects", "30", DefectParameters, _defects_of_run, "defects as instances with depth, clock and kind"
 )

@@ -18,9 +18,10 @@ import numpy as np
 
 from pipeline.arrays import Bool, Float, Float32, Int
 from pipeline.artefacts.measured import WallTexture
+from pipeline.machine.scratch import Scratch
 from stages.defects.along import stretches
 from stages.defects.relief import WallRelief
-from stages.defects.segment import Region
+from stages.defects.segment import Region, instances
 
 # Half a millimetre is a wide crack and two pixels of a usual photo; mm and pixels, 1 σ of the smoothing.
 _LINE_MM, _LINE_PX = 0.25, 1.0
@@ -34,9 +35,12 @@ _EDGE_MM = 2.0
 _OVERLAP_MM = 30.0
 # So many of the heaviest lines tell how the weights of a pattern fall off; a photo has a line by chance in so
 # many cases; shorter ones are specks, mm. Chosen.
-_HEAVIEST, _BY_CHANCE, _SHORTEST_MM = 40, 0.01, 5.0
-# A bright line is dark on both sides, at 1.7 times the smoothing: so far away a heavier bright one is looked
-# for, mm.
+_HEAVIEST, _BY_CHANCE, _SHORTEST_MM = 40, 0.05, 5.0
+_MAY_BE_CRACKS = 5  # of the heaviest
+_LOOKED_AT = 400  # of dark and of bright ones: flanks and what lies beyond the seam are left out of them
+_GAP_MM = 1.0  # parts of a line so near to each other are one
+# A bright line is dark on both sides, at 1.7 times the smoothing, and a dark one bright: a heavier line of
+# the other kind is looked for so far away, mm.
 _FLANK_MM = 1.0
 # The rim of a finding is dark as well, so far from it, mm: of its lines more than half lies there. Chosen.
 _BESIDE_MM, _MOSTLY = 2.0, 0.5
@@ -52,18 +56,17 @@ class _Line:
     weight: float
 
 
-def dark_lines(texture: WallTexture, relief: WallRelief) -> tuple[Region, ...]:
+def dark_lines(texture: WallTexture, relief: WallRelief, scratch: Scratch) -> list[Region]:
     """Return the dark lines of a photo that its own pattern does not explain, as cells of the map."""
-    rows = len(texture.bgra)
     overlap = round(_OVERLAP_MM / texture.mm_per_px)
-    parts = stretches(rows, overlap)
-    cells: list[Region] = []
+    parts = stretches(len(texture.bgra), overlap)
+    cells = scratch.zeros(relief.shape, np.bool_)
     for part in parts:
         strip = _Strip(texture, part.wide, relief.radius_mm)
-        lines = (line for line in strip.unexplained(_BY_CHANCE / len(parts)))
-        own = (k for k in lines if part.inner.start <= k.row.mean() < part.inner.stop)
-        cells += [strip.cells_of(line, relief) for line in own]
-    return tuple(cells)
+        for line in strip.unexplained(_BY_CHANCE / len(parts)):
+            if part.inner.start <= line.row.mean() < part.inner.stop:
+                cells[strip.cells_of(line, relief)] = True
+    return instances(cells, 1.0, relief.cell_mm, _GAP_MM, scratch)
 
 
 class _Strip:
@@ -81,17 +84,23 @@ class _Strip:
     def unexplained(self, by_chance: float) -> Iterator[_Line]:
         """Yield the dark lines that are heavier than the photo's pattern makes lines, but by this chance."""
         valley, ridge = self._strengths()
-        dark, bright = self._lines(valley), self._lines(ridge)
-        reach = tuple(2 * round(_FLANK_MM / c) + 1 for c in self._cell)
-        beside = cv2.dilate(ridge, np.ones(reach, np.uint8))
-        weight = np.sort([line.weight for line in dark + bright])[::-1]
-        limit = limit_of_weight(weight, by_chance)
+        dark, bright = self._lines_but_flanks(valley, ridge), self._lines_but_flanks(ridge, valley)
+        limit = limit_of_weight(np.sort([line.weight for line in dark + bright])[::-1], by_chance)
         for line in dark:
             size = np.hypot(np.ptp(line.row) * self._cell[0], np.ptp(line.column) * self._cell[1])
-            middle = self._beyond <= line.column.mean() < self._beyond + self._around
-            flank = beside[line.row, line.column].sum() > valley[line.row, line.column].sum()
-            if line.weight > limit and size >= _SHORTEST_MM and middle and not flank:
+            if line.weight > limit and size >= _SHORTEST_MM:
                 yield line
+
+    def _lines_but_flanks(self, strength: Float32, other: Float32) -> list[_Line]:
+        """Return lines, but none along a heavier one of the other kind, and none beyond the seam."""
+        reach = tuple(2 * round(_FLANK_MM / c) + 1 for c in self._cell)
+        beside = cv2.dilate(other, np.ones(reach, np.uint8))
+        own = (
+            k
+            for k in self._lines(strength)
+            if beside[k.row, k.column].sum() < strength[k.row, k.column].sum()
+        )
+        return [k for k in own if self._beyond <= k.column.mean() < self._beyond + self._around]
 
     def _strengths(self) -> tuple[Float32, Float32]:
         """Return how strong dark and bright lines are (h, w), over what is usual; 0 without a photo."""
@@ -126,21 +135,24 @@ class _Strip:
         row, column = np.nonzero(thin)
         number = label[row, column]
         weight = np.bincount(number, np.minimum(strength[row, column], _MOST))
-        heaviest = np.argsort(weight)[::-1][:_HEAVIEST]
-        return [_Line(row[number == k], column[number == k], float(weight[k])) for k in heaviest if weight[k]]
+        if not len(weight):
+            return []
+        least = np.sort(weight)[-_LOOKED_AT:][0]
+        kept = np.flatnonzero(weight[number] >= least)
+        kept = kept[np.argsort(number[kept], kind="stable")]
+        cuts = np.flatnonzero(np.diff(number[kept])) + 1
+        return [_Line(row[k], column[k], float(weight[number[k[0]]])) for k in np.split(kept, cuts) if len(k)]
 
-    def cells_of(self, line: _Line, relief: WallRelief) -> Region:
-        """Return the cells of the map through which a line goes."""
+    def cells_of(self, line: _Line, relief: WallRelief) -> tuple[Int, Int]:
+        """Return rows and columns of the map's cells through which a line goes."""
         texture, radius_map = self._texture, relief.radius_map
         s = texture.distance_from_mm + (self._first + line.row) * texture.mm_per_px
         psi = texture.azimuth_from_rad + (line.column - self._beyond) * texture.rad_per_px
         step = radius_map.azimuth_rad[1] - radius_map.azimuth_rad[0]
         i = np.rint((s - radius_map.distance_mm[0]) / relief.cell_mm[0]).astype(int)
-        j = np.rint((psi - radius_map.azimuth_rad[0]) / step).astype(int)
-        i = np.clip(i, 0, len(radius_map.distance_mm) - 1)
-        mask = np.zeros((np.ptp(i) + 1, np.ptp(j) + 1), np.uint8)
-        mask[i - i.min(), j - j.min()] = 1
-        return Region(int(i.min()), int(j.min()), mask > 0, 1.0)
+        j = np.rint((psi - radius_map.azimuth_rad[0]) / step).astype(int) % relief.shape[1]
+        on_map = (i >= 0) & (i < relief.shape[0])
+        return i[on_map], j[on_map]
 
 
 def lies_beside(line: Region, found: Region, relief: WallRelief) -> bool:
@@ -158,11 +170,15 @@ def lies_beside(line: Region, found: Region, relief: WallRelief) -> bool:
 def limit_of_weight(weight: Float, by_chance: float) -> float:
     """Return the weight above which a pattern whose lines weigh so much (N,), falling, has one by chance.
 
-    Above some weight they fall off as a power (Pareto), whose exponent their median gives, which a few cracks
-    hardly move. Of too few lines nothing is known, and the limit is endless.
+    Above some weight they fall off as a power (Pareto): their logarithms exponentially. The heaviest may be
+    cracks and are only known to be heavier than the rest; the limit holds how unsure the rest leave the power
+    (predictive distribution of an exponential law with censored data: Lawless, Statistical Models and Methods
+    for Lifetime Data, 2003, ch. 4). Of too few lines nothing is known, and the limit is endless.
     """
-    if len(weight) < _HEAVIEST:
+    if len(weight) < _HEAVIEST or weight[_HEAVIEST - 1] <= 0:
         return np.inf
-    least = weight[_HEAVIEST - 1]
-    fall = float(np.median(np.log(weight[:_HEAVIEST] / least))) / np.log(2)
-    return float(least * (_HEAVIEST / by_chance) ** fall)
+    beyond = np.log(weight[: _HEAVIEST - 1] / weight[_HEAVIEST - 1])
+    known = len(beyond) - _MAY_BE_CRACKS
+    fall = (beyond[_MAY_BE_CRACKS:].sum() + _MAY_BE_CRACKS * beyond[_MAY_BE_CRACKS]) / known
+    most = known * fall * ((len(beyond) / by_chance) ** (1 / known) - 1)
+    return float(weight[_HEAVIEST - 1] * np.exp(most))

@@ -34,6 +34,9 @@ _SMALL_MM2 = 60.0  # below this a quartic surface follows everything
 _UNKNOWN_ROUGHNESS = 0.08, 0.08
 # Coefficients of a quartic surface.
 _QUARTIC = 15
+# A line that scatters no more about a straight one, r.m.s., may be a joint or a seam: a cell (chosen).
+_STRAIGHT_MM = 0.4
+_CRACK_OR = "a crack, or a scratch, the edge of a stain or a shadow"
 _ROUND = " It goes all round: it may be the gap of a joint or the hollow root of a weld."
 
 
@@ -127,6 +130,8 @@ def describe_line(region: Region, depth: Depth, surface: Surface, scene: Scene) 
     """
     shown = describe(region, depth, surface, scene)
     direction = features_of(surface.relief, region, depth).direction_rad
+    straight = _across_mm(surface.relief, region) < _STRAIGHT_MM
+    causes = "the edge of a joint, a seam, a water line, a scratch or a crack" if straight else _CRACK_OR
     length = float(np.hypot(shown.length_mm, shown.width_mm))
     rings = notation.depth(shown.depth_mm, shown.depth_sigma_mm)
     return replace(
@@ -136,12 +141,18 @@ def describe_line(region: Region, depth: Depth, surface: Surface, scene: Scene) 
         probability=float("nan"),
         confidence=float("nan"),
         pof_class="",
-        pacp_suggestion=pacp_suggestion(DefectKind.CRACK, direction),
-        en13508_suggestion=en13508_suggestion(DefectKind.CRACK),
-        statement=f"Dark line in the photo, about {length:.0f} mm long. It may be a crack, or a scratch, the "
-        f"edge of a stain or a shadow. Rings, which measure no width below 1 mm, show {rings}. Not "
-        "confirmed. The photo alone shows it.",
+        pacp_suggestion="" if straight else pacp_suggestion(DefectKind.CRACK, direction),
+        en13508_suggestion="" if straight else en13508_suggestion(DefectKind.CRACK),
+        statement=f"{'Straight dark' if straight else 'Dark'} line in the photo, about {length:.0f} mm long. "
+        f"It may be {causes}. Rings, which measure no width below 1 mm, show {rings}. Not confirmed. The "
+        "photo alone shows it.",
     )
+
+
+def _across_mm(relief: Relief, region: Region) -> float:
+    """Return by how much the cells of a line scatter to either side of a straight one, r.m.s."""
+    place = np.argwhere(region.mask) * relief.cell_mm
+    return float(np.sqrt(max(np.linalg.eigvalsh(np.cov(place.T))[0], 0.0))) if len(place) > 1 else 0.0
 
 
 def _goes_round(relief: Relief, region: Region) -> bool:

@@ -66,7 +66,7 @@ def regions_of(relief: WallRelief, cells: Grown, gap_mm: float, scratch: Scratch
     """
     regions = [_weld(relief, band) for band in relief.welds]
     for sign, mask in ((1.0, cells.into), (-1.0, cells.inward)):
-        regions += _instances(mask, sign, relief.cell_mm, gap_mm, scratch)
+        regions += instances(mask, sign, relief.cell_mm, gap_mm, scratch)
     return tuple(sorted(regions, key=lambda r: (r.row, r.column, r.sign)))
 
 
@@ -75,9 +75,10 @@ def _weld(relief: WallRelief, band: slice) -> Region:
     return Region(band.start, 0, np.isfinite(rows), float(np.sign(np.nanmedian(rows))), True)
 
 
-def _instances(
+def instances(
     mask: Bool, sign: float, cell_mm: tuple[float, float], gap_mm: float, scratch: Scratch
 ) -> list[Region]:
+    """Return what belongs together among cells (S, A) of one sign, wherever a long map is cut."""
     patches = _patches(mask, cell_mm, gap_mm, scratch)
     out: list[Region] = []
     for number, extent in enumerate(patches.extent):

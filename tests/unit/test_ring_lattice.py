@@ -57,13 +57,18 @@ def test_pictures_as_the_camera_took_them_have_no_lattice() -> None:
     assert error < 0.05
 
 
-def drawn(period_px: float, size_px: float) -> RingSamples:
-    """Return rings of a swaying probe, drawn to blocks of rows, with noise that is alike in neighbours."""
-    random = np.random.default_rng(2)
-    sway = np.stack([12 * np.sin(0.3 * np.arange(RINGS)), 12 * np.cos(0.2 * np.arange(RINGS))], -1)
-    radius = 200 + sway @ np.stack([np.cos(AZIMUTH), np.sin(AZIMUTH)])
-    fine = random.normal(0, 0.1, radius.shape)
-    radius += fine + np.roll(fine, 1, 1) + np.roll(fine, 2, 1)
+def drawn(
+    period_px: float, size_px: float, sway_px: float = 12.0, rough_px: float = 0.1, seed: int = 2
+) -> RingSamples:
+    """Return rings of a swaying probe, drawn to blocks of rows, with noise that is alike in neighbours.
+
+    A probe that does not sway sees the same wall in all its rings, as one that stands.
+    """
+    random = np.random.default_rng(seed)
+    way = np.stack([np.sin(0.3 * np.arange(RINGS)), np.cos(0.2 * np.arange(RINGS))], -1)
+    radius = 200 + sway_px * way @ np.stack([np.cos(AZIMUTH), np.sin(AZIMUTH)])
+    fine = random.normal(0, rough_px, radius.shape if sway_px else AZIMUTHS)
+    radius += fine + np.roll(fine, 1, -1) + np.roll(fine, 2, -1)
     radius += 1.0 * np.exp(-0.5 * ((AZIMUTH - 1.5) / 0.05) ** 2)  # a groove where the line runs along rows
     row = CENTRE[1] + radius * np.sin(AZIMUTH)
     radius += size_px * np.sin(2 * np.pi * row / period_px) * np.sin(AZIMUTH) * ALONG_ROWS
@@ -89,3 +94,10 @@ def test_blocks_of_rows_are_found_and_leave_a_groove_as_it_is(period_px: float) 
 
 def test_noise_and_a_groove_are_no_lattice() -> None:
     assert lattices_of(drawn(8.0, 0.0)) == ()
+
+
+@pytest.mark.parametrize("rough_px", [0.02, 0.1])
+@pytest.mark.parametrize("seed", range(5))
+def test_a_wall_that_all_rings_see_alike_is_no_lattice(rough_px: float, seed: int) -> None:
+    """A groove in a smooth pipe, or the roughness where a probe stands, repeats a little with some period."""
+    assert lattices_of(drawn(8.0, 0.0, 0.0, rough_px, seed)) == ()

@@ -105,8 +105,8 @@ def _findings(found: Sequence[Defect], pictures: Gallery) -> tuple[Finding, ...]
 def _finding(defect: Defect, photo: str, deviation: str) -> Finding:
     codes = (
         f"POF: {defect.pof_class}" if defect.pof_class else "",
-        f"PACP, suggested: {defect.pacp_suggestion}",
-        f"EN 13508-2, suggested: {defect.en13508_suggestion}",
+        f"PACP, suggested: {defect.pacp_suggestion}" if defect.pacp_suggestion else "",
+        f"EN 13508-2, suggested: {defect.en13508_suggestion}" if defect.en13508_suggestion else "",
     )
     return Finding(
         number=defect.id,
