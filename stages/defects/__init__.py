@@ -64,6 +64,10 @@ _MIN_CELLS, _MIN_CIRCLES, _HALF = 1000, 8, 0.5
 # Nothing says that what stays at one place of the image, or lies where the line ends, is rather the wall.
 _WALL_OR_NOT = 0.5
 _UNSURE = "Its depth is not known to twice its σ"
+_AT_LEAST = (
+    "It is at least so deep, to ± {:.2f} mm by noise, which does not make it: the rest of σ is what pictures "
+    "that hold some of those before them may have taken off."
+)
 
 
 def find_defects(
@@ -133,6 +137,18 @@ class _Found:
     by_noise: Defect
     evidence: Evidence
     step: bool
+
+    @property
+    def flattened(self) -> bool:
+        """Whether it is deeper than noise makes it, and may have been flattened by about its depth."""
+        return is_depth_known(self.by_noise) and not is_depth_known(self.defect)
+
+    def told(self, probability: float) -> Defect:
+        """Return it with its probability, and in words whether its depth is a lower bound."""
+        words = _AT_LEAST.format(self.by_noise.depth_sigma_mm)
+        told = f"{self.defect.statement} {words}" if self.flattened else self.defect.statement
+        sure = self.defect.confidence * probability
+        return replace(self.defect, probability=probability, confidence=sure, statement=told)
 
 
 def _credibility(found: Sequence[_Found], tail: NoiseTail, wall: MeasuredWall) -> Credibility:
@@ -211,7 +227,7 @@ def _judged(
         real = min(real, MOST_SURE) * (1.0 if f.evidence.on_wall else _WALL_OR_NOT)
         real = 0.0 if f.step else real
         counts = f.evidence.corroborated and real >= COUNTED and is_depth_known(f.by_noise)
-        defect = replace(f.defect, probability=real, confidence=f.defect.confidence * real)
+        defect = f.told(real)
         if counts:
             confirmed.append(defect)
         else:

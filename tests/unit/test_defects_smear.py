@@ -134,3 +134,18 @@ def test_rings_that_are_missing_make_no_long_way() -> None:
     ways = cloud_along(replace(cloud_of(DISTANCE[[0, 1, 2, 90]]), frame=np.array([0, 2, 4, 180]))).ways_mm()
     assert ways[[2, 4, 180]] == pytest.approx([0.5, 0.5, 0.0])
     assert not cloud_along(cloud_of(DISTANCE[:1])).ways_mm().any()
+
+
+@pytest.mark.parametrize("flattened", [True, False])
+def test_a_finding_whose_depth_may_be_flattened_by_as_much_is_told_as_at_least_so_deep(
+    flattened: bool,
+) -> None:
+    """It was confirmed at .98 with .40 ± .44 mm and not a word."""
+    drawn = DrawnDefect("pit", 40.0, 1.0, 3.0, 7.0, 1.0)
+    true = relief(drawn, DISTANCE, AZIMUTH, RADIUS, np.random.default_rng(0))
+    share = 0.9 if flattened else 0.0
+    seen = lfilter([1 - share], [1, -share], true, axis=0)
+    told = found_on(seen, HeldOver(share ** np.arange(12)))
+    assert (abs(told.depth_mm) < 1.96 * told.depth_sigma_mm) == flattened
+    assert told.probability > 0.5
+    assert ("It is at least so deep" in told.statement) == flattened
