@@ -102,9 +102,7 @@ def by_block(samples: BlockSamples, values: Float) -> Float32:
     return out
 
 
-def to_power(
-    number: Int, log_light: Float32, shown: Shown, told: Float, log_photo: Float32 | None = None
-) -> Pair:
+def to_power(number: Int, log_light: Float32, shown: Shown, told: Float) -> Pair:
     """Return a frame in other light than its photo was made in, to a power.
 
     Parameters
@@ -116,11 +114,7 @@ def to_power(
     shown : Shown
     told : (1,)
         1 more than the power: 1 leaves the frame as it is.
-    log_photo : (F, rows, columns), optional
-        By how much the photo errs, which is granted either way: logarithm of brightness.
     """
     level, own = shown.twin.level, int(np.searchsorted(number, shown.number))
     more = full_size(log_light[own], level.shape, 0.0)
-    if log_photo is not None:
-        level = level * np.exp(full_size(log_photo[own], level.shape, 0.0))
     return Pair(level, level * np.exp(np.float32(told[0] - 1) * more), shown.wall, "scale")

@@ -132,9 +132,12 @@ class BlockSamples:
                 u, v = ((a + 0.5) * BLOCK_PX for a in (self.column, self.row))
                 away = np.hypot(u - place["u_px"], v - place["v_px"])
                 keep &= away > place["radius_px"] + 2 * BLOCK_PX
-        whole = (a.name for a in fields(self))
-        values = {n: getattr(self, n) for n in whole if np.shape(getattr(self, n)) == keep.shape}
-        return replace(self, **{n: v[keep] for n, v in values.items()}) if keep.any() else self
+        return self.kept(keep) if keep.any() else self
+
+    def kept(self, keep: Bool) -> BlockSamples:
+        """Return the blocks in ``keep`` (N,)."""
+        of_blocks = (f.name for f in fields(self) if f.name not in ("first_mm", "cell_mm", "number"))
+        return replace(self, **{name: getattr(self, name)[keep] for name in of_blocks})
 
     @cached_property
     def strength(self) -> Float:

@@ -144,7 +144,8 @@ class Sums:
     ) -> tuple[tuple[Suspected, ...], tuple[Mismatch, ...]]:
         """Return what makes the lamps uneven in all frames, and what wall seen twice does not bear out.
 
-        The run's own photo holds most of it, which then shows in how it changes over polar angle alone.
+        The run's own photo holds most of it, which then shows in how it changes over polar angle alone: that
+        cannot be told from other patterns.
         """
         if led_failed:
             return (), ()
@@ -153,8 +154,7 @@ class Sums:
         uneven, of_wall = parted_from_wall(uneven, lamp, self._scene, samples)
         if any("led_dead" in one.mismatch.names for one in uneven):
             return uneven, of_wall
-        dim = dead_led(samples, self._scene)
-        return (dim, ()) if dim else (uneven, of_wall)
+        return uneven, (*of_wall, *dead_led(samples, self._scene))
 
     def _shown(self, recording: Recording, frames: Int) -> Iterator[tuple[int, Shown]]:
         """Yield compared frames anew, with what renders them under other assumptions."""
