@@ -13,7 +13,7 @@ from pipeline.physics.effect import Channel, FixedTo
 from stages.diagnose.agreement import Agreement, Part, agreement, chance_of_name
 from stages.diagnose.channels import Seen
 from stages.diagnose.inference import SURE
-from stages.diagnose.late_pictures import Exposure, as_late_as_shown
+from stages.diagnose.late_pictures import Exposure, as_late_as_exposed, as_late_as_shown
 from stages.diagnose.profile.evidence import ProfileEvidence
 from stages.diagnose.profile.finding import Finding
 from stages.diagnose.result import CourseFound, EffectFound, Location, Value
@@ -142,8 +142,9 @@ def claims_of(field: Seen | None, gauge: Seen | None, stated_exposure_s: float) 
             out.append(_borne_out(*sorted(each, key=lambda c: (c.of_gauge_alone, c.p_value))))
         else:
             out.append(_against(each[0], field if name in of_gauge else gauge))
-    if not any(c.name == "time_offset" and c.sure for c in out):
-        out = [replace(c, parameters=as_late_as_shown(c.parameters, recordings)) for c in out]
+    own_delay = any(c.name == "time_offset" and c.sure for c in out)
+    of_exposure = as_late_as_exposed if own_delay else lambda size: as_late_as_shown(size, recordings)
+    out = [replace(c, parameters=of_exposure(c.parameters)) for c in out]
     return sorted((c for c in out if not _excluded(c, out)), key=lambda c: c.p_value)
 
 

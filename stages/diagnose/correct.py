@@ -31,7 +31,7 @@ Change = Callable[[dict[str, float], Float, Shape], None]
 # A longer exposure makes pictures late, so that readings seem late by what it adds to their own delay.
 _OF_ENCODER = {
     "encoder_scale": "relative", "encoder_slip": "slip_mm", "encoder_backlash": "backlash_mm",
-    "time_offset": "delay_s", "motion_blur": "exposure_s",
+    "time_offset": "delay_s", "motion_blur": "late_s",
 }  # fmt: skip
 ENCODER_EFFECTS = frozenset(_OF_ENCODER)
 _ROUNDS = 3
@@ -64,11 +64,16 @@ def _shift(encoder: Encoder, true_mm: Float, effects: Sequence[EffectFound]) -> 
     travel = Travel(encoder.time_s, true_mm, np.gradient(true_mm, encoder.time_s))
     shift = np.zeros(len(true_mm))
     for e in effects:
-        # Of a longer exposure only what the encoder shows of it: see `as_late_as_shown`.
-        late = e.parameters.get("late_s")
-        size = 2 * late.value if late is not None else e.parameters[_OF_ENCODER[e.name]].value
-        shift += LIBRARY[e.name].reading_shift_mm(travel, _shape(e), np.array([size]))
+        shift += LIBRARY[e.name].reading_shift_mm(travel, _shape(e), np.array([_size(e)]))
     return shift
+
+
+def _size(effect: EffectFound) -> float:
+    """Return the size; of a longer exposure what the encoder shows of it, nothing where none shows any."""
+    size = effect.parameters.get(_OF_ENCODER[effect.name])
+    if effect.name == "motion_blur":
+        return 2 * size.value if size is not None else 0.0
+    return effect.parameters[_OF_ENCODER[effect.name]].value
 
 
 def _shape(effect: EffectFound) -> Shape:

@@ -21,6 +21,9 @@ from stages.diagnose.travel.solve import DELAY
 _EXPOSURE, _DELAY = "motion_blur", "time_offset"
 # So many σ beyond what a frame has time for, a width is not that of an exposure: by chance once in 700.
 _SURE = 3.0
+# Stamps may be of an exposure's begin, of its middle or of any time between, all as likely: pictures are late
+# by none to all of half the exposure. About all of that half this is 1 σ, as a part of it.
+_BY_STAMPS = float(1 / np.sqrt(3))
 
 
 @dataclass(frozen=True)
@@ -98,28 +101,42 @@ class Exposure:
 def as_late_as_shown(size: dict[str, Value], recordings: Iterable[Seen | None]) -> dict[str, Value]:
     """Return an effect's size, of an exposure with how late it makes pictures as far as an encoder shows it.
 
-    Stamps may be of the exposure's middle, so that half of it makes no picture late against its stamp.
+    Stamps may be of the exposure's middle, so that half of it makes no picture late against its stamp. Of a
+    delay that both recordings tell, what is found counts; where no encoder tells any, nothing is known.
     """
+    travels = (s.travel for s in recordings if s is not None and s.travel is not None)
+    each = [e for t in travels if (e := t.estimate(_DELAY)) is not None and np.isfinite(e.size_sigma)]
+    if "exposure_s" not in size or not each:
+        return size
+    shown = min(each, key=lambda e: (not is_found(e.p_value), e.size_sigma))
+    half = Value(size["exposure_s"].value / 2, size["exposure_s"].sd / 2)
+    value = min(max(shown.value, 0.0), half.value) if is_found(shown.p_value) else 0.0
+    return size | {"late_s": half if 0 < half.value == value else Value(value, shown.size_sigma)}
+
+
+def as_late_as_exposed(size: dict[str, Value]) -> dict[str, Value]:
+    """Return an effect's size, of an exposure with half of it, which is taken off the encoder's own delay."""
     if "exposure_s" not in size:
         return size
-    half = Value(size["exposure_s"].value / 2, size["exposure_s"].sd / 2)
-    travels = (s.travel for s in recordings if s is not None and s.travel is not None)
-    shown = next((e for t in travels if (e := t.estimate(_DELAY)) is not None), None)
-    if shown is None or not is_found(shown.p_value):
-        return size | {"late_s": Value(0.0, half.sd)}
-    least = half if shown.value > half.value else Value(max(shown.value, 0.0), shown.size_sigma)
-    return size | {"late_s": least}
+    half = size["exposure_s"].value / 2
+    return size | {"late_s": Value(half, float(np.hypot(size["exposure_s"].sd / 2, half * _BY_STAMPS)))}
 
 
 def _less_half(late: TravelEstimate, longer: Size, fit: TravelFit | None) -> TravelEstimate:
-    """Return the delay less half of a longer exposure, and what parts of the travel say of what is left."""
-    value, sigma = late.value - longer.value / 2, float(np.hypot(late.sigma, longer.sigma / 2))
-    again = late.agreements if fit is None else second_predictions(fit, DELAY, known=longer.value / 2)
-    own = replace(late, value=value, sigma=sigma, agreements=again)
+    """Return the delay less half of a longer exposure, and what parts of the travel say of what is left.
+
+    A delay from none to that half needs no encoder that is late, whatever the stamps are of.
+    """
+    half = longer.value / 2
+    value, sigma = late.value - half, float(np.hypot(late.sigma, longer.sigma / 2))
+    again = late.agreements if fit is None else second_predictions(fit, DELAY, known=half)
+    by_stamps = float(np.hypot(late.stated_sigma, half * _BY_STAMPS))
+    own = replace(late, value=value, sigma=sigma, stated_sigma=by_stamps, agreements=again)
     if not np.isfinite(sigma):
         return own
     possible = LIBRARY[_DELAY].possible((), np.array([value]))
-    return replace(own, p_value=float(2 * norm.sf(abs(value) / own.size_sigma)) if possible else 1.0)
+    beyond = max(value, -late.value, 0.0) / float(np.hypot(sigma, late.stated_sigma))
+    return replace(own, p_value=float(2 * norm.sf(beyond)) if possible else 1.0)
 
 
 def _another(exposure: Size, width: Size) -> bool:

@@ -85,12 +85,16 @@ def test_pictures_late_by_half_an_exposure_and_late_readings_are_put_right_toget
         return 20 * time_s + 3 * np.sin(time_s)
 
     time_s = np.arange(0.0, 8.0, 0.01)
-    longer, late = found("motion_blur", exposure_s=0.06), found("time_offset", delay_s=-0.08)
+    longer, late = found("motion_blur", exposure_s=0.06, late_s=0.03), found("time_offset", delay_s=-0.08)
     for effects, seconds in (((longer,), 0.03), ((late,), -0.08), ((longer, late), -0.05)):
         read = recording(time_s, way(time_s - seconds))
         assert encoder_effects(effects) == effects
         mended = with_true_readings(read, effects).encoder.distance_mm
         assert mended[20:-20] == pytest.approx(way(time_s)[20:-20], abs=0.02)
+    # Of an exposure that no encoder shows to make pictures late nothing is put right.
+    read = recording(time_s, way(time_s))
+    mended = with_true_readings(read, (found("motion_blur", exposure_s=0.06),)).encoder.distance_mm
+    assert mended == pytest.approx(way(time_s), abs=1e-9)
 
 
 def test_residuals_fall_into_the_cells_where_they_lie():

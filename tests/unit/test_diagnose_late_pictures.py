@@ -15,10 +15,10 @@ from pipeline.recording.base import Encoder, Recording
 from stages.diagnose.agreement import Agreement
 from stages.diagnose.channels import Seen
 from stages.diagnose.correct import with_true_readings
-from stages.diagnose.late_pictures import Exposure
+from stages.diagnose.late_pictures import Exposure, as_late_as_shown
 from stages.diagnose.profile.evidence import ProfileEvidence
 from stages.diagnose.profile.finding import Size, finding
-from stages.diagnose.result import Diagnosis, Verdict
+from stages.diagnose.result import Diagnosis, Value, Verdict
 from stages.diagnose.travel.events import with_events
 from stages.diagnose.travel.evidence import TravelEstimate, _estimates
 from stages.diagnose.travel.model import TravelFit, fitted
@@ -35,14 +35,14 @@ def thirty_a_second() -> TravelFit:
 
 def late(
     source: str, fit: TravelFit, delay_s: float | None, width_ms: tuple[float, float] | None,
-    agreements: tuple[Agreement, ...] = (AGREES,),
+    agreements: tuple[Agreement, ...] = (AGREES,), sigma_s: float = 2e-4,
 ) -> Seen:  # fmt: skip
     """Return a recording whose readings seem late, and whose line widens with its speed."""
     estimates: tuple[TravelEstimate, ...] = ()
     if delay_s is not None:
         p = 1e-12 if abs(delay_s) > 5e-3 else 0.8
         estimates = (
-            TravelEstimate("time_offset", "delay_s", delay_s, 2e-4, 1e-3, p, 0.01, (), (AGREES,)),
+            TravelEstimate("time_offset", "delay_s", delay_s, sigma_s, 1e-3, p, 0.01, (), (AGREES,)),
         )  # fmt: skip
     recording = seen(source, estimates=estimates, fit=fit)
     if width_ms is None:
@@ -142,7 +142,8 @@ def test_the_encoders_own_delay_holds_what_the_width_leaves_open(
 ) -> None:
     named = answer(real_probe, None, late("gauge", thirty_a_second, 0.018, (16.0, 2.0)))
     (own,) = (e for e in named.effects if e.name == "time_offset")
-    assert own.parameters["delay_s"].sd == pytest.approx(np.sqrt(0.2**2 + 1 + 1) * 1e-3)
+    # Stamps of any time from the exposure's begin to its middle leave 10 to 18 ms: 3⁻½ × 8 ms about 10.
+    assert own.parameters["delay_s"].sd == pytest.approx(np.sqrt(0.2**2 + 1 + 1 + 8**2 / 3) * 1e-3)
     within = answer(real_probe, None, late("gauge", thirty_a_second, 0.012, (16.0, 2.0)))
     assert sizes(within) == pytest.approx({"motion_blur": 0.016})
     # An exposure that the halves of the frames do not bear out leaves the delay open.
@@ -182,3 +183,47 @@ def test_what_confirms_the_encoders_own_delay_speaks_of_it_and_not_of_the_whole(
     assert estimate.value == pytest.approx(whole.value - 0.008)
     assert whole.agreements
     assert sizes_told(estimate) == pytest.approx([s - 0.008 for s in sizes_told(whole)], abs=2e-4)
+
+
+def test_without_an_encoder_nothing_is_told_of_how_late_an_exposure_makes_pictures(
+    real_probe: Probe, thirty_a_second: TravelFit
+) -> None:
+    """It had been 0 ± .5 ms, "as the encoder shows"."""
+    size = {"exposure_s": Value(0.016, 0.001)}
+    assert as_late_as_shown(size, (None, None)) == size
+    unknown = late("gauge", thirty_a_second, 0.0, None, sigma_s=np.inf)
+    assert as_late_as_shown(size, (unknown,)) == size
+    found = answer(real_probe, None, late("gauge", thirty_a_second, None, (16.0, 1.0)))
+    assert "late_s" not in found.effects[0].parameters
+
+
+def test_how_late_pictures_are_is_as_unsure_as_the_encoder_tells_it(thirty_a_second: TravelFit) -> None:
+    """An encoder known to 10 ms had shown 0 ± .5 ms, and hidden the 8 ± 1 ms of the other recording."""
+    size = {"exposure_s": Value(0.020, 0.001)}
+    unsure = late("field", thirty_a_second, 0.004, None, sigma_s=0.010)
+    shown = as_late_as_shown(size, (unsure, None))["late_s"]
+    assert (shown.value, shown.sd) == pytest.approx((0.0, np.hypot(0.010, 0.001)))
+    sure = late("gauge", thirty_a_second, 0.008, None)
+    for both in ((unsure, sure), (sure, unsure)):
+        shown = as_late_as_shown(size, both)["late_s"]
+        assert (shown.value, shown.sd) == pytest.approx((0.008, np.hypot(0.0002, 0.001)))
+
+
+@pytest.mark.parametrize("delay_s", [0.0055, 0.0075])
+def test_a_delay_that_stamps_between_begin_and_middle_make_is_not_the_encoders(
+    real_probe: Probe, thirty_a_second: TravelFit, delay_s: float
+) -> None:
+    """Of 5.5 ms found beside 30 ms of exposure, −9.5 ms had been an encoder that is early."""
+    found = answer(real_probe, None, late("gauge", thirty_a_second, delay_s, (30.0, 0.5)))
+    assert sizes(found) == pytest.approx({"motion_blur": 0.030})
+    assert found.effects[0].parameters["late_s"].value == pytest.approx(delay_s)
+
+
+def test_beside_an_encoders_own_delay_half_of_the_exposure_is_put_right_as_well(
+    real_probe: Probe, thirty_a_second: TravelFit
+) -> None:
+    found = answer(real_probe, None, late("gauge", thirty_a_second, 0.018, (16.0, 1.0)))
+    of_name = {e.name: e.parameters for e in found.effects}
+    assert of_name["motion_blur"]["late_s"].value == pytest.approx(0.008)
+    assert of_name["time_offset"]["delay_s"].value == pytest.approx(0.010)
+    assert of_name["motion_blur"]["late_s"].sd == pytest.approx(np.sqrt(0.5**2 + 8**2 / 3) * 1e-3)
