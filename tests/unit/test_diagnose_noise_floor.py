@@ -76,6 +76,14 @@ def test_fewer_than_two_edges_repeat_nothing(count: int) -> None:
     assert [len(of_pair) for of_pair in _in_other_pictures(cast(Any, edges))] == [0, 0]
 
 
+def test_edges_that_the_camera_sees_nowhere_are_in_no_pair() -> None:
+    """They had ended the diagnosis as a fault of the program."""
+    uv = np.array([[np.nan, np.nan], [5.0, 5.0], [300.0, 5.0], [5.0, 6.0]])
+    edges = SimpleNamespace(uv=uv, normal=np.ones((4, 2)), frame=np.arange(4))
+    first, second = _in_other_pictures(cast(Any, edges))
+    assert list(zip(first.tolist(), second.tolist(), strict=True)) == [(1, 3), (3, 1)]
+
+
 def test_where_the_noise_is_not_known_it_is_not_known_that_an_explanation_fits() -> None:
     for floor, fits in ((0.09, True), (0.05, False), (np.nan, False)):
         quality = FitQuality("px", 1.0, 0.09, 1.0, 0.1, floor)

@@ -123,15 +123,19 @@ def variance_of_pairs(value: Float, weight: Float, first: Int, second: Int) -> f
 
 
 def _in_other_pictures(edges: Edges) -> tuple[Int, Int]:
-    """Return pairs (P,) of fiducials' edges of other pictures, at one place of the image and as steep."""
-    if len(edges.frame) < 2:
-        return np.zeros(0, np.int64), np.zeros(0, np.int64)
+    """Return pairs (P,) of fiducials' edges of other pictures, at one place of the image and as steep.
+
+    Edges that the camera model sees nowhere have no place.
+    """
     place = np.concatenate([edges.uv / _SAME_PLACE_PX, edges.normal / _SAME_STEEPNESS_RAD], axis=1)
-    apart, near = cKDTree(place).query(place, k=min(_NEIGHBOURS, len(place)))
-    near = np.asarray(near)
-    other = (edges.frame[near] != edges.frame[:, None]) & (apart < 1)
+    seen = np.flatnonzero(np.isfinite(place).all(axis=1))
+    if len(seen) < 2:
+        return np.zeros(0, np.int64), np.zeros(0, np.int64)
+    apart, near = cKDTree(place[seen]).query(place[seen], k=min(_NEIGHBOURS, len(seen)))
+    near, frame = np.asarray(near), edges.frame[seen]
+    other = (frame[near] != frame[:, None]) & (apart < 1)
     first = np.flatnonzero(other.any(axis=1))
-    return first, near[first, np.argmax(other[first], axis=1)]
+    return seen[first], seen[near[first, np.argmax(other[first], axis=1)]]
 
 
 def on_other_wall(azimuth_rad: Float, frame: Int, along_mm: Float, section: Int) -> tuple[Int, Int]:
