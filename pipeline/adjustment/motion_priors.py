@@ -22,9 +22,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.adjustment.bordered import Rows
 from pipeline.adjustment.elimination import BLOCK
 from pipeline.adjustment.robust import Cauchy, robust_spreads
+from pipeline.adjustment.rows import Rows
 from pipeline.arrays import Float, Int
 from pipeline.geometry.rigid import vector_from_rotation
 

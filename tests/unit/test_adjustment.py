@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.ndimage import median_filter
 
-from pipeline.adjustment.bordered import BorderedSystem, Rows
+from pipeline.adjustment.bordered import BorderedSystem
 from pipeline.adjustment.elimination import BLOCK
 from pipeline.adjustment.levenberg_marquardt import Minimum, Stop, minimise
 from pipeline.adjustment.local_spread import running_median
@@ -20,6 +20,7 @@ from pipeline.adjustment.normal_equations import (
     solved,
 )
 from pipeline.adjustment.robust import cluster_covariance, cluster_variance, two_way_variance
+from pipeline.adjustment.rows import Rows
 from pipeline.arrays import Float
 
 

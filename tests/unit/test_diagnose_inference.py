@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from pipeline.adjustment.bordered import Rows
+from pipeline.adjustment.rows import Rows
 from stages.diagnose.effects.courses import with_courses
 from stages.diagnose.effects.library import LIBRARY
 from stages.diagnose.effects.nameless import VOCABULARY

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from scipy.ndimage import map_coordinates
 
-from pipeline.adjustment.bordered import Rows
 from pipeline.adjustment.normal_equations import Marginal
 from pipeline.adjustment.robust import cluster_variance
+from pipeline.adjustment.rows import Rows
 from pipeline.arrays import Float
 from stages.calibrate.gauge.terms import WALL_CELL_MM, wall_cells
 from stages.diagnose.gauge.elimination import RING, Equations, eliminate_poses, of_no_edge

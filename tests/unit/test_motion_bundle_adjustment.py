@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
-from pipeline.adjustment.bordered import BorderedSystem, Factor, LandmarkRows, Rows, Step, landmark_steps
+from pipeline.adjustment.bordered import BorderedSystem, Factor, landmark_steps
 from pipeline.adjustment.elimination import BLOCK
 from pipeline.adjustment.levenberg_marquardt import Damping
 from pipeline.adjustment.motion_priors import trembling
 from pipeline.adjustment.normal_equations import BandedCholesky
 from pipeline.adjustment.robust import Cauchy, GemanMcClure, Loss, Squares
+from pipeline.adjustment.rows import LandmarkRows, Rows, Step
 from pipeline.arrays import Float, Int
 from pipeline.geometry.rigid import from_parts, rotation_from_vector, vector_from_rotation
 from stages.motion.bundle_adjustment.equations import Equations, Measurements, Scales, linearised, scales_of

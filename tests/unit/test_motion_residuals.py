@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipeline.adjustment.bordered import Rows
 from pipeline.adjustment.motion_priors import smooth_motion_rows, third_difference_coefficients
 from pipeline.adjustment.robust import GemanMcClure
+from pipeline.adjustment.rows import Rows
 from pipeline.arrays import Float
 from pipeline.artefacts.measured import RingPoints, RingSamples, RingValidity
 from pipeline.geometry.axis import to_pipe

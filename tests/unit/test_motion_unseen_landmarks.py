@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pipeline.adjustment.bordered import LandmarkRows, landmark_steps
+from pipeline.adjustment.bordered import landmark_steps
+from pipeline.adjustment.rows import LandmarkRows
 
 SEEN, FRAMES, BORDER, OWN = 3, 4, 6, 3
 

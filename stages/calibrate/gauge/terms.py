@@ -6,10 +6,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pipeline.adjustment.bordered import Rows
 from pipeline.adjustment.elimination import BLOCK
 from pipeline.adjustment.motion_priors import slip_drift_rows
 from pipeline.adjustment.robust import Cauchy, robust_spread
+from pipeline.adjustment.rows import Rows
 from pipeline.arrays import Float, Int
 from pipeline.geometry.rigid import inverse, skew, transform
 from pipeline.recording.base import Encoder

@@ -7,9 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from pipeline.adjustment.bordered import BorderedSystem, Factor, Rows
+from pipeline.adjustment.bordered import BorderedSystem, Factor
 from pipeline.adjustment.normal_equations import marginalised
 from pipeline.adjustment.robust import cluster_variance
+from pipeline.adjustment.rows import Rows
 from pipeline.arrays import Float, Int
 from stages.diagnose.field.system import FieldSystem
 from stages.diagnose.inference import Evidence

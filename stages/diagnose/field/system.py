@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pipeline.adjustment.bordered import LandmarkRows, Rows
 from pipeline.adjustment.elimination import BLOCK
 from pipeline.adjustment.motion_priors import smooth_motion_rows
 from pipeline.adjustment.robust import Squares
+from pipeline.adjustment.rows import LandmarkRows, Rows
 from pipeline.arrays import Float, Int
 from pipeline.geometry.rigid import inverse, transform
 from stages.diagnose.effects.base import EffectModel, ImagePoints, Shape, Travel

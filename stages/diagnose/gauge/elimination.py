@@ -13,9 +13,9 @@ from itertools import pairwise
 import numpy as np
 from scipy.sparse import csr_array
 
-from pipeline.adjustment.bordered import Rows
 from pipeline.adjustment.elimination import Sums, add_rows
 from pipeline.adjustment.normal_equations import BandedCholesky, Marginal, marginalised
+from pipeline.adjustment.rows import Rows
 from pipeline.arrays import Bool, Float, Int
 
 POSE = 6

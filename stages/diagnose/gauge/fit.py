@@ -9,8 +9,8 @@ from functools import cached_property
 import numpy as np
 from scipy.linalg import block_diag
 
-from pipeline.adjustment.bordered import Rows
 from pipeline.adjustment.levenberg_marquardt import Watch
+from pipeline.adjustment.rows import Rows
 from pipeline.arrays import Float, Int
 from pipeline.geometry.rigid import from_parts, rotation_from_vector
 from stages.calibrate.gauge.state import ENCODER, Unknowns

@@ -8,8 +8,8 @@ from dataclasses import fields, replace
 import numpy as np
 from scipy.linalg import block_diag
 
-from pipeline.adjustment.bordered import Rows
 from pipeline.adjustment.motion_priors import smooth_motion_rows
+from pipeline.adjustment.rows import Rows
 from pipeline.arrays import Float, Int
 from pipeline.recording.base import Encoder
 from stages.calibrate.gauge.edges import Edges

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, fields
 
-from pipeline.adjustment.bordered import Rows
 from pipeline.adjustment.levenberg_marquardt import Watch, unwatched
+from pipeline.adjustment.rows import Rows
 from pipeline.arrays import Float
 from pipeline.files.codec import NOT_STORED
 from pipeline.recording.base import Encoder

@@ -7,9 +7,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pipeline.adjustment.bordered import BorderedSystem, Factor, LandmarkRows, Rows, Step, landmark_steps
+from pipeline.adjustment.bordered import BorderedSystem, Factor, landmark_steps
 from pipeline.adjustment.motion_priors import LOOSE, smooth_motion_rows
 from pipeline.adjustment.robust import Cauchy, GemanMcClure, robust_spread
+from pipeline.adjustment.rows import LandmarkRows, Rows, Step
 from pipeline.arrays import Float
 from pipeline.geometry.axis import to_pipe
 from pipeline.geometry.rigid import inverse, transform

@@ -7,8 +7,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import chdtrc
 
-from pipeline.adjustment.bordered import BorderedSystem, Rows
+from pipeline.adjustment.bordered import BorderedSystem
 from pipeline.adjustment.elimination import BLOCK
+from pipeline.adjustment.rows import Rows
 from pipeline.arrays import Bool, Float
 from pipeline.geometry.axis import to_pipe
 from pipeline.geometry.rigid import transform

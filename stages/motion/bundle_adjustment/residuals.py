@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.adjustment.bordered import Rows
 from pipeline.adjustment.elimination import BLOCK
 from pipeline.adjustment.motion_priors import slip_drift_rows
 from pipeline.adjustment.robust import Cauchy, Loss, Squares
+from pipeline.adjustment.rows import Rows
 from pipeline.arrays import Float
 from pipeline.geometry.axis import to_pipe
 from pipeline.geometry.rigid import skew, transform, vector_from_rotation

@@ -9,9 +9,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from pipeline.adjustment.bordered import Factor, Step
+from pipeline.adjustment.bordered import Factor
 from pipeline.adjustment.levenberg_marquardt import Minimum, Stop, Watch, minimise, unwatched
 from pipeline.adjustment.motion_priors import TREMBLING_GROWTH, third_difference_sigma, trembling
+from pipeline.adjustment.rows import Step
 from pipeline.arrays import Float, Int
 from pipeline.errors import UnusableError
 from pipeline.geometry.axis import distance_along
