@@ -24,7 +24,7 @@ SHAKE = np.array([0.1, 0.1, 0, 2e-3, 2e-3, 0])
 """Trembling, 1 σ, mm and rad."""
 _SIGMA_PX = 0.1
 _RING_MM_PER_PX = 1.5  # dr = b (1 + r² / b²) dθ, 90 px per radian, b = 22 mm
-_RING_PX = 103.0
+RING_PX = 103.0
 
 
 @dataclass(frozen=True)
@@ -83,7 +83,7 @@ def scene(
     rings = _rings(wall, noise, random, unsure.shape[1])
     larger = picture_grows * (k / (frames - 1) - 0.5)
     tracks = tracks.reduced(1 - larger, instrument.camera.centre_px)
-    grown = _RING_PX * larger[rings.frame, None] * rings.by_pixel
+    grown = RING_PX * larger[rings.frame, None] * rings.by_pixel
     rings = replace(rings, xyz_c=rings.xyz_c + grown)
     distance = t[:, 2] - t[0, 2] + noise * ENCODER_SIGMA_MM * random.standard_normal(frames)
     readings = EncoderReadings(distance, ENCODER_SIGMA_MM, np.ones(len(distance), bool)) if encoder else None

@@ -26,7 +26,7 @@ from stages.motion.windows.steady_scale import SteadyRun, with_steady_scale
 from stages.motion.windows.submaps import Window
 from stages.triangulate import TriangulateParameters, triangulate_rings
 from tests.drawn_run import RADIUS, DrawnRun, drawn_run
-from tests.motion_scene import Scene, scene
+from tests.motion_scene import RING_PX, Scene, scene
 from tests.quiet import quiet_context
 from tests.ring_images import MemorySource
 
@@ -134,7 +134,13 @@ class WholeRun:
         return SimpleNamespace(poses=TrackedPoses(np.arange(FEW), self.made.truth.T_pc, none_lost))
 
     def measured(self, window: Window, parameters: MotionParameters) -> Measurements:
-        return self.made.measured
+        """Return it without what is taken out of the scale."""
+        was = self.made.measured
+        if self.image_scale is None:
+            return was
+        tracks = was.tracks.reduced(self.image_scale, was.probe.camera.centre_px)
+        larger = RING_PX * (self.image_scale - 1)[was.rings.frame, None] * was.rings.by_pixel
+        return replace(was, tracks=tracks, rings=replace(was.rings, xyz_c=was.rings.xyz_c - larger))
 
 
 @pytest.mark.parametrize(("again", "taken_out"), [(1.0, True), (0.1, False)])
@@ -152,7 +158,38 @@ def test_a_drift_that_is_not_found_again_is_not_taken_out(
     run = WholeRun(made)
     steady = with_steady_scale(cast(Any, run), WHOLE, estimate, made.measured, parameters, cast(Any, None))
     assert steady.taken_out == steady.drift.told == (steady.scale is not None) == taken_out
+    assert steady.drift.contradicted != taken_out
     assert steady.scale_sigma is not None
+    assert (steady.scale_sigma >= np.abs(drift.at_frames)).all()
+    assert steady.distance_sigma > 0
+
+
+def test_a_drift_that_contradicts_itself_is_told_as_such() -> None:
+    """It was told as too little texture to tell which, or not at all: p of a steady scale decided."""
+    made = scene(FEW, 100, noise=0.1, picture_grows=GROWS)
+    drift = drift_of_scale(estimate_state(made.truth, made.measured, MotionParameters()), made.measured)
+    for p_neither in (0.0, 1.0):
+        told: list[str] = []
+        refused = replace(drift, p_neither=p_neither, contradicted=True)
+        refused.warn(replace(quiet_context(), warn=told.append), taken_out=False)
+        assert not refused.told
+        assert not refused.ambiguous
+        assert len(told) == 1
+        assert "texture and rings do not agree" in told[0]
+        assert "too little texture" not in told[0]
+
+
+def test_a_drift_that_is_real_is_found_again_and_taken_out() -> None:
+    made = scene(FEW, 100, noise=0.1, picture_grows=GROWS)
+    parameters = MotionParameters(match_bias_px=0.01)
+    estimate = estimate_state(made.truth, made.measured, parameters)
+    steady = with_steady_scale(
+        cast(Any, WholeRun(made)), WHOLE, estimate, made.measured, parameters, lambda *_: None
+    )
+    assert steady.taken_out
+    assert not steady.drift.contradicted
+    assert steady.scale is not None
+    assert np.ptp(steady.scale) == pytest.approx(GROWS, rel=0.1)
 
 
 @pytest.mark.parametrize(("course", "told"), [((-1, 0.5, 1), True), ((-1, 1, -0.5), False)])

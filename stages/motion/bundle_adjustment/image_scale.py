@@ -64,6 +64,8 @@ class ScaleDrift:
         Gain of the rings' radius per relative gain of scale.
     stated_mm : float
         1 σ of the pipe's radius without any of it.
+    contradicted : bool
+        Whether it was not found again with it when it was taken out.
     """
 
     at_frames: Float
@@ -74,12 +76,13 @@ class ScaleDrift:
     alone: Float
     ring_mm: float
     stated_mm: float
+    contradicted: bool = False
 
     @property
     def told(self) -> bool:
         """Whether the scale cannot have been steady, and went one way."""
         one_way = abs(self.change) > _ONE_WAY * float(np.ptp(self.at_frames))
-        return self.p_steady < _SURE_P and one_way
+        return self.p_steady < _SURE_P and one_way and not self.contradicted
 
     def not_told(self) -> ScaleDrift:
         """Return the course as one that is neither told nor ambiguous."""
@@ -102,7 +105,7 @@ class ScaleDrift:
     @property
     def ambiguous(self) -> bool:
         """Whether the rings change, and a lens that drifts explains it as well as a pipe that widens."""
-        return not self.told and self.p_neither < _SURE_P and self.p_even > _MAY_BE_P
+        return not (self.told or self.contradicted) and self.p_neither < _SURE_P and self.p_even > _MAY_BE_P
 
     @property
     def offset_sigma(self) -> float:
@@ -112,7 +115,7 @@ class ScaleDrift:
     @property
     def stated_sigma(self) -> Float:
         """Return the 1 σ (N,) of the scale, relative, that radii are to be stated with."""
-        if self.told:
+        if self.told or self.contradicted:
             own = np.hypot(self.sigma, _OTHER_CAUSE * self.at_frames)
             return np.asarray(np.hypot(own, self.offset_sigma))
         return np.abs(self.alone) if self.ambiguous else np.zeros_like(self.alone)
@@ -121,6 +124,13 @@ class ScaleDrift:
         """Warn of a scale that drifts, or of rings that may change because of it."""
         if self.told:
             context.warn(self._words(taken_out))
+        elif self.contradicted:
+            context.warn(
+                f"as if {self._what}. But with this taken out texture and rings do not agree, as where a "
+                "noise filter makes texture lag behind the wall. Nothing is corrected: σ of the radii "
+                "includes it. What to do: switch off noise reduction, let the probe warm up, or measure both "
+                "ends' diameters"
+            )
         elif self.ambiguous and (widest := float(np.ptp(self.alone) * abs(self.ring_mm))) > self.stated_mm:
             context.warn(
                 f"the rings change by {widest:.2f} mm of radius over the run. Either the pipe does, or the "
@@ -129,18 +139,21 @@ class ScaleDrift:
                 "warm up, record back and forth, give an encoder, or measure both ends' diameters"
             )
 
-    def _words(self, taken_out: bool) -> str:
+    @property
+    def _what(self) -> str:
         course = float(np.ptp(self.at_frames))
-        what = (
+        return (
             f"the picture {'grows' if self.change > 0 else 'shrinks'} by {100 * course:.2f} % over the run: "
             f"the rings change by {abs(course * self.ring_mm):.2f} mm of radius, and the texture does not "
             "follow"
         )
+
+    def _words(self, taken_out: bool) -> str:
         if self.large:
             return (
-                f"as if {what}. No lens changes so much by warming up: zoom or stabilisation is on, the "
-                "laser is loose, or the pipe's filling (water) or the probe is not as stated. This is not "
-                "corrected: radii and distances may be off by more than their σ. What to do: look at the "
+                f"as if {self._what}. No lens changes so much by warming up: zoom or stabilisation is on, "
+                "the laser is loose, or the pipe's filling (water) or the probe is not as stated. This is "
+                "not corrected: radii and distances may be off by more than their σ. What to do: look at the "
                 "pictures and the probe file, run boresight diagnose"
             )
         outcome = (
@@ -149,7 +162,7 @@ class ScaleDrift:
             else "Runs of this length are not corrected: radii and distances may be off by more than their σ"
         )
         return (
-            f"{what}. The lens warms up or is loose, the laser moves against the camera, or zoom or "
+            f"{self._what}. The lens warms up or is loose, the laser moves against the camera, or zoom or "
             f"stabilisation is on. {outcome}. What to do: let the probe warm up before the run, fix lens and "
             "laser, switch off zoom and stabilisation"
         )

@@ -41,7 +41,7 @@ class SteadyRun:
     @property
     def distance_sigma(self) -> float:
         """Return the relative 1 σ of distances by it: they follow the rings, or hold to the encoder."""
-        if not self.drift.told:
+        if not (self.drift.told or self.drift.contradicted):
             return 0.0
         by_rings = abs(self.drift.ring_mm) * self.drift.offset_sigma / self.estimate.state.nominal_radius_mm
         return by_rings if self.measured.encoder is None else min(by_rings, self._encoder_sigma)
@@ -59,7 +59,8 @@ class SteadyRun:
     def scale_sigma(self) -> Float | None:
         """Return its 1 σ (N,); None where the recording bears out a steady scale, or is too long."""
         whole = len(self.drift.at_frames) == len(self.run.time_s)
-        return self.drift.stated_sigma if whole and (self.drift.told or self.drift.ambiguous) else None
+        stated = self.drift.told or self.drift.ambiguous or self.drift.contradicted
+        return self.drift.stated_sigma if whole and stated else None
 
 
 def with_steady_scale(
@@ -74,7 +75,7 @@ def with_steady_scale(
 
     A large drift is told and not taken out. In a reducer nothing is told: rings and texture depart there as
     they do where the image scale drifts. Without texture in most pictures, nothing tells it from a pipe that
-    widens, nor where a drift that was taken out is not found again with it.
+    widens. A drift that is not found again with it when it is taken out contradicts itself: it stays in.
 
     Raises
     ------
@@ -88,7 +89,8 @@ def with_steady_scale(
         drift = drift.not_told_from_width()
     if not drift.told or window != run.whole or drift.large:
         return SteadyRun(run, estimate, measured, drift, taken_out=False)
-    unchanged = SteadyRun(run, estimate, measured, drift.not_told_from_width(), taken_out=False)
+    contradicted = replace(drift, contradicted=True)
+    unchanged = SteadyRun(run, estimate, measured, contradicted, taken_out=False)
     first = drift
     for _ in range(_ROUNDS):
         taken_out = drift.at_frames
