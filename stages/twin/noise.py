@@ -25,6 +25,8 @@ _LEVELS, _FEWEST, _FEWEST_CELLS = 14, 40, 3
 """Most cells of grey level, windows that each has, and fewest cells: noise has three figures."""
 _LEAST_VARIANCE = 1 / 12
 """Of rounding to whole grey levels."""
+_RANGE_FOR_PARTS = 1.5
+"""Ratio of brightest to darkest level needed to tell the noise's parts from each other; chosen."""
 _PILE = 16
 """Grey levels within which a lossy codec leaves clipped pixels: H.264 leaves them within eight. Chosen."""
 _RANGE_FOR_GAMMA = 3.0
@@ -101,14 +103,16 @@ class CameraNoise:
     def read_electrons(self) -> Figure:
         """Read noise, 1 σ, in electrons of the conversion above, rounding taken off; infinite as that is.
 
-        One fit gives read noise and conversion: what one gains the other loses, so that their σ add.
+        One fit gives read noise and conversion: what one gains the other loses, so that their σ add. Of
+        noise below a grey level rounding may show none, or as much again as its own.
         """
         e, variance = self.electrons_per_level, max(self.read_variance.value - _LEAST_VARIANCE, 0.0)
         if not np.isfinite(e.value):
             return Figure(np.inf, np.inf)
-        read, sd = float(np.sqrt(variance)), self.read_variance.sd
-        own = min(0.5 * sd / max(read, 1e-9), float(np.sqrt(sd)))
-        return Figure(read * e.value, own * e.value + read * e.sd)
+        read, sd = float(np.sqrt(variance)), float(np.hypot(self.read_variance.sd, _LEAST_VARIANCE))
+        if not np.isfinite([sd, e.sd]).all():
+            return Figure(read * e.value, np.inf)
+        return Figure(read * e.value, _of_root(read, sd) * e.value + read * e.sd)
 
 
 @dataclass(frozen=True)
@@ -154,12 +158,28 @@ def windows_of(left_over: Float32, again: Float32, level: Float32, use: Bool) ->
 
 
 def photon_transfer(windows: list[NoiseWindows], black: Figure, white: float) -> CameraNoise:
-    """Return the noise that windows of several frames show; σ from leaving out one frame at a time."""
-    whole = _fitted(windows)
+    """Return the noise that windows of several frames show; σ from leaving out one frame at a time.
+
+    Each part of the noise is 0 at least, but not where σ is told: it would be 0 for parts that are 0 in every
+    fit. Windows of one grey level show the sum of the parts alone, which is then read noise of unknown σ.
+    """
+    cells = _Cells.of(windows)
     others = [windows[:k] + windows[k + 1 :] for k in range(len(windows))]
-    if min((sum(len(w.level) for w in some) for some in others), default=0) < _FEWEST_CELLS * _FEWEST:
-        return _camera_noise(whole, np.full(4, np.inf), black, white)
-    return _camera_noise(whole, left_out_sd(np.array([_fitted(some) for some in others])), black, white)
+    few = min((sum(len(w.level) for w in some) for some in others), default=0) < _FEWEST_CELLS * _FEWEST
+    if few or cells is None or cells.of_one_level:
+        return _camera_noise(_fitted(cells), np.full(4, np.inf), black, white)
+    each = np.array([c.free for c in map(_Cells.of, others) if c is not None])
+    read, per_level, square, gamma = np.nan_to_num(left_out_sd(each), nan=np.inf)
+    value = _fitted(cells)
+    return _camera_noise(
+        value, np.array([read, per_level, _of_root(float(value[2]), float(square)), gamma]), black, white
+    )
+
+
+def _of_root(root: float, sd: float) -> float:
+    """Return the 1 σ of a root whose square has a σ: half the way, by two of these, to the farther end."""
+    ends = np.sqrt(max(root**2 - 2 * sd, 0.0)), np.sqrt(root**2 + 2 * sd)
+    return float(max(root - ends[0], ends[1] - root)) / 2
 
 
 def _camera_noise(value: Float, sd: Float, black: Figure, white: float) -> CameraNoise:
@@ -169,25 +189,62 @@ def _camera_noise(value: Float, sd: Float, black: Figure, white: float) -> Camer
     return CameraNoise(black, white, read, per_level, uneven, gamma)
 
 
-def _fitted(windows: list[NoiseWindows]) -> Float:
+@dataclass(frozen=True)
+class _Cells:
+    """Mean level and variance (C,) of cells of windows that are alike bright."""
+
+    level: Float
+    variance: Float
+
+    @classmethod
+    def of(cls, windows: list[NoiseWindows]) -> _Cells | None:
+        """Return the cells; None where windows are too few."""
+        level = np.concatenate([w.level for w in windows])
+        variance = np.concatenate([w.variance for w in windows])
+        cells = min(_LEVELS, len(level) // _FEWEST)
+        if cells < _FEWEST_CELLS:
+            return None
+        edges = np.quantile(level, np.linspace(0, 1, cells + 1))
+        cell = np.clip(np.searchsorted(edges, level) - 1, 0, cells - 1)
+        used = [k for k in range(cells) if (cell == k).sum() >= _FEWEST // 2]
+        # Where black cuts noise off, windows show none at all.
+        floored = [max(float(variance[cell == k].mean()), _LEAST_VARIANCE) for k in used]
+        return cls(np.array([level[cell == k].mean() for k in used]), np.array(floored))
+
+    @property
+    def of_one_level(self) -> bool:
+        """Whether levels differ too little to part the noise."""
+        return bool(self.level.max() < _RANGE_FOR_PARTS * max(self.level.min(), 1.0))
+
+    @property
+    def design(self) -> Float:
+        """(C, 3) parts of the noise over each cell's variance."""
+        x = self.level
+        return np.asarray(np.stack([np.ones_like(x), x, x**2], 1) / self.variance[:, None])
+
+    @property
+    def free(self) -> Float:
+        """Read variance, variance per level and square of unevenness, below 0 if need be, and γ."""
+        size = np.linalg.lstsq(self.design, np.ones_like(self.level), rcond=None)[0]
+        return np.array([*size, self.gamma])
+
+    @property
+    def gamma(self) -> float:
+        """Exponent of the response; NaN where cells cannot tell."""
+        x, shot = self.level, self.variance - _LEAST_VARIANCE
+        if len(x) <= 3 or x.max() <= _RANGE_FOR_GAMMA * max(x.min(), 1.0) or not (shot > 0).all():
+            return float("nan")
+        return 2 - float(np.polyfit(np.log(np.maximum(x, 1.0)), np.log(shot), 1)[0])
+
+
+def _fitted(cells: _Cells | None) -> Float:
     """Return read variance, variance per level, unevenness and γ."""
-    level = np.concatenate([w.level for w in windows])
-    variance = np.concatenate([w.variance for w in windows])
-    cells = min(_LEVELS, len(level) // _FEWEST)
-    if cells < _FEWEST_CELLS:
+    if cells is None:
         return np.array([_LEAST_VARIANCE, 0.0, 0.0, np.nan])
-    edges = np.quantile(level, np.linspace(0, 1, cells + 1))
-    cell = np.clip(np.searchsorted(edges, level) - 1, 0, cells - 1)
-    used = [k for k in range(cells) if (cell == k).sum() >= _FEWEST // 2]
-    x = np.array([level[cell == k].mean() for k in used])
-    # Where black cuts noise off, windows show none at all.
-    y = np.array([max(float(variance[cell == k].mean()), _LEAST_VARIANCE) for k in used])
-    design = np.stack([np.ones_like(x), x, x**2], 1) / y[:, None]
-    (read, per_level, square), _ = nnls(design, np.ones_like(x))
-    shot = y - _LEAST_VARIANCE
-    wide = len(x) > 3 and x.max() > _RANGE_FOR_GAMMA * max(x.min(), 1.0) and (shot > 0).all()
-    gamma = 2 - np.polyfit(np.log(np.maximum(x, 1.0)), np.log(shot), 1)[0] if wide else np.nan
-    return np.array([max(read, _LEAST_VARIANCE), per_level, np.sqrt(square), gamma])
+    if cells.of_one_level:
+        return np.array([cells.variance.mean(), 0.0, 0.0, np.nan])
+    (read, per_level, square), _ = nnls(cells.design, np.ones_like(cells.level))
+    return np.array([max(read, _LEAST_VARIANCE), per_level, np.sqrt(square), cells.gamma])
 
 
 def black_and_white(images: list[Float32]) -> tuple[Figure, float]:

@@ -74,3 +74,36 @@ def test_pictures_whose_dark_shows_no_noise_have_that_of_rounding():
     black = np.zeros((120, 240), np.float32)
     noise = photon_transfer([windows_of(black, black, black, black == 0)] * 2, BLACK, 255.0)
     assert noise.read_variance.value == pytest.approx(1 / 12)
+
+
+@pytest.mark.parametrize("frames", [1, 2])
+def test_read_noise_of_few_frames_has_a_sigma(frames):
+    """It had been 0 ± NaN of one frame, and 0 ± 0 of two where rounding is more than the read noise."""
+    noise = photon_transfer(list(_noisy_frames(0.2, 40.0, frames=frames)), BLACK, 255.0)
+    read = noise.read_electrons
+    assert abs(read.value - 0.2 * 40) < 2 * read.sd
+    assert frames == 2 or read.sd == np.inf
+
+
+def test_parts_of_the_noise_are_as_unsure_as_they_differ():
+    """Of parts that were 0 in every fit, or nearly so, σ had been 0 or far too small."""
+    made = [
+        photon_transfer(list(_dim_frames(np.random.default_rng(k), 1.0, 40.0, rows=48)), BLACK, 255.0)
+        for k in range(40)
+    ]
+    assert all(min(n.read_variance.sd, n.variance_per_level.sd, n.uneven.sd) > 0 for n in made)
+    for part, true in (("read_variance", 1.0), ("variance_per_level", 1 / 40), ("uneven", 0.0)):
+        figures = [getattr(n, part) for n in made]
+        assert np.mean([abs(f.value - true) <= 2.001 * f.sd for f in figures]) >= 0.9, part
+
+
+def test_windows_of_one_grey_level_tell_the_sum_of_the_noise_alone():
+    """Read noise had been that of rounding, and shot noise 0, both of σ 0."""
+    random, level = np.random.default_rng(0), np.full((96, 240), 100, np.float32)
+    windows = [
+        windows_of(*(2 * random.standard_normal((2, *level.shape))).astype(np.float32), level, level > 0)
+        for _ in range(6)
+    ]
+    noise = photon_transfer(windows, BLACK, 255.0)
+    assert noise.variance(np.array([100.0], np.float32))[0] == pytest.approx(4.0, rel=0.05)
+    assert {noise.read_variance.sd, noise.variance_per_level.sd, noise.uneven.sd} == {np.inf}
