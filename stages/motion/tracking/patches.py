@@ -152,6 +152,18 @@ def cornerness(contrast: Float32, usable: Bool, half: int, rows: slice) -> Float
     return np.where(whole, corner, np.float32(0))
 
 
+def best_of_cells(corner: Float32, free: Bool, cell: int) -> tuple[Int, Int]:
+    """Return rows and columns of the best corner of each of a row of cells (C,) that is free."""
+    blocks = corner[:, : len(free) * cell].reshape(len(corner), len(free), cell)[:, free]
+    flat = blocks.swapaxes(0, 1).reshape(blocks.shape[1], -1)
+    if not flat.size:
+        return np.zeros(0, np.int64), np.zeros(0, np.int64)
+    best = flat.argmax(1)
+    there = flat.max(1) > 0
+    row, column = np.divmod(best[there], cell)
+    return row, np.flatnonzero(free)[there] * cell + column
+
+
 def whole_patches(usable: Bool, half: int) -> Bool:
     """Return where (H, W) all samples of a patch of side 2 half + 1 are usable."""
     return np.asarray(cv2.erode(usable.astype(np.uint8), np.ones((2 * half + 1,) * 2)) > 0)

@@ -10,14 +10,14 @@ from functools import cached_property
 import cv2
 import numpy as np
 
-from pipeline.arrays import Bool, Float, Float32, Image, Int
+from pipeline.arrays import Bool, Float, Image, Int
 from pipeline.geometry.rigid import from_parts, rotation_from_vector
 from pipeline.instrument.probe import Probe
 from pipeline.machine.scratch import Scratch
 from stages.motion.encoder import PosePredictor
 from stages.motion.parameters import MotionParameters
 from stages.motion.tracking.landmarks import LandmarkMap, ObservationStore, TrackedPoses, Tracks
-from stages.motion.tracking.patches import cornerness, cut, whole_patches
+from stages.motion.tracking.patches import best_of_cells, cornerness, cut, whole_patches
 from stages.motion.tracking.strips import Hidden, Strip, StripGrid, unroll
 
 _FEWEST = 12
@@ -255,7 +255,7 @@ class TextureTracker:
             first = (first_cell + k) * cell - strip.first_row
             top, end = max(first, 0), min(max(first + cell, 0), len(strip.contrast))
             corner = cornerness(strip.contrast, strip.usable, half, slice(top, end))
-            row, column = _best_of_cells(corner, free[k], cell)
+            row, column = best_of_cells(corner, free[k], cell)
             rows.append(top + row)
             columns.append(column)
         return np.concatenate(rows), np.concatenate(columns)
@@ -289,15 +289,3 @@ def _displacement(before: Strip, now: Strip) -> Float:
     window = np.broadcast_to(np.hanning(halves[0].shape[0])[:, None], halves[0].shape)
     (dx, dy), response = cv2.phaseCorrelate(*(np.asarray(h * window, np.float32) for h in halves))
     return np.array([2 * dy, 2 * dx]) if response > _LEAST_RESPONSE else np.zeros(2)
-
-
-def _best_of_cells(corner: Float32, free: Bool, cell: int) -> tuple[Int, Int]:
-    """Return rows and columns of the best corner of each of a row of cells (C,) that is free."""
-    blocks = corner[:, : len(free) * cell].reshape(len(corner), len(free), cell)[:, free]
-    flat = blocks.swapaxes(0, 1).reshape(blocks.shape[1], -1)
-    if not flat.size:
-        return np.zeros(0, np.int64), np.zeros(0, np.int64)
-    best = flat.argmax(1)
-    there = flat.max(1) > 0
-    row, column = np.divmod(best[there], cell)
-    return row, np.flatnonzero(free)[there] * cell + column
