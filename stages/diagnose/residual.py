@@ -17,11 +17,11 @@ from stages.diagnose.field.run import ring_points as field_points
 from stages.diagnose.field.system import field_system
 from stages.diagnose.gauge.elimination import RING
 from stages.diagnose.gauge.fit import Fit, fit
-from stages.diagnose.gauge.heldout import on_other_wall, variance_of_pairs
 from stages.diagnose.gauge.linearise import ring_mm_per_px
 from stages.diagnose.gauge.points import Moving
 from stages.diagnose.gauge.points import ring_points as gauge_points
 from stages.diagnose.gauge.run import GaugeRun, Term
+from stages.diagnose.unrepeated import unrepeated
 
 AZIMUTHS = 72
 WALL_STEP_MM = 2.0
@@ -73,19 +73,12 @@ class RingResidual:
     def floor_px(self) -> float:
         """R.m.s., px, of what rings do not repeat at one azimuth of the image on other wall; NaN: unknown.
 
-        It is the share that pairs do not repeat of all that is there. Rings near an end, where texture places
-        the camera worst, are in fewer pairs. Not in it is where texture alone has the middle of a ring, which
-        errs slowly: 0.05 to 0.08 px in four sound inspections, where its σ is 0.09 to 0.11 px.
+        Not in it is where texture alone has the middle of a ring, which errs slowly: 0.05 to 0.08 px in four
+        sound inspections, where its σ is 0.09 to 0.11 px. In it is a part of what changes within a few mm.
         """
-        own = np.flatnonzero(self.usable)
-        value, one_bore = self.residual_px[own], np.zeros(len(own), np.int64)
-        pairs = on_other_wall(self.azimuth_c_rad[own], self.frame[own], self.distance_mm[own], one_bore)
-        if not len(pairs[0]):
-            return float("nan")
-        share = variance_of_pairs(value, np.ones(len(own)), *pairs) / np.mean(
-            value[np.concatenate(pairs)] ** 2
-        )
-        return float(np.sqrt(share)) * self.rms_px
+        own = self.usable
+        azimuth, frame, along = self.azimuth_c_rad[own], self.frame[own], self.distance_mm[own]
+        return float(np.sqrt(unrepeated(self.residual_px[own], azimuth, frame, along)))
 
     def over_frames(self, frames: Int) -> Float:
         """Return the mean residual, mm, over (F, `AZIMUTHS`) frames and azimuth in C; NaN where none is."""

@@ -146,14 +146,29 @@ def on_other_wall(azimuth_rad: Float, frame: Int, along_mm: Float, section: Int)
     azimuth_rad, frame, along_mm, section : (M,)
         In the image; where along the pipe; in which bore.
     """
-    place = np.round(azimuth_rad / _SAME_AZIMUTH_RAD).astype(np.int64)
+    turn, apart = turns_apart(frame, along_mm)
+    first, second = at_one_azimuth(azimuth_rad, turn, apart, 2 * apart)
+    alike = section[first] == section[second]
+    return first[alike], second[alike]
+
+
+def turns_apart(frame: Int, along_mm: Float) -> tuple[Int, int]:
+    """Return which (M,) of all frames each is, and how many frames are apart so as to show other wall."""
     frames, at, turn = np.unique(frame, return_index=True, return_inverse=True)
     step_mm = float(np.median(np.abs(np.diff(along_mm[at])))) if len(frames) > 1 else np.inf
     apart = min(max(int(np.ceil(_OTHER_WALL_MM / max(step_mm, 1e-9))), 1), max(len(frames) // 4, 1))
+    return turn, apart
+
+
+def at_one_azimuth(azimuth_rad: Float, turn: Int, apart: int, most: int) -> tuple[Int, Int]:
+    """Return pairs (P,) of ring bins (M,) of one azimuth, each with the one ``apart`` places on.
+
+    Where frames are missing there they are farther apart, but by no more than ``most`` frames.
+    """
+    place = np.round(azimuth_rad / _SAME_AZIMUTH_RAD).astype(np.int64)
     order = np.lexsort((turn, place))
     first, second = order[:-apart], order[apart:]
-    alike = (place[first] == place[second]) & (section[first] == section[second])
-    alike &= turn[second] - turn[first] <= 2 * apart
+    alike = (place[first] == place[second]) & (turn[second] - turn[first] <= most)
     return first[alike], second[alike]
 
 
