@@ -35,7 +35,8 @@ _SMOOTH, _LIKE_OTHERS = 0.01, 0.75
 def out_of_order(pictures: Pictures, light: Int) -> Bool:
     """Return (F,) true for pictures exchanged with one of the same light, or with a neighbour of the other.
 
-    Those of the laser among themselves do not show it, and where lights are not told apart nothing does.
+    Those of the laser among themselves do not show it, and where lights are not told apart nothing does. Nor
+    is it told of the first or the last picture of the wall: nothing shows where it would have lain.
     """
     out = np.zeros(len(light), bool)
     place = np.flatnonzero((light == Light.WALL) & (pictures.partner >= 0) & np.isfinite(pictures.step))

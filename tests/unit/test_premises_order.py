@@ -10,7 +10,7 @@ import pytest
 from pipeline.recording.base import Encoder, FrameTable
 from stages.premises.light import Light
 from stages.premises.losses import Steps, rows_by_motion, sway_of_line
-from stages.premises.order import _in_usual_steps, _lights_exchanged, _off_their_place
+from stages.premises.order import _in_usual_steps, _lights_exchanged, _off_their_place, out_of_order
 from stages.premises.pictures import Pictures, look_at_pictures
 from tests.drawn_run import drawn_run
 from tests.premises_run import COUNT, STEP_MM, checked, with_rings
@@ -216,19 +216,40 @@ def test_pictures_from_outside_the_pipe_are_left_out(outside, good, run):
     assert "before the first laser line or behind the last" in told[0]
 
 
+def told_by_motion(order, way, noise_mm):
+    """Return which of lit pictures stored in this ``order`` are told, the first of which has no partner."""
+    count = len(order)
+    step = np.diff(way[order], prepend=np.nan) + noise_mm
+    pictures = Pictures(
+        np.ones(count), np.zeros(count), np.ones((count, 8), np.float32), np.arange(8.0), np.ones(count),
+        np.arange(count) - 1, np.ones(count), step,
+    )  # fmt: skip
+    return np.flatnonzero(out_of_order(pictures, np.full(count, Light.WALL))).tolist()
+
+
 @pytest.mark.parametrize("seed", range(20))
 @pytest.mark.parametrize("noise", [0.0, 0.05])
-@pytest.mark.parametrize("pair", [[50, 53], [0, 3]], ids=["in the run", "at its begin"])
+@pytest.mark.parametrize(
+    "pair", [[50, 53], [1, 4], [75, 78]], ids=["in the run", "near its begin", "its end"]
+)
 def test_a_probe_that_stands_hides_no_exchange_and_makes_none(pair, noise, seed):
     """A step over the usual one is there noise over noise, or 0 / 0, which hid all exchanges behind it.
 
-    At the begin, the first step was the usual one: it was repeated before the run, and outvoted all others.
+    Near the begin, the first step was the usual one: it was repeated before the run, and outvoted all others.
     """
     random = np.random.default_rng(seed)
     way = np.cumsum(np.where((np.arange(80) > 9) & (np.arange(80) < 30), 0.0, 2.0))
-    way[pair] = way[pair[::-1]]
-    size = np.diff(way, prepend=0.0) + noise * random.standard_normal(80)
-    assert np.flatnonzero(_off_their_place(_in_usual_steps(size))).tolist() == pair
+    order = np.arange(80)
+    order[pair] = order[pair[::-1]]
+    assert told_by_motion(order, way, noise * random.standard_normal(80)) == pair
+
+
+@pytest.mark.parametrize("pair", [[0, 1], [0, 3], [76, 79], [78, 79]])
+def test_nothing_shows_where_the_first_and_the_last_picture_of_the_wall_would_have_lain(pair):
+    """It was said to be told, by a step before the first picture, which no recording has."""
+    order = np.arange(80)
+    order[pair] = order[pair[::-1]]
+    assert told_by_motion(order, 2.0 * np.arange(80), 0.0) == []
 
 
 def exchanged(taken, way):
