@@ -33,6 +33,7 @@ from pipeline.simulator.wall import MeasuredPipe, write_measured
 from pipeline.simulator.wall.grid import Wall, WallGrid
 from stages.texture.surface import wall_surface
 from stages.twin import PHOTOMETRY, Photometry
+from stages.twin.noise import CameraNoise
 from stages.twin.reflectance import LUMA_BGR
 from stages.twin.scene import SHADING_MM, SMOOTHING_MM
 
@@ -43,6 +44,8 @@ _ROUNDS, _LOOKED_AT = 3, 3
 """Rounds in which the lights are set, since clipping bends them, and frames of each light for it."""
 _LIT = 10.0
 """Grey levels above black from which a pixel tells of a light."""
+_LARGE_WELL_E = 1e9
+"""Electrons at which a pixel clips that has no shot noise: at full scale it has 3e-5 of that then. Chosen."""
 # Grey levels above are clipped or nearly so.
 _CLEAR_OF_WHITE = 250.0
 _DEFECT = ("kind", "distance_mm", "azimuth_deg", "length_mm", "width_mm", "depth_mm")
@@ -196,11 +199,7 @@ def _seen_light(found: Photometry, offset: float, slope: float) -> dict[str, Any
     state = found.state
     noise, line, lamp = state.noise, state.line, state.lamp
     sensor: dict[str, float] = {"black_level": max((noise.black.value - offset) / slope, 0.0)}
-    if math.isfinite(noise.electrons_per_level.value):
-        # Noise is drawn for each colour, and grey, the sum of all by their shares, has less of it.
-        less = float(np.linalg.norm(LUMA_BGR))
-        sensor["full_well_e"] = max(255 * slope * less**2 * noise.electrons_per_level.value, 20.0)
-        sensor["read_noise_e"] = max(less * noise.read_electrons.value, 0.0)
+    sensor |= _sensor_noise(noise, slope)
     values: dict[str, Any] = {"sensor": sensor}
     if line is not None:
         # A pixel alone blurs by 1/√12 px; the simulator's samples do that themselves.
@@ -212,6 +211,20 @@ def _seen_light(found: Photometry, offset: float, slope: float) -> dict[str, Any
         lobe = float(np.polyfit(np.log(cosine), lamp.log_falloff, 1, w=weight)[0])
         values["light"] = {"lobe": float(np.clip(lobe, 0, 20)), "even": 0.0}
     return values
+
+
+def _sensor_noise(noise: CameraNoise, slope: float) -> dict[str, float]:
+    """Return the noise of a sensor whose grey is as noisy as the recorded one; nothing where that is unknown.
+
+    Noise is drawn for each colour, and grey, the sum of all by their shares, has less of it. A camera without
+    shot noise has a well so large that it has hardly any.
+    """
+    less, read = float(np.linalg.norm(LUMA_BGR)), noise.read_variance.value - 1 / 12
+    if read <= 0 and math.isinf(noise.variance_per_level.sd):
+        return {}
+    well = 255 * slope * less**2 * noise.electrons_per_level.value
+    well = max(well, 20.0) if math.isfinite(well) else _LARGE_WELL_E
+    return {"full_well_e": well, "read_noise_e": math.sqrt(max(read, 0.0)) / (255 * slope * less) * well}
 
 
 def _with_lights(scene: Scene, file: Path, recording: Recording) -> Scene:

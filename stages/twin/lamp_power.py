@@ -5,7 +5,7 @@ in which the same wall, and the same place of the image, is lit more or less str
 which brightness follows that light: 1 for a linear camera and direct light. A response grey = light^p gives p
 itself, whatever the photo was made with. Light that bounces about the bore hardly changes when the lamps
 move, so that a share q of it gives 1 − q. The lamps' lobe depends mostly on the place in the image alone, and
-takes little part; of lobes from even to that of the cosine the middle one is taken.
+takes little part; it is taken to be even, which is part of σ.
 """
 
 from __future__ import annotations
@@ -32,8 +32,8 @@ _OF_LIGHT, _BY_COSINE, _FEWEST_FRAMES = 0.02, 0.04, 6
 """1 σ of a power for want of knowing the black level: one grey level of fifty changes it by so much. By how
 much LEDs that shine as the cosine raise it, held against LEDs that shine alike in all directions: five drawn
 recordings in bores of 76 and 102 mm by .032 to .051, and ten rings of LEDs, 11 and 16 mm wide, 8 mm behind to
-5 mm ahead of the camera, by .052, r.m.s. Half of it is taken off, and is 1 σ. Fewest lit frames. Light that
-bounces is no part of it."""
+5 mm ahead of the camera, by .052, r.m.s. It is 1 σ: which lobe the LEDs of a probe have is not known. Fewest
+lit frames. Light that bounces is no part of it."""
 _SLOWLY = 3
 """Degree of the polynomial in row and column that slow light is: of lamps aside, most is linear."""
 _LEAST_WANDER = 1e-3
@@ -48,9 +48,14 @@ def lamp_power(samples: BlockSamples | None) -> tuple[NamedFigure, ...]:
     if told[:, 1].sum() < _LEAST_WANDER**2 * len(samples.change):
         return ()
     whole, without = told.sum(0), told.sum(0) - told
-    power = (1 + float(whole[0] / whole[1])) / (1 + _BY_COSINE / 2)
+    power = float(_power(whole)[0])
     spread = float(left_out_sd(without[:, 0] / np.maximum(without[:, 1], 1e-12)))
-    return (NamedFigure("lamp_power", power, float(np.linalg.norm([spread, _OF_LIGHT, _BY_COSINE / 2]))),)
+    return (NamedFigure("lamp_power", power, float(np.linalg.norm([spread, _OF_LIGHT, _BY_COSINE]))),)
+
+
+def _power(sums: Float) -> Float:
+    """Return the power (1,) from the sums (2,) of `_products`: as it is told, and as it is judged."""
+    return np.array([1 + sums[0] / sums[1]])
 
 
 def power_of_lamps(samples: BlockSamples | None, ring: Ring) -> tuple[Suspected, ...]:
@@ -73,7 +78,7 @@ def power_of_lamps(samples: BlockSamples | None, ring: Ring) -> tuple[Suspected,
         ring.whole(int(samples.number[0])),
     )  # fmt: skip
     law = partial(to_power, samples.number, by_block(samples, samples.light_and_brightness[0]))
-    return (Suspected(found, law, samples.number, told, lambda mean: np.array([1 + mean[0] / mean[1]])),)
+    return (Suspected(found, law, samples.number, told, _power),)
 
 
 def _products(samples: BlockSamples) -> Float:

@@ -118,10 +118,14 @@ def test_what_the_photo_did_not_see_takes_the_mean_about_it():
     np.testing.assert_allclose(filled, 100 / 255, atol=1e-3)
 
 
+@pytest.mark.parametrize("shot", [0.02, 0.0])
 @pytest.mark.parametrize("slope", [1.0, 219 / 255])
-def test_grey_of_the_rendered_camera_is_as_noisy_as_that_of_the_recorded_one(slope):
-    """The electrons of the grey picture had been given to each of its three colours: too little noise."""
-    dark, shot = 1.2, 0.02  # variance of recorded grey, and its growth per grey level
+def test_grey_of_the_rendered_camera_is_as_noisy_as_that_of_the_recorded_one(slope, shot):
+    """The electrons of the grey picture had been given to each of its three colours: too little noise.
+
+    Without shot noise the camera had been any.
+    """
+    dark = 1.2  # variance of recorded grey; ``shot`` is its growth per grey level
     noise = CameraNoise(
         Figure(0.0, 0.1),
         255.0,
