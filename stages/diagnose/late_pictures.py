@@ -111,7 +111,7 @@ def as_late_as_shown(size: dict[str, Value], recordings: Iterable[Seen | None]) 
     shown = min(each, key=lambda e: (not is_found(e.p_value), e.size_sigma))
     half = Value(size["exposure_s"].value / 2, size["exposure_s"].sd / 2)
     value = min(max(shown.value, 0.0), half.value) if is_found(shown.p_value) else 0.0
-    return size | {"late_s": half if 0 < half.value == value else Value(value, shown.size_sigma)}
+    return size | {"late_s": Value(value, max(shown.size_sigma, half.sd * (value == half.value)))}
 
 
 def as_late_as_exposed(size: dict[str, Value]) -> dict[str, Value]:

@@ -204,6 +204,10 @@ def test_how_late_pictures_are_is_as_unsure_as_the_encoder_tells_it(thirty_a_sec
     shown = as_late_as_shown(size, (unsure, None))["late_s"]
     assert (shown.value, shown.sd) == pytest.approx((0.0, np.hypot(0.010, 0.001)))
     sure = late("gauge", thirty_a_second, 0.008, None)
+    # Later than half of the exposure, pictures are so late by no more than that: as unsure as either.
+    for exposure_sd, sd in ((0.001, np.hypot(0.0002, 0.001)), (0.004, 0.002)):
+        shown = as_late_as_shown({"exposure_s": Value(0.015, exposure_sd)}, (sure,))["late_s"]
+        assert (shown.value, shown.sd) == pytest.approx((0.0075, sd))
     for both in ((unsure, sure), (sure, unsure)):
         shown = as_late_as_shown(size, both)["late_s"]
         assert (shown.value, shown.sd) == pytest.approx((0.008, np.hypot(0.0002, 0.001)))
