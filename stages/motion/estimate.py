@@ -95,7 +95,8 @@ def estimate_motion(
     require_along_pipe(trajectory)
     loops.report(context)
     report_instrument(probe, trajectory, context)
-    steady, trajectory = estimate.steady, doubting_instrument(trajectory, probe, estimate.lasting, shakes)
+    doubted = shakes or run.texture.poses.much_lost
+    steady, trajectory = estimate.steady, doubting_instrument(trajectory, probe, estimate.lasting, doubted)
     return replace(
         trajectory, events=events, image_scale=steady.scale, image_scale_sigma=steady.scale_sigma,
         radius_doubt=doubt,
@@ -180,7 +181,7 @@ def _motion_of_run(
 
 MOTION = Stage(
     "motion",
-    "45",
+    "46",
     MotionParameters,
     _motion_of_run,
     "camera pose in every frame and the pipe's axis, from texture, rings and encoder together",

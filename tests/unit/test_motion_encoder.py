@@ -170,6 +170,7 @@ def test_texture_lost_in_many_pictures_speaks_against_no_encoder(
     poses = TrackedPoses(np.arange(20), np.zeros((20, 4, 4)), np.arange(20, 0, -1) <= lost)
     run = SimpleNamespace(bore=ONE_BORE, texture=SimpleNamespace(poses=poses))
     first = SimpleNamespace(run=run, estimate=None, measured=None)
+    first.with_texture_off = lambda _: first
     _, scale, unsure = first_window.with_scale(cast(Any, first), 0.001)
     assert scale is not None
     assert (scale.sigma > found.sigma) == doubted

@@ -25,7 +25,7 @@ from stages.motion.windows import steady_scale
 from stages.motion.windows.steady_scale import SteadyRun, with_steady_scale
 from stages.motion.windows.submaps import Window
 from stages.triangulate import TriangulateParameters, triangulate_rings
-from tests.drawn_run import RADIUS, DrawnRun, drawn_run
+from tests.drawn_run import RADIUS, DrawnRun, drawn_run, without_encoder
 from tests.motion_scene import RING_PX, Scene, scene
 from tests.quiet import quiet_context
 from tests.ring_images import MemorySource
@@ -280,6 +280,20 @@ def test_a_probe_moved_by_what_is_in_doubt_is_as_unsure_as_it_was_moved(
     found = doubting_instrument(got, run.probe, lasting, trembles).instrument_covariance
     assert found is not None
     np.testing.assert_allclose(found, 1e-4 * np.eye(len(moved)) + doubted * np.outer(moved, moved))
+
+
+def test_a_probe_moved_by_texture_that_was_much_lost_is_in_doubt(monkeypatch: pytest.MonkeyPatch) -> None:
+    run = without_encoder(drawn_run(0.9 * np.arange(12), np.zeros(12)))
+    parameters, found = MotionParameters(strip_step_mm=0.6, cell_px=20, patch_half_px=8), []
+    for lost in (False, True):
+        monkeypatch.setattr(TrackedPoses, "much_lost", lost)
+        got = estimate_motion(run.recording, run.probe, run.rings, run.points, parameters, quiet_context())
+        assert got.instrument is not None
+        assert got.instrument_covariance is not None
+        found.append(got.instrument_covariance)
+    moved = got.instrument - run.probe.parameters
+    assert np.abs(moved).max() > 1e-6, "the control"
+    np.testing.assert_allclose(found[1] - found[0], np.outer(moved, moved), atol=1e-15)
 
 
 def test_distances_are_as_unsure_as_the_pipe_is_wider_by_a_probe_in_doubt() -> None:

@@ -45,10 +45,6 @@ _MOST_SHARED_PX = 2.0
 _IN_REDUCER = 0.005
 """Relative 1 σ of distances where texture was followed through a reducer and nothing else tells them: in five
 drawn ones, 12 to 15 % wider or narrower over 14 and 20 mm, they were off by .1 to 1.0 %, .5 % rms."""
-_LOST = 0.25
-"""Share of the lit pictures without texture from which the rest speaks against no encoder: good recordings
-have none (chosen). Of VP9 at .5 Mbit/s a half had none, what the codec had kept of the others came out 4.8 %
-short, and the encoder, which was right, was thrown away."""
 _ROUNDS, _NOISIER = 4, 1.5
 """Times that the noise of readings is looked at again while it is half as large again as taken: the poses
 follow readings that are believed too much. Good recordings show 0.5 to 1.2 times what is taken (open-1 to
@@ -132,6 +128,14 @@ class _Adjusted:
         run = replace(self.run, encoder=encoder)
         return replace(self, run=run, measured=run.measured(self.window, self.parameters))
 
+    def with_texture_off(self, times: float) -> _Adjusted:
+        """Return it adjusted to matches that err by so many times as much, if more, alone and together."""
+        if times <= 1:
+            return self
+        given = self.parameters
+        wider = {"match_bias_px": times * given.match_bias_px, "alike": times**2 * given.alike}
+        return replace(self, parameters=given.model_copy(update=wider)).again(self.estimate.state)
+
     def again(self, start: State) -> _Adjusted:
         """Return it adjusted again, from a state on."""
         estimate = estimate_state(start, self.measured, self.parameters, self.watch)
@@ -210,8 +214,9 @@ def _with_noise(first: _Adjusted) -> _Adjusted:
 def with_scale(first: _Adjusted, unsure: float) -> tuple[_Adjusted, EncoderScale | None, float]:
     """Make the encoder's scale as unsure as the pictures contradict it; return it and texture's 1 σ."""
     scale = scale_of_encoder(first.estimate, first.measured, unsure)
-    lost = first.run.texture.poses.lost[1:]
-    if first.run.bore.reduces or np.sum(lost) > _LOST * len(lost):
+    if first.run.texture.poses.much_lost and scale is not None:
+        first = first.with_texture_off(scale.in_sigma)
+    if first.run.bore.reduces or first.run.texture.poses.much_lost:
         scale = None if scale is None else scale.without_trust_in_texture()
         unsure = float(np.hypot(unsure, _IN_REDUCER)) if scale is None else scale.sigma
     if scale is not None and scale.contradicted:
