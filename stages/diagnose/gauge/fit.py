@@ -249,12 +249,6 @@ def kept_columns(found: Fit, asked: Sequence[tuple[EffectModel, Shape]]) -> tupl
     return names, np.pad(value, (0, len(names) - len(value)))
 
 
-def own_parameters(state: Unknowns) -> Unknowns:
-    """Return the state with the instrument's corrections in the parameters' own units."""
-    correction = state.probe.parameters - state.stated.parameters
-    return replace(state, instrument=correction, unsure=np.eye(len(correction)))
-
-
 def _at(run: GaugeRun, state: Unknowns, terms: tuple[Term, ...]) -> Fit:
     return _costed(Fit(run, state, terms, np.nan))
 

@@ -17,7 +17,7 @@ from stages.calibrate.gauge.state import GaugeParameters, SheetModel, Unknowns, 
 from stages.calibrate.gauge.terms import frame_spread
 from stages.diagnose.effects.base import EffectModel
 from stages.diagnose.effects.library import ring_shift_px, texture_shift_px
-from stages.diagnose.gauge.fit import Fit, fit, fit_beside, own_parameters
+from stages.diagnose.gauge.fit import Fit, fit, fit_beside
 from stages.diagnose.gauge.linearise import linearise
 from stages.diagnose.gauge.points import widths_at
 from stages.diagnose.gauge.run import GaugeRun, Linearised, Term
@@ -84,7 +84,7 @@ def prepare(measured_run: MeasuredRun, watch: Watch = unwatched) -> tuple[GaugeR
 
 def stated_start(state: Unknowns) -> Unknowns:
     """Return the poses of a state with the stated instrument."""
-    return own_parameters(
+    return _in_own_units(
         replace(state, instrument=0 * state.instrument, bore_mm=0 * state.bore_mm, edge_mm=0 * state.edge_mm)
     )
 
@@ -263,3 +263,9 @@ def _counts(found: Fit) -> bool:
     """Return whether the last effect is large enough beside the others to count."""
     sizes = [shift_px(found, t) for t in found.terms]
     return len(sizes) < 2 or sizes[-1] > LEAST_SHARE * max(sizes[:-1])
+
+
+def _in_own_units(state: Unknowns) -> Unknowns:
+    """Return the state with the instrument's corrections in the parameters' own units."""
+    correction = state.probe.parameters - state.stated.parameters
+    return replace(state, instrument=correction, unsure=np.eye(len(correction)))
