@@ -175,3 +175,13 @@ def test_texture_lost_in_many_pictures_speaks_against_no_encoder(
     assert scale is not None
     assert (scale.sigma > found.sigma) == doubted
     assert unsure == (scale.sigma if doubted else 0.001)
+
+
+def test_texture_lost_in_all_pictures_makes_no_encoder_unsure(monkeypatch: pytest.MonkeyPatch) -> None:
+    """By VP9 at .3 Mbit/s no landmark was left: the encoder's 102 mm, right by .2 mm, got a σ of 60 mm."""
+    monkeypatch.setattr(first_window, "scale_of_encoder", lambda *_: EncoderScale(1.001, 0.6, 0.002))
+    poses = TrackedPoses(np.arange(20), np.zeros((20, 4, 4)), np.ones(20, bool))
+    run = SimpleNamespace(bore=ONE_BORE, texture=SimpleNamespace(poses=poses))
+    first = SimpleNamespace(run=run, estimate=None, measured=None)
+    first.with_texture_off = lambda _: first
+    assert first_window.with_scale(cast(Any, first), 0.001)[2] == 0.001

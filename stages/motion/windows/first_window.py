@@ -129,9 +129,7 @@ class _Adjusted:
         return replace(self, run=run, measured=run.measured(self.window, self.parameters))
 
     def with_texture_off(self, times: float) -> _Adjusted:
-        """Return it adjusted to matches that err by so many times as much, if more, alone and together."""
-        if times <= 1:
-            return self
+        """Return it adjusted to matches that err by so many times as much, alone and together."""
         given = self.parameters
         wider = {"match_bias_px": times * given.match_bias_px, "alike": times**2 * given.alike}
         return replace(self, parameters=given.model_copy(update=wider)).again(self.estimate.state)
@@ -214,9 +212,10 @@ def _with_noise(first: _Adjusted) -> _Adjusted:
 def with_scale(first: _Adjusted, unsure: float) -> tuple[_Adjusted, EncoderScale | None, float]:
     """Make the encoder's scale as unsure as the pictures contradict it; return it and texture's 1 σ."""
     scale = scale_of_encoder(first.estimate, first.measured, unsure)
-    if first.run.texture.poses.much_lost and scale is not None:
+    doubted = first.run.texture.poses.much_lost and (scale is None or scale.in_sigma > 1)
+    if doubted and scale is not None:
         first = first.with_texture_off(scale.in_sigma)
-    if first.run.bore.reduces or first.run.texture.poses.much_lost:
+    if first.run.bore.reduces or doubted:
         scale = None if scale is None else scale.without_trust_in_texture()
         unsure = float(np.hypot(unsure, _IN_REDUCER)) if scale is None else scale.sigma
     if scale is not None and scale.contradicted:
