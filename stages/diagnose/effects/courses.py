@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from pipeline.arrays import Float
+from pipeline.arrays import Bool, Float
 from pipeline.physics.catalogue import effect
 from pipeline.physics.effect import Course, CourseKind
 from stages.diagnose.effects.base import Amplitude, EffectModel, Factored, ImagePoints, Product, Shape
@@ -42,9 +42,11 @@ _TIMES = 32
 _EDGE = 1 / 14
 _SHARES = (0.1, 0.2, 0.4, 0.8, 1.6)
 _SPEED_MM_S, _DISTANCE_MM = 20.0, 100.0
-# A probe stands that is slower than this part of its fastest: after a sudden stop `rates` of
-# `stages.diagnose.gauge.points` go back by up to .08 of it, unless the stop is in the last ten frames.
-_STANDS = 0.1
+# A probe stands that is slower than a tenth of its fastest so many seconds before and after: after a sudden
+# stop `rates` of `stages.diagnose.gauge.points`, taken over a third of a second and more where frames are
+# few, go back by up to .08 of it, unless the stop is in the last ten frames. It stands, too, where it is
+# slower than a hundredth of its fastest anywhere: noise of poses makes .1 mm/s.
+_STANDS, _ABOUT_S, _STILL = 0.1, 0.4, 0.01
 _WORDS: Mapping[CourseKind, str] = {
     CourseKind.STEP: "a step at {time_s:.2f} s: before it there is none of it",
     CourseKind.RAMP: "growing evenly from nothing at the first frame to this at {time_s:.1f} s",
@@ -116,7 +118,7 @@ class Coursed(Product):
         courses = [(shape[0], phase) for phase in (0.0, 90.0)] if swings else [shape]
         speed = points.speed_mm_s
         if self.kind is CourseKind.REVERSAL:
-            speed = np.where(np.abs(speed) < _STANDS * np.max(np.abs(speed), initial=0.0), 0.0, speed)
+            speed = np.where(_stands(points.time_s, np.abs(speed)), 0.0, speed)
         at = points.time_s, points.camera_distance_mm, speed
         return tuple(Course(self.kind, c).factor(*at) for c in courses), self.static, self.own
 
@@ -167,3 +169,15 @@ def with_courses(
         if (name, kind) not in _NAMED
     ]
     return {**library, **{model.name: model for model in more}}
+
+
+def _stands(time_s: Float, speed: Float) -> Bool:
+    """Return where a probe of such speeds (M,) at times (M,), in any order, stands."""
+    if not len(time_s):
+        return np.zeros(0, bool)
+    order = np.argsort(time_s, kind="stable")
+    times, ends = time_s[order], np.append(speed[order], 0.0)
+    first = np.searchsorted(times, time_s - _ABOUT_S)
+    end = np.searchsorted(times, time_s + _ABOUT_S, side="right")
+    fastest_about = np.maximum.reduceat(ends, np.stack([first, end], -1).ravel())[::2]
+    return np.asarray(speed < np.maximum(_STANDS * fastest_about, _STILL * speed.max()))

@@ -15,7 +15,7 @@ from pipeline.instrument.probe import Probe
 from pipeline.machine.stage import Context
 from pipeline.recording.base import Recording
 from stages.diagnose.effects.base import ImagePoints
-from stages.diagnose.gauge.points import AS_ADJUSTED, Moving, rates, widths_at
+from stages.diagnose.gauge.points import SHARP, Moving, rates, widths_at
 from stages.motion import (
     MATCH_BIASES,
     EncoderReadings,
@@ -175,7 +175,7 @@ def texture_points(run: FieldRun) -> ImagePoints:
 
 def speed_mm_s(run: FieldRun) -> Float:
     """Return the camera's speed (N,) along the pipe."""
-    return rates(distance_mm(run)[:, None], run.measured.time_s, AS_ADJUSTED)[:, 0]
+    return rates(distance_mm(run)[:, None], run.measured.time_s, SHARP)[:, 0]
 
 
 def distance_mm(run: FieldRun) -> Float:
@@ -197,4 +197,4 @@ def _wall_at(run: FieldRun, frame: Int, xyz_c: Float) -> tuple[Float, Float, Flo
 
 def _passing(run: FieldRun, frame: Int, xyz_c: Float) -> Float:
     """Return how points (M, 3) of the wall pass in C, mm/s."""
-    return Moving.of(run.state.T_pc, run.measured.time_s, AS_ADJUSTED).passing_mm_s(frame, xyz_c)
+    return Moving.of(run.state.T_pc, run.measured.time_s, SHARP).passing_mm_s(frame, xyz_c)

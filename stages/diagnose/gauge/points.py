@@ -24,9 +24,10 @@ from stages.diagnose.effects.base import ImagePoints
 # 11 frames leave of this noise what differences over two frames, smoothed over nine, had left (up to a tenth
 # more), and lose less of the motion. Below 30 frames/s noise makes slower rates: a third of a second, or 7
 # frames, leave at most .10 mm/s of poses that err by .01 mm, and lose .5 % of a sway of .6 Hz at 10 frames/s.
-# 5 lose 1.2 % at an eighth of the frame rate. The adjustment of an inspection has smoothed its poses before.
+# 5, sharp ones, lose 1.2 % at an eighth of the frame rate. They are an inspection's, whose adjustment has
+# smoothed its poses before: its sizes do not hold what rates lose.
 _FEWEST, _MOST, _SMOOTHED_S = 7, 11, 1 / 3
-SHARP, AS_ADJUSTED = 5, 3
+SHARP = 5
 # Of the polynomial: where frames were lost, times are uneven, and a cubic errs by the fourth order.
 _DEGREE = 4
 BASELINE_SIGMA_PX = 0.01
