@@ -143,10 +143,10 @@ class _Found:
         """Whether it is deeper than noise makes it, and may have been flattened by about its depth."""
         return is_depth_known(self.by_noise) and not is_depth_known(self.defect)
 
-    def told(self, probability: float) -> Defect:
-        """Return it with its probability, and in words whether its depth is a lower bound."""
+    def told(self, probability: float, counts: bool) -> Defect:
+        """Return it with its probability, and if it counts in words whether its depth is a lower bound."""
         words = _AT_LEAST.format(self.by_noise.depth_sigma_mm)
-        told = f"{self.defect.statement} {words}" if self.flattened else self.defect.statement
+        told = f"{self.defect.statement} {words}" if counts and self.flattened else self.defect.statement
         sure = self.defect.confidence * probability
         return replace(self.defect, probability=probability, confidence=sure, statement=told)
 
@@ -227,7 +227,7 @@ def _judged(
         real = min(real, MOST_SURE) * (1.0 if f.evidence.on_wall else _WALL_OR_NOT)
         real = 0.0 if f.step else real
         counts = f.evidence.corroborated and real >= COUNTED and is_depth_known(f.by_noise)
-        defect = f.told(real)
+        defect = f.told(real, counts)
         if counts:
             confirmed.append(defect)
         else:

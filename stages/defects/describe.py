@@ -34,8 +34,9 @@ _SMALL_MM2 = 60.0  # below this a quartic surface follows everything
 _UNKNOWN_ROUGHNESS = 0.08, 0.08
 # Coefficients of a quartic surface.
 _QUARTIC = 15
-# A line that scatters no more about a straight one, r.m.s., may be a joint or a seam: a cell (chosen).
-_STRAIGHT_MM = 0.4
+# A line so long that scatters no more about a straight one, r.m.s., may be a joint or a seam. Chosen.
+# Short cracks are as straight, but no joint is as short.
+_STRAIGHT_MM, _LONG_MM = 0.4, 30.0
 _CRACK_OR = "a crack, or a scratch, the edge of a stain or a shadow"
 _ROUND = " It goes all round: it may be the gap of a joint or the hollow root of a weld."
 
@@ -130,9 +131,9 @@ def describe_line(region: Region, depth: Depth, surface: Surface, scene: Scene) 
     """
     shown = describe(region, depth, surface, scene)
     direction = features_of(surface.relief, region, depth).direction_rad
-    straight = _across_mm(surface.relief, region) < _STRAIGHT_MM
-    causes = "the edge of a joint, a seam, a water line, a scratch or a crack" if straight else _CRACK_OR
     length = float(np.hypot(shown.length_mm, shown.width_mm))
+    straight = length > _LONG_MM and _across_mm(surface.relief, region) < _STRAIGHT_MM
+    causes = "the edge of a joint, a seam, a water line, a scratch or a crack" if straight else _CRACK_OR
     rings = notation.depth(shown.depth_mm, shown.depth_sigma_mm)
     return replace(
         shown,

@@ -11,6 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy import stats
 from scipy.fft import rfft, rfftfreq
 
 from pipeline.adjustment.robust import robust_spread
@@ -37,9 +38,9 @@ _PERIODS = 3
 # Rings that are looked at, and worked on at a time: 27,000 samples along rows tell a share of .001.
 _RINGS = 96
 _FEWEST = 200
-# Parts of a ring that must agree on what repeats, rad, and by how many σ: of some 6000 periods looked for
-# chance lets one reach 4.9 σ in a recording of a hundred.
-_PART_RAD, _SURE = np.radians(4.0), 6.0
+# Parts of a ring that must agree on what repeats, rad, so many at least, and the chance that they do: some
+# 6000 periods are looked for, of which one may do so in a recording of a hundred.
+_PART_RAD, _FEWEST_PARTS, _BY_CHANCE = np.radians(4.0), 12, 1e-6
 # Waves of which the samples show less than this share of others' are not known: the line stood still.
 _KNOWN = 0.1
 
@@ -122,7 +123,7 @@ def _lattice(samples: RingSamples, rings: slice, off: Float, axis: int) -> Latti
         return None
     period, share = _period(place[along], signed[along])
     part = np.broadcast_to(np.floor(samples.azimuth_rad / _PART_RAD), off.shape)[along]
-    if share < _REPEATS or _borne_out(_waves(place[along], period), signed[along], part) < _SURE:
+    if share < _REPEATS or not _borne_out(_waves(place[along], period), signed[along], part):
         return None
     waves, slant = _waves(place, period), np.broadcast_to(_slant(across), off.shape)
     known = np.isfinite(signed)
@@ -130,13 +131,15 @@ def _lattice(samples: RingSamples, rings: slice, off: Float, axis: int) -> Latti
     return Lattice(axis, period, share, np.array(sizes))
 
 
-def _borne_out(waves: Float, value: Float, part: Float) -> float:
-    """Return by how many σ parts of the ring repeat (n, 2 K) as all other parts do, each beside the others.
+def _borne_out(waves: Float, value: Float, part: Float) -> bool:
+    """Return whether parts of the ring repeat (n, 2 K) as all others do, each beside the others.
 
     A groove along the pipe, or the wall's roughness where the probe stands, repeats as well as one likes with
     some period, but the parts of the ring do not agree on it.
     """
-    number = np.unique(part, return_inverse=True)[1]
+    parts, number = np.unique(part, return_inverse=True)
+    if len(parts) < _FEWEST_PARTS:
+        return False
     wave, value = waves[:, [0, _OVERTONES]], value - value.mean()
     products = [np.bincount(number, wave[:, i] * wave[:, j]) for i, j in ((0, 0), (0, 1), (0, 1), (1, 1))]
     normal = np.array(products).T.reshape(-1, 2, 2)
@@ -145,7 +148,9 @@ def _borne_out(waves: Float, value: Float, part: Float) -> float:
     expected = np.einsum("bi,bij,bj->b", others[..., 0], normal, others[..., 0])
     shown = (others[..., 0] * right).sum(1)
     rest = shown - expected * shown.sum() / expected.sum()
-    return float(shown.sum() / (np.linalg.norm(rest) + 1e-12))
+    # Student's t: the scatter between parts is known by as many
+    chance = stats.t.sf(shown.sum() / (np.linalg.norm(rest) + 1e-12), len(parts) - 1)
+    return bool(chance < _BY_CHANCE)
 
 
 def _fitted(waves: Float, signed: Float, use: Bool) -> Float:

@@ -43,10 +43,17 @@ def picture(seed: int, rows: int = 600, fine: float = 3.0) -> np.ndarray:
     return 110 * np.exp(patches + grains) + fine * rng.standard_normal((rows, _AROUND))
 
 
-def drawn(grey: np.ndarray, row_mm: float, azimuth_rad: float, turn_deg: float, times: float = 0.55) -> None:
+def drawn(
+    grey: np.ndarray,
+    row_mm: float,
+    azimuth_rad: float,
+    turn_deg: float,
+    times: float = 0.55,
+    wave_mm: float = 0.8,
+) -> None:
     """Draw a wavy line of 18 mm and .3 mm width, so many times as bright, beyond the seam if need be."""
     t = np.linspace(-9, 9, 60)
-    side = 0.8 * np.sin(t)
+    side = wave_mm * np.sin(t)
     c, s = np.cos(np.radians(turn_deg)), np.sin(np.radians(turn_deg))
     i = (row_mm + c * t - s * side) / _PX_MM
     j = (azimuth_rad + np.pi) * _RADIUS_MM / _PX_MM + (s * t + c * side) / _PX_MM
@@ -176,6 +183,14 @@ def test_a_crack_that_rings_do_not_show_is_listed_and_not_counted() -> None:
     assert np.isnan([line.probability, line.confidence]).all()
     assert abs(line.depth_mm) < 3 * line.depth_sigma_mm
     assert len(line.frames) > 20
+
+
+def test_a_short_straight_crack_keeps_its_code() -> None:
+    grey = picture(3)
+    drawn(grey, 45.0, 0.5, 90.0, wave_mm=0.0)
+    (line,) = searched(grey).unconfirmed
+    assert line.pacp_suggestion.startswith("CC")
+    assert line.statement.startswith("Dark line")
 
 
 @pytest.mark.parametrize("along", [True, False])

@@ -96,6 +96,14 @@ def test_noise_and_a_groove_are_no_lattice() -> None:
     assert lattices_of(drawn(8.0, 0.0)) == ()
 
 
+@pytest.mark.parametrize("half_deg", [2.0, 4.0, 12.0])
+@pytest.mark.parametrize("seed", range(5))
+def test_an_arc_of_a_ring_bears_no_lattice_out(half_deg: float, seed: int) -> None:
+    samples = drawn(8.0, 0.0, 0.0, 0.1, seed)
+    samples.validity[:, np.abs(AZIMUTH - np.pi / 2) > np.radians(half_deg)] = 1
+    assert lattices_of(samples) == ()
+
+
 @pytest.mark.parametrize("rough_px", [0.02, 0.1])
 @pytest.mark.parametrize("seed", range(5))
 def test_a_wall_that_all_rings_see_alike_is_no_lattice(rough_px: float, seed: int) -> None:
