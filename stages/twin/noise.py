@@ -161,19 +161,17 @@ def photon_transfer(windows: list[NoiseWindows], black: Figure, white: float) ->
     """Return the noise that windows of several frames show; σ from leaving out one frame at a time.
 
     Each part of the noise is 0 at least, but not where σ is told: it would be 0 for parts that are 0 in every
-    fit. Windows of one grey level show the sum of the parts alone, which is then read noise of unknown σ.
+    fit. Windows of one grey level show the sum of the parts alone, which is then read noise; of few levels,
+    or where all frames but one have few, every σ is infinite.
     """
-    cells = _Cells.of(windows)
-    others = [windows[:k] + windows[k + 1 :] for k in range(len(windows))]
-    few = min((sum(len(w.level) for w in some) for some in others), default=0) < _FEWEST_CELLS * _FEWEST
-    if few or cells is None or cells.of_one_level:
-        return _camera_noise(_fitted(cells), np.full(4, np.inf), black, white)
-    each = np.array([c.free for c in map(_Cells.of, others) if c is not None])
-    read, per_level, square, gamma = np.nan_to_num(left_out_sd(each), nan=np.inf)
-    value = _fitted(cells)
-    return _camera_noise(
-        value, np.array([read, per_level, _of_root(float(value[2]), float(square)), gamma]), black, white
-    )
+    value, others = _fitted(_Cells.of(windows)), (windows[:k] + windows[k + 1 :] for k in range(len(windows)))
+    each = [_Cells.of(some) for some in (windows, *others)]
+    parted = [c.free for c in each if c is not None and c.part_the_noise]
+    if len(parted) < len(each):
+        return _camera_noise(value, np.full(4, np.inf), black, white)
+    read, per_level, square, gamma = np.nan_to_num(left_out_sd(np.array(parted[1:])), nan=np.inf)
+    uneven = _of_root(float(value[2]), float(square))
+    return _camera_noise(value, np.array([read, per_level, uneven, gamma]), black, white)
 
 
 def _of_root(root: float, sd: float) -> float:
@@ -199,8 +197,8 @@ class _Cells:
     @classmethod
     def of(cls, windows: list[NoiseWindows]) -> _Cells | None:
         """Return the cells; None where windows are too few."""
-        level = np.concatenate([w.level for w in windows])
-        variance = np.concatenate([w.variance for w in windows])
+        level = np.concatenate([np.zeros(0), *(w.level for w in windows)])
+        variance = np.concatenate([np.zeros(0), *(w.variance for w in windows)])
         cells = min(_LEVELS, len(level) // _FEWEST)
         if cells < _FEWEST_CELLS:
             return None
@@ -215,6 +213,11 @@ class _Cells:
     def of_one_level(self) -> bool:
         """Whether levels differ too little to part the noise."""
         return bool(self.level.max() < _RANGE_FOR_PARTS * max(self.level.min(), 1.0))
+
+    @property
+    def part_the_noise(self) -> bool:
+        """Whether levels tell the noise's parts from each other; equal levels leave fewer cells than made."""
+        return len(self.level) >= _FEWEST_CELLS and not self.of_one_level
 
     @property
     def design(self) -> Float:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from stages.twin.lamp_light import Figure
-from stages.twin.noise import photon_transfer, windows_of
+from stages.twin.noise import NoiseWindows, photon_transfer, windows_of
 
 BLACK = Figure(16.0, 0.1)
 
@@ -107,3 +107,15 @@ def test_windows_of_one_grey_level_tell_the_sum_of_the_noise_alone():
     noise = photon_transfer(windows, BLACK, 255.0)
     assert noise.variance(np.array([100.0], np.float32))[0] == pytest.approx(4.0, rel=0.05)
     assert {noise.read_variance.sd, noise.variance_per_level.sd, noise.uneven.sd} == {np.inf}
+
+
+@pytest.mark.parametrize("levels", [(20, 100), (0, 60)])
+def test_windows_of_two_grey_levels_do_not_part_the_noise(levels):
+    """Equal levels left two cells, to which three parts were fitted, with σ of a thousandth and wrong values."""
+    random = np.random.default_rng(0)
+    each = [random.choice(levels, 400).astype(float) for _ in range(6)]
+    windows = [NoiseWindows(x, (1 + 0.02 * x + 0.0004 * x**2) * random.chisquare(24, 400) / 24) for x in each]
+    noise = photon_transfer(windows, BLACK, 255.0)
+    assert {noise.read_variance.sd, noise.variance_per_level.sd, noise.uneven.sd} == {np.inf}
+    at = np.array(levels, np.float32)
+    np.testing.assert_allclose(noise.variance(at), 1 + 0.02 * at + 0.0004 * at**2, rtol=0.1)
