@@ -267,16 +267,16 @@ def _blur_of(own: Float, cross: Float) -> Float:
 
 
 def _brings_light(law: int, mean: Float, more: Float) -> bool:
-    """Return whether the wall is as bright as a law's pattern on it foretells, where a picture can tell.
+    """Return whether the wall is surely as bright as a law's pattern on it foretells.
 
-    ``mean`` (F,) is foretold, ``more`` by how much the wall is brighter than that: NaN without a place that
-    sees no wall, from which black is known. The camera's own black would hold even light, not light that
-    falls off.
+    ``mean`` (F,) is foretold, ``more`` by how much the wall is brighter than that: NaN in frames without a
+    place that sees no wall, from which black is known. A pattern alone is none of light: a codec leaves some.
     """
-    if np.isnan(more).any():
-        return STRAY_NAMES[law] != "ambient_light"
-    sd = float(np.std(more, ddof=1) / np.sqrt(len(more)))
-    return abs(float(more.mean())) < max(_SURE * sd, _OF_MEAN[law] * abs(float(mean.mean())))
+    told = np.isfinite(more)
+    if told.sum() < 2:
+        return False
+    sd = float(np.std(more[told], ddof=1) / np.sqrt(told.sum()))
+    return abs(float(more[told].mean())) + _SURE * sd < _OF_MEAN[law] * abs(float(mean[told].mean()))
 
 
 def _size_beside_one(value: Float, column: Float) -> Float:

@@ -12,11 +12,11 @@ from stages.twin.gate import _borne_out, judged
 from stages.twin.lamp_light import Figure
 from stages.twin.line_light import _plain_line
 from stages.twin.name import focus_of, response_of
-from stages.twin.picture import WholePictures
+from stages.twin.picture import WholePictures, _brings_light
 from stages.twin.reference import BlocksOfFrames
 from stages.twin.render import Region, TwinFrame
 from stages.twin.scene import Ring
-from stages.twin.switched import Shown
+from stages.twin.switched import STRAY_NAMES, Shown
 
 SHAPE, FRAMES, WHITE = (240, 320), 8, 200.0
 V, U = np.mgrid[0 : SHAPE[0], 0 : SHAPE[1]].astype(np.float32)
@@ -233,17 +233,46 @@ def test_texture_that_a_codec_keeps_of_lit_frames_is_no_light(haze):
     assert _stray_names(lambda pale: 6 * (pale - 1) + haze) == []
 
 
+def test_a_pattern_is_no_light_because_the_pictures_flicker():
+    """The wall's mean, too unsure to contradict, had counted as agreement: this was ambient light."""
+    random = np.random.default_rng(4)
+    assert _stray_names(lambda pale: 6 * (pale - 1) + random.normal(0, 8)) == []
+
+
 def test_without_a_place_that_sees_no_wall_even_light_is_not_told():
-    blind = SimpleNamespace(**{**vars(SCENE), "outside": None})
-    assert _stray_names(lambda pale: 22 * pale, blind) == []
+    assert _stray_names(lambda pale: 22 * pale, SimpleNamespace(**{**vars(SCENE), "outside": None})) == []
+
+
+def test_frames_that_see_black_tell_of_light_for_those_that_do_not():
+    """One frame without black withdrew the evidence of all others: for ambient light, against the rest."""
+    mean, bright = np.full(8, 4.0), np.array([0.1, -0.1, 0, 0.1, -0.1, 0.1, 0, np.nan])
+    assert all(_brings_light(law, mean, bright) for law in range(3))
+    assert not any(_brings_light(law, mean, bright - 4) for law in range(3))
+    assert not any(_brings_light(law, mean, np.where(np.arange(8) < 1, 0, np.nan)) for law in range(3))
+
+
+SIZES = np.array([1.0, 0.7, 1.3, 0.9, 1.1, 0.8, 1.2, 1.0])
+
+
+def _frames_of_law(law, more):
+    """Frames in which one law fits, and the wall is so many grey levels brighter than it foretells."""
+    whole = WholePictures(SCENE)
+    whole.stray = [np.tile([0.1, 100, 0, 9, more], (3, 1)) for _ in SIZES]
+    for frame, s in zip(whole.stray, SIZES, strict=True):
+        frame[law] = [s, 100, 5, 90 * s, more]
+    whole.frame["stray"] = list(range(len(SIZES)))
+    return whole
 
 
 def test_the_best_of_three_laws_has_three_times_the_chance():
-    whole = WholePictures(SCENE)
-    size = np.array([1.0, 0.7, 1.3, 0.9, 1.1, 0.8, 1.2, 1.0])
-    whole.stray = [np.array([[0.1, 100, 0, 9, 0], [0.1, 100, 0, 9, 0], [s, 100, 5, 90 * s, 0]]) for s in size]
-    whole.frame["stray"] = list(range(len(size)))
-    assert whole._stray().mismatch.probability == pytest.approx(3 * chance_of(size))
+    assert _frames_of_law(2, 0)._stray().mismatch.probability == pytest.approx(3 * chance_of(SIZES))
+
+
+@pytest.mark.parametrize("law", [0, 1, 2])
+def test_without_a_place_that_sees_no_wall_no_light_is_told(law):
+    """Light bounced once was told from its pattern alone, which what a codec keeps may have as well."""
+    assert _frames_of_law(law, 0.0)._stray().mismatch.name == STRAY_NAMES[law]
+    assert _frames_of_law(law, np.nan)._stray() is None
 
 
 def test_a_second_ring_is_found_and_a_glint_is_none():
