@@ -111,7 +111,7 @@ def test_windows_of_one_grey_level_tell_the_sum_of_the_noise_alone():
 
 @pytest.mark.parametrize("levels", [(20, 100), (0, 60)])
 def test_windows_of_two_grey_levels_do_not_part_the_noise(levels):
-    """Equal levels left two cells, to which three parts were fitted, with σ of a thousandth and wrong values."""
+    """Equal levels left two cells, to which three parts were fitted: wrong values of σ nearly 0."""
     random = np.random.default_rng(0)
     each = [random.choice(levels, 400).astype(float) for _ in range(6)]
     windows = [NoiseWindows(x, (1 + 0.02 * x + 0.0004 * x**2) * random.chisquare(24, 400) / 24) for x in each]
