@@ -7,13 +7,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pipeline.arrays import Float
 from pipeline.physics.catalogue import effect
 from pipeline.physics.effect import Channel, FixedTo
-from stages.diagnose.agreement import Agreement, Part, agreement, chance_of_name
+from stages.diagnose.agreement import Agreement, chance_of_name
+from stages.diagnose.both_recordings import agreements
 from stages.diagnose.channels import Seen
 from stages.diagnose.inference import SURE
-from stages.diagnose.late_pictures import Exposure, as_late_as_exposed, as_late_as_shown
+from stages.diagnose.late_pictures import Exposure, how_late, own_size, whole_size
 from stages.diagnose.profile.evidence import ProfileEvidence
 from stages.diagnose.profile.finding import Finding
 from stages.diagnose.result import CourseFound, EffectFound, Location, Value
@@ -33,8 +33,6 @@ _GOES_WITH = {
     "time_offset": (FixedTo.TIME, "speed"),
     "motion_blur": (FixedTo.CAMERA, "speed"),
 }
-# Another recording has its own events, its own aliases, and a P that is rolled otherwise.
-_OF_ONE_RECORDING = frozenset({"time_s", "duration_s", "slip_mm", "frequency_hz", "direction_deg"})
 # Of a swing: what one ring takes for a turn of the camera.
 _TURNED = 0.01
 
@@ -68,6 +66,8 @@ class Claim:
     beside : int
         What else the same readings show and nobody can name, by kinds. Each may come of a cause that made
         this as well, at even odds: the name is unsure then, but no less likely than that.
+    whole : tuple of (str, Value)
+        Sizes before a part was taken off that another effect makes: recordings are compared by these.
     """
 
     name: str
@@ -83,6 +83,7 @@ class Claim:
     fits_p: float = 1.0
     otherwise: float = 0.0
     unknown: frozenset[str] = frozenset()
+    whole: tuple[tuple[str, Value], ...] = ()
 
     @property
     def rivals(self) -> tuple[str, ...]:
@@ -106,6 +107,11 @@ class Claim:
     def _chance(self) -> float:
         doubts = len(self.rivals) + (not self.counted) + self.beside
         return chance_of_name(self.p_value, doubts, self.agreements, self.fits_p, self.otherwise)
+
+    @property
+    def compared(self) -> dict[str, Value]:
+        """What recordings are compared by: sizes, whole where another effect makes a part."""
+        return self.parameters | dict(self.whole)
 
     def not_knowing(self, names: Collection[str]) -> Claim:
         """Return the claim of one who does not know some effects."""
@@ -143,9 +149,14 @@ def claims_of(field: Seen | None, gauge: Seen | None, stated_exposure_s: float) 
         else:
             out.append(_against(each[0], field if name in of_gauge else gauge))
     own_delay = any(c.name == "time_offset" and c.sure for c in out)
-    of_exposure = as_late_as_exposed if own_delay else lambda size: as_late_as_shown(size, recordings)
-    out = [replace(c, parameters=of_exposure(c.parameters)) for c in out]
+    out = [_of_exposure(c, recordings, own_delay) for c in out]
     return sorted((c for c in out if not _excluded(c, out)), key=lambda c: c.p_value)
+
+
+def _of_exposure(claim: Claim, recordings: Sequence[Seen | None], own_delay: bool) -> Claim:
+    """Return the claim of a longer exposure with how late it makes pictures; any other as it is."""
+    size, words = how_late(claim.parameters, recordings, own_delay)
+    return replace(claim, parameters=size, statement=claim.statement + words)
 
 
 def _excluded(claim: Claim, claims: Sequence[Claim]) -> bool:
@@ -185,9 +196,10 @@ def _of_estimate(e: TravelEstimate, travel: TravelEvidence, exposure: Exposure) 
     beside = bool(travel.unsettled) + (travel.unexplained is not None)
     beside += exposure.leaves_open(e)
     return Claim(
-        e.effect, {e.quantity: Value(e.value, e.size_sigma)}, e.statement, e.p_value, alike, travel.source,
+        e.effect, {e.quantity: own_size(e)}, e.statement, e.p_value, alike, travel.source,
         stretch(travel, e.where, fixed_to, time), e.agreements,
         beside=beside, fits_p=travel.fits_p, otherwise=e.otherwise,
+        whole=((e.quantity, whole_size(e)),) if e.taken_off else (),
     )  # fmt: skip
 
 
@@ -265,7 +277,9 @@ def stretch(
 def _borne_out(claim: Claim, other: Claim) -> Claim:
     """Return the claim with what the other recording says; a rival stays only where both leave it."""
     alike = tuple(n for n in claim.alike if n in other.alike)
-    both = _agreements(claim, other.where, other.parameters)
+    both = agreements(
+        claim.where, claim.compared, other.where, other.compared, "whole " if claim.whole else ""
+    )
     return replace(claim, alike=alike, agreements=(*claim.agreements, *both))
 
 
@@ -275,25 +289,6 @@ def _against(claim: Claim, other: Seen | None) -> Claim:
     estimate = travel.estimate(claim.name) if travel is not None else None
     if travel is None or estimate is None or not np.isfinite(estimate.sigma) or estimate.alike:
         return claim
-    same = {estimate.quantity: Value(estimate.value, estimate.size_sigma)}
-    return replace(claim, agreements=(*claim.agreements, *_agreements(claim, travel.source, same)))
-
-
-def _agreements(claim: Claim, where: str, parameters: dict[str, Value]) -> Iterable[Agreement]:
-    """Return, for each quantity that two recordings share, whether they agree on it."""
-    for name, value in claim.parameters.items():
-        if name not in parameters or name in _OF_ONE_RECORDING:
-            continue
-        first, second = _part(claim.where, name, value), _part(where, name, parameters[name])
-        found = agreement(first[0], second[0], (first[1], second[1]), first[1] + second[1])
-        if found is not None:
-            yield found
-
-
-def _part(where: str, name: str, value: Value) -> tuple[Part, Float]:
-    """Return a quantity with its covariance; an azimuth as a direction."""
-    words = f"{name} {value.value:.4g} (± {value.sd:.2g})"
-    if not name.endswith("azimuth_deg"):
-        return Part(where, words, np.array([value.value])), np.array([[value.sd**2]])
-    angle = np.radians(value.value)
-    return Part(where, words, np.array([np.cos(angle), np.sin(angle)])), np.radians(value.sd) ** 2 * np.eye(2)
+    same = {estimate.quantity: whole_size(estimate)}
+    both = agreements(claim.where, claim.compared, travel.source, same, "whole " if claim.whole else "")
+    return replace(claim, agreements=(*claim.agreements, *both))

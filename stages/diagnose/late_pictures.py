@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -98,20 +98,70 @@ class Exposure:
         return (_EXPOSURE,) if 0 < exposure.value < longest and not told_apart else ()
 
 
+def how_late(
+    size: dict[str, Value], recordings: Sequence[Seen | None], own_delay: bool
+) -> tuple[dict[str, Value], str]:
+    """Return an effect's size, of an exposure with how late it makes pictures, and what is said beside it.
+
+    ``own_delay`` tells whether the encoder has a sure delay of its own, with half the exposure taken off.
+    """
+    if own_delay:
+        return as_late_as_exposed(size), ""
+    return as_late_as_shown(size, recordings), later_than_exposed(size, recordings)
+
+
 def as_late_as_shown(size: dict[str, Value], recordings: Iterable[Seen | None]) -> dict[str, Value]:
     """Return an effect's size, of an exposure with how late it makes pictures as far as an encoder shows it.
 
-    Stamps may be of the exposure's middle, so that half of it makes no picture late against its stamp. Of a
-    delay that both recordings tell, what is found counts; where no encoder tells any, nothing is known.
+    Stamps may be of the exposure's middle, so that half of it makes no picture late against its stamp. Of two
+    recordings the first that can tell half of it from nothing counts; where no encoder tells any, nothing is
+    known. What an encoder is later than by half, it may or may not share: it is in σ.
     """
+    if "exposure_s" not in size or (shown := _shown(size["exposure_s"], recordings)) is None:
+        return size
+    half = _half(size["exposure_s"])
+    if not is_found(shown.p_value):
+        return size | {"late_s": Value(0.0, shown.size_sigma)}
+    value = min(max(shown.value, 0.0), half.value)
+    sd = max(shown.size_sigma, half.sd * (value == half.value), shown.value - half.value)
+    return size | {"late_s": Value(value, sd)}
+
+
+def later_than_exposed(size: dict[str, Value], recordings: Iterable[Seen | None]) -> str:
+    """Return what is said of an encoder that is later than half of an exposure makes it; else nothing."""
+    if "exposure_s" not in size or (shown := _shown(size["exposure_s"], recordings)) is None:
+        return ""
+    half = _half(size["exposure_s"])
+    beyond, sigma = shown.value - half.value, float(np.hypot(shown.size_sigma, half.sd))
+    if not is_found(shown.p_value) or beyond <= _SURE * sigma:
+        return ""
+    size_ms = f"{1e3 * beyond:.1f} ms (± {1e3 * sigma:.1f})"
+    return f" The encoder is later than the exposure accounts for, by {size_ms}."
+
+
+def _shown(exposure: Value, recordings: Iterable[Seen | None]) -> TravelEstimate | None:
+    """Return the delay of the first encoder that tells half of an exposure from nothing, else the surest."""
     travels = (s.travel for s in recordings if s is not None and s.travel is not None)
     each = [e for t in travels if (e := t.estimate(_DELAY)) is not None and np.isfinite(e.size_sigma)]
-    if "exposure_s" not in size or not each:
-        return size
-    shown = min(each, key=lambda e: (not is_found(e.p_value), e.size_sigma))
-    half = Value(size["exposure_s"].value / 2, size["exposure_s"].sd / 2)
-    value = min(max(shown.value, 0.0), half.value) if is_found(shown.p_value) else 0.0
-    return size | {"late_s": Value(value, max(shown.size_sigma, half.sd * (value == half.value)))}
+    telling = (e for e in each if is_found(e.p_value) or _SURE * e.size_sigma < exposure.value / 2)
+    return next(telling, min(each, key=lambda e: e.size_sigma, default=None))
+
+
+def _half(exposure: Value) -> Value:
+    return Value(exposure.value / 2, exposure.sd / 2)
+
+
+def whole_size(late: TravelEstimate) -> Value:
+    """Return a size before anything was taken off, to compare recordings of one probe by.
+
+    What stamps are of is common to them, and explains no difference.
+    """
+    return Value(late.value + late.taken_off, late.size_sigma)
+
+
+def own_size(late: TravelEstimate) -> Value:
+    """Return a size, as unsure as it is and what stamps may be of makes what was taken off."""
+    return Value(late.value, float(np.hypot(late.size_sigma, late.taken_off * _BY_STAMPS)))
 
 
 def as_late_as_exposed(size: dict[str, Value]) -> dict[str, Value]:
@@ -130,12 +180,11 @@ def _less_half(late: TravelEstimate, longer: Size, fit: TravelFit | None) -> Tra
     half = longer.value / 2
     value, sigma = late.value - half, float(np.hypot(late.sigma, longer.sigma / 2))
     again = late.agreements if fit is None else second_predictions(fit, DELAY, known=half)
-    by_stamps = float(np.hypot(late.stated_sigma, half * _BY_STAMPS))
-    own = replace(late, value=value, sigma=sigma, stated_sigma=by_stamps, agreements=again)
+    own = replace(late, value=value, sigma=sigma, agreements=again, taken_off=half)
     if not np.isfinite(sigma):
         return own
     possible = LIBRARY[_DELAY].possible((), np.array([value]))
-    beyond = max(value, -late.value, 0.0) / float(np.hypot(sigma, late.stated_sigma))
+    beyond = max(value, -late.value, 0.0) / own.size_sigma
     return replace(own, p_value=float(2 * norm.sf(beyond)) if possible else 1.0)
 
 

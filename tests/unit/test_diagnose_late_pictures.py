@@ -231,3 +231,46 @@ def test_beside_an_encoders_own_delay_half_of_the_exposure_is_put_right_as_well(
     assert of_name["motion_blur"]["late_s"].value == pytest.approx(0.008)
     assert of_name["time_offset"]["delay_s"].value == pytest.approx(0.010)
     assert of_name["motion_blur"]["late_s"].sd == pytest.approx(np.sqrt(0.5**2 + 8**2 / 3) * 1e-3)
+
+
+@pytest.mark.parametrize(
+    ("delay_s", "sigma_s", "of_gauge_s"), [(0.0, 2e-4, 0.018), (0.007, 2e-3, 0.018), (0.0, 2.4e-3, 0.014)]
+)
+def test_what_stamps_are_of_explains_no_difference_between_two_recordings(
+    real_probe: Probe, thirty_a_second: TravelFit, delay_s: float, sigma_s: float, of_gauge_s: float
+) -> None:
+    """10 ± 4.8 ms beside 0 ± 1 were alike: named, and a sound inspection's readings were moved by 18 ms."""
+    field = late("field", thirty_a_second, delay_s, (16.0, 1.0), sigma_s=sigma_s)
+    assert field.travel is not None
+    of_field = (replace(field.travel.estimates[0], p_value=0.8),)
+    field = replace(field, travel=replace(field.travel, estimates=of_field))
+    found = answer(real_probe, field, late("gauge", thirty_a_second, of_gauge_s, (16.0, 1.0)))
+    assert found.verdict is Verdict.PARTLY
+    assert sizes(found) == pytest.approx({"motion_blur": 0.016})
+    assert found.effects[0].parameters["late_s"].value == 0.0
+
+
+def test_recordings_that_share_an_own_delay_bear_it_out_by_the_whole(
+    real_probe: Probe, thirty_a_second: TravelFit
+) -> None:
+    both = [late(source, thirty_a_second, 0.018, (16.0, 1.0)) for source in ("field", "gauge")]
+    (own,) = (e for e in answer(real_probe, both[0], both[1]).effects if e.name == "time_offset")
+    assert own.parameters["delay_s"].value == pytest.approx(0.010)
+    assert own.parameters["delay_s"].sd > 8e-3 / 3**0.5
+    (told,) = (c for c in own.confirmed_by if "gauge" in c.prediction + c.measured)
+    assert told.agrees
+    assert "whole delay_s 0.018" in told.prediction
+    assert "whole delay_s 0.018" in told.measured
+
+
+def test_what_an_encoder_is_later_than_half_the_exposure_is_in_its_uncertainty_and_said(
+    real_probe: Probe, thirty_a_second: TravelFit
+) -> None:
+    """13 ± 1 ms beside 8 that the width allows were 8.0 ± 1.0, "as the encoder shows"."""
+    found = answer(real_probe, late("field", thirty_a_second, 0.013, (16.0, 1.0)), None)
+    (exposure,) = found.effects
+    late_s = exposure.parameters["late_s"]
+    assert (late_s.value, late_s.sd) == pytest.approx((0.008, 0.005))
+    assert "The encoder is later than the exposure accounts for, by 5.0 ms (± 1.1)." in exposure.statement
+    near = answer(real_probe, late("field", thirty_a_second, 0.0085, (16.0, 1.0)), None)
+    assert "later than" not in near.effects[0].statement

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.stats import norm
 
 from pipeline.arrays import Bool, Float
+from pipeline.files.codec import NOT_STORED
 from pipeline.physics.catalogue import effect
 from pipeline.recording.base import Encoder, Recording
 from stages.diagnose.agreement import Agreement
@@ -59,6 +60,9 @@ class TravelEstimate:
         Places of the `Sight`, both included, between which it adds to the readings.
     otherwise : float
         How likely courses without a name are in its place, beside it, on average.
+    taken_off : float
+        What another effect makes of the whole, so that ``value`` is the rest: set when recordings are set
+        beside each other, and never stored.
     """
 
     effect: str
@@ -72,6 +76,7 @@ class TravelEstimate:
     agreements: tuple[Agreement, ...] = ()
     where: tuple[int, int] | None = None
     otherwise: float = 0.0
+    taken_off: float = field(default=0.0, metadata=NOT_STORED)
 
     @property
     def size_sigma(self) -> float:
