@@ -91,14 +91,14 @@ def estimate_motion(
     events = find_events(recording.frames, trajectory, run.texture.poses, joined.slip, has_encoder)
     seen = SeenCentres(circles.centre_c, probe.laser.baseline_mm)
     shakes = camera_trembles(trajectory, run.texture.poses, seen)
-    report_motion(context, estimate, run.texture, trajectory, shakes, wider)
+    doubted = shakes or run.texture.poses.much_lost
+    steady, believed = estimate.steady, doubting_instrument(trajectory, probe, estimate.lasting, doubted)
+    report_motion(context, estimate, run.texture, believed, shakes, wider)
     require_along_pipe(trajectory)
     loops.report(context)
     report_instrument(probe, trajectory, context)
-    doubted = shakes or run.texture.poses.much_lost
-    steady, trajectory = estimate.steady, doubting_instrument(trajectory, probe, estimate.lasting, doubted)
     return replace(
-        trajectory, events=events, image_scale=steady.scale, image_scale_sigma=steady.scale_sigma,
+        believed, events=events, image_scale=steady.scale, image_scale_sigma=steady.scale_sigma,
         radius_doubt=doubt,
         knock=steady.run.knock,
     )  # fmt: skip
@@ -181,7 +181,7 @@ def _motion_of_run(
 
 MOTION = Stage(
     "motion",
-    "47",
+    "48",
     MotionParameters,
     _motion_of_run,
     "camera pose in every frame and the pipe's axis, from texture, rings and encoder together",

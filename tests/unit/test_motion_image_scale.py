@@ -285,15 +285,18 @@ def test_a_probe_moved_by_what_is_in_doubt_is_as_unsure_as_it_was_moved(
 def test_a_probe_moved_by_texture_that_was_much_lost_is_in_doubt(monkeypatch: pytest.MonkeyPatch) -> None:
     run = without_encoder(drawn_run(0.9 * np.arange(12), np.zeros(12)))
     parameters, found = MotionParameters(strip_step_mm=0.6, cell_px=20, patch_half_px=8), []
+    told: dict[str, float] = {}
+    context = replace(quiet_context(), report=lambda name, value, unit="": told.update({name: value}))
     for lost in (False, True):
         monkeypatch.setattr(TrackedPoses, "much_lost", lost)
-        got = estimate_motion(run.recording, run.probe, run.rings, run.points, parameters, quiet_context())
+        got = estimate_motion(run.recording, run.probe, run.rings, run.points, parameters, context)
         assert got.instrument is not None
         assert got.instrument_covariance is not None
         found.append(got.instrument_covariance)
     moved = got.instrument - run.probe.parameters
     assert np.abs(moved).max() > 1e-6, "the control"
     np.testing.assert_allclose(found[1] - found[0], np.outer(moved, moved), atol=1e-15)
+    assert told["1 σ of distance at the end"] == got.distance_sigma_mm, "what is told holds the doubt as well"
 
 
 def test_distances_are_as_unsure_as_the_pipe_is_wider_by_a_probe_in_doubt() -> None:

@@ -16,6 +16,12 @@ from stages.motion.bundle_adjustment.unknowns import ENCODER_SCALE
 _TOO_FAR = 4.0
 """Differences, in σ, from which the encoder's scale was not as stated: by chance once in 16 000 recordings.
 A smaller one draws distances by 4 σ_pictures² / σ_encoder at most: .15 % at .09 and .2 %."""
+_DOUBTFUL, _SERIOUS = 3.0, 5.0
+"""Differences, in σ, from which texture that was much lost makes distances unsure, and from which that is
+told (chosen): by chance once in 370 and once in 1.7 million recordings."""
+_TELLS_NOTHING = 10.0
+"""Times the encoder's σ from which texture's is so large that 3 to 5 of it draw a distance by less than half
+of the encoder's own σ: in_sigma / √(1 + 10²)."""
 _ALIKE = 2.0
 """Factor within which diameter and way err alike. A zoomed picture changes radii by θ / sin θ cos θ times as
 much, 3.0 at 65°, and ways by about as much as radii: 2.6 and 2.0 % for 1 % of zoom (open-1-field)."""
@@ -31,11 +37,14 @@ class EncoderScale:
         With its 1 σ.
     stated_sigma : float
         1 σ that the probe's file states about 1.
+    lost_in_sigma : float
+        Difference from 1 in σ by texture that was much lost, before it was distrusted; 0 by other texture.
     """
 
     scale: float
     sigma: float
     stated_sigma: float
+    lost_in_sigma: float = 0.0
 
     @property
     def in_sigma(self) -> float:
@@ -47,12 +56,24 @@ class EncoderScale:
         """Whether the pictures contradict the stated scale."""
         return self.in_sigma > _TOO_FAR
 
+    @property
+    def doubted(self) -> bool:
+        """Whether texture, if much of it was lost, still tells enough to make distances unsure."""
+        tells = self.sigma < _TELLS_NOTHING * self.stated_sigma
+        return self.in_sigma > (_DOUBTFUL if tells else _SERIOUS)
+
+    def beside_lost_texture(self) -> EncoderScale:
+        """Return the scale without trust in texture, which keeps how far that was off."""
+        return replace(self.without_trust_in_texture(), lost_in_sigma=self.in_sigma)
+
     def without_trust_in_texture(self) -> EncoderScale:
         """Return the scale with a σ as large as the difference between texture and encoder."""
         return replace(self, sigma=float(np.hypot(self.sigma, abs(self.scale - 1))))
 
     def warn(self, context: Context, wider: float) -> None:
         """Warn of an encoder that the pictures contradict, in a pipe ``wider`` than nominal by that share."""
+        if self.lost_in_sigma > _SERIOUS:
+            self._warn_beside_lost_texture(context)
         if not self.contradicted:
             return
         more = "more" if self.scale < 1 else "less"
@@ -62,6 +83,14 @@ class EncoderScale:
             "baseline and camera instead. If the probe is wrong and the encoder right, distances and "
             f"radii would be wrong by as much{self._witness(wider)}. What to do: measure the wheel and "
             "compare the clocks of encoder.csv and frames.csv; compare the diameter with one that is known"
+        )
+
+    def _warn_beside_lost_texture(self, context: Context) -> None:
+        context.warn(
+            f"encoder and pictures differ by {100 * abs(1 / self.scale - 1):.1f} % "
+            f"({self.lost_in_sigma:.0f} σ), and the pictures show too little texture to tell which is right: "
+            "distances follow the encoder, and their σ holds the difference. What to do: check the encoder's "
+            "wheel and unit"
         )
 
     def doubt_of_probe(self, wider: float) -> float:
