@@ -262,7 +262,7 @@ def _where(column: Float) -> tuple[int, int] | None:
 def _shortcomings(source: str, recording: Recording, sight: Sight) -> tuple[str, ...]:
     out, source = [], _in_words(source)
     if recording.encoder is None:
-        out.append(f"The {source} has no encoder, whose scale, slips, play and delay could be told.")
+        out.append(f"The {source} has no encoder: its scale, slips, play and delay cannot be told.")
     if len(sight.frame) < _LEAST_FRAMES:
         out.append(
             f"Only {len(sight.frame)} frames of the {source} show where the camera is along the pipe: motion "
