@@ -42,10 +42,11 @@ class CloudAlong:
 
     def ring_spacing_mm(self) -> float:
         """Return the median distance between neighbouring rings, where a probe moved that mostly stood."""
-        apart = np.diff(np.sort(self._rings()[1]))
-        stands = apart <= _MOVES * usual_way(self.ways_mm())
-        if 2 * stands.sum() > len(stands) and not stands.all():
-            apart = apart[~stands]
+        _, middle = self._rings()
+        gone, apart = np.abs(np.diff(middle)), np.diff(np.sort(middle))
+        moves = _MOVES * usual_way(gone)
+        if 2 * np.sum(gone <= moves) > len(gone) and (apart > moves).any():
+            apart = apart[apart > moves]
         return float(np.median(apart)) if len(apart) else 0.0
 
     def ways_mm(self) -> Float:

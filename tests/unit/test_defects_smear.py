@@ -130,6 +130,16 @@ def test_the_way_from_ring_to_ring_is_that_in_order_of_time(places_mm: Float) ->
     assert sigma == pytest.approx(told_sigma(bell, HeldOver(HELD ** np.arange(12))))
 
 
+@pytest.mark.parametrize("passes", [2, 3, 8])
+def test_a_probe_that_goes_to_and_fro_does_not_stand(passes: int) -> None:
+    """Its rings lie between each other: those near another one were taken for ones of a probe that stands."""
+    shift = np.random.default_rng(0).uniform(0, 0.5, passes)
+    way = np.arange(0, 80, 0.5)
+    places = np.concatenate([way[:: 1 - 2 * (k % 2)] + shift[k] for k in range(passes)])
+    expected = np.median(np.diff(np.sort(places)))
+    assert cloud_along(cloud_of(places)).ring_spacing_mm() == pytest.approx(expected, rel=0.05)
+
+
 def test_rings_that_are_missing_make_no_long_way() -> None:
     ways = cloud_along(replace(cloud_of(DISTANCE[[0, 1, 2, 90]]), frame=np.array([0, 2, 4, 180]))).ways_mm()
     assert ways[[2, 4, 180]] == pytest.approx([0.5, 0.5, 0.0])
