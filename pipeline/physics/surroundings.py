@@ -35,7 +35,7 @@ POSE_EFFECTS = (
         "encoder_scale", "pose",
         (Quantity("relative", "", 0.005, -0.1, 0.1, "reading over true distance, less one"),),
         None, None, FixedTo.PIPE, Channel.MOTION, "static",
-        "reading = s (1 + κ); visual/encoder = (1 − δl/l)/(1 + κ)", None,
+        "reading = s (1 + κ); (way by pictures) / (way by encoder) = (1 − δl/l)/(1 + κ)", None,
         ("baseline",), "a known diameter",
     ),
     Effect(
@@ -45,7 +45,7 @@ POSE_EFFECTS = (
             Quantity("time_s", "s", 4.0, 0.0, 1e6, "when it slips"),
         ),
         None, None, FixedTo.TIME, Channel.MOTION, "event",
-        "a step in visual − encoder", None,
+        "a step in (way by pictures) − (way by encoder)", None,
         (), "dropped frames show in both passes and in the times",
     ),
     Effect(
@@ -59,7 +59,7 @@ POSE_EFFECTS = (
         "time_offset", "pose",
         (Quantity("delay_s", "s", 0.02, -1.0, 1.0, "by which the encoder's readings are late"),),
         None, None, FixedTo.TIME, Channel.MOTION, "speed",
-        "visual − encoder = v τ", None,
+        "(way by pictures) − (way by encoder) = v τ", None,
         ("encoder_backlash",), "changes of |v|",
     ),
 )  # fmt: skip

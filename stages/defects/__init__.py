@@ -283,5 +283,5 @@ def _defects_of_run(
 
 
 DEFECTS = Stage(
-    "defects", "30", DefectParameters, _defects_of_run, "defects as instances with depth, clock and kind"
+    "defects", "31", DefectParameters, _defects_of_run, "defects as instances with depth, clock and kind"
 )

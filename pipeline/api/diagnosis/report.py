@@ -106,7 +106,7 @@ def size_of_mismatch(found: Diagnosis) -> str:
     return (
         f"With the stated instrument the ring shows the wall up to {before:.3f} mm beside where texture and "
         f"motion place it (median of frames, worst azimuth); with what was found, {after:.3f} mm are left. "
-        "--apply measures the pipe anew and says what changes for each defect."
+        "The same command with the option “apply” measures the pipe anew and tells what changes."
     )
 
 

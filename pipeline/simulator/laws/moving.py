@@ -188,7 +188,7 @@ def _scale() -> Check:
     visual = 1 + harmonic(ring.azimuth_rad, ring.error_mm, 0).real / _RADIUS_MM
     computed = visual / (_reading(truth, 6.0) - _reading(truth, 1.0)) * (_way(truth, 6.0) - _way(truth, 1.0))
     predicted = (1 - grown / BASELINE_MM) / (1 + count)
-    law = "visual/encoder = (1 − δl/l)/(1 + κ)"
+    law = "(way by pictures) / (way by encoder) = (1 − δl/l)/(1 + κ)"
     tolerance = 2 * (grown / BASELINE_MM) ** 2
     return Check("encoder_scale", "✓", law, "κ = 0.5 %, δl = 0.05 mm", predicted, computed, "", tolerance)
 
@@ -198,7 +198,7 @@ def _slip() -> Check:
     truth = _travelling([switch])
     time = switch.quantities["time_s"]
     steps = [_way(truth, t) - _reading(truth, t) for t in (time - 0.1, time + 0.1)]
-    law = "a step in visual − encoder"
+    law = "a step in (way by pictures) − (way by encoder)"
     of, size = f"slip of {switch.values[0]:g} mm", -switch.values[0]
     return Check("encoder_slip", "○", law, of, size, steps[1] - steps[0], "mm", _READING_MM)
 
@@ -218,11 +218,11 @@ def _late() -> Iterator[Check]:
     delay, predicted = switch.values[0], _SPEED_MM_S * switch.values[0]
     late, punctual = _travelling([switch]), _travelling([])
     computed = _way(late, 5.0) - _way(late, -delay) - _reading(late, 5.0)
-    law = "visual − encoder = v τ, the reading at t being that of t − τ"
+    law = "(way by pictures) − (way by encoder) = v τ, the reading at t being that of t − τ"
     yield Check("time_offset", "✓", law, "20 ms at 15 mm/s", predicted, computed, "mm", _READING_MM)
     # a stamp t of a clock that is behind was made at t + τ
     computed = _way(punctual, 5.0) - _way(punctual, 0.0) - _reading(punctual, 5.0 + delay)
-    law = "visual − encoder = −v τ where the encoder's clock is behind by τ: its readings are early"
+    law = "(way by pictures) − (way by encoder) = −v τ where the encoder's clock is behind by τ"
     yield Check("time_offset", "", law, "20 ms at 15 mm/s", -predicted, computed, "mm", _READING_MM)
 
 

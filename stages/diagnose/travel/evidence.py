@@ -286,7 +286,8 @@ def _blind(estimates: Sequence[TravelEstimate], sight: Sight) -> tuple[str, ...]
     for e in estimates:
         if not np.isfinite(e.sigma):
             why = "" if sight.reverses or e.effect != "encoder_backlash" else ": the probe never turns back"
-            out.append(f"The motion of the probe does not show {e.effect}{why}.")
+            out.append(f"The motion of the probe does not show {e.effect.replace('_', ' ')}{why}.")
         for other, correlation in e.alike:
-            out.append(f"In this motion {e.effect} and {other} look alike (correlation {correlation:+.2f}).")
+            pair = f"{e.effect} and {other}".replace("_", " ")
+            out.append(f"In this motion {pair} look alike (correlation {correlation:+.2f}).")
     return tuple(out)
