@@ -99,8 +99,8 @@ class Claim:
 
     @property
     def may_go_otherwise(self) -> bool:
-        """Whether what it leaves, or other courses in its place, are enough to make the name unsure."""
-        clear = replace(self, beside=0)
+        """Whether what it leaves, or other courses in its place, leave more in doubt than its rivals do."""
+        clear = replace(self, alike=(), beside=0)
         return not clear.sure and replace(clear, fits_p=1.0, otherwise=0.0).sure
 
     @property

@@ -60,9 +60,11 @@ class Exposure:
     def taken_off(self, seen: Seen | None) -> Seen | None:
         """Return a recording with the delay that is the encoder's own, if the width shows an exposure."""
         longer = next((f.sizes[0] for f in self.widths if f.found), None)
-        if seen is None or seen.travel is None or longer is None or not self.has_time(seen, longer):
+        if seen is None or seen.travel is None or longer is None:
             return seen
         fit = seen.travel.fit
+        if not self._has_time(fit, longer):
+            return seen
         # Of an encoder in time nothing is taken off: stamps may be of the exposure's middle.
         each = (
             _less_half(e, longer, fit) if e.effect == _DELAY and is_found(e.p_value) else e
@@ -70,17 +72,16 @@ class Exposure:
         )
         return replace(seen, travel=replace(seen.travel, estimates=tuple(each)))
 
-    def has_time(self, seen: Seen, longer: Size) -> bool:
+    def _has_time(self, fit: TravelFit | None, longer: Size) -> bool:
         """Return whether pictures can be exposed so much longer: each ends before the next one begins."""
-        if seen.travel is None or seen.travel.fit is None:
+        if fit is None:
             return True
-        left_s = seen.travel.fit.sight.frame_time_s - self.stated_s
-        return longer.value - _SURE * longer.sigma < left_s
+        return longer.value - _SURE * longer.sigma < fit.sight.frame_time_s - self.stated_s
 
     def too_long(self, seen: Seen, found: Finding) -> str:
         """Return what is said of an exposure that no picture has time for; nothing of any other finding."""
         fit = seen.travel.fit if seen.travel is not None else None
-        if found.effect != _EXPOSURE or not found.sizes or fit is None or self.has_time(seen, found.sizes[0]):
+        if found.effect != _EXPOSURE or not found.sizes or fit is None or self._has_time(fit, found.sizes[0]):
             return ""
         apart = f"{1e3 * fit.sight.frame_time_s:.1f} ms"
         return f", for which no picture has time: the next begins after {apart}."
@@ -93,9 +94,9 @@ class Exposure:
         if found.effect != _DELAY or travel.fit is None or any(f.found for f in self.widths):
             return ()
         exposure = Size("exposure_s", "s", 2 * found.value, 2 * found.size_sigma)
-        longest = travel.fit.sight.frame_time_s - self.stated_s + exposure.sigma
+        possible = exposure.value > 0 and self._has_time(travel.fit, exposure)
         told_apart = any(_another(exposure, f.sizes[0]) for f in self.widths)
-        return (_EXPOSURE,) if 0 < exposure.value < longest and not told_apart else ()
+        return (_EXPOSURE,) if possible and not told_apart else ()
 
 
 def how_late(

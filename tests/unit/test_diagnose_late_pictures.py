@@ -163,6 +163,29 @@ def test_an_exposure_leaves_no_more_of_the_time_to_the_next_picture_than_is_not_
     assert answer(long, None, recording).verdict is Verdict.NAMED
 
 
+@pytest.mark.parametrize(("delay_s", "verdict"), [(0.018, Verdict.CLASS), (0.022, Verdict.NAMED)])
+def test_an_exposure_is_a_rival_unless_it_is_surely_longer_than_the_time_to_the_next_picture(
+    real_probe: Probe, thirty_a_second: TravelFit, delay_s: float, verdict: Verdict
+) -> None:
+    """Of 33 ms from picture to picture, 36 ± 2 ms (1.7 σ too long) was ruled out, and 44 ± 2 ms is."""
+    assert answer(real_probe, None, late("gauge", thirty_a_second, delay_s, None)).verdict is verdict
+
+
+def test_a_class_says_that_none_of_it_may_be_right_where_something_else_fits_as_well(
+    real_probe: Probe, thirty_a_second: TravelFit
+) -> None:
+    """A play that was left out looked like a delay or an exposure, and no word was said of anything else."""
+    recording = late("gauge", thirty_a_second, 0.008, None)
+    assert "in another way" not in answer(real_probe, None, recording).identifiable
+    assert recording.travel is not None
+    otherwise = (replace(recording.travel.estimates[0], otherwise=0.2),)
+    recording = replace(recording, travel=replace(recording.travel, estimates=otherwise))
+    found = answer(real_probe, None, recording)
+    assert found.verdict is Verdict.CLASS
+    assert "or a cause that the library does not have" in found.identifiable
+    assert "in another way" in found.identifiable
+
+
 def sizes_told(estimate: TravelEstimate) -> list[float]:
     """Return the delays, s, that confirmations quote: "... delay_s 0.018 ± ..."."""
     told = (t for a in estimate.agreements for t in (a.confirmation.prediction, a.confirmation.measured))
