@@ -97,13 +97,17 @@ def _law(name: str) -> str:
 
 def _of_probabilities(lines: Sequence[Line]) -> Iterator[str]:
     """Yield how often a law is there that is given such a probability, and the Brier score over all laws."""
-    pairs = []
+    pairs, untold = [], 0
     for line in lines:
         told = {law: sum(c["probability"] for c in line["answer"].get("candidates", ()) if law in
                          map(_law, c["names"])) for law in LIBRARY}  # fmt: skip
-        told |= {e["name"]: e["probability"] for e in line["answer"]["effects"]}
         true = {c[0] for c in line["concealed"]}
-        pairs += [(p, law in true) for law, p in told.items() if p > 0 or law in true]
+        # Candidates are of rings: what they give no chance to is ruled out, unless rings do not tell of it.
+        is_told = {law for law, p in told.items() if p > 0 or law in true - set(TRAVEL_EFFECTS)}
+        told |= {e["name"]: e["probability"] for e in line["answer"]["effects"]}
+        is_told |= {e["name"] for e in line["answer"]["effects"]}
+        untold += len(true - is_told)
+        pairs += [(told[law], law in true) for law in sorted(is_told)]
     if not pairs:
         return
     chance, there = np.array(pairs, float).T
@@ -112,6 +116,7 @@ def _of_probabilities(lines: Sequence[Line]) -> Iterator[str]:
         if inside.any():
             told = _words(rate(map(bool, there[inside])))
             yield f"told with {low:g} to {high:.3g} (mean {chance[inside].mean():.3f}): there in {told}"
+    yield f"effects of motion and encoder that no probability is told of: {untold}"
     yield f"Brier score a case: {np.sum((chance - there) ** 2) / len(lines):.4f}"
 
 

@@ -114,3 +114,19 @@ def test_several_effects_are_scored_name_by_name_and_a_wrong_answer_scores_badly
     assert "names that are right 0 of 1" in wrong
     assert "hold the truth: 0 of 1" in wrong
     assert "Brier score a case: 3.0000" in wrong
+
+
+def test_what_rings_cannot_tell_of_is_no_truth_that_was_ruled_out():
+    """A slip that was in the class, and one that was not seen, counted as told with less than .001."""
+
+    def told(true: str) -> str:
+        effects = [{"name": "laser_tilt", "probability": 0.5}]
+        sets = [{"names": ["laser_tilt"], "probability": 1.0}]
+        answer = {"verdict": "class", "effects": effects, "candidates": sets, "class": ["laser_tilt", true]}
+        line = {"mode": "singles", "seed": 1, "concealed": [[true, [0.3]]], "left_out": [], "snr": [20.0],
+                "cpu_s": 1.0, "answer": answer}  # fmt: skip
+        return "\n".join(more_figures([line], [trial_from(line)]))
+
+    assert "told with 0 to 0.001 (mean 0.000): there in 1 of 1" in told("baseline")
+    assert "told with 0 to 0.001" not in told("encoder_slip")
+    assert "no probability is told of: 1" in told("encoder_slip")
