@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.arrays import Bool, Float, runs_of
+from pipeline.arrays import Bool, Float, Int, runs_of
 from pipeline.geometry.rigid import from_parts, rotation_from_vector
 from pipeline.machine.stage import Context
 from pipeline.recording.base import Recording
@@ -18,6 +18,9 @@ _JUMP_TIMES = 5.0
 fast as nine in ten steps are at most. Not measured."""
 _LEAST_COVERED = 0.2
 """Share of the frames that an encoder must cover. Not measured."""
+_MOST_OUTSIDE = 0.05
+"""Share of the frames without a reading from which that is told (chosen): a clock that starts a little late
+is no news."""
 _LEAST_STEPS = 8
 """Steps by which an encoder is judged at least. Not measured."""
 _CONTRADICTED = 0.3
@@ -82,8 +85,19 @@ def encoder_at_frames(
             "in frames.csv) of encoder.csv"
         )
         return None
+    _warn_of_unread(recording.frames.frame[~known], len(known), context)
     sigma = float(np.hypot(sigma_mm, _quantum(encoder.distance_mm) / np.sqrt(12)))
     return EncoderReadings(at_frames, sigma, known)
+
+
+def _warn_of_unread(frames: Int, count: int, context: Context) -> None:
+    """Warn where many frames, of so many, lie outside the encoder's times or in its gaps."""
+    if len(frames) > _MOST_OUTSIDE * count:
+        context.warn(
+            f"the encoder has no readings for {len(frames)} of {count} frames, between frame {frames[0]} and "
+            f"{frames[-1]}: distances there rest on laser and texture, and their σ says so. What to do: see "
+            "whether encoder.csv was cut off, and whether its clock is that of frames.csv"
+        )
 
 
 def contradicted(encoder: EncoderReadings, tracked: TrackedPoses, context: Context) -> bool:

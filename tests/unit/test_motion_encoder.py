@@ -107,6 +107,18 @@ def test_frames_after_its_end_are_not_known() -> None:
     assert not found.known[int(1.1 * RATE) :].any()
 
 
+@pytest.mark.parametrize(("until_s", "told"), [(1.0, True), (1.95, False)])
+def test_an_encoder_that_was_cut_off_is_told(until_s: float, told: bool) -> None:
+    """Two fifths of a run were without encoder, and no word said so; a frame or two are no news."""
+    time_s, distance = clean()
+    words: list[str] = []
+    there = time_s < until_s
+    run = recorded(time_s[there], distance[there])
+    assert encoder_at_frames(run, 0.0, 60.0, replace(quiet_context(), warn=words.append))  # type: ignore[arg-type]
+    assert any("29 of 60 frames" in w or "28 of 60 frames" in w for w in words) is told
+    assert told or not words
+
+
 def test_a_frame_just_before_its_start_or_behind_its_end_lies_where_the_probe_went_on_to() -> None:
     """Held at the last reading, the end of a run at 280 mm/s lay 0.9 mm (7 σ) short."""
     time_s, distance = clean()
