@@ -159,7 +159,7 @@ def _matched(recording: Recording, probe: Probe, seen: _Seen) -> _Matched:
     stated_s = without_stretch(row_times(table, row), row, table, recording.frame_rate)
     jumps = clock_jumps(stated_s, steps, encoder)
     changes = Changes(recording.frames, label, row, without_jumps(stated_s, jumps))
-    left_out = LeftOut(seen.outside, seen.astray, copy)
+    left_out = LeftOut(seen.outside, seen.astray, copy & (np.diff(row, prepend=-1) > 0))
     return _Matched(changes, left_out, jumps, steps, rings_mm, radius_mm, forwards)
 
 

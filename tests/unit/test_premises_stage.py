@@ -67,6 +67,16 @@ def test_the_frame_from_which_they_were_lost_is_named(good, run):
     assert "before frame 31 (1)" in told[0]
 
 
+def test_a_picture_that_was_put_in_once_more_is_told_once(good, run):
+    """It was told as a repetition that needs nothing, and again as a hang during which wall was passed."""
+    order = [*range(30), 29, *range(30, 44), 43, *range(44, COUNT)]
+    lights = np.array(["laser", "led"])[np.arange(len(order)) % 2]
+    found, told = checked(rearranged(good, order, lights), run.probe)
+    assert len(found.frame) == COUNT
+    assert len([t for t in told if "frame 30, 45" in t]) == 1
+    assert not any("hung" in t for t in told)
+
+
 class _Chosen:
     """Chooses one frame in place of a random one."""
 
