@@ -174,7 +174,8 @@ def accumulate_wall(
     _report(context, wall, spread)
     warn_of_held(held, context)
     _warn_of_fixed(fixed, context)
-    warn_of_unmeasured(wall.radius_map, trajectory.radius_mm, gap_mm, context)
+    spacing_mm = float(np.nanmedian(np.abs(np.diff(survey.middle_mm)))) if len(survey.middle_mm) > 1 else 0.0
+    warn_of_unmeasured(wall.radius_map, trajectory.radius_mm, gap_mm, spacing_mm, context)
     return wall
 
 
@@ -268,7 +269,7 @@ def _report(context: Context, wall: Wall, spread: CalibrationSpread) -> None:
 
 ACCUMULATE = Stage(
     "accumulate",
-    "11",
+    "12",
     AccumulateParameters,
     accumulate_wall,
     "point cloud and radius map about the pipe's own axis, with σ",

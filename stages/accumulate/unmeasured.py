@@ -33,11 +33,19 @@ class Unmeasured:
     area_mm2: float
 
 
-def warn_of_unmeasured(radius_map: RadiusMap, pipe_radius_mm: float, gap_mm: float, context: Context) -> None:
-    """Warn of places inside the wall that are not measured, larger than gaps that are bridged."""
+def warn_of_unmeasured(
+    radius_map: RadiusMap, pipe_radius_mm: float, gap_mm: float, spacing_mm: float, context: Context
+) -> None:
+    """Warn of places inside the wall that are not measured, larger than gaps that are bridged.
+
+    Where neighbouring rings are ``spacing_mm`` apart, which is more than that, the whole wall is such places.
+    """
     places = unmeasured_places(radius_map, pipe_radius_mm, gap_mm)
     context.report("places inside the wall that are not measured", len(places), "")
     if not places:
+        return
+    if spacing_mm > gap_mm:
+        _warn_of_sparse_rings(radius_map, gap_mm, spacing_mm, context)
         return
     largest = sorted(places, key=lambda p: -p.area_mm2)[:_TOLD]
     where = ", ".join(
@@ -51,6 +59,15 @@ def warn_of_unmeasured(radius_map: RadiusMap, pipe_radius_mm: float, gap_mm: flo
         f"{many}, could not be measured{', the largest' * (len(places) > _TOLD)}: {where}. Defects there are "
         "not found. What to do: look at these places in the lit pictures; clean window and wall, let water "
         "off, shade reflections, and record again"
+    )
+
+
+def _warn_of_sparse_rings(radius_map: RadiusMap, gap_mm: float, spacing_mm: float, context: Context) -> None:
+    lost = float(np.mean(~np.isfinite(radius_map.radius_mm)))
+    context.warn(
+        f"rings are {spacing_mm:.1f} mm apart, and {gap_mm:g} mm are bridged at most: {100 * lost:.0f} % of "
+        "the wall was passed and not measured. Defects are missed, large ones as well. What to do: run it "
+        "again with --config long, which is for rings so far apart, or pull the probe more slowly"
     )
 
 

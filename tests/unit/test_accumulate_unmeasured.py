@@ -30,7 +30,7 @@ def wall(*, from_row: int = 4000, from_column: int = 100, rows: int = 0, columns
 def test_a_place_that_was_passed_and_not_measured_is_told_once(from_column: int) -> None:
     told: list[str] = []
     hidden = wall(from_column=from_column, rows=14, columns=8)
-    warn_of_unmeasured(hidden, RADIUS, 3.0, replace(quiet_context(), warn=told.append))
+    warn_of_unmeasured(hidden, RADIUS, 3.0, 1.3, replace(quiet_context(), warn=told.append))
     assert len(told) == 1
     assert "1 place inside the wall, 49 mm² in all, could not be measured: at 2004 mm" in told[0]
     assert "(7 mm along, 7 mm around)" in told[0]
@@ -45,3 +45,13 @@ def test_a_sector_hidden_all_along_is_a_place_of_each_lot_of_rows() -> None:
     found = unmeasured_places(wall(from_row=0, rows=ROWS, columns=9), RADIUS, 3.0)
     assert len(found) == 3
     assert sum(p.area_mm2 for p in found) == pytest.approx(9 * CELL_MM * ROWS / 2, rel=0.02)
+
+
+@pytest.mark.parametrize(("spacing_mm", "told"), [(2.9, False), (4.0, True)])
+def test_rings_too_far_apart_are_named_as_the_cause(spacing_mm: float, told: bool) -> None:
+    """A pull at three times the speed lost two of three defects, and the window was to be cleaned."""
+    words: list[str] = []
+    sparse = wall(from_row=100, rows=4500, columns=COLUMNS)
+    warn_of_unmeasured(sparse, RADIUS, 3.0, spacing_mm, replace(quiet_context(), warn=words.append))
+    assert len(words) == 1
+    assert ("rings are 4.0 mm apart" in words[0] and "50 % of the wall" in words[0]) is told
