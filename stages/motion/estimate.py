@@ -23,7 +23,7 @@ from pipeline.recording.checks import CheckedFrames
 from stages.motion.bundle_adjustment.equations import Equations, Measurements
 from stages.motion.bundle_adjustment.solver import Estimate, estimate_state
 from stages.motion.bundle_adjustment.unknowns import State
-from stages.motion.events import find_events
+from stages.motion.events import find_events, warn_of_slips
 from stages.motion.loops.loop_closure import close_loops
 from stages.motion.loops.revisits import Passage, WallFeatures, bands_in_rings, texture_at
 from stages.motion.measuring import measure_run, places_of
@@ -89,6 +89,7 @@ def estimate_motion(
     trajectory = trajectory_of(joined, recording.frames, probe, has_encoder)
     trajectory = lay_route(trajectory, joined.turn_variance, recording, probe, context)
     events = find_events(recording.frames, trajectory, run.texture.poses, joined.slip, has_encoder)
+    warn_of_slips(events, trajectory, probe.encoder_scale_sigma, context)
     seen = SeenCentres(circles.centre_c, probe.laser.baseline_mm)
     shakes = camera_trembles(trajectory, run.texture.poses, seen)
     doubted = shakes or run.texture.poses.much_lost
@@ -181,7 +182,7 @@ def _motion_of_run(
 
 MOTION = Stage(
     "motion",
-    "49",
+    "50",
     MotionParameters,
     _motion_of_run,
     "camera pose in every frame and the pipe's axis, from texture, rings and encoder together",

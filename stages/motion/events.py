@@ -10,6 +10,7 @@ from pipeline.adjustment.robust import robust_spread
 from pipeline.arrays import Bool, Float, Int, runs_of
 from pipeline.artefacts.measured import MotionEvent, Trajectory
 from pipeline.geometry.axis import distance_along
+from pipeline.machine.stage import Context
 from pipeline.recording.base import FrameTable
 from stages.motion.tracking.landmarks import TrackedPoses
 
@@ -37,6 +38,8 @@ _SLIP_SPREADS = 6.0
 _SLIP_STEP_MM = 0.02
 _SLIP_MM = 0.3
 """A slip is a row of steps of the encoder's slip beyond six spreads and 0.02 mm, 0.3 mm in all."""
+_TOLD_SIGMAS = 5.0
+"""Slips are told from so many σ of the encoder's stated scale on, over the whole way."""
 
 
 def find_events(
@@ -62,6 +65,23 @@ def find_events(
     if has_encoder:
         found += list(_slips(f, slip))
     return tuple(sorted(found, key=lambda e: (e.frame_from, e.kind)))
+
+
+def warn_of_slips(
+    events: tuple[MotionEvent, ...], trajectory: Trajectory, scale_sigma: float, context: Context
+) -> None:
+    """Warn where the encoder lost more of the way than ``scale_sigma``, the 1 σ of its scale, explains."""
+    slips = [e for e in events if e.kind == "encoder_slip"]
+    lost_mm = sum(abs(e.size) for e in slips)
+    way_mm = float(np.abs(np.diff(distance_along(trajectory.axis, trajectory.T_pc))).sum())
+    if lost_mm > _TOLD_SIGMAS * scale_sigma * way_mm > 0:
+        worst = max(slips, key=lambda e: abs(e.size))
+        context.warn(
+            f"the encoder lost or added {lost_mm:.1f} of {way_mm:.0f} mm, most between frame "
+            f"{worst.frame_from} and {worst.frame_to}: its wheel slipped or hung, or it stopped counting. "
+            "Distances there rest on laser and texture. What to do: see that the wheel is pressed to the "
+            "wall and turns, and that readings are not cut off"
+        )
 
 
 def _ends_of_runs(mask: Bool) -> list[tuple[int, int]]:

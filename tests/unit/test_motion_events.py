@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -9,8 +11,9 @@ from pipeline.arrays import Float
 from pipeline.artefacts.measured import MotionEvent, Trajectory
 from pipeline.geometry.axis import PipeAxis, axis_through, frames_at, straight_axis
 from pipeline.recording.base import FrameTable
-from stages.motion.events import find_events
+from stages.motion.events import find_events, warn_of_slips
 from stages.motion.tracking.landmarks import TrackedPoses
+from tests.quiet import quiet_context
 
 FRAMES, RATE, STEP = 120, 30.0, 0.6
 
@@ -113,6 +116,23 @@ def test_slip_is_found_where_there_is_an_encoder(encoder: bool, expected: set[st
     if encoder:
         assert found["encoder_slip"].size == pytest.approx(4.0, abs=0.1)
         assert found["encoder_slip"].frame_from == 69
+
+
+@pytest.mark.parametrize(
+    ("from_frame", "each_mm", "told"), [(90, -STEP, "lost or added 18.0 of 71 mm"), (119, 0.5, "")]
+)
+def test_an_encoder_that_stopped_counting_is_told(from_frame: int, each_mm: float, told: str) -> None:
+    """Readings hung for the last quarter of a run without a word; half a millimetre is no news."""
+    slip = np.cumsum(np.where(np.arange(FRAMES) >= from_frame, each_mm, 0.0))
+    found = tuple(events(steady(), slip=slip).values())
+    assert [e.kind for e in found] == ["encoder_slip"]
+    T = np.tile(np.eye(4), (FRAMES, 1, 1))
+    T[:, 2, 3] = steady(0.0)
+    number, axis = np.arange(FRAMES), straight_axis(-50, 200)
+    run = Trajectory(number, number / RATE, T, np.zeros((FRAMES, 6, 6)), axis, 50.0, 1.0, 0.0, 0.0, ())
+    words: list[str] = []
+    warn_of_slips(found, run, 0.002, replace(quiet_context(), warn=words.append))
+    assert [told in w for w in words] == [True] * bool(told)
 
 
 def test_few_frames_have_no_events() -> None:
