@@ -77,10 +77,10 @@ def warn_of_slips(
     if lost_mm > _TOLD_SIGMAS * scale_sigma * way_mm > 0:
         worst = max(slips, key=lambda e: abs(e.size))
         context.warn(
-            f"the encoder lost or added {lost_mm:.1f} of {way_mm:.0f} mm, most between frame "
-            f"{worst.frame_from} and {worst.frame_to}: its wheel slipped or hung, or it stopped counting. "
-            "Distances there rest on laser and texture. What to do: see that the wheel is pressed to the "
-            "wall and turns, and that readings are not cut off"
+            f"encoder and wall's texture disagree by {lost_mm:.1f} of {way_mm:.0f} mm, most between frame "
+            f"{worst.frame_from} and {worst.frame_to}: the wheel slipped or hung, readings stop, or a filter "
+            "against noise held the texture back. Distances there follow laser and texture. What to do: see "
+            "that the wheel is pressed to the wall and turns, and that encoder.csv is whole"
         )
 
 

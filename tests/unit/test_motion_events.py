@@ -119,7 +119,7 @@ def test_slip_is_found_where_there_is_an_encoder(encoder: bool, expected: set[st
 
 
 @pytest.mark.parametrize(
-    ("from_frame", "each_mm", "told"), [(90, -STEP, "lost or added 18.0 of 71 mm"), (119, 0.5, "")]
+    ("from_frame", "each_mm", "told"), [(90, -STEP, "disagree by 18.0 of 71 mm"), (119, 0.5, "")]
 )
 def test_an_encoder_that_stopped_counting_is_told(from_frame: int, each_mm: float, told: str) -> None:
     """Readings hung for the last quarter of a run without a word; half a millimetre is no news."""
