@@ -21,13 +21,20 @@ def hypothesis(name: str, surprise: float) -> Any:
         # By its equations tilt and cone had seemed likelier; fitted, it is not.
         (["tilt and cone"], 1.0, ["tilt", "tilt and pattern", "tilt and cone", "nothing"]),
         (["tilt and cone"], -20.0, ["tilt and pattern", "tilt", "tilt and cone", "nothing"]),
+        # Two such sets left no round for patterns.
+        (
+            ["tilt and wave", "tilt and cone"],
+            -20.0,
+            ["tilt and pattern", "tilt", "tilt and cone", "tilt and wave", "nothing"],
+        ),
     ],
 )
 def test_patterns_are_weighed_once_beside_each_likeliest_also_where_a_likelier_set_loses(
     monkeypatch: pytest.MonkeyPatch, likelier: list[str], with_pattern: float, ranked_as: list[str]
 ) -> None:
     asked: Counter[str] = Counter()
-    surprise = {"nothing": 50.0, "tilt": 0.0, "tilt and cone": 3.0, "tilt and pattern": with_pattern}
+    surprise = {"nothing": 50.0, "tilt": 0.0, "tilt and cone": 3.0, "tilt and wave": 4.0}
+    surprise["tilt and pattern"] = with_pattern
     sets = [SimpleNamespace(terms=(), name=n) for n in likelier]
 
     def near(*_: Any) -> tuple[float, None]:

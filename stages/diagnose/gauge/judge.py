@@ -32,8 +32,9 @@ from stages.diagnose.inference import Stated
 # Sets that are less likely than the best by more than this in −2 ln are not kept: a thousand of them weigh
 # less than a hundredth of what a name may be wrong by.
 _FAR = 30.0
-# How often the likeliest is replaced by what is likelier still, as its own equations show.
-_ROUNDS = 3
+# How often the likeliest is replaced by what is likelier still, as its own equations show; one round more is
+# for patterns beside the last of them.
+_ROUNDS = 4
 
 
 @dataclass(frozen=True)
@@ -148,7 +149,7 @@ def judge(
         if is_new:
             left, sets = _near(run, best, searched.steps[-1].scores, laws, stated, ratio)
         near = _unfitted(sets, ranked)
-        more = _better(run, best, near) if rounds_left else None
+        more = _better(run, best, near) if rounds_left > 1 else None
         if more is None and rounds_left and patterned is not best:
             patterned = best
             more = _with_patterns(run, best, left, stated)
