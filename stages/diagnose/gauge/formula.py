@@ -64,8 +64,12 @@ def pattern_of(term: Term) -> tuple[str, str, int | None]:
     known = EFFECTS[model.law]
     numbers = model.quantities(term.shape, term.amplitude)
     order = int(numbers["order"]) if "order" in numbers else known.harmonic
-    time = _IN_TIME[model.kind] if isinstance(model, Coursed) else known.time
-    return str(known.fixed_to), time, order
+    return str(known.fixed_to), behaviour(model), order
+
+
+def behaviour(model: EffectModel) -> str:
+    """Return how an effect of the library behaves in time."""
+    return _IN_TIME[model.kind] if isinstance(model, Coursed) else EFFECTS[model.law].time
 
 
 def empirical(run: GaugeRun, before: Fit, stated: Stated, swung: Sequence[Scored]) -> Fit:

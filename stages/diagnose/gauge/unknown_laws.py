@@ -19,9 +19,10 @@ from pipeline.arrays import Float
 from pipeline.physics.catalogue import effect
 from pipeline.physics.effect import FixedTo
 from stages.diagnose.effects.base import Amplitude, EffectModel, ImagePoints, Shape
+from stages.diagnose.effects.courses import SEARCHED, Coursed
 from stages.diagnose.effects.kinds import Drifting
 from stages.diagnose.gauge.fit import evidence
-from stages.diagnose.gauge.formula import pattern_of
+from stages.diagnose.gauge.formula import behaviour, pattern_of
 from stages.diagnose.gauge.hypotheses import Judged
 from stages.diagnose.gauge.run import GaugeRun, Linearised, Term
 from stages.diagnose.gauge.sets import NAMELESS, beforehand, prior_sigma
@@ -137,15 +138,27 @@ def odds_of_unknown_laws(
     return tuple(o * known_alike(t.model, library) for o, t in zip(odds, best.library_terms, strict=True))
 
 
-def known_alike(model: EffectModel, library: Mapping[str, EffectModel]) -> int:
-    """Return how many laws of the library are of a model's kind, its own included."""
-    return len({other.law for other in library.values() if _kind(other) == _kind(model)})
+def known_alike(model: EffectModel, library: Mapping[str, EffectModel]) -> float:
+    """Return how many laws of the library are of a model's kind, its own included.
+
+    Each counts by its chance beforehand beside the model's. A law without a harmonic has none: it is told by
+    what it goes with, grow as it may.
+    """
+    if _kind(model)[0] is None:
+        return 0.0
+    like_it = sorted((_share(other), other.law) for other in library.values() if _kind(other) == _kind(model))
+    return sum({law: share for share, law in like_it}.values()) / _share(model)
 
 
-def _kind(model: EffectModel) -> tuple[int | None, bool]:
-    """Return the harmonic of a model's law, and whether it moves the laser's sheet, not the picture."""
+def _share(model: EffectModel) -> float:
+    """Return how likely a model is beforehand beside a law that the library has for itself."""
+    return 1 / len(SEARCHED) if isinstance(model, Coursed) else 1.0
+
+
+def _kind(model: EffectModel) -> tuple[int | None, bool, str]:
+    """Return the harmonic of a model's law, whether it moves the laser's sheet, and its behaviour in time."""
     known = effect(model.static.law if isinstance(model, Drifting) else model.law)
-    return known.harmonic, known.fixed_to is FixedTo.LASER
+    return known.harmonic, known.fixed_to is FixedTo.LASER, behaviour(model)
 
 
 def odds_in(
