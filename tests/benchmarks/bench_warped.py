@@ -22,6 +22,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -144,30 +145,38 @@ CASES = {
 
 @dataclass(frozen=True)
 class Warp:
-    """Warps pictures of a camera with a centre and a focal length, both in px, as a case says."""
+    """Warps pictures as a case says; ``x`` and ``y`` are the places of the pixels, in focal lengths."""
 
     case: Case
-    centre_px: tuple[float, float]
+    x: Float32
+    y: Float32
     focal_px: float
+
+    @staticmethod
+    def of(case: Case, camera: dict[str, Any]) -> Warp:
+        width, height = camera["image_size"]
+        (cu, cv), focal = camera["centre_px"], camera["focal_px"][0]
+        v, u = np.mgrid[0:height, 0:width].astype(np.float32)
+        return Warp(case, (u - np.float32(cu)) / focal, (v - np.float32(cv)) / focal, focal)
 
     def __call__(self, image: Float32, laser: bool, k: int, random: np.random.Generator) -> Float32:
         if self.case.shift is None:
             return image
+        dx, dy = self.case.shift(self.x, self.y, k / RATE)
         v, u = np.mgrid[0 : image.shape[0], 0 : image.shape[1]].astype(np.float32)
-        x, y = ((a - c) / self.focal_px for a, c in zip((u, v), self.centre_px, strict=True))
-        dx, dy = self.case.shift(x, y, k / RATE)
-        back = (u - self.focal_px * dx).astype(np.float32), (v - self.focal_px * dy).astype(np.float32)
-        moved = cv2.remap(image, *back, cv2.INTER_LANCZOS4, borderMode=cv2.BORDER_REPLICATE)
-        return (image + self.case.copied * moved if self.case.copied else moved).astype(np.float32)
+        back = u - np.float32(self.focal_px) * dx, v - np.float32(self.focal_px) * dy
+        stored = np.clip(image + 0.5, 0, 255).astype(np.uint8)
+        moved: Float32 = cv2.remap(stored, *back, cv2.INTER_LANCZOS4).astype(np.float32)
+        return image + self.case.copied * moved if self.case.copied else moved
 
 
 def make(case: Case, source: Path, folder: Path, kind: str) -> None:
     """Make one recording of a case: the source's, with the pictures warped and the encoder changed."""
     shutil.copytree(source, folder, ignore=shutil.ignore_patterns("truth*"))
-    probe = yaml.safe_load((folder / "probe.yaml").read_text("utf-8"))["camera"]
+    camera = yaml.safe_load((folder / "probe.yaml").read_text("utf-8"))["camera"]
     if kind not in case.where:
         return
-    repaint(folder, Warp(case, tuple(probe["centre_px"]), probe["focal_px"][0]), 1)
+    repaint(folder, Warp.of(case, camera), 1)
     if case.reading is not None:
         _rewrite(folder / "encoder.csv", case.reading)
 
