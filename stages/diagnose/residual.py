@@ -157,7 +157,7 @@ def _gauge_residual(run: GaugeRun, found: Fit, frames: Int) -> RingResidual:
     usable &= np.min(np.abs(run.rings.frame[:, None] - seen), axis=1) <= _NEAR
     return RingResidual(
         "gauge", frames[run.rings.frame], points.azimuth_rad, points.azimuth_p_rad, points.distance_mm,
-        run.rings.uv, residual, residual / ring_mm_per_px(points), usable,
+        run.rings.uv, residual * ring_mm_per_px(points), residual, usable,
     )  # fmt: skip
 
 

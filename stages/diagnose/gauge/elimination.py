@@ -44,6 +44,7 @@ class Equations:
     by_global : (M, G − E)
         Derivatives by the globals that any measurement may depend on.
     residual, weight : (M,)
+        Of rings and edges in px, of the encoder in mm.
     cell : (M,) int
         Measurements of one cell err alike.
     kind : (M,) int

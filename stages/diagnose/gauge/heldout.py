@@ -15,7 +15,7 @@ from stages.diagnose.effects.courses import OWN_CLOCK, Coursed
 from stages.diagnose.gauge.elimination import EDGE, RING, Equations, Part, eliminate_globals, eliminate_poses
 from stages.diagnose.gauge.fit import Fit, evidence, kept_columns, own_unknowns
 from stages.diagnose.gauge.hypotheses import Judged, Regime
-from stages.diagnose.gauge.linearise import asking, ring_mm_per_px
+from stages.diagnose.gauge.linearise import asking
 from stages.diagnose.gauge.points import BASELINE_SIZE
 from stages.diagnose.gauge.run import GaugeRun
 from stages.diagnose.gauge.sets import prior_sigma
@@ -92,17 +92,15 @@ def repeatability_px(run: GaugeRun, found: Fit) -> float:
     alike in both, so that a bad fit makes no larger floor. A kind that repeats nowhere is left out; NaN where
     neither does.
     """
-    about = found.linearised
-    equations, per_px = about.equations, ring_mm_per_px(about.rings)
+    equations = found.linearised.equations
     ring, edge = equations.kind == RING, equations.kind == EDGE
-    of_rings = np.where(np.isfinite(per_px), equations.weight[ring] * per_px**2, 0.0)
-    of_edges = equations.weight[edge]
+    of_rings, of_edges = equations.weight[ring], equations.weight[edge]
     stated = float(of_edges @ run.edges.sigma_px**2) / max(float(of_edges.sum()), 1e-300)
     edges = variance_of_pairs(equations.residual[edge], of_edges, *_in_other_pictures(run.edges))
     along_mm = found.state.T_pc[run.rings.frame, 2, 3]
     azimuth = np.arctan2(run.rings.outward[:, 1], run.rings.outward[:, 0])
     pairs = on_other_wall(azimuth, run.rings.frame, along_mm, run.rings.section)
-    rings = variance_of_pairs(equations.residual[ring] / per_px, of_rings, *pairs)
+    rings = variance_of_pairs(equations.residual[ring], of_rings, *pairs)
     # Without pairs NumPy's maximum stays NaN, where Python's may not.
     variance = np.array([rings, np.maximum(edges, stated)])
     weight = np.where(np.isfinite(variance), [of_rings.sum(), of_edges.sum()], 0.0)
@@ -178,13 +176,9 @@ def _rms_px(run: GaugeRun, judged: Judged, parts: Sequence[Part], rules: Sequenc
     # Smooth patterns of a hundredth of a pixel would take up what is asked about: they stay out of it.
     whole = asking(run, judged.fit.state, about, (), with_baseline=True)
     whole.by_global[:, -BASELINE_SIZE:] = 0.0
-    per_px = np.full(len(whole.frame), np.nan)
-    per_px[whole.kind == RING] = ring_mm_per_px(about.rings)
-    per_px[whole.kind == EDGE] = 1.0
     columns, value = kept_columns(judged.fit, ())
     squares = weights = 0.0
     for part, rule in zip(parts, rules, strict=True):
-        use = part.frames[whole.frame] & np.isin(whole.kind, part.kinds)
         equations = whole.of(part)
         reduced = eliminate_poses(equations, about.motion, len(judged.fit.state.T_pc))
         left, _ = eliminate_globals(reduced, own_unknowns(run, judged.fit, equations.size))
@@ -192,8 +186,8 @@ def _rms_px(run: GaugeRun, judged: Judged, parts: Sequence[Part], rules: Sequenc
         residual = _residual(equations, reduced.pose_step - reduced.pose_by_global @ step, step)
         # What is off the camera model has no weight, and no residual either.
         shown = np.isin(equations.kind, (RING, EDGE)) & (equations.weight > 0)
-        weight = equations.weight[shown] * per_px[use][shown] ** 2
-        squares += float(weight @ (residual[shown] / per_px[use][shown]) ** 2)
+        weight = equations.weight[shown]
+        squares += float(weight @ residual[shown] ** 2)
         weights += float(weight.sum())
     return float(np.sqrt(squares / weights))
 

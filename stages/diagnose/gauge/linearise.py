@@ -1,4 +1,8 @@
-"""Measurements of a gauge run as equations about a state and a few effects at their present size."""
+"""Measurements of a gauge run as equations about a state and a few effects at their present size.
+
+Rings count in pixels of the image, as fiducials do: a lens that maps a millimetre to more pixels makes the
+same noise fewer millimetres, so that by millimetres it would fit better than the true one.
+"""
 
 from __future__ import annotations
 
@@ -79,22 +83,21 @@ def asking(
     Where a prediction fails, measurements do not count.
     """
     run.watch()
-    equations, mm_per_px = at.equations, ring_mm_per_px(at.rings)
+    equations = at.equations
     own, count = equations.by_global.shape[1], sum(len(model.amplitudes) for model, _ in asked)
     size = own + count + BASELINE_SIZE * with_baseline
     by_global = np.zeros((len(equations.frame), size))
     by_global[:, :own] = equations.by_global
-    _ask(run, state, at, mm_per_px, asked, by_global[:, own : own + count])
+    _ask(run, state, at, asked, by_global[:, own : own + count])
     bad = ~np.isfinite(by_global[:, own : own + count]).all(1)
     if with_baseline:
-        by_global[:, own + count :] = _baseline(run, at, mm_per_px)
+        by_global[:, own + count :] = _baseline(run, at)
     by_global[bad] = 0.0
     return replace(equations, by_global=by_global, weight=np.where(bad, 0.0, equations.weight))
 
 
 def _ask(
-    run: GaugeRun, state: Unknowns, at: Linearised, mm_per_px: Float,
-    asked: Sequence[tuple[EffectModel, Shape]], out: Float,
+    run: GaugeRun, state: Unknowns, at: Linearised, asked: Sequence[tuple[EffectModel, Shape]], out: Float,
 ) -> None:  # fmt: skip
     """Write the derivatives of the residuals by the effects' amplitudes into ``out`` (M, Q)."""
     edges, rings = len(at.edges.uv), len(at.edges.uv) + len(at.rings.uv)
@@ -102,7 +105,7 @@ def _ask(
     for model, shape in asked:
         own = slice(first, first + len(model.amplitudes))
         out[:edges, own] = _across(texture_columns(model, at.edges, shape), run.edges)
-        out[edges:rings, own] = -mm_per_px[:, None] * columns(model, at.rings, shape)
+        out[edges:rings, own] = -columns(model, at.rings, shape)
         if run.encoder is not None:
             out[rings:, own] = state.encoder[0] * reading_columns(model, at.travel, shape)
         first = own.stop
@@ -113,11 +116,11 @@ def _across(shift: Float, edges: Edges) -> Float:
     return np.asarray(np.einsum("mi...,mi->m...", shift, edges.normal))
 
 
-def _baseline(run: GaugeRun, at: Linearised, mm_per_px: Float) -> Float:
+def _baseline(run: GaugeRun, at: Linearised) -> Float:
     """Return (M, 38) derivatives of the residuals by the baseline's patterns, in px."""
     on_edges = edge_baseline(at.edges, run.edges.normal)
-    # The residual of a ring falls with its outward shift by the millimetres of a pixel.
-    on_rings = -mm_per_px[:, None] * ring_baseline(at.rings)
+    # The residual of a ring falls with its outward shift.
+    on_rings = -ring_baseline(at.rings)
     rest = len(at.equations.frame) - len(on_edges) - len(on_rings)
     # At the edge of the camera model's domain the derivative does not exist; such points are left out.
     return np.nan_to_num(block_diag(on_edges, on_rings, np.zeros((rest, 0))), posinf=0.0, neginf=0.0)
@@ -156,11 +159,24 @@ def _ring_part(
     run: GaugeRun, state: Unknowns, rings: BoreRings, points: ImagePoints, residual: Float,
     terms: Sequence[Term],
 ) -> Equations:  # fmt: skip
-    mm_per_px = ring_mm_per_px(points)
     shift = [_slope(t, lambda model, *at: ring_shift_px(model, points, *at)) for t in terms]
     rows, _ = ring_rows(_without_edges(state), rings, residual, points.uv)
     return _with_effects(
-        rows, -mm_per_px[:, None], shift, run.ring_weight, wall_cells(rings.wall_mm), RING, rings.wall_mm
+        _in_px(rows, ring_mm_per_px(points)), -1.0, shift, run.ring_weight, wall_cells(rings.wall_mm), RING,
+        rings.wall_mm,
+    )  # fmt: skip
+
+
+def _in_px(rows: Rows, mm_per_px: Float) -> Rows:
+    """Return the equations (M,) of rings by pixels; of no weight where the sheet is not seen."""
+    seen = np.isfinite(mm_per_px) & (mm_per_px > 0)
+    per_mm = np.divide(1.0, mm_per_px, out=np.zeros_like(mm_per_px), where=seen)
+    return replace(
+        rows,
+        by_frame=per_mm[:, None, None] * rows.by_frame,
+        by_border=per_mm[:, None] * rows.by_border,
+        residual=per_mm * rows.residual,
+        sigma=np.where(seen, rows.sigma, np.inf),
     )
 
 
@@ -182,12 +198,12 @@ def _edge_part(
     by_edge = rows.by_border[np.arange(len(number)), at.start + number]
     rows = replace(rows, by_border=np.delete(rows.by_border, at, axis=1))
     nowhere = np.full((len(number), 2), np.nan)
-    found = _with_effects(rows, np.ones((len(number), 1)), shift, run.edge_weight, -1 - number, EDGE, nowhere)
+    found = _with_effects(rows, 1.0, shift, run.edge_weight, -1 - number, EDGE, nowhere)
     return replace(found, edge=at.start + number, by_edge=by_edge)
 
 
 def _with_effects(
-    rows: Rows, sign: Float, shift: list[Float], weight: Float, cell: Int, kind: int, wall_mm: Float
+    rows: Rows, sign: float, shift: list[Float], weight: Float, cell: Int, kind: int, wall_mm: Float
 ) -> Equations:
     effects = [sign * s for s in shift]
     bad = (

@@ -91,14 +91,12 @@ def stated_start(state: Unknowns) -> Unknowns:
 
 def weighed(run: GaugeRun, found: Linearised) -> GaugeRun:
     """Return the run with weights by the residuals' spread frame by frame, outliers counting little."""
-    assert found.rings.per_px_c is not None
     of, count = found.equations, len(run.edges.uv)
     edges, rings = slice(0, count), slice(count, count + len(run.rings.uv))
-    sigma_mm = run.rings.sigma_px * np.linalg.norm(found.rings.per_px_c, axis=1)
     return replace(
         run,
         edge_weight=_weight(of.frame[edges], of.residual[edges], run.edges.sigma_px),
-        ring_weight=_weight(of.frame[rings], of.residual[rings], sigma_mm),
+        ring_weight=_weight(of.frame[rings], of.residual[rings], run.rings.sigma_px),
     )
 
 
