@@ -11,7 +11,6 @@ from stages.calibrate.gauge.edges import Edges
 from stages.diagnose.gauge.answer import _fits
 from stages.diagnose.gauge.elimination import EDGE, RING
 from stages.diagnose.gauge.heldout import _in_other_pictures, repeatability_px
-from stages.diagnose.gauge.linearise import ring_mm_per_px
 from stages.diagnose.residual import RingResidual
 from stages.diagnose.result import FitQuality
 
@@ -34,11 +33,7 @@ def floor_px(
     nowhere, none = np.zeros((count, 3)), np.zeros(count, np.int64)
     edges = Edges(frame, none, none, nowhere, nowhere, uv, normal, np.full(count, stated_px))
     left = left_px * np.sin(uv[:, 0] / 150) * normal[:, 0]
-    way = np.ones((rings, 3))
-    of_rings = random.normal(0, 0.3, rings) * ring_mm_per_px(
-        cast(Any, SimpleNamespace(normal_c=way, per_px_c=way))
-    )
-    residual = np.r_[left + random.normal(0, noise_px, count), of_rings]
+    residual = np.r_[left + random.normal(0, noise_px, count), random.normal(0, 0.3, rings)]
     equations = SimpleNamespace(
         kind=np.repeat([EDGE, RING], [count, rings]), residual=residual,
         weight=np.r_[np.full(count, stated_px**-2), np.full(rings, 1e-9)],
@@ -46,7 +41,7 @@ def floor_px(
     seen = SimpleNamespace(
         outward=np.ones((rings, 2)), frame=np.arange(rings), section=np.zeros(rings, np.int64)
     )
-    linearised = SimpleNamespace(equations=equations, rings=SimpleNamespace(normal_c=way, per_px_c=way))
+    linearised = SimpleNamespace(equations=equations)
     state = SimpleNamespace(T_pc=np.tile(np.eye(4), (max(pictures, rings), 1, 1)))
     run = SimpleNamespace(edges=edges, rings=seen)
     return repeatability_px(cast(Any, run), cast(Any, SimpleNamespace(linearised=linearised, state=state)))
