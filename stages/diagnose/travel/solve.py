@@ -4,15 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
+from scipy.linalg.lapack import dgelsy
 from scipy.stats import f as fisher
 
 from pipeline.adjustment.robust import spread_about_median
 from pipeline.arrays import Float, Int
 from pipeline.recording.base import Encoder
-from stages.diagnose.travel.sight import Sight, lag_mm, readings_at, turns_between
+from stages.diagnose.travel.sight import Sight, Turns, lag_mm, readings_at, turns_between
 
 OFFSET, SCALE, DELAY, PLAY = range(4)
 SMOOTH = ("offset", "encoder_scale", "time_offset", "encoder_backlash")
@@ -29,6 +31,8 @@ _LAGS = (2, 4, 8, 16, 32)
 # Increments a lag needs at least: one or two steps among twelve do not move their median by much.
 _PER_LAG = 12
 _REWEIGHTINGS = 30
+# Columns of length 1 are told apart to this share: a root of what doubles resolve.
+_SOLID = 1e-8
 
 
 @dataclass(frozen=True)
@@ -100,7 +104,8 @@ def refined(asked: Asked, start: tuple[float, float], held: tuple[int, ...]) -> 
     delay_s, play_mm = start
     for _ in range(_ROUNDS):
         reading = readings_at(asked.steady, asked.sight.time_s + delay_s)
-        smooth, off = _smooth_columns(asked, delay_s, play_mm)
+        turns = turns_between(asked.sight, asked.steady, delay_s)
+        smooth, off = _smooth_columns(asked, turns, play_mm)
         columns = np.concatenate([smooth, asked.of_events], 1)
         # The effect already applied to the reading is added back, so that every round gives whole values.
         difference = reading - asked.sight.distance_mm + columns[:, DELAY] * delay_s + off
@@ -131,9 +136,10 @@ def nearest_start(asked: Asked) -> tuple[float, float]:
 def _misfit_at_delay(asked: Asked, delay_s: float) -> tuple[float, float]:
     """Return the sum of absolute increments left at a delay, and the play at which they are least."""
     difference = readings_at(asked.steady, asked.sight.time_s + delay_s) - asked.sight.distance_mm
+    turns = turns_between(asked.sight, asked.steady, delay_s)
     left, play_mm = np.inf, 0.0
     for _ in range(_PLAYS if asked.sight.reverses else 1):
-        smooth, off = _smooth_columns(asked, delay_s, play_mm)
+        smooth, off = _smooth_columns(asked, turns, play_mm)
         columns = np.concatenate([np.delete(smooth, DELAY, 1), asked.of_events], 1)
         found = robust_coefficients(difference + off, columns, _QUICKLY)
         left = float(np.sum(np.abs(np.diff(difference + off - columns @ found))))
@@ -145,14 +151,13 @@ def _within(value: float, most: float) -> float:
     return float(np.clip(value, -most, most))
 
 
-def _smooth_columns(asked: Asked, delay_s: float, play_mm: float) -> tuple[Float, Float]:
+def _smooth_columns(asked: Asked, turns: Turns, play_mm: float) -> tuple[Float, Float]:
     """Return (N, 4) columns of offset, scale, delay and play, and what (N,) the play's is off at its size.
 
     What the play does to a reading is the column times the size less the second. Columns of what is not known
     are 0.
     """
     sight = asked.sight
-    turns = turns_between(sight, asked.steady, delay_s)
     low, here, high = (lag_mm(sight, turns, play_mm + step) for step in (-_PLAY_STEP_MM, 0.0, _PLAY_STEP_MM))
     slope = (high - low) / (2 * _PLAY_STEP_MM)
     way = sight.distance_mm - sight.distance_mm[0]
@@ -202,11 +207,24 @@ def robust_coefficients(values: Float, columns: Float, rounds: int = _REWEIGHTIN
     """Return coefficients (C,) of least absolute deviations of the increments (iterated reweighting)."""
     y, a = np.diff(values), np.diff(columns, axis=0)
     scale = np.maximum(np.linalg.norm(a, axis=0), 1e-12)
-    found = np.zeros(columns.shape[1])
+    even, found = a / scale, np.zeros(columns.shape[1])
     for _ in range(rounds):
         weight = 1 / np.sqrt(np.maximum(np.abs(y - a @ found), 1e-4))
-        found = np.linalg.lstsq(weight[:, None] * a / scale, weight * y, rcond=1e-8)[0] / scale
+        found = _least_squares(weight[:, None] * even, weight * y) / scale
     return found
+
+
+def _least_squares(columns: Float, values: Float) -> Float:
+    """Return the shortest (C,) that fits values (N,) best; directions below `_SOLID` of the largest get 0.
+
+    By an orthogonal factorisation with pivots, called without NumPy's and SciPy's wrappers: those, and the
+    singular values by which they tell the rank, take ten times as long, and searches ask this 20,000 times.
+    """
+    n, count = columns.shape
+    right = np.zeros(max(n, count))
+    right[:n] = values
+    pivots, work = np.zeros(count, np.int32), 4 * count + n + 32 * (count + 1)
+    return np.asarray(dgelsy(columns, right, pivots, _SOLID, work)[1][:count])
 
 
 @dataclass(frozen=True)
@@ -221,15 +239,27 @@ class Whitened:
         Of the differences.
     weighted : (N,)
         K⁻¹ residual.
-    projector : (N, N)
-        K⁻¹ less what the columns take.
+    factor : (N, N)
+        Lower Cholesky factor of K; what is above its diagonal means nothing.
+    weighted_columns : (N, C)
+        K⁻¹ columns.
+    inverse : (C, C)
+        Inverse of the columns' information, 0 in directions that say nothing.
     """
 
     estimate: Float
     covariance: Float
     residual: Float
     weighted: Float
-    projector: Float
+    factor: Float
+    weighted_columns: Float
+    inverse: Float
+
+    @cached_property
+    def projector(self) -> Float:
+        """(N, N) K⁻¹ less what the columns take, made when asked for: most fits are only weighed."""
+        taken = self.weighted_columns @ self.inverse @ self.weighted_columns.T
+        return np.asarray(cho_solve((self.factor, True), np.eye(len(self.residual))) - taken)
 
     def gain(self, candidates: Float) -> tuple[Float, Float]:
         """Return estimates (M,) and scores z² (M,) that each candidate column (N, M) alone would add."""
@@ -247,15 +277,16 @@ def whitened_fit(difference_mm: Float, columns: Float, covariance: Float) -> Whi
     information = columns.T @ weighted_columns
     scale = 1 / np.sqrt(np.maximum(np.diag(information), 1e-30))
     value, vector = np.linalg.eigh(information * np.outer(scale, scale))
-    solid = value > 1e-8
+    solid = value > _SOLID
     inverse = (vector[:, solid] / value[solid]) @ vector[:, solid].T
     inverse = inverse * np.outer(scale, scale)
     hidden = (vector[:, ~solid] ** 2).sum(1) > 1e-6
     estimate = inverse @ (weighted_columns.T @ difference_mm)
     residual = difference_mm - columns @ estimate
-    projector = cho_solve(factor, np.eye(len(residual))) - weighted_columns @ inverse @ weighted_columns.T
-    inverse[hidden, hidden] = np.inf
-    return Whitened(estimate, inverse, residual, cho_solve(factor, residual), projector)
+    spread = inverse.copy()
+    spread[hidden, hidden] = np.inf
+    weighted = cho_solve(factor, residual)
+    return Whitened(estimate, spread, residual, weighted, factor[0], weighted_columns, inverse)
 
 
 def chance_of_noise(left_over: float, free: int, pictures: int) -> float:
