@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cache
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -18,7 +19,7 @@ from stages.motion import MotionParameters, estimate_motion
 from stages.motion.bore import ONE_BORE, Bore
 from stages.motion.bundle_adjustment.equations import Measurements
 from stages.motion.bundle_adjustment.image_scale import ScaleDrift, drift_of_scale
-from stages.motion.bundle_adjustment.solver import estimate_state
+from stages.motion.bundle_adjustment.solver import Estimate, estimate_state
 from stages.motion.tracking.landmarks import TrackedPoses
 from stages.motion.trajectory import doubting_instrument
 from stages.motion.windows import steady_scale
@@ -32,13 +33,19 @@ from tests.ring_images import MemorySource
 
 FRAMES, LANDMARKS = 60, 500
 GROWS = 0.005
+PARAMETERS = MotionParameters(match_bias_px=0.01)
 REDUCER = replace(ONE_BORE, rings_mm=np.arange(2.0), rings_wider_mm=np.arange(2.0))
 
 
-def drift_in(**changes: float) -> tuple[ScaleDrift, list[str]]:
+@cache
+def adjusted(**changes: float) -> tuple[Scene, Estimate]:
+    """Return a scene and its adjustment, made once for all tests of it, which change neither."""
     made = scene(FRAMES, LANDMARKS, noise=1.0, **changes)
-    parameters = MotionParameters(match_bias_px=0.01)
-    estimate = estimate_state(made.truth, made.measured, parameters)
+    return made, estimate_state(made.truth, made.measured, PARAMETERS)
+
+
+def drift_in(**changes: float) -> tuple[ScaleDrift, list[str]]:
+    made, estimate = adjusted(**changes)
     drift, told = drift_of_scale(estimate, made.measured), []
     drift.warn(replace(quiet_context(), warn=told.append), taken_out=True)
     return drift, told
@@ -84,13 +91,12 @@ def test_a_little_change_of_the_rings_may_be_either() -> None:
 
 def steady_run(bore: Bore, lost: float, **changes: float) -> SteadyRun:
     """Return what is told of a run's image scale in a ``bore`` where so many lit pictures are ``lost``."""
-    made, parameters = scene(FRAMES, LANDMARKS, noise=1.0, **changes), MotionParameters(match_bias_px=0.01)
-    estimate = estimate_state(made.truth, made.measured, parameters)
+    made, estimate = adjusted(**changes)
     poses = TrackedPoses(np.arange(FRAMES), made.truth.T_pc, np.arange(FRAMES) < lost * FRAMES)
     run = SimpleNamespace(bore=bore, whole=None, image_scale=None, texture=SimpleNamespace(poses=poses))
     run.time_s = made.measured.time_s
     part_of_run, nobody = Window(0, FRAMES), cast(Any, None)
-    return with_steady_scale(cast(Any, run), part_of_run, estimate, made.measured, parameters, nobody)
+    return with_steady_scale(cast(Any, run), part_of_run, estimate, made.measured, PARAMETERS, nobody)
 
 
 @pytest.mark.parametrize("changes", [{"picture_grows": GROWS}, {"widens": 0.002}], ids=["grows", "either"])
@@ -210,8 +216,7 @@ def test_what_no_lens_does_is_told_with_other_causes() -> None:
 
 
 def test_a_step_of_the_bore_may_explain_what_the_rings_do() -> None:
-    made = scene(FRAMES, LANDMARKS, noise=1.0, widens=0.002)
-    estimate = estimate_state(made.truth, made.measured, MotionParameters(match_bias_px=0.01))
+    made, estimate = adjusted(widens=0.002)
     plain = drift_of_scale(estimate, made.measured)
     middle = float(np.median(made.truth.T_pc[:, 2, 3]))
     bore = Bore(np.array([middle + 20.0]), np.zeros(2))

@@ -1,7 +1,7 @@
 """A growing recording is looked at for the price of what is new, and seen as it would be if read anew."""
 
 import shutil
-from dataclasses import fields
+from dataclasses import dataclass, fields
 from fractions import Fraction
 from pathlib import Path
 
@@ -11,9 +11,10 @@ import pytest
 
 from pipeline.errors import InputError
 from pipeline.recording import open_recording
+from pipeline.recording.base import Recording
 from pipeline.recording.growing import GrowingRecording
 from pipeline.recording.matroska_tail import matroska_tail
-from pipeline.recording.video import open_video
+from pipeline.recording.video import VideoSource, open_video
 from tests.bad_recordings import RATE, SAMPLE
 
 TIMES, PIECES = 3, 18
@@ -78,43 +79,68 @@ def newest(recording, after: int) -> dict[int, np.ndarray]:
     return {n: image.copy() for n, image in recording.read(wanted, "grey") if image is not None}
 
 
-def test_every_look_sees_what_a_fresh_reader_sees(whole: Path, tmp_path: Path) -> None:
-    growing, seen = GrowingRecording(tmp_path / "r"), -1
+@dataclass(frozen=True)
+class Look:
+    """What one look at the growing recording saw and cost, and what a reader that opens it anew needs."""
+
+    recording: Recording
+    fresh: VideoSource
+    pictures: int
+    read_bytes: int
+    anew_bytes: int
+    differ: tuple[int, ...]
+
+
+@pytest.fixture(scope="module")
+def looks(whole: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[Look]]:
+    """The recording that grew by pieces, and what each look saw while it did."""
+    folder = tmp_path_factory.mktemp("looks") / "r"
+    growing, seen, out = GrowingRecording(folder), -1, []
     for piece in range(1, PIECES + 1):
-        written(whole, tmp_path / "r", Fraction(piece, PIECES))
-        recording, fresh = growing.look(), open_video(tmp_path / "r" / "frames.mkv")
-        index = recording.source.index
-        # where a shown frame is not in the file yet, frames about it are not to be trusted yet
-        for field in (f for f in fields(index) if f.name != "broken" or piece == PIECES):
-            assert np.array_equal(getattr(index, field.name), getattr(fresh.index, field.name)), field.name
+        written(whole, folder, Fraction(piece, PIECES))
+        before = bytes_read()
+        recording = growing.look()
         pictures = newest(recording, seen)
-        for number, image in fresh.read(np.array(sorted(pictures)), "grey"):
-            assert np.array_equal(pictures[number], image)
+        looked = bytes_read()
+        fresh = open_video(folder / "frames.mkv")
+        opened = bytes_read()
+        differ = [
+            n for n, image in fresh.read(np.array(sorted(pictures)), "grey")
+            if not np.array_equal(pictures[n], image)
+        ]  # fmt: skip
+        out.append(Look(recording, fresh, len(pictures), looked - before, opened - looked, tuple(differ)))
         seen = max(pictures)
-    last = open_recording(tmp_path / "r")
+    return folder, out
+
+
+def test_every_look_sees_what_a_fresh_reader_sees(looks: tuple[Path, list[Look]]) -> None:
+    folder, every = looks
+    for look in every:
+        index, anew = look.recording.source.index, look.fresh.index
+        # where a shown frame is not in the file yet, frames about it are not to be trusted yet
+        for field in (f for f in fields(index) if f.name != "broken" or look is every[-1]):
+            assert np.array_equal(getattr(index, field.name), getattr(anew, field.name)), field.name
+        assert look.pictures > 0
+        assert look.differ == ()
+    recording, last = every[-1].recording, open_recording(folder)
     assert np.array_equal(recording.frames.frame, last.frames.frame)
     assert np.array_equal(recording.frames.illumination, last.frames.illumination)
     assert np.array_equal(recording.encoder.distance_mm, last.encoder.distance_mm)
 
 
-def test_a_look_reads_what_is_new_however_long_the_recording_is(whole: Path, tmp_path: Path) -> None:
-    growing, seen, cost, anew = GrowingRecording(tmp_path / "r"), -1, [], []
-    for piece in range(1, PIECES + 1):
-        written(whole, tmp_path / "r", Fraction(piece, PIECES))
-        before = bytes_read()
-        recording = growing.look()
-        seen = max(newest(recording, seen))
-        cost.append(bytes_read() - before)
-        before = bytes_read()
-        open_video(tmp_path / "r" / "frames.mkv")
-        anew.append(bytes_read() - before)
+def test_a_look_reads_what_is_new_however_long_the_recording_is(
+    whole: Path, looks: tuple[Path, list[Look]]
+) -> None:
+    every = looks[1]
+    cost = [look.read_bytes for look in every]
     new = sum((whole / name).stat().st_size for name in GROWING) / PIECES
     # what is new is listed and decoded, each from the cluster before it on; a cluster holds a second
-    cluster = RATE * (whole / "frames.mkv").stat().st_size / len(recording.frames.frame)
+    cluster = RATE * (whole / "frames.mkv").stat().st_size / len(every[-1].recording.frames.frame)
     most = 2 * (new + 2 * cluster) + 200_000
     assert max(cost) < most
     assert np.mean(cost[-3:]) < 1.3 * np.mean(cost[2:5])
-    assert anew[-1] > 2 * max(cost)  # the negative control: opened anew, a look costs the whole
+    # the negative control: opened anew, a look costs the whole
+    assert every[-1].anew_bytes > 2 * max(cost)
 
 
 def test_a_recorder_that_starts_again_is_read_from_its_start(whole: Path, tmp_path: Path) -> None:
