@@ -170,7 +170,7 @@ def run(
     _warn(console, "Look at this first", job.recording.warnings)
     display = ProgressDisplay(console, warn_at_once=False)
     try:
-        with display, compiled_ahead(_kernels()):
+        with display, compiled_ahead(kernels_of_a_run()):
             outcome = run_job(job, Selection(from_stage, only, resume), display)
         _print_outcome(outcome, output)
     finally:
@@ -206,7 +206,7 @@ def config(
     typer.echo(text, nl=False)
 
 
-def _kernels() -> dict[str, dict[str, str]]:
+def kernels_of_a_run() -> dict[str, dict[str, str]]:
     """Return the kernels of a run, by module and function."""
     from pipeline.files.installed import KERNELS, shipped_file
     from pipeline.files.json_yaml import read_yaml

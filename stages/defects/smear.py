@@ -9,7 +9,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from scipy.signal import lfilter
 
 from pipeline.adjustment.shared_light import HeldOver
 from pipeline.arrays import Float
@@ -68,4 +67,7 @@ def _kept(profile: Float, share: float) -> float:
 
 def _held_over(profile: Float, share: float) -> Float:
     """Return a profile (H,) of which each cell holds such a share of the one before."""
+    # Loaded where it is needed, as few runs do: it brings scipy.stats, a fifth of the time of all imports.
+    from scipy.signal import lfilter
+
     return np.asarray(lfilter([1 - share], [1, -share], profile))

@@ -11,8 +11,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import stats
 from scipy.fft import rfft, rfftfreq
+from scipy.special import stdtr
 
 from pipeline.adjustment.robust import robust_spread
 from pipeline.arrays import Bool, Float
@@ -149,7 +149,7 @@ def _borne_out(waves: Float, value: Float, part: Float) -> bool:
     shown = (others[..., 0] * right).sum(1)
     rest = shown - expected * shown.sum() / expected.sum()
     # Student's t: the scatter between parts is known by as many
-    chance = stats.t.sf(shown.sum() / (np.linalg.norm(rest) + 1e-12), len(parts) - 1)
+    chance = stdtr(len(parts) - 1, -shown.sum() / (np.linalg.norm(rest) + 1e-12))
     return bool(chance < _BY_CHANCE)
 
 

@@ -12,9 +12,10 @@ from pathlib import Path
 import pytest
 from numba import types
 
-from pipeline.cli import _kernels
+from pipeline.cli import kernels_of_a_run
 from pipeline.system import kernels
 from pipeline.system.kernels import compile_all, compiled_ahead, type_of
+from tests.shared_data import PROJECT_ROOT
 
 KERNEL = """
 import numba
@@ -35,7 +36,7 @@ def kernel(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_every_listed_kernel_is_there_and_takes_so_many_arguments() -> None:
-    for module, functions in _kernels().items():
+    for module, functions in kernels_of_a_run().items():
         for name, words in functions.items():
             wanted = [type_of(word) for word in words.split("; ")]
             function = getattr(import_module(module), name).py_func
@@ -44,7 +45,17 @@ def test_every_listed_kernel_is_there_and_takes_so_many_arguments() -> None:
 
 def test_every_listed_kernel_takes_the_types_listed() -> None:
     """One that does not would end the second process, and what is listed behind it be compiled by the run."""
-    compile_all(_kernels())
+    compile_all(kernels_of_a_run())
+
+
+def test_a_run_starts_without_the_part_of_scipy_that_loads_slowly() -> None:
+    """Both together took a fifth of the time of all imports, for one tail of Student's t and a filter."""
+    told = "import sys, stages.catalogue, pipeline.export.catalogue, pipeline.cli; print(*sys.modules)"
+    loaded = subprocess.run(
+        [sys.executable, "-c", told], cwd=PROJECT_ROOT, capture_output=True, text=True, check=True
+    )
+    assert "scipy.ndimage" in loaded.stdout.split(), "the control"
+    assert not {"scipy.stats", "scipy.signal"} & set(loaded.stdout.split())
 
 
 def test_types_are_read() -> None:
