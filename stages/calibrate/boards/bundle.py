@@ -26,7 +26,7 @@ POSE = 6
 # Corners beyond the model's reach count as so far off. A tenth and ten times of it, half and twice the trials
 # and a tenth and ten times of the gain at which a fit stops move no Kannala-Brandt camera by 1e-6 of its σ.
 _OUT_OF_MODEL_PX = 1e4
-_STOP = Stop(trials=300, enough=1e-10)
+STOP = Stop(trials=300, enough=1e-10)
 
 
 @dataclass(frozen=True)
@@ -138,7 +138,7 @@ class Linearised:
         return self.normal.decrease(step)
 
 
-def solve(start: Estimate, corners: Corners, free: Free, huber_px: float) -> Estimate:
+def solve(start: Estimate, corners: Corners, free: Free, huber_px: float, stop: Stop = STOP) -> Estimate:
     """Return the estimate of least robust cost reached from ``start``.
 
     Parameters
@@ -147,6 +147,8 @@ def solve(start: Estimate, corners: Corners, free: Free, huber_px: float) -> Est
         What to estimate beside the poses.
     huber_px
         Residual length beyond which a corner counts linearly.
+    stop
+        When the search ends.
     """
 
     def linearised(estimate: Estimate, _: None) -> Linearised:
@@ -158,7 +160,7 @@ def solve(start: Estimate, corners: Corners, free: Free, huber_px: float) -> Est
     def as_given(equations: Linearised) -> tuple[Linearised, None]:
         return equations, None
 
-    return minimise(start, linearised, moved, as_given, _STOP).state
+    return minimise(start, linearised, moved, as_given, stop).state
 
 
 def cost(residual: Float, huber_px: float) -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -13,7 +14,7 @@ from pipeline.instrument.camera.calibration import BoardView
 from pipeline.instrument.camera.fisheye import Equidistant, KannalaBrandt
 from pipeline.instrument.camera.plumb_bob import Pinhole, Unified
 from pipeline.instrument.camera.scaramuzza import Scaramuzza
-from stages.calibrate.boards.bundle import FLAT, POSES_ONLY, Corners, Estimate, Free, cost, solve
+from stages.calibrate.boards.bundle import FLAT, POSES_ONLY, STOP, Corners, Estimate, Free, cost, solve
 
 # From where the fit starts. Half and twice as many fields, half and twice the two below move no parameter of
 # Kannala-Brandt cameras by 1e-6 of its σ (three sets of 14 drawn views).
@@ -25,6 +26,9 @@ _START_HUBER_PX = 5.0
 _NEAR_FORWARD, _LEAST_POINTS = 0.3, 4
 # Up to where a first polynomial is fitted: 1.4 and 3.1 rad move no Scaramuzza camera by 1e-6 of its σ.
 _WIDEST_FIT_RAD = 2.8
+# Steps after which the fields are compared, the best of which is fitted to its end: of ten drawn sets for six
+# cameras the best after 3 steps was the best in the end, and after 8 its cost lay within .1 % of that.
+_COMPARED = replace(STOP, trials=8)
 _FOCAL, _ALL = Free(np.arange(2), FLAT), Free(np.arange(4), FLAT)
 
 
@@ -101,7 +105,7 @@ def _equidistant_polynomial(focal: float, theta_max: float, degree: int) -> tupl
 
 def _posed(sample: list[BoardView], corners: Corners, camera: Camera) -> Estimate:
     T_cb = np.stack([pose(view, camera) for view in sample])
-    return solve(Estimate(camera, T_cb, np.zeros(3)), corners, POSES_ONLY, _START_HUBER_PX)
+    return solve(Estimate(camera, T_cb, np.zeros(3)), corners, POSES_ONLY, _START_HUBER_PX, _COMPARED)
 
 
 def _thinned(view: BoardView) -> BoardView:
