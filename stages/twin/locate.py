@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
+from scipy.ndimage import maximum_filter1d
 from scipy.stats import norm
 
 from pipeline.adjustment.robust import spread_about_median
@@ -21,8 +22,10 @@ from pipeline.arrays import Bool, Float, Float32
 from pipeline.artefacts.twin import Mismatch
 from stages.twin.compare import BLOCK_PX
 
-_RING_BLOCKS, _FEWEST_OF_RING = 4, 30
-"""Rings are 32 px wide: wide enough that one speck is a small part of each but the innermost. Chosen."""
+_FEWEST_OF_RING, _HALF_WIDTHS = 100, (0.5, 1.0, 2.0, 4.0)
+"""Half the width of rings, blocks: the first that holds enough of them, of which a speck is a small part.
+Where the lamps' light ends, beyond 90°, light that no twin has, as from wall to wall, makes one ring brighter
+by a third and leaves the next as it is: wide rings do not show it. Chosen."""
 FALSE_ALARM = 0.01
 """Probability that a recording without dirt shows a place of dirt anywhere. Chosen."""
 _BROAD_BLOCKS, _FEWEST_FRAMES, _FEWEST_BLOCKS = 25, 3, 2
@@ -165,14 +168,16 @@ def told_once(found: list[Mismatch]) -> tuple[Mismatch, ...]:
 
 
 def _spread_of_rings(change: Float32, known: Bool) -> Float32:
-    """Return the robust spread (rows, columns) of the blocks as far from the image's middle."""
+    """Return the robust spread (rows, columns) about 0 of the blocks as far from the image's middle."""
     row, column = (np.arange(n) - (n - 1) / 2 for n in change.shape)
-    ring = (np.hypot(row[:, None], column) / _RING_BLOCKS).astype(int)
-    least = spread_about_median(change[known])
+    away, least = np.hypot(row[:, None], column), spread_about_median(change[known])
+    ring = away.round().astype(int)
     of_ring = np.full(ring.max() + 1, least)
-    for k in np.flatnonzero(np.bincount(ring[known]) >= _FEWEST_OF_RING):
-        of_ring[k] = max(least, spread_about_median(change[known & (ring == k)]))
-    return np.asarray(of_ring[ring], np.float32)
+    for k in np.unique(ring[known]):
+        near = [change[known & (np.abs(away - k) <= w)] for w in _HALF_WIDTHS]
+        enough = next((n for n in near if len(n) >= _FEWEST_OF_RING), near[-1])
+        of_ring[k] = max(least, spread_about_median(np.concatenate([enough, -enough])))
+    return np.asarray(maximum_filter1d(of_ring, 3)[ring], np.float32)
 
 
 def _broad(values: Float32, known: Bool) -> Float32:

@@ -162,15 +162,15 @@ class BlockSamples:
         u, v = ((float(a[k]) + 0.5) * BLOCK_PX for a in (self.column, self.row))
         return Look(int(self.number[self.frame[k]]), u, v, half_px)
 
-    def fixed_to(self, use: Bool) -> str:
-        """Return what the blocks in ``use`` (N,) are fixed to; empty where no order predicts them.
+    def fixed_to(self, use: Bool, orders: Sequence[str] = ("image", "wall", "rows")) -> str:
+        """Return to which of orders the blocks in ``use`` (N,) are fixed; empty where none predicts them.
 
         ``image or wall`` stands for two orders that cannot be told apart.
         """
         frames = np.unique(self.frame[use])
         if len(frames) < FEWEST_FRAMES:
             return ""
-        found = sorted(((k, self.explained(k, use)[frames]) for k in self.orders), key=lambda e: -e[1].sum())
+        found = sorted(((k, self.explained(k, use)[frames]) for k in orders), key=lambda e: -e[1].sum())
         (first, best), (second, next_best) = found[:2]
         if sigmas(best) < _SURE:
             return ""
@@ -239,7 +239,11 @@ class BlocksOfFrames:
 
 
 def in_image(samples: BlockSamples | None, places: tuple[ImagePlace, ...]) -> tuple[str, ...]:
-    """Return what each place of the image is fixed to; the image itself where frames are too few to tell."""
+    """Return what each place of the image is fixed to; the image itself where frames are too few to tell.
+
+    Rows of single frames make no place of the image: their means predict the fragments of texture in a drop,
+    which change from frame to frame, no worse than the drop's own place does.
+    """
     if samples is None or samples.frame.max() + 1 < FEWEST_FRAMES:
         return ("image",) * len(places)
     return tuple(_fixed_in_image(samples, p) for p in places)
@@ -249,7 +253,7 @@ def _fixed_in_image(samples: BlockSamples, place: ImagePlace) -> str:
     away = np.hypot(
         (samples.column + 0.5) * BLOCK_PX - place.u_px, (samples.row + 0.5) * BLOCK_PX - place.v_px
     )
-    return samples.fixed_to(away < max(place.radius_px, BLOCK_PX))
+    return samples.fixed_to(away < max(place.radius_px, BLOCK_PX), ("image", "wall"))
 
 
 def map_of(samples: BlockSamples, order: str, shape: tuple[int, int]) -> tuple[Float, Float]:

@@ -27,15 +27,26 @@ PARTS = 6
 
 @dataclass(frozen=True)
 class FittedLaw:
-    """A law's size, and by how much χ² of frames (F,) falls with the size that other frames tell."""
+    """A law's size, and by how much χ² of frames (F,) falls with the size that other frames tell.
+
+    ``shown`` (F,) is which share of the change that the law foretells each frame shows, where that is known:
+    0 but for chance without what the law says, 1 with it.
+    """
 
     fall: Float
     size: NamedFigure
+    shown: Float | None = None
 
     @property
     def chance(self) -> float:
-        """The probability that chance makes χ² fall as much, neighbouring frames seeing the same wall."""
-        return over_frames(self.fall)[1]
+        """The probability that chance makes frames bear the law out, neighbours seeing the same wall.
+
+        A law that changes some frames ten times as much as others makes their falls as unequal, which looks
+        like chance. The shares that they show are alike.
+        """
+        if self.shown is None:
+            return over_frames(self.fall)[1]
+        return over_frames(self.shown)[1] if self.fall.sum() > 0 else 1.0
 
 
 def fall_of_spot(sums: Float32, start: Float, beyond: float) -> FittedLaw:

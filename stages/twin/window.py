@@ -41,10 +41,6 @@ _STATED = {
     "window_scatter": "something on the window or the lens scatters",
     "droplet": "a drop on the window or the lens bends",
 }
-_NOT_TOLD = (
-    "as far as frames show it; whether the image or the wall is so cannot be told. What to do: record once "
-    "more with the probe rolled"
-)
 
 
 @dataclass
@@ -159,9 +155,8 @@ class WindowPlace:
         bends = self.bends and tried["droplet"].chance < FALSE_ALARM
         # Dirt may lie there, too, but draws nothing aside.
         name = "droplet" if bends else max(tried, key=lambda n: tried[n].fall.sum())
-        fixed_to = "image" if bends else fixed_to
         chance = max(self.place.probability, tried[name].chance)
-        if chance > FALSE_ALARM or "wall" in fixed_to or ("rows" in fixed_to and "image" not in fixed_to):
+        if chance > FALSE_ALARM or ("wall" in fixed_to and not bends):
             return None
         more = {n: sigmas(tried[name].fall - fit.fall) for n, fit in tried.items() if n != name}
         rivals = [n for n, by in more.items() if by < _SURE and not bends]
@@ -170,7 +165,7 @@ class WindowPlace:
             return None
         if name == "window_dirt":
             law = replace(law, size=_with_photo(law.size))
-        return self._mismatch([name, *rivals], fixed_to or "image", law, chance)
+        return self._mismatch([name, *rivals], law, chance)
 
     def _least(self, name: str, sd: float) -> float:
         """Return the size, whose 1 σ is given, from which it is told.
@@ -184,7 +179,7 @@ class WindowPlace:
         parts = min(PARTS, len(self.frame))
         return max(float(t.isf(FALSE_ALARM, parts - 1)) * sd, LEAST_CHANGE + _SURELY * sd)
 
-    def _mismatch(self, names: list[str], fixed_to: str, law: FittedLaw, chance: float) -> Mismatch:
+    def _mismatch(self, names: list[str], law: FittedLaw, chance: float) -> Mismatch:
         place, size = self.place, law.size
         numbers = ("u_px", "v_px", "radius_px")
         where = tuple(NamedFigure(n, getattr(place, n), place.radius_px / 2, "px") for n in numbers)
@@ -193,15 +188,13 @@ class WindowPlace:
         unlike = names[0] != "droplet" and size.value < 0
         after = before - float(law.fall.sum()) / sum(self.pixels)
         return Mismatch(
-            "" if unlike else " or ".join(names), "intensity", fixed_to, where, (size,), chance,
-            before, after, self._said(names, size.value, fixed_to),
+            "" if unlike else " or ".join(names), "intensity", "image", where, (size,), chance,
+            before, after, self._said(names, size.value),
             Look(self.frame[0], place.u_px, place.v_px, 4 * place.radius_px),
         )  # fmt: skip
 
-    def _said(self, names: list[str], size: float, fixed_to: str) -> str:
+    def _said(self, names: list[str], size: float) -> str:
         at = f"About ({self.place.u_px:.0f}, {self.place.v_px:.0f})"
-        if fixed_to != "image":
-            return f"{at} the image differs in all frames, {_NOT_TOLD}."
         if names[0] == "window_dirt" and size < 0:
             return f"{at} the image is {100 * -size:.0f} % brighter in all frames."
         if names[0] == "window_scatter" and size < 0:
@@ -274,11 +267,12 @@ def _with_photo(share: NamedFigure) -> NamedFigure:
 
 def _fall_of_drop(sums: Float, aside_px: float) -> FittedLaw:
     """Return the drop that fits best; ``sums`` (F, 2, L) are of those tried, then of what frames tell."""
-    frames, fall = np.arange(len(sums)), np.zeros(len(sums))
-    gain = 2 * sums[:, 0] - sums[:, 1]
-    for half in (frames % 2 == 0, frames % 2 == 1):
-        fall[~half] = gain[~half, int(np.argmax(gain[half].sum(0)))]
+    frames, (cross, own) = np.arange(len(sums)), np.moveaxis(sums, 1, 0)
+    gain, half = 2 * cross - own, np.arange(len(sums)) % 2
+    by_half = np.array([int(np.argmax(gain[half != h].sum(0))) for h in (0, 1)])
+    told = frames, by_half[half]
+    fall, shown = gain[told], cross[told] / np.maximum(own[told], 1e-9)
     best = int(np.argmax(gain.sum(0)))
     if best == len(_DROPS):
-        return FittedLaw(fall, NamedFigure("aside", aside_px, _ASIDE_PX, "px"))
-    return FittedLaw(fall, NamedFigure("power", _DROPS[best][0], _POWER_STEP / 2))
+        return FittedLaw(fall, NamedFigure("aside", aside_px, _ASIDE_PX, "px"), shown)
+    return FittedLaw(fall, NamedFigure("power", _DROPS[best][0], _POWER_STEP / 2), shown)

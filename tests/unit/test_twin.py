@@ -94,6 +94,12 @@ def test_what_stays_in_the_image_on_the_wall_and_in_rows_is_told_apart():
     assert (bands.name, bands.fixed_to) == ("banding", "rows")
 
 
+def test_a_drop_whose_fragments_change_from_frame_to_frame_is_not_fixed_to_rows():
+    place = (ImagePlace(20.5 * BLOCK_PX, 20.5 * BLOCK_PX, 16.0, 0.2, 0.01, 0.0),)
+    fragments = _samples(lambda f, r, c, s: _near(r, 20, c, 20) * np.where(f % 2, 1, -1))
+    assert in_image(fragments, place) == ("",)
+
+
 def test_what_stands_still_cannot_be_told_apart():
     place = (ImagePlace(20.5 * BLOCK_PX, 20.5 * BLOCK_PX, 16.0, 0.2, 0.01, 0.0),)
     still = _samples(lambda f, r, c, s: _near(r, 20, c, 20), still=True)

@@ -10,7 +10,7 @@ from stages.twin.locate import ImagePlace, full_size, places_displaced, places_i
 from stages.twin.render import Region, TwinFrame
 from stages.twin.scene import Ring
 from stages.twin.spot import FittedLaw
-from stages.twin.window import WindowPlace, _with_photo, beside_blur, through_window
+from stages.twin.window import WindowPlace, _fall_of_drop, _with_photo, beside_blur, through_window
 
 
 def _frame(level):
@@ -253,6 +253,27 @@ def test_a_photo_that_is_poor_far_ahead_is_no_dirt():
     far = np.hypot(v - 37, u - 49.5)
     poor = np.where(far < 8, 0.1 * np.sin(0.7 * (u + 2 * v)), 0)
     (place,), _ = places_in_image([r + poor.astype(np.float32) for r in ratios])
+    assert place.u_px == pytest.approx(80.5 * BLOCK_PX, abs=BLOCK_PX)
+
+
+@pytest.mark.parametrize(
+    ("shown", "told"), [((0.6, 1.0, 0.9, 0.8, 0.6), True), ((0.4, -0.4, 0.6, 0, 0.1), False)]
+)
+def test_a_drop_is_told_by_frames_that_show_it_as_foretold_however_much_each_changes(shown, told):
+    """Texture that a drop draws aside differs from frame to frame, and so do the falls of χ²."""
+    own = np.array([23e3, 320e3, 180e3, 14e3, 7e3])
+    sums = np.stack([own * np.array(shown), own], 1)[..., None]
+    assert (_fall_of_drop(sums, 1.5).chance < 0.01) == told
+
+
+def test_a_ring_that_no_twin_lights_is_no_dirt():
+    """Light from wall to wall, where that of the lamps ends, had been listed as 21 places of the window."""
+    random = np.random.default_rng(4)
+    v, u = np.mgrid[0:75, 0:100]
+    ring = np.abs(np.hypot(v - 37, u - 49.5) - 24.5) < 1
+    bounced = ring * (0.35 + 0.1 * random.standard_normal(ring.shape))
+    ratios = [r + bounced.astype(np.float32) for r in _ratios(random, (80, 30, 0.4))]
+    (place,), _ = places_in_image(ratios)
     assert place.u_px == pytest.approx(80.5 * BLOCK_PX, abs=BLOCK_PX)
 
 
