@@ -6,7 +6,7 @@ shows at Δ from its middle what is at Δ (1 − p (1 − Δ²/R²)). w is a spo
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import cv2
@@ -152,20 +152,33 @@ class WindowPlace:
             "window_scatter": fall_of_spot(spots[:, 1], start, _OF_CONTRAST),
             "droplet": _fall_of_drop(np.stack(self.drops), self.aside_px),
         }
-        bends = self.bends and tried["droplet"].chance < FALSE_ALARM
-        # Dirt may lie there, too, but draws nothing aside.
-        name = "droplet" if bends else max(tried, key=lambda n: tried[n].fall.sum())
+        name, rivals = self._likeliest(tried)
+        alone = self.bends and name == "droplet" and not rivals
         chance = max(self.place.probability, tried[name].chance)
-        if chance > FALSE_ALARM or ("wall" in fixed_to and not bends):
+        if chance > FALSE_ALARM or ("wall" in fixed_to and not alone):
             return None
-        more = {n: sigmas(tried[name].fall - fit.fall) for n, fit in tried.items() if n != name}
-        rivals = [n for n, by in more.items() if by < _SURE and not bends]
         law = tried[name]
         if abs(law.size.value) < self._least(name, law.size.sd):
             return None
         if name == "window_dirt":
             law = replace(law, size=_with_photo(law.size))
         return self._mismatch([name, *rivals], law, chance)
+
+    def _likeliest(self, tried: Mapping[str, FittedLaw]) -> tuple[str, list[str]]:
+        """Return the law that is likeliest, and those that frames do not part from it.
+
+        Dirt may lie on a drop, too, but draws nothing aside: a drop that frames bear out is it, if none fits
+        surely better, and alone, if none fits better at all. What is dark may foretell a little of a drop's
+        change, too, and its rim seems to displace texture.
+        """
+        best, drop = max(tried, key=lambda n: tried[n].fall.sum()), tried["droplet"]
+        bends = self.bends and drop.chance < FALSE_ALARM
+        if bends and best == "droplet":
+            return best, []
+        beaten = any(sigmas(fit.fall - drop.fall) >= _SURE for fit in tried.values())
+        name = "droplet" if bends and not beaten else best
+        others = [n for n in tried if n != name]
+        return name, [n for n in others if sigmas(tried[name].fall - tried[n].fall) < _SURE]
 
     def _least(self, name: str, sd: float) -> float:
         """Return the size, whose 1 σ is given, from which it is told.

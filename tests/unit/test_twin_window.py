@@ -158,6 +158,44 @@ def test_texture_aside_by_less_than_its_own_error_is_no_drop(aside_px, bends):
     assert (named is not None and named.name == "droplet") == bends
 
 
+def test_dirt_that_a_drop_explains_a_little_of_is_no_drop():
+    """The photo holds a part of what lies on the window: a drop would make it larger, as frames do."""
+    random = np.random.default_rng(3)
+    place = WindowPlace(ImagePlace(120.0, 100.0, 12.0, -0.5, 0.02, 1e-6), aside_px=1.25)
+    v, u = np.mgrid[0:200, 0:240].astype(np.float32)
+    spot = np.exp(-0.5 * (((u - 120) ** 2 + (v - 100) ** 2) / 10**2) ** 2)
+    for frame in range(9):
+        clean = 90 + 0.15 * (_textured(random) - 90)
+        recorded = clean * (1 - 0.5 * spot) + 2 * random.standard_normal(clean.shape)
+        photo = _frame((clean * (1 - 0.25 * spot)).astype(np.float32))
+        place.add(frame, recorded.astype(np.float32), photo, np.ones(clean.shape, bool))
+    assert _fall_of_drop(np.stack(place.drops), 1.25).chance < 0.01
+    assert place.judged("image").name == "window_dirt"
+
+
+@pytest.mark.parametrize(
+    ("dirt", "name"),
+    [
+        ((30, 31, 29, 30, 32, 30, 31, 29, 30), "window_dirt"),
+        ((90, 1, 2, 0, 80, 1, 3, 0, 2), "droplet or window_dirt"),
+        ((1, 2, 0, 1, 2, 1, 0, 2, 1), "droplet"),
+    ],
+)
+def test_a_drop_stands_beside_dirt_that_fits_better_but_not_surely(dirt, name, monkeypatch):
+    dirt_falls = FittedLaw(np.array(dirt, float), NamedFigure("share", 0.5, 0.01))
+    no_scatter = FittedLaw(np.full(9, -5.0), NamedFigure("share", 0.0, 0.01))
+    drop = FittedLaw(np.linspace(9, 11, 9), NamedFigure("aside", 1.25, 0.5), np.linspace(0.9, 1.1, 9))
+    laws = iter((dirt_falls, no_scatter))
+    monkeypatch.setattr("stages.twin.window.fall_of_spot", lambda *_: next(laws))
+    monkeypatch.setattr("stages.twin.window._fall_of_drop", lambda *_: drop)
+    random = np.random.default_rng(3)
+    place = WindowPlace(ImagePlace(120.0, 100.0, 18.0, -0.3, 0.02, 1e-6), aside_px=1.25)
+    for frame in range(9):
+        level = _textured(random)
+        place.add(frame, level, _frame(level), np.ones(level.shape, bool), level)
+    assert place.judged("image").name == name
+
+
 def test_faint_texture_is_found_where_brightness_is_even():
     random = np.random.default_rng(3)
     shares = []
