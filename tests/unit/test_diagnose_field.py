@@ -1,16 +1,21 @@
 """A field alone gives a class, never a name; against the gauge it bears out or contradicts."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from stages.diagnose.effects.library import LIBRARY
+from stages.diagnose.field.against_gauge import not_refuted
 from stages.diagnose.field.answer import _alone, _met, field_answer
 from stages.diagnose.field.evidence import FieldEvidence, scale_by_line
-from stages.diagnose.inference import Column, Evidence, Stated
+from stages.diagnose.gauge.fit import fit
+from stages.diagnose.gauge.scan import Scored
+from stages.diagnose.gauge.search import prepare
+from stages.diagnose.inference import Column, Evidence, Score, Stated, stated_belief
 from stages.diagnose.result import Confirmation, Diagnosis, EffectFound, Value, Verdict
-from tests.gauge_runs import stated_probe
+from tests.gauge_runs import made_run, measured_run, stated_probe
 
 NOTHING_STATED = Stated((), np.zeros((0, 0)))
 AZIMUTH = np.linspace(-np.pi, np.pi, 400, endpoint=False)
@@ -67,7 +72,7 @@ def test_a_tilt_is_a_class_with_its_sizes_and_a_gauge_run_is_asked_for():
     assert "The laser sheet is tilted" in answer.identifiable
     assert answer.next.startswith("A gauge run")
     bare = Diagnosis("field", "", Verdict.NOT_IDENTIFIABLE, 1.0)
-    found = _alone(bare, answer, field, with_gauge=False)
+    found = _alone(bare, answer, answer, field, with_gauge=False)
     assert found.verdict is Verdict.CLASS
     assert found.effects == ()
 
@@ -92,3 +97,40 @@ def test_a_field_that_cannot_tell_says_so_and_changes_no_verdict():
     found = _met(named, {"outside_index": None})
     assert found.verdict is Verdict.NAMED
     assert "too little of outside_index" in found.shortcomings[0]
+
+
+@pytest.fixture(scope="module")
+def sound_gauge():
+    run, start = prepare(measured_run(made_run(3, frames=40)))
+    return SimpleNamespace(searched=SimpleNamespace(run=run, nothing=fit(run, start, ())))
+
+
+def seen_in_the_field(law, size):
+    amplitude, covariance = np.array([size]), np.array([[(0.05 * size) ** 2]])
+    return Scored(LIBRARY[law], (), Score(amplitude, covariance, 400.0, 1e-80, 400.0), 1)
+
+
+def test_the_gauge_refutes_what_is_fixed_to_the_probe_and_acts_in_every_recording(sound_gauge):
+    shown = [seen_in_the_field(*each) for each in (("focal_scale", 0.03), ("dome_axial", 8.0))]
+    stated = stated_belief(sound_gauge.searched.nothing.state.stated)
+    assert not_refuted(shown, sound_gauge, stated) == ()
+
+
+def test_the_gauge_has_no_say_in_what_acts_in_a_pipe_or_is_too_small_for_it(sound_gauge):
+    shown = tuple(
+        seen_in_the_field(*each)
+        for each in (("outside_index", 3e-3), ("focal_scale", 1e-4), ("focal_drift", 0.03))
+    )
+    stated = stated_belief(sound_gauge.searched.nothing.state.stated)
+    assert not_refuted(shown, sound_gauge, stated) == shown
+
+
+def test_what_the_gauge_refutes_is_unexplained_and_says_what_it_looks_like():
+    noise = SIGMA * np.random.default_rng(1).standard_normal(400)
+    field = field_with(2.0 * WAVE @ [0.3, 0.4] + noise)
+    answer = field_answer(field, LIBRARY, NOTHING_STATED)
+    nothing = Diagnosis("field", "gauge", Verdict.CONSISTENT, 1.0)
+    found = _alone(nothing, answer, replace(answer, shown=()), field, with_gauge=True)
+    assert found.verdict is Verdict.UNEXPLAINED
+    assert found.members == ()
+    assert "looks like this: The laser sheet is tilted" in found.identifiable

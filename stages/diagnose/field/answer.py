@@ -14,6 +14,7 @@ from stages.diagnose.agreement import same, sized
 from stages.diagnose.channels import Seen
 from stages.diagnose.effects.base import EffectModel, Shape
 from stages.diagnose.effects.courses import OWN_CLOCK, Coursed
+from stages.diagnose.field.against_gauge import not_refuted
 from stages.diagnose.field.evidence import FieldEvidence, travels
 from stages.diagnose.gauge.confirm import partial_of
 from stages.diagnose.gauge.examine import Examined
@@ -38,6 +39,10 @@ DETECTED = 1e-4
 _ALMOST, _APART = 0.1, 20.0
 _SHOWN = 4
 _BY_FIELD = "The inspection alone shows: "
+_LOOKS_LIKE = (
+    "The inspection alone shows something that looks like this: {}. But the gauge run, by the same probe, "
+    "shows none of it: the probe changed between the recordings, or the library does not have the cause"
+)
 # The field confirms or contradicts only when its 1 σ is below this share of the effect's size.
 # Debt: data/debts.md.
 _TELLING = 0.33
@@ -139,7 +144,8 @@ def with_field(
         names = [t.model.law for t in examined.best.fit.terms]
         return _met(found, dict(zip(names, met, strict=True)))
     if alone.shown:
-        return _alone(found, alone, field.field, gauge is not None)
+        possible = alone.shown if examined is None else not_refuted(alone.shown, examined, stated)
+        return _alone(found, alone, replace(alone, shown=possible), field.field, gauge is not None)
     if found.verdict is Verdict.NOT_IDENTIFIABLE and gauge is None and travels(field.field.run):
         return replace(found, verdict=Verdict.CONSISTENT)
     return found
@@ -185,22 +191,36 @@ def _confirmed(effect: EffectFound, met: Confirmation | None) -> EffectFound:
     return replace(effect, confirmed_by=(*effect.confirmed_by, met))
 
 
-def _alone(found: Diagnosis, alone: FieldAnswer, field: FieldEvidence, with_gauge: bool) -> Diagnosis:
-    """Return the class that the field alone shows, beside whatever other channels say."""
+def _alone(
+    found: Diagnosis, alone: FieldAnswer, possible: FieldAnswer, field: FieldEvidence, with_gauge: bool
+) -> Diagnosis:
+    """Return the class that the field alone shows, beside whatever other channels say.
+
+    Where the gauge run refutes every one of them, what the field shows is unexplained.
+    """
     note = (
         "The gauge run shows none of it: it came or went between the recordings, or does not act in a gauge."
         if with_gauge
         else "In one pipe of unknown size several causes look alike: it gives a class, not a name."
     )
-    said = [text for text in (found.identifiable, _BY_FIELD + alone.identifiable) if text]
+    told = _BY_FIELD + possible.identifiable if possible.shown else _LOOKS_LIKE.format(alone.identifiable)
+    said = [text for text in (found.identifiable, told) if text]
     certain = found.effects if found.verdict in (Verdict.NAMED, Verdict.PARTLY) else ()
     names = () if certain else classes_of([e.name for e in found.effects])
     where = location_in_field(field, alone.shown)
-    found = _beside(found, certain, _union(alone.members, names))
+    found = _beside(found, certain, _union(possible.members, names)) if possible.shown else _nameless(found)
     found = replace(found, identifiable="; ".join(said), record_next=alone.next, notes=(*found.notes, note))
     if found.remainder is None:
         return replace(found, location=where)
     return replace(found, remainder=replace(found.remainder, location=where))
+
+
+def _nameless(found: Diagnosis) -> Diagnosis:
+    """Return the answer with something unexplained beside what is sure, else with that alone."""
+    if found.verdict in (Verdict.NAMED, Verdict.PARTLY):
+        before = found.remainder or Remainder(Verdict.UNEXPLAINED)
+        return replace(found, verdict=Verdict.PARTLY, remainder=replace(before, verdict=Verdict.UNEXPLAINED))
+    return replace(found, verdict=Verdict.UNEXPLAINED)
 
 
 def _union(first: Sequence[str], second: Sequence[str]) -> tuple[str, ...]:
