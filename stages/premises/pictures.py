@@ -89,7 +89,7 @@ def look_at_pictures(
     recording: Recording, probe: Probe, context: Context, stays: Bool | None = None
 ) -> Pictures:
     """Look once at every picture of a recording; motion is not told where something ``stays`` (h, w)."""
-    polar = PolarView(recording.source.image_size, probe.camera.centre_px)
+    polar = _PolarView(recording.source.image_size, probe.camera.centre_px)
     motion = _AxialMotion(probe.camera, polar.line_width_px, stays)
     count = len(recording.frames.frame)
     seen = _empty(count, polar.azimuth_rad)
@@ -127,7 +127,7 @@ def combing(image: Image) -> float:
     return next_row / next_but_one if next_but_one > 0 else float("nan")
 
 
-class PolarView:
+class _PolarView:
     """A picture resampled along rays from the centre: rows are rays, columns radii."""
 
     def __init__(self, image_size: tuple[int, int], centre_px: Float) -> None:
