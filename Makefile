@@ -8,7 +8,7 @@ COVERAGE := --cov --cov-report=term:skip-covered
 
 # Compiled modules are kept even where Python is told not to: each of the many programs that tests start would
 # compile all of them again, a second of processor time each.
-export PYTHONDONTWRITEBYTECODE :=
+test: export PYTHONDONTWRITEBYTECODE :=
 
 .PHONY: setup run test docs lock clean
 
@@ -28,7 +28,7 @@ test: setup
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	# Beside the types, on the other core, loops are compiled once: tests in two processes would each do it.
-	$(BIN)/mypy & types=$$!; $(BIN)/python -m tests.compiled && wait $$types
+	$(BIN)/mypy & types=$$!; $(BIN)/python -m tests.compiled; compiled=$$?; wait $$types && exit $$compiled
 	$(BIN)/pytest --numprocesses=2 --dist=loadfile --no-loadscope-reorder --durations=30 $(COVERAGE)
 
 # The pages of `import boresight`, into build/docs.
