@@ -21,6 +21,11 @@ _LEAST_COVERED = 0.2
 _MOST_OUTSIDE = 0.05
 """Share of the frames without a reading from which that is told (chosen): a clock that starts a little late
 is no news."""
+_NAMED = 4
+"""Runs of frames without a reading that are named, the longest."""
+_COUNTS = 1.5
+"""Between two readings lies more than one count of a counter that logs what it counts only if some are
+missing: half-way between one and two."""
 _LEAST_STEPS = 8
 """Steps by which an encoder is judged at least. Not measured."""
 _CONTRADICTED = 0.3
@@ -85,19 +90,35 @@ def encoder_at_frames(
             "in frames.csv) of encoder.csv"
         )
         return None
-    _warn_of_unread(recording.frames.frame[~known], len(known), context)
     sigma = float(np.hypot(sigma_mm, _quantum(encoder.distance_mm) / np.sqrt(12)))
     return EncoderReadings(at_frames, sigma, known)
 
 
-def _warn_of_unread(frames: Int, count: int, context: Context) -> None:
-    """Warn where many frames, of so many, lie outside the encoder's times or in its gaps."""
-    if len(frames) > _MOST_OUTSIDE * count:
-        context.warn(
-            f"the encoder has no readings for {len(frames)} of {count} frames, between frame {frames[0]} and "
-            f"{frames[-1]}: distances there rest on laser and texture, and their σ says so. What to do: see "
-            "whether encoder.csv was cut off, and whether its clock is that of frames.csv"
-        )
+def warn_of_unread(encoder: EncoderReadings, tracked: TrackedPoses, frames: Int, context: Context) -> None:
+    """Warn where the encoder says nothing of many frames (N,) of a run in which the wall's texture moves.
+
+    A counter that logs only what it counts says nothing at rest, before its first count and after its last.
+    """
+    if len(tracked.frames) < 2:
+        return
+    at_mm = np.interp(np.arange(len(frames)), tracked.frames, tracked.T_pc[:, 2, 3])
+    least_mm = max(_DIFFERENCE_MM, _COUNTS * _COARSE * encoder.sigma_mm)
+    unread = [
+        run
+        for run in runs_of(~encoder.known)
+        if np.ptp(at_mm[max(run.start - 1, 0) : run.stop + 1]) > least_mm
+    ]
+    count = sum(run.stop - run.start for run in unread)
+    if count <= _MOST_OUTSIDE * len(frames):
+        return
+    longest = sorted(sorted(unread, key=lambda run: run.start - run.stop)[:_NAMED], key=lambda run: run.start)
+    where = ", ".join(f"{frames[run.start]} to {frames[run.stop - 1]}" for run in longest)
+    context.warn(
+        f"the encoder has no readings for {count} of {len(frames)} frames"
+        f"{', most of them' * (len(unread) > _NAMED)} (frames {where}), in which the probe moved: distances "
+        "there rest on laser and texture, and their σ says so. What to do: see whether encoder.csv was cut "
+        "off, and whether its clock is that of frames.csv"
+    )
 
 
 def contradicted(encoder: EncoderReadings, tracked: TrackedPoses, context: Context) -> bool:
@@ -148,7 +169,7 @@ def _in_gaps(time_s: Float, read_s: Float, read_mm: Float, frame_s: float) -> Bo
     """Return which frames (N,) lie in gaps of the readings during which the probe moved on."""
     usual_s = float(np.median(np.diff(read_s)))
     gap = np.diff(read_s) > max(_JUMP_TIMES * usual_s, 2 * frame_s)
-    gap &= np.abs(np.diff(read_mm)) > _DIFFERENCE_MM
+    gap &= np.abs(np.diff(read_mm)) > max(_DIFFERENCE_MM, _COUNTS * _quantum(read_mm))
     at = np.clip(np.searchsorted(read_s, time_s) - 1, 0, len(gap) - 1)
     return np.asarray(gap[at] & (time_s > read_s[at]) & (time_s < read_s[at + 1]))
 

@@ -14,7 +14,13 @@ from pipeline.machine.stage import Context
 from pipeline.recording.base import Recording
 from stages.motion.bore import Bore, warn_of_steps
 from stages.motion.bundle_adjustment.laser_knock import find_jump, texture_breaks
-from stages.motion.encoder import EncoderReadings, PosePredictor, contradicted, encoder_at_frames
+from stages.motion.encoder import (
+    EncoderReadings,
+    PosePredictor,
+    contradicted,
+    encoder_at_frames,
+    warn_of_unread,
+)
 from stages.motion.frame_times import believed_times
 from stages.motion.parameters import MotionParameters
 from stages.motion.rings import RingCircles, circles_in_rings
@@ -63,6 +69,8 @@ def measure_run(
     if encoder is not None and contradicted(encoder, texture.poses, context):
         encoder = None
         texture, predictor = _track(view, circles, None, parameters, context)
+    if encoder is not None:
+        warn_of_unread(encoder, texture.poses, recording.frames.frame, context)
     _require_distance(texture.poses, encoder)
     place = places_of(recording, rings.frame)
     followed = _in_bore(circles, texture, predictor, view, encoder)

@@ -14,7 +14,7 @@ from pipeline.instrument.probe import Probe
 from pipeline.recording.base import Encoder, FrameTable
 from stages.motion.bore import ONE_BORE, Bore
 from stages.motion.bundle_adjustment.encoder_scale import EncoderScale
-from stages.motion.encoder import EncoderReadings, contradicted, encoder_at_frames
+from stages.motion.encoder import EncoderReadings, contradicted, encoder_at_frames, warn_of_unread
 from stages.motion.tracking.landmarks import TrackedPoses
 from stages.motion.windows import first_window
 from stages.motion.windows.submaps import Window
@@ -107,16 +107,43 @@ def test_frames_after_its_end_are_not_known() -> None:
     assert not found.known[int(1.1 * RATE) :].any()
 
 
-@pytest.mark.parametrize(("until_s", "told"), [(1.0, True), (1.95, False)])
-def test_an_encoder_that_was_cut_off_is_told(until_s: float, told: bool) -> None:
+def words_on_unread(time_s: np.ndarray, distance_mm: np.ndarray, z: np.ndarray) -> list[str]:
+    """Return what is told of an encoder's readings where texture says that frames lie at z (FRAMES,)."""
+    words: list[str] = []
+    found = readings(time_s, distance_mm)
+    assert found is not None
+    context = replace(quiet_context(), warn=words.append)
+    warn_of_unread(found, tracked(z), np.arange(FRAMES), context)
+    return words
+
+
+@pytest.mark.parametrize(
+    ("from_s", "until_s", "told"),
+    [(0.0, 1.0, "(frames 31 to 59)"), (0.0, 1.95, ""), (0.505, 1.5, "(frames 0 to 14, 46 to 59)")],
+)
+def test_an_encoder_that_was_cut_off_is_told(from_s: float, until_s: float, told: str) -> None:
     """Two fifths of a run were without encoder, and no word said so; a frame or two are no news."""
     time_s, distance = clean()
-    words: list[str] = []
-    there = time_s < until_s
-    run = recorded(time_s[there], distance[there])
-    assert encoder_at_frames(run, 0.0, 60.0, replace(quiet_context(), warn=words.append))  # type: ignore[arg-type]
-    assert any("29 of 60 frames" in w or "28 of 60 frames" in w for w in words) is told
-    assert told or not words
+    there = (time_s >= from_s) & (time_s < until_s)
+    words = words_on_unread(time_s[there], distance[there], SPEED * np.arange(FRAMES) / RATE)
+    assert [told in w for w in words] == [True] * bool(told)
+
+
+@pytest.mark.parametrize("count_mm", [0.5, 1.0, 2.0])
+@pytest.mark.parametrize("rests_s", [(0.0, 0.7), (0.7, 1.3), (1.3, 2.1)])
+def test_a_counter_that_logs_only_what_it_counts_is_read_while_the_probe_rests(
+    count_mm: float, rests_s: tuple[float, float]
+) -> None:
+    """At rest it "had no readings for 61 of 300 frames", though it lost nothing."""
+    time_s = np.arange(0, FRAMES / RATE, 0.001)
+    way = SPEED * (time_s - np.clip(time_s - rests_s[0], 0, rests_s[1] - rests_s[0]))
+    counted = count_mm * np.floor(way / count_mm)
+    logged = np.flatnonzero(np.diff(counted)) + 1
+    z = np.interp(np.arange(FRAMES) / RATE, time_s, way)
+    found = readings(time_s[logged], counted[logged])
+    assert found is not None
+    assert found.known[25:35].all(), "one count is no gap"
+    assert words_on_unread(time_s[logged], counted[logged], z) == []
 
 
 def test_a_frame_just_before_its_start_or_behind_its_end_lies_where_the_probe_went_on_to() -> None:
