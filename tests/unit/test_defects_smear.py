@@ -159,3 +159,13 @@ def test_a_finding_whose_depth_may_be_flattened_by_as_much_is_told_as_at_least_s
     assert (abs(told.depth_mm) < 1.96 * told.depth_sigma_mm) == flattened
     assert told.probability > 0.5
     assert ("It is at least so deep" in told.statement) == flattened
+
+
+def test_the_depth_of_what_goes_all_round_is_no_lower_bound() -> None:
+    """Of a bead of .92 mm with a glint on it, at least 1.94 mm to ± .21 by noise was told."""
+    drawn = DrawnDefect("weld", 40.0, 1.0, 3.0, 7.0, -1.0)
+    true = relief(drawn, DISTANCE, AZIMUTH, RADIUS, np.random.default_rng(0))
+    told = found_on(lfilter([0.1], [1, -0.9], true, axis=0), HeldOver(0.9 ** np.arange(12)))
+    assert (told.kind, told.probability > 0.5) == ("weld", True)
+    assert abs(told.depth_mm) < 1.96 * told.depth_sigma_mm
+    assert "at least so deep" not in told.statement
