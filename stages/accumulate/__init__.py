@@ -174,8 +174,7 @@ def accumulate_wall(
     _report(context, wall, spread)
     warn_of_held(held, context)
     _warn_of_fixed(fixed, context)
-    spacing_mm = float(np.nanmedian(np.abs(np.diff(survey.middle_mm)))) if len(survey.middle_mm) > 1 else 0.0
-    warn_of_unmeasured(wall.radius_map, trajectory.radius_mm, gap_mm, spacing_mm, context)
+    warn_of_unmeasured(wall.radius_map, trajectory.radius_mm, gap_mm, survey.middle_mm, context)
     return wall
 
 
@@ -269,7 +268,7 @@ def _report(context: Context, wall: Wall, spread: CalibrationSpread) -> None:
 
 ACCUMULATE = Stage(
     "accumulate",
-    "12",
+    "13",
     AccumulateParameters,
     accumulate_wall,
     "point cloud and radius map about the pipe's own axis, with σ",

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import binary_opening, find_objects, label
 
-from pipeline.arrays import Float32
+from pipeline.arrays import Float, Float32
 from pipeline.artefacts.findings import clock_of_azimuth
 from pipeline.artefacts.measured import RadiusMap
 from pipeline.machine.stage import Context
@@ -20,6 +20,14 @@ _ROWS = 4096
 # Rings lie askew and hidden sectors end anywhere: inside is where nine in ten columns have begun and none of
 # the last tenth has ended.
 _BEGUN = 0.9
+# Share of the way round that a place between two rings reaches at least: most of it (chosen), as a hidden
+# sector that meets it changes nothing.
+_ALL_ROUND = 0.9
+# Holes between rings, each nearer to the next than what is bridged, from which on rings are sparse: something
+# that hides a place leaves one, or two with an edge between (chosen).
+_IN_A_ROW = 3
+# What `configs/long.yaml` bridges, mm.
+LONG_GAP_MM = 12.0
 
 
 @dataclass(frozen=True)
@@ -33,20 +41,57 @@ class Unmeasured:
     area_mm2: float
 
 
+@dataclass(frozen=True)
+class SparseRings:
+    """Where rings lie farther apart than is bridged: ends of such stretches (N, 2), and how far, mm."""
+
+    ends_mm: Float
+    spacing_mm: float
+
+    def lost(self, place: Unmeasured, pipe_radius_mm: float) -> bool:
+        """Return whether a place lies there and reaches round the wall, as what lies between rings does."""
+        first, last = self.ends_mm.T
+        beyond = np.maximum(first - place.distance_mm, place.distance_mm - last)
+        all_round = place.width_mm > _ALL_ROUND * 2 * np.pi * pipe_radius_mm
+        return bool(all_round and np.any(beyond < place.length_mm / 2))
+
+
 def warn_of_unmeasured(
-    radius_map: RadiusMap, pipe_radius_mm: float, gap_mm: float, spacing_mm: float, context: Context
+    radius_map: RadiusMap, pipe_radius_mm: float, gap_mm: float, ring_at_mm: Float, context: Context
 ) -> None:
     """Warn of places inside the wall that are not measured, larger than gaps that are bridged.
 
-    Where neighbouring rings are ``spacing_mm`` apart, which is more than that, the whole wall is such places.
+    Where rings (F,) lie farther apart than that, one after the other, that is told instead of their places.
     """
     places = unmeasured_places(radius_map, pipe_radius_mm, gap_mm)
     context.report("places inside the wall that are not measured", len(places), "")
-    if not places:
-        return
-    if spacing_mm > gap_mm:
-        _warn_of_sparse_rings(radius_map, gap_mm, spacing_mm, context)
-        return
+    sparse = sparse_rings(ring_at_mm, gap_mm)
+    between = [p for p in places if sparse.lost(p, pipe_radius_mm)]
+    others = [p for p in places if not sparse.lost(p, pipe_radius_mm)]
+    if between:
+        _warn_of_sparse_rings(sparse, between, pipe_radius_mm, gap_mm, context)
+    if others:
+        _warn_of_places(others, context)
+
+
+def sparse_rings(ring_at_mm: Float, gap_mm: float) -> SparseRings:
+    """Return where several steps in a row from ring to ring (F,) along the wall are longer than ``gap_mm``.
+
+    The rings' order in time does not matter: the probe may pass twice, or rest. NaN is a ring that was not
+    found.
+    """
+    at = np.sort(ring_at_mm[np.isfinite(ring_at_mm)])
+    wide = np.diff(at) > gap_mm
+    holes = np.stack([at[:-1][wide], at[1:][wide]], 1)
+    apart = np.flatnonzero(holes[1:, 0] - holes[:-1, 1] > gap_mm) + 1
+    rows = [row for row in np.split(holes, apart) if len(row) >= _IN_A_ROW]
+    if not rows:
+        return SparseRings(np.zeros((0, 2)), 0.0)
+    ends = np.array([(row[0, 0], row[-1, 1]) for row in rows])
+    return SparseRings(ends, float(np.median(np.diff(np.concatenate(rows), axis=1))))
+
+
+def _warn_of_places(places: list[Unmeasured], context: Context) -> None:
     largest = sorted(places, key=lambda p: -p.area_mm2)[:_TOLD]
     where = ", ".join(
         f"at {p.distance_mm:.0f} mm, {notation.clock(float(clock_of_azimuth(p.azimuth_rad)))} "
@@ -62,12 +107,21 @@ def warn_of_unmeasured(
     )
 
 
-def _warn_of_sparse_rings(radius_map: RadiusMap, gap_mm: float, spacing_mm: float, context: Context) -> None:
-    lost = float(np.mean(~np.isfinite(radius_map.radius_mm)))
+def _warn_of_sparse_rings(
+    sparse: SparseRings, lost: list[Unmeasured], pipe_radius_mm: float, gap_mm: float, context: Context
+) -> None:
+    length_mm = float(np.diff(sparse.ends_mm, axis=1).sum())
+    share = min(sum(p.area_mm2 for p in lost) / (2 * np.pi * pipe_radius_mm * length_mm), 1.0)
+    coarser = (
+        f", or run it again with --config long, which bridges {LONG_GAP_MM:g} mm and makes coarser maps"
+        if sparse.spacing_mm <= LONG_GAP_MM
+        else ""
+    )
     context.warn(
-        f"rings are {spacing_mm:.1f} mm apart, and {gap_mm:g} mm are bridged at most: {100 * lost:.0f} % of "
-        "the wall was passed and not measured. Defects are missed, large ones as well. What to do: run it "
-        "again with --config long, which is for rings so far apart, or pull the probe more slowly"
+        f"along {length_mm:.0f} mm of the pipe rings that were found lie {sparse.spacing_mm:.1f} mm apart, "
+        f"and {gap_mm:g} mm are bridged at most: {100 * share:.0f} % of the wall there was passed and not "
+        f"measured. Defects are missed, large ones as well. What to do: pull the probe more slowly "
+        f"there{coarser}"
     )
 
 

@@ -6,10 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import yaml
 
+from pipeline.arrays import Float
 from pipeline.artefacts.measured import RadiusMap
-from stages.accumulate.unmeasured import unmeasured_places, warn_of_unmeasured
+from stages.accumulate.unmeasured import LONG_GAP_MM, unmeasured_places, warn_of_unmeasured
 from tests.quiet import quiet_context
+from tests.shared_data import PROJECT_ROOT
 
 RADIUS, ROWS, COLUMNS = 50.0, 9000, 360
 CELL_MM = 2 * np.pi * RADIUS / COLUMNS
@@ -26,11 +29,30 @@ def wall(*, from_row: int = 4000, from_column: int = 100, rows: int = 0, columns
     return RadiusMap(0.5 * np.arange(ROWS), azimuth, radius, none, none, none.astype(int), none)
 
 
+def every(step_mm: float) -> Float:
+    """Return where rings lie along the whole wall."""
+    return np.arange(0, ROWS / 2, step_mm)
+
+
+def told_of(radius_map: RadiusMap, gap_mm: float, ring_at_mm: Float) -> list[str]:
+    words: list[str] = []
+    warn_of_unmeasured(radius_map, RADIUS, gap_mm, ring_at_mm, replace(quiet_context(), warn=words.append))
+    return words
+
+
+def between_rings(ring_at_mm: Float, reach_mm: float) -> RadiusMap:
+    """Return a wall that is known only near rings."""
+    found = wall()
+    far = np.abs(found.distance_mm[:, None] - np.unique(ring_at_mm)).min(1) > reach_mm
+    found.radius_mm[far] = np.nan
+    return found
+
+
 @pytest.mark.parametrize("from_column", [100, COLUMNS - 4])
 def test_a_place_that_was_passed_and_not_measured_is_told_once(from_column: int) -> None:
     told: list[str] = []
     hidden = wall(from_column=from_column, rows=14, columns=8)
-    warn_of_unmeasured(hidden, RADIUS, 3.0, 1.3, replace(quiet_context(), warn=told.append))
+    warn_of_unmeasured(hidden, RADIUS, 3.0, every(1.3), replace(quiet_context(), warn=told.append))
     assert len(told) == 1
     assert "1 place inside the wall, 49 mm² in all, could not be measured: at 2004 mm" in told[0]
     assert "(7 mm along, 7 mm around)" in told[0]
@@ -47,11 +69,54 @@ def test_a_sector_hidden_all_along_is_a_place_of_each_lot_of_rows() -> None:
     assert sum(p.area_mm2 for p in found) == pytest.approx(9 * CELL_MM * ROWS / 2, rel=0.02)
 
 
-@pytest.mark.parametrize(("spacing_mm", "told"), [(2.9, False), (4.0, True)])
-def test_rings_too_far_apart_are_named_as_the_cause(spacing_mm: float, told: bool) -> None:
+THERE = np.arange(0, ROWS / 2, 4.0)
+FAST = np.r_[np.arange(0, 3000, 2.0), np.arange(3000, ROWS / 2, 6.0)]
+
+
+@pytest.mark.parametrize(
+    ("ring_at_mm", "apart"),
+    [
+        (THERE, "4.0"),
+        (np.r_[np.zeros(2000), THERE], "4.0"),
+        (np.r_[THERE, THERE[::-1] + 0.2], "3.8"),
+        (np.where(np.arange(1800) % 2, np.nan, every(2.5)), "5.0"),
+        (FAST, "6.0"),
+    ],
+    ids=["steady", "rests for half of the time", "twice at the same places", "each second lost", "faster"],
+)
+def test_rings_too_far_apart_are_named_as_the_cause(ring_at_mm: Float, apart: str) -> None:
     """A pull at three times the speed lost two of three defects, and the window was to be cleaned."""
-    words: list[str] = []
-    sparse = wall(from_row=100, rows=4500, columns=COLUMNS)
-    warn_of_unmeasured(sparse, RADIUS, 3.0, spacing_mm, replace(quiet_context(), warn=words.append))
+    known = ring_at_mm[np.isfinite(ring_at_mm)]
+    words = told_of(between_rings(known, 0.8), 3.0, ring_at_mm)
     assert len(words) == 1
-    assert ("rings are 4.0 mm apart" in words[0] and "50 % of the wall" in words[0]) is told
+    assert f"rings that were found lie {apart} mm apart" in words[0]
+    assert "--config long" in words[0]
+
+
+@pytest.mark.parametrize(
+    "ring_at_mm", [np.r_[THERE, THERE[::-1] + 2], np.r_[every(1.3)[:1500], every(1.3)[1600:]]]
+)
+def test_a_hidden_place_is_told_where_the_rings_of_all_passes_lie_close(ring_at_mm: Float) -> None:
+    """Forth and back with 4 mm each, 2 mm together: "rings are 4 mm apart", and the place was not told."""
+    words = told_of(wall(rows=14, columns=8), 3.0, ring_at_mm)
+    assert len(words) == 1
+    assert "1 place inside the wall" in words[0]
+
+
+def test_a_hidden_place_is_told_beside_rings_too_far_apart() -> None:
+    sparse = between_rings(FAST, 0.8)
+    sparse.radius_mm[2000:2014, 100:108] = np.nan
+    words = told_of(sparse, 3.0, FAST)
+    assert ["lie 6.0 mm apart" in w for w in words] == [True, False]
+    assert "1 place inside the wall" in words[1]
+    assert "at 1004 mm" in words[1]
+
+
+def test_long_is_advised_only_where_it_bridges_more() -> None:
+    ring_at_mm = every(14.0)
+    words = told_of(between_rings(ring_at_mm, 3.0), LONG_GAP_MM, ring_at_mm)
+    assert len(words) == 1
+    assert "lie 14.0 mm apart" in words[0]
+    assert "--config" not in words[0]
+    stated = yaml.safe_load((PROJECT_ROOT / "configs/long.yaml").read_text())
+    assert stated["accumulate"]["largest_gap_mm"] == LONG_GAP_MM
