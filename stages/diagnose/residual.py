@@ -148,11 +148,12 @@ def rings_against_fiducials(
 
 def _gauge_residual(run: GaugeRun, found: Fit, frames: Int) -> RingResidual:
     equations = found.linearised.equations
-    residual = equations.residual[equations.kind == RING]
+    ring = equations.kind == RING
+    residual = equations.residual[ring]
     moving = Moving.of(found.state.T_pc, run.time_s)
     points = gauge_points(found.state, run.rings, run.time_s, moving, run.width_px)
     assert points.distance_mm is not None
-    usable = run.ring_weight > _OUTLIER * np.median(run.ring_weight)
+    usable = equations.weight[ring] > _OUTLIER * np.median(equations.weight[ring])
     seen = np.unique(run.edges.frame)
     usable &= np.min(np.abs(run.rings.frame[:, None] - seen), axis=1) <= _NEAR
     return RingResidual(

@@ -3,7 +3,7 @@
 usage: python -m tests.benchmarks.bench_warped OUT [CASE ...] [--pair blind-a/a10] [--others]
 
 The pictures of gauge and inspection are warped as the error of a lens would move them, or the readings of
-the encoder are changed; neither renderer nor warp shares anything with the diagnosis' own laws. A case is
+the encoder are changed; neither renderer nor warp shares code with the diagnosis. A case is
 right when exactly its names are told with a probability of .99 or more. Cases without a name lie outside the
 library: any sure name is wrong. ``--others`` holds every answer against the names of the next case instead:
 the count of right ones must fall.
@@ -120,6 +120,7 @@ def eccentric_wheel(time: Float, way: Float, by: float) -> Float:
 PX = 1 / 366.0
 CASES = {
     "nothing": Case(()),
+    "resampled": Case((), partial(scale, by=0.0)),
     "focal": Case(("focal_scale",), partial(scale, by=0.003)),
     "focal_small": Case(("focal_scale",), partial(scale, by=-0.001)),
     "focal_settles": Case(("focal_drift",), partial(settling_scale, by=0.003)),
@@ -196,7 +197,11 @@ def answered(case: Case, pair: str, folder: Path) -> dict[str, object]:
     if not told.is_file():
         for kind in ("gauge", "field"):
             if not (folder / kind).is_dir():
-                make(case, shared("recordings", f"{pair}-{kind}"), folder / kind, kind)
+                # Whole or not there: what was stopped half-way is no recording of the case.
+                half = folder / f"{kind}-half"
+                shutil.rmtree(half, ignore_errors=True)
+                make(case, shared("recordings", f"{pair}-{kind}"), half, kind)
+                half.rename(folder / kind)
         command = [sys.executable, "-m", "pipeline.cli", "diagnose", str(folder / "field")]
         with (folder / "log").open("w", encoding="utf-8") as log:
             more = ["--gauge", str(folder / "gauge"), "-o", str(folder / "answer")]

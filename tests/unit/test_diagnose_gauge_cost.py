@@ -1,24 +1,62 @@
 """Hypotheses about a gauge run are ranked by how well they fit, not by what their lens makes of the noise."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from pipeline.arrays import Float
 from stages.calibrate.gauge.state import Unknowns
-from stages.diagnose.effects.library import LIBRARY
-from stages.diagnose.gauge.fit import fit
-from stages.diagnose.gauge.run import GaugeRun, Term
-from stages.diagnose.gauge.search import prepare
+from stages.diagnose.gauge.elimination import RING
+from stages.diagnose.gauge.linearise import linearise
+from stages.diagnose.gauge.run import GaugeRun
+from stages.diagnose.gauge.search import prepare, weighed
 from tests.gauge_runs import made_run, measured_run
+
+NOISE_PX = 0.1
 
 
 @pytest.fixture(scope="module")
 def run() -> tuple[GaugeRun, Unknowns]:
-    return prepare(measured_run(made_run(4, frames=40)))
+    return prepare(measured_run(made_run(4, frames=24)))
 
 
-@pytest.mark.parametrize("law", ["radial_distortion", "focal_scale", "dome_axial"])
-def test_a_law_more_never_fits_worse(run: tuple[GaugeRun, Unknowns], law: str) -> None:
-    without = fit(*run, ())
-    beside = fit(*run, (Term(LIBRARY[law], (), np.zeros(1)),))
-    # Rounding of the steps, which end where less than half a unit of χ² is left.
-    assert beside.cost < without.cost + 0.5
+def told_of_noise(measured: GaugeRun, start: Unknowns, larger: float) -> Float:
+    """Return how residuals change where the same rings, through a lens so much larger, lie a bit outward."""
+    focal = np.zeros(len(start.instrument))
+    focal[:2] = larger * np.array(start.stated.camera.focal_px)
+    state, centre = replace(start, instrument=focal), start.stated.camera.centre_px
+    rings = replace(measured.rings, uv=centre + (1 + larger) * (measured.rings.uv - centre))
+    noisy = replace(rings, uv=rings.uv + NOISE_PX * rings.outward)
+    before, after = (linearise(replace(measured, rings=r), state, ()).equations for r in (rings, noisy))
+    ring = (before.kind == RING) & (before.weight > 0)
+    return np.asarray(after.residual[ring] - before.residual[ring])
+
+
+def test_noise_of_the_image_counts_alike_whatever_the_lens_makes_of_it(
+    run: tuple[GaugeRun, Unknowns],
+) -> None:
+    stated = told_of_noise(*run, larger=0.0)
+    assert np.median(stated) == pytest.approx(NOISE_PX, rel=0.05)
+    # By millimetres it would be 2 % less.
+    assert told_of_noise(*run, larger=0.02) == pytest.approx(stated, rel=1e-3)
+
+
+def test_what_no_camera_sees_has_no_weight_and_does_not_sharpen_the_rest(
+    run: tuple[GaugeRun, Unknowns],
+) -> None:
+    measured, start = run
+    rings = measured.rings
+    away = np.arange(len(rings.frame)) % 3 == 0
+    uv = np.where(away[:, None], rings.uv + 5000 * rings.outward, rings.uv)
+    found = linearise(replace(measured, rings=replace(rings, uv=uv)), start, ())
+    ring = found.equations.kind == RING
+    assert not found.equations.weight[ring][away].any()
+    assert np.isfinite(found.equations.residual[ring]).all()
+    kept = weighed(measured, found).ring_weight
+    assert not kept[away].any()
+    alone = measured.rings.select(~away)
+    few = replace(
+        measured, rings=alone, width_px=measured.width_px[~away], ring_weight=np.ones((~away).sum())
+    )
+    assert kept[~away] == pytest.approx(weighed(few, linearise(few, start, ())).ring_weight, rel=1e-6)

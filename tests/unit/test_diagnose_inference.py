@@ -241,7 +241,7 @@ def test_a_name_stands_for_as_many_unknown_laws_as_there_are_known_ones_of_its_k
     every = with_courses({n: LIBRARY[n] for n in names})
     alike = {n: known_alike(LIBRARY[n], every) for n in (*names[1:], "focal_scale")}
     drifting = {"focal_drift": 7 / 6, "baseline_drift": 7 / 6}
-    static = {"focal_scale": 2, "dome_axial": 2, "baseline": 1, "pixel_locking": 0}
+    static = {"focal_scale": 2, "dome_axial": 2, "baseline": 1, "pixel_locking": 1}
     assert alike == pytest.approx(drifting | static)
     assert known_alike(every["focal_scale, ramp"], every) == pytest.approx(7)
 

@@ -17,6 +17,7 @@ from stages.calibrate.gauge.state import GaugeParameters, SheetModel, Unknowns, 
 from stages.calibrate.gauge.terms import frame_spread
 from stages.diagnose.effects.base import EffectModel
 from stages.diagnose.effects.library import ring_shift_px, texture_shift_px
+from stages.diagnose.gauge.elimination import Equations
 from stages.diagnose.gauge.fit import Fit, fit, fit_beside
 from stages.diagnose.gauge.linearise import linearise
 from stages.diagnose.gauge.points import widths_at
@@ -90,13 +91,16 @@ def stated_start(state: Unknowns) -> Unknowns:
 
 
 def weighed(run: GaugeRun, found: Linearised) -> GaugeRun:
-    """Return the run with weights by the residuals' spread frame by frame, outliers counting little."""
+    """Return the run with weights by the residuals' spread frame by frame, outliers counting little.
+
+    What the instrument does not see has no weight from then on, whatever instrument a hypothesis has.
+    """
     of, count = found.equations, len(run.edges.uv)
     edges, rings = slice(0, count), slice(count, count + len(run.rings.uv))
     return replace(
         run,
-        edge_weight=_weight(of.frame[edges], of.residual[edges], run.edges.sigma_px),
-        ring_weight=_weight(of.frame[rings], of.residual[rings], run.rings.sigma_px),
+        edge_weight=_weight(of, edges, run.edges.sigma_px),
+        ring_weight=_weight(of, rings, run.rings.sigma_px),
     )
 
 
@@ -109,10 +113,13 @@ def _freed(state: Unknowns) -> Unknowns:
     return replace(state, unsure=unsure, instrument=np.zeros(unsure.shape[1]))
 
 
-def _weight(frame: Int, residual: Float, sigma: Float) -> Float:
-    in_sigma = residual / sigma
-    spread = frame_spread(frame, in_sigma)
-    return np.asarray(1 / (1 + (in_sigma / spread / _CAUCHY) ** 2) / (sigma * spread) ** 2)
+def _weight(of: Equations, rows: slice, sigma: Float) -> Float:
+    seen = of.weight[rows] > 0
+    in_sigma = of.residual[rows][seen] / sigma[seen]
+    spread = frame_spread(of.frame[rows][seen], in_sigma)
+    weight = np.zeros(len(sigma))
+    weight[seen] = 1 / (1 + (in_sigma / spread / _CAUCHY) ** 2) / (sigma[seen] * spread) ** 2
+    return weight
 
 
 @dataclass(frozen=True)

@@ -141,11 +141,11 @@ def odds_of_unknown_laws(
 def known_alike(model: EffectModel, library: Mapping[str, EffectModel]) -> float:
     """Return how many laws of the library are of a model's kind, its own included.
 
-    Each counts by its chance beforehand beside the model's. A law without a harmonic has none: it is told by
-    what it goes with, grow as it may.
+    Each counts by its chance beforehand beside the model's, once for all its courses of that behaviour. A
+    law without a harmonic is told by what it goes with, grow as it may: of its kind there is itself alone.
     """
     if _kind(model)[0] is None:
-        return 0.0
+        return 1.0
     like_it = sorted((_share(other), other.law) for other in library.values() if _kind(other) == _kind(model))
     return sum({law: share for share, law in like_it}.values()) / _share(model)
 

@@ -221,10 +221,15 @@ def _least_squares(columns: Float, values: Float) -> Float:
     singular values by which they tell the rank, take ten times as long, and searches ask this 20,000 times.
     """
     n, count = columns.shape
+    if not columns.size:
+        return np.zeros(count)
     right = np.zeros(max(n, count))
     right[:n] = values
     pivots, work = np.zeros(count, np.int32), 4 * count + n + 32 * (count + 1)
-    return np.asarray(dgelsy(columns, right, pivots, _SOLID, work)[1][:count])
+    found = np.asarray(dgelsy(columns, right, pivots, _SOLID, work)[1][:count])
+    if not np.isfinite(found).all():
+        raise np.linalg.LinAlgError("readings or columns are not finite")
+    return found
 
 
 @dataclass(frozen=True)
