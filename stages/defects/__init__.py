@@ -186,8 +186,7 @@ def _measured(
             if region.sign * depth.depth_mm >= parameters.min_depth_mm:
                 top = float(region.cut(score.astype(float))[region.mask].max())
                 evidence = evidence_for(here, depth, surface, scene.seen_by, _fixed_in(region, fixed), top)
-                least_mm = min(abs(depth.depth_mm) / 2, parameters.min_depth_mm)
-                step = is_step(region, least_mm, wall.relief.radius_map)
+                step = is_step(region, depth.depth_mm, wall.relief.radius_map)
                 widened = flattened(depth, here, surface, scene.seen_by.held, wall.ways_mm)
                 told = describe(here, widened, surface, scene)
                 yield _Found(region, told, replace(told, depth_sigma_mm=depth.sigma_mm), evidence, step)
@@ -288,5 +287,5 @@ def _defects_of_run(
 
 
 DEFECTS = Stage(
-    "defects", "33", DefectParameters, _defects_of_run, "defects as instances with depth, clock and kind"
+    "defects", "34", DefectParameters, _defects_of_run, "defects as instances with depth, clock and kind"
 )

@@ -10,18 +10,14 @@ from stages.defects.segment import Region
 
 # The bore beside a finding is looked at over a tenth of the diameter: a step is smeared over as much.
 _BESIDE = 0.2
-# A finding that goes round so much of the pipe is the way from one bore to the other if it stands out of the
-# one by less than half of what it stands out of both in the mean. A bead stands out of both alike. Chosen.
+# A finding that goes round so much of the pipe and stands out of neither bore beside it by half of its depth
+# is the way from one to the other. A bead stands out of both by all of it. Chosen.
 _ALL_ROUND, _STANDS_OUT = 0.9, 0.5
 IS_STEP = "The bore is of one width before it and of another behind it: it is a step, no bead or groove"
 
 
-def is_step(region: Region, least_mm: float, radius_map: RadiusMap) -> bool:
-    """Return whether a region that goes round the pipe is a step of the bore.
-
-    So is what stands out of the bore beside it by less than ``least_mm``. Its median round the pipe is what
-    stands out: a pit in a bead or a glint on it is deeper than the bead.
-    """
+def is_step(region: Region, depth_mm: float, radius_map: RadiusMap) -> bool:
+    """Return whether a region of depth ``depth_mm``, positive into the wall, is a step of the bore."""
     radius_mm = radius_map.radius_mm
     if region.mask.any(0).sum() < _ALL_ROUND * radius_mm.shape[1]:
         return False
@@ -32,6 +28,6 @@ def is_step(region: Region, least_mm: float, radius_map: RadiusMap) -> bool:
     before, inside, behind = (row_median(radius_mm[r]) for r in rows)
     if not np.isfinite(before).any() or not np.isfinite(behind).any():
         return False
-    sides = region.sign * np.array([np.nanmedian(before), np.nanmedian(behind)])
-    out_mm = float(np.nanmax(region.sign * inside)) - sides
-    return bool(out_mm.min() < max(_STANDS_OUT * out_mm.mean(), least_mm))
+    sides = np.sign(depth_mm) * np.array([np.nanmedian(before), np.nanmedian(behind)])
+    out_mm = float(np.nanmax(np.sign(depth_mm) * inside) - sides.max())
+    return out_mm < _STANDS_OUT * abs(depth_mm)

@@ -116,15 +116,6 @@ def test_a_step_of_the_bore_is_no_bead_and_no_groove(step_mm):
     assert all(d.probability == d.confidence == 0 for d in steps)
 
 
-def test_a_bead_with_a_glint_on_it_is_no_step_of_the_bore():
-    """A bead of 0.9 mm on which a glint stood out by 1.9 was a step, at 0, between bores of one width."""
-    rng = np.random.default_rng(5)
-    drawn = [DrawnDefect("weld", 60.0, 0.0, 6.0, 0.0, -0.9), DrawnDefect("pit", 60.0, 1.0, 3.0, 4.0, -1.3)]
-    found = search(noisy(rng, sum(relief(d, DISTANCE, AZIMUTH, RADIUS, rng) for d in drawn)))
-    assert any(d.kind == "weld" and d.probability > 0.9 for d in found.items)
-    assert not any("it is a step" in d.statement for d in found.unconfirmed)
-
-
 def test_a_groove_all_round_is_no_pit():
     """The gap of a joint, 70 times as long as wide, was called a pit: no kind is as long."""
     rng = np.random.default_rng(3)
