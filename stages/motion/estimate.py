@@ -89,7 +89,8 @@ def estimate_motion(
     trajectory = trajectory_of(joined, recording.frames, probe, has_encoder)
     trajectory = lay_route(trajectory, joined.turn_variance, recording, probe, context)
     events = find_events(recording.frames, trajectory, run.texture.poses, joined.slip, has_encoder)
-    warn_of_slips(events, trajectory, probe.encoder_scale_sigma, context)
+    if run.encoder is not None:
+        warn_of_slips(events, trajectory, probe.encoder_scale_sigma, run.encoder.sigma_mm, context)
     seen = SeenCentres(circles.centre_c, probe.laser.baseline_mm)
     shakes = camera_trembles(trajectory, run.texture.poses, seen)
     doubted = shakes or run.texture.poses.much_lost
@@ -182,7 +183,7 @@ def _motion_of_run(
 
 MOTION = Stage(
     "motion",
-    "51",
+    "52",
     MotionParameters,
     _motion_of_run,
     "camera pose in every frame and the pipe's axis, from texture, rings and encoder together",

@@ -39,7 +39,9 @@ _SLIP_STEP_MM = 0.02
 _SLIP_MM = 0.3
 """A slip is a row of steps of the encoder's slip beyond six spreads and 0.02 mm, 0.3 mm in all."""
 _TOLD_SIGMAS = 5.0
-"""Slips are told from so many σ of the encoder's stated scale on, over the whole way."""
+"""Slips are told from so many σ on, each by the σ over its own way."""
+_TOLD_MM = 3.0
+"""Smaller slips are not told (chosen): rings bridge as much, and a wheel at rest has some play."""
 
 
 def find_events(
@@ -68,19 +70,34 @@ def find_events(
 
 
 def warn_of_slips(
-    events: tuple[MotionEvent, ...], trajectory: Trajectory, scale_sigma: float, context: Context
+    events: tuple[MotionEvent, ...],
+    trajectory: Trajectory,
+    scale_sigma: float,
+    reading_sigma_mm: float,
+    context: Context,
 ) -> None:
-    """Warn where the encoder lost more of the way than ``scale_sigma``, the 1 σ of its scale, explains."""
-    slips = [e for e in events if e.kind == "encoder_slip"]
-    lost_mm = sum(abs(e.size) for e in slips)
-    way_mm = float(np.abs(np.diff(distance_along(trajectory.axis, trajectory.T_pc))).sum())
-    if lost_mm > _TOLD_SIGMAS * scale_sigma * way_mm > 0:
-        worst = max(slips, key=lambda e: abs(e.size))
+    """Warn where encoder and texture disagree by more than the encoder's σ and its clock explain.
+
+    Each slip is held against the 1 σ of the encoder's scale (1) over the slip's own way, that of two
+    readings, mm, and the way of a usual frame, by which the clocks of encoder and pictures may differ.
+    """
+    z = distance_along(trajectory.axis, trajectory.T_pc)
+    frame_mm = float(np.percentile(np.abs(np.diff(z)), _CRUISE_PERCENT)) if len(z) > 1 else 0.0
+    slips = [e for e in events if e.kind == "encoder_slip" and abs(e.size) > _TOLD_MM]
+    first = np.searchsorted(trajectory.frame, [e.frame_from for e in slips])
+    last = np.searchsorted(trajectory.frame, [e.frame_to for e in slips])
+    size = np.array([abs(e.size) for e in slips])
+    way = np.abs(z[last] - z[first]) + size
+    sigma = np.sqrt((scale_sigma * way) ** 2 + 2 * reading_sigma_mm**2 + frame_mm**2)
+    told = np.flatnonzero(size > _TOLD_SIGMAS * sigma)
+    if len(told):
+        worst = slips[told[np.argmax(size[told])]]
+        elsewhere = f", and {len(told) - 1} times more" if len(told) > 1 else ""
         context.warn(
-            f"encoder and wall's texture disagree by {lost_mm:.1f} of {way_mm:.0f} mm, most between frame "
-            f"{worst.frame_from} and {worst.frame_to}: the wheel slipped or hung, readings stop, or a filter "
-            "against noise held the texture back. Distances there follow laser and texture. What to do: see "
-            "that the wheel is pressed to the wall and turns, and that encoder.csv is whole"
+            f"encoder and wall's texture disagree by {abs(worst.size):.1f} mm between frame "
+            f"{worst.frame_from} and {worst.frame_to}{elsewhere}: the wheel slipped or hung, readings stop, "
+            "or a filter against noise held the texture back. Distances there follow laser and texture. What "
+            "to do: see that the wheel is pressed to the wall and turns, and that encoder.csv is whole"
         )
 
 

@@ -118,21 +118,57 @@ def test_slip_is_found_where_there_is_an_encoder(encoder: bool, expected: set[st
         assert found["encoder_slip"].frame_from == 69
 
 
-@pytest.mark.parametrize(
-    ("from_frame", "each_mm", "told"), [(90, -STEP, "disagree by 18.0 of 71 mm"), (119, 0.5, "")]
-)
-def test_an_encoder_that_stopped_counting_is_told(from_frame: int, each_mm: float, told: str) -> None:
-    """Readings hung for the last quarter of a run without a word; half a millimetre is no news."""
-    slip = np.cumsum(np.where(np.arange(FRAMES) >= from_frame, each_mm, 0.0))
-    found = tuple(events(steady(), slip=slip).values())
-    assert [e.kind for e in found] == ["encoder_slip"]
-    T = np.tile(np.eye(4), (FRAMES, 1, 1))
-    T[:, 2, 3] = steady(0.0)
-    number, axis = np.arange(FRAMES), straight_axis(-50, 200)
-    run = Trajectory(number, number / RATE, T, np.zeros((FRAMES, 6, 6)), axis, 50.0, 1.0, 0.0, 0.0, ())
-    words: list[str] = []
-    warn_of_slips(found, run, 0.002, replace(quiet_context(), warn=words.append))
-    assert [told in w for w in words] == [True] * bool(told)
+def told_of(z: Float, slip: Float, scale_sigma: float, reading_sigma_mm: float = 0.015) -> list[str]:
+    """Return what is told where the encoder slips against motion (N,), each step of which is a frame's."""
+    number, words = np.arange(len(z)), list[str]()
+    T = np.tile(np.eye(4), (len(z), 1, 1))
+    T[:, 2, 3] = z
+    axis = straight_axis(min(z) - 50, max(z) + 50)
+    run = Trajectory(number, number / RATE, T, np.zeros((len(z), 6, 6)), axis, 50.0, 1.0, 0.0, 0.0, ())
+    table = FrameTable(number, number / RATE, np.full(len(z), "led"))
+    found = find_events(table, run, TrackedPoses(number, T, np.zeros(len(z), bool)), slip, True)
+    assert [e.kind for e in found if e.kind == "encoder_slip"]
+    context = replace(quiet_context(), warn=words.append)
+    warn_of_slips(found, run, scale_sigma, reading_sigma_mm, context)
+    return words
+
+
+def hung(first: int, last: int, by_mm: float, frames: int = FRAMES) -> Float:
+    return np.interp(np.arange(frames), [first, last], [0.0, by_mm])
+
+
+@pytest.mark.parametrize("scale_sigma", [0.0, 0.002])
+def test_an_encoder_that_stopped_counting_is_told(scale_sigma: float) -> None:
+    """Readings hung for the last quarter of a run without a word; a σ of 0 silenced it."""
+    words = told_of(steady(0.0), hung(89, 119, -18.0), scale_sigma)
+    assert len(words) == 1
+    assert "disagree by 18.0 mm between frame 89 and 119:" in words[0]
+
+
+@pytest.mark.parametrize("frames", [10, 30, FRAMES])
+def test_a_slip_within_a_frames_way_is_no_news(frames: int) -> None:
+    """In a run of ten frames .4 mm were told."""
+    assert told_of(steady(0.0)[:frames], hung(frames // 2, frames // 2 + 1, 0.4, frames), 0.002) == []
+
+
+def test_a_slip_is_judged_by_its_own_way() -> None:
+    """An encoder that hung for 900 mm of 100 m got no word: σ of the scale over 100 m is 200 mm."""
+    words = told_of(5.0 * np.arange(20000), hung(9000, 9180, -900.0, 20000), 0.002)
+    assert len(words) == 1
+    assert "disagree by 900.0 mm between frame 9000 and 9180" in words[0]
+
+
+def test_an_encoder_that_runs_while_the_probe_rests_is_told() -> None:
+    assert len(told_of(np.zeros(600), hung(300, 330, 30.0, 600), 0.002)) == 1
+
+
+def test_many_small_slips_of_jerks_are_not_summed() -> None:
+    slip = np.sum([hung(at, at + 2, 2.0 * (-1) ** at) for at in range(5, 110, 7)], axis=0)
+    assert told_of(steady(0.0), slip, 0.002) == []
+
+
+def test_a_coarse_counter_slips_by_no_count() -> None:
+    assert told_of(steady(0.0), hung(50, 51, 8.0), 0.002, 8 / np.sqrt(12)) == []
 
 
 def test_few_frames_have_no_events() -> None:
