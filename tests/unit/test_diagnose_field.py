@@ -134,3 +134,4 @@ def test_what_the_gauge_refutes_is_unexplained_and_says_what_it_looks_like():
     assert found.verdict is Verdict.UNEXPLAINED
     assert found.members == ()
     assert "looks like this: The laser sheet is tilted" in found.identifiable
+    assert "tell" not in found.record_next

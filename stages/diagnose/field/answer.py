@@ -208,8 +208,13 @@ def _alone(
     certain = found.effects if found.verdict in (Verdict.NAMED, Verdict.PARTLY) else ()
     names = () if certain else classes_of([e.name for e in found.effects])
     where = location_in_field(field, alone.shown)
+    if where is not None and not possible.shown:
+        # What the refuted causes are fixed to was not measured.
+        where = replace(where, fixed_to=None, time=None)
     found = _beside(found, certain, _union(possible.members, names)) if possible.shown else _nameless(found)
-    found = replace(found, identifiable="; ".join(said), record_next=alone.next, notes=(*found.notes, note))
+    found = replace(
+        found, identifiable="; ".join(said), record_next=possible.next, notes=(*found.notes, note)
+    )
     if found.remainder is None:
         return replace(found, location=where)
     return replace(found, remainder=replace(found.remainder, location=where))
