@@ -129,9 +129,10 @@ def test_what_the_gauge_refutes_is_unexplained_and_says_what_it_looks_like():
     noise = SIGMA * np.random.default_rng(1).standard_normal(400)
     field = field_with(2.0 * WAVE @ [0.3, 0.4] + noise)
     answer = field_answer(field, LIBRARY, NOTHING_STATED)
-    nothing = Diagnosis("field", "gauge", Verdict.CONSISTENT, 1.0)
-    found = _alone(nothing, answer, replace(answer, shown=()), field, with_gauge=True)
+    before = Diagnosis("field", "gauge", Verdict.CLASS, 1.0, members=("subsurface", "line_skew"))
+    found = _alone(before, answer, replace(answer, shown=()), field, with_gauge=True)
     assert found.verdict is Verdict.UNEXPLAINED
     assert found.members == ()
     assert "looks like this: The laser sheet is tilted" in found.identifiable
     assert "tell" not in found.record_next
+    assert not any("came or went" in note for note in found.notes)

@@ -13,9 +13,9 @@ from stages.diagnose.gauge.fit import evidence
 from stages.diagnose.gauge.scan import Scored
 from stages.diagnose.inference import Stated, places_of, score
 
-# A gauge has a say only where its 1 σ is below this share of the size that the inspection shows: it is then
-# three such σ away from showing nothing of it. The inspection's own say has the same limit.
-_TELLING = 0.33
+# Inspection and gauge confirm or refute each other only where the 1 σ of what is asked is below this share of
+# the other's size: it is then three such σ away from nothing. Debt: data/debts.md.
+TELLING = 0.33
 _PARTS_OF_THE_PROBE = ("laser", "camera", "window")
 # The medium is that of the pipe or of the gauge, not of the probe.
 _OF_THE_MEDIUM = ("outside_index",)
@@ -37,7 +37,7 @@ def not_refuted(shown: Sequence[Scored], gauge: Examined, stated: Stated) -> tup
     for s in shown:
         own = score(about, stated, places_of(about, s.model, s.shape)) if s in asked else None
         size = float(np.linalg.norm(s.score.amplitude))
-        telling = own is not None and np.sqrt(np.trace(own.covariance)) < _TELLING * size
+        telling = own is not None and np.sqrt(np.trace(own.covariance)) < TELLING * size
         if own is None or not telling or same(
             s.score.amplitude, own.amplitude, s.score.covariance + own.covariance, size
         ):  # fmt: skip

@@ -14,7 +14,7 @@ from stages.diagnose.agreement import same, sized
 from stages.diagnose.channels import Seen
 from stages.diagnose.effects.base import EffectModel, Shape
 from stages.diagnose.effects.courses import OWN_CLOCK, Coursed
-from stages.diagnose.field.against_gauge import not_refuted
+from stages.diagnose.field.against_gauge import TELLING, not_refuted
 from stages.diagnose.field.evidence import FieldEvidence, travels
 from stages.diagnose.gauge.confirm import partial_of
 from stages.diagnose.gauge.examine import Examined
@@ -39,13 +39,14 @@ DETECTED = 1e-4
 _ALMOST, _APART = 0.1, 20.0
 _SHOWN = 4
 _BY_FIELD = "The inspection alone shows: "
+_NOT_IN_GAUGE = (
+    "The gauge run shows none of it: it came or went between the recordings, or does not act in a gauge."
+)
+_ONE_PIPE = "In one pipe of unknown size several causes look alike: it gives a class, not a name."
 _LOOKS_LIKE = (
     "The inspection alone shows something that looks like this: {}. But the gauge run, by the same probe, "
     "shows none of it: the probe changed between the recordings, or the library does not have the cause"
 )
-# The field confirms or contradicts only when its 1 σ is below this share of the effect's size.
-# Debt: data/debts.md.
-_TELLING = 0.33
 
 
 @dataclass(frozen=True)
@@ -198,12 +199,8 @@ def _alone(
 
     Where the gauge run refutes every one of them, what the field shows is unexplained.
     """
-    note = (
-        "The gauge run shows none of it: it came or went between the recordings, or does not act in a gauge."
-        if with_gauge
-        else "In one pipe of unknown size several causes look alike: it gives a class, not a name."
-    )
     told = _BY_FIELD + possible.identifiable if possible.shown else _LOOKS_LIKE.format(alone.identifiable)
+    notes = (_NOT_IN_GAUGE if with_gauge else _ONE_PIPE,) if possible.shown else ()
     said = [text for text in (found.identifiable, told) if text]
     certain = found.effects if found.verdict in (Verdict.NAMED, Verdict.PARTLY) else ()
     names = () if certain else classes_of([e.name for e in found.effects])
@@ -213,7 +210,7 @@ def _alone(
         where = replace(where, fixed_to=None, time=None)
     found = _beside(found, certain, _union(possible.members, names)) if possible.shown else _nameless(found)
     found = replace(
-        found, identifiable="; ".join(said), record_next=possible.next, notes=(*found.notes, note)
+        found, identifiable="; ".join(said), record_next=possible.next, notes=(*found.notes, *notes)
     )
     if found.remainder is None:
         return replace(found, location=where)
@@ -221,11 +218,11 @@ def _alone(
 
 
 def _nameless(found: Diagnosis) -> Diagnosis:
-    """Return the answer with something unexplained beside what is sure, else with that alone."""
+    """Return the answer with something unexplained, beside what is sure or alone: no class holds it."""
     if found.verdict in (Verdict.NAMED, Verdict.PARTLY):
         before = found.remainder or Remainder(Verdict.UNEXPLAINED)
         return replace(found, verdict=Verdict.PARTLY, remainder=replace(before, verdict=Verdict.UNEXPLAINED))
-    return replace(found, verdict=Verdict.UNEXPLAINED)
+    return replace(found, verdict=Verdict.UNEXPLAINED, members=(), effects=())
 
 
 def _union(first: Sequence[str], second: Sequence[str]) -> tuple[str, ...]:
@@ -253,7 +250,7 @@ def confirm_in_field(
         return None
     own = _own_score(model, shape, found, stated)
     size = float(np.linalg.norm(amplitude))
-    if own is None or np.sqrt(np.trace(own.covariance)) > _TELLING * size:
+    if own is None or np.sqrt(np.trace(own.covariance)) > TELLING * size:
         return None
     return Confirmation(
         f"in the inspection, by the gauge run: {sized(model, shape, amplitude, covariance)}",
