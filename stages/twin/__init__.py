@@ -287,7 +287,7 @@ PHOTOMETRY = Stage(
 )
 TWIN = Stage(
     "twin",
-    "34",
+    "35",
     TwinParameters,
     compare_with_twin,
     "recorded frames beside the same frames, re-rendered from what the run has measured",

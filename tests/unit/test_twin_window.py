@@ -9,7 +9,7 @@ from stages.twin.compare import BLOCK_PX, block_textures
 from stages.twin.locate import ImagePlace, full_size, places_displaced, places_in_image, told_once
 from stages.twin.render import Region, TwinFrame
 from stages.twin.scene import Ring
-from stages.twin.spot import FittedLaw
+from stages.twin.spot import FittedLaw, _slopes_at, _spot_at
 from stages.twin.window import WindowPlace, _fall_of_drop, _with_photo, beside_blur, through_window
 
 
@@ -240,6 +240,15 @@ def test_the_size_of_a_spot_holds_whatever_its_rim(flatness):
     away = np.abs(1 - (1 - 0.3) * (1 - in_photo) - share.value)
     assert np.mean(away < 2 * share.sd) > 0.99
     assert np.mean(away < share.sd) == pytest.approx(1 / np.sqrt(3), abs=0.07)  # of a uniform error
+
+
+def test_a_spot_is_fitted_by_its_derivatives():
+    u, v = np.mgrid[3:60:7, 4:50:5].reshape(2, -1)
+    spot = np.array([0.4, 31.0, 24.0, 12.0, 1.7, 0.02])
+    for k, step in enumerate(1e-5 * np.maximum(spot, 1.0)):
+        more, less = (_spot_at(spot + way * step * np.eye(6)[k], u, v) for way in (1, -1))
+        np.testing.assert_allclose(_slopes_at(spot, u, v)[:, k], (more - less) / (2 * step), atol=1e-6)
+    assert np.isfinite(_slopes_at(spot, np.array([31]), np.array([24]))).all()
 
 
 @pytest.mark.parametrize("share", [-0.2, 1.2])
