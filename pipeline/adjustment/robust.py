@@ -122,16 +122,16 @@ def spread_about_median(values: Float | Float32) -> float:
     return robust_spread(values - np.median(values))
 
 
-def basis_of(azimuth_rad: Float) -> Float:
-    """Return (A, 5): 1, cos ψ, sin ψ, cos 2ψ, sin 2ψ."""
-    waves = [f(m * azimuth_rad) for m in range(1, _HARMONICS + 1) for f in (np.cos, np.sin)]
+def basis_of(azimuth_rad: Float, harmonics: int = _HARMONICS) -> Float:
+    """Return (A, 1 + 2 h): 1, cos ψ, sin ψ, … cos hψ, sin hψ for h harmonics."""
+    waves = [f(m * azimuth_rad) for m in range(1, harmonics + 1) for f in (np.cos, np.sin)]
     return np.stack([np.ones_like(azimuth_rad), *waves], -1)
 
 
 def ring_harmonics(radius: Float, basis: Float) -> Float:
-    """Return the harmonics (S, 5) of rows (S, A) by a redescending fit, so that defects do not pull.
+    """Return the harmonics (S, B) of rows (S, A) by a redescending fit, so that defects do not pull.
 
-    ``basis`` (A, 5) is that of `basis_of`. NaN for rows seen to less than a half.
+    ``basis`` (A, B) is that of `basis_of`. NaN for rows seen to less than a half.
     """
     radius, basis = _sectors(radius), _sectors(basis.T).T
     seen = np.isfinite(radius)

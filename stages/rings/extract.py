@@ -12,11 +12,12 @@ from pydantic import Field
 from pipeline.arrays import Byte, Float, Float32, Image, Int
 from pipeline.artefacts.measured import RingSamples, RingValidity
 from pipeline.errors import UnusableError
-from pipeline.geometry.image_places import ImagePlaces, clear_of
+from pipeline.geometry.image_places import ImagePlaces
 from pipeline.instrument.probe import Probe
 from pipeline.machine.scratch import Scratch
 from pipeline.machine.stage import Context, Parameters
 from pipeline.recording.base import Illumination, Recording
+from stages.rings.behind_dirt import left_out
 from stages.rings.expectation import warn_of_rings
 from stages.rings.glints import SAYING_RINGS
 from stages.rings.lattice import lattices_of, take_out, warn_of_lattices
@@ -57,8 +58,8 @@ class RingParameters(Parameters):
     )
     left_out: ImagePlaces = Field(
         (),
-        description="dirty places of the image in which no line is measured: u, v and radius, px, of each; "
-        "boresight run --twin takes them from a twin",
+        description="dirty places of the image: u, v and radius, px, of each; the line is left out there "
+        "but where it follows its ring; boresight run --twin takes them from a twin",
     )
 
 
@@ -85,8 +86,7 @@ def extract_rings(
     samples, rings = _empty(frames, sectors, context.scratch), 0
     for done, (frame, trace) in enumerate(found, 1):
         if trace is not None and trace.coverage >= parameters.least_coverage:
-            seen = _outside(parameters.left_out, trace, sectors)
-            _put(samples, int(np.searchsorted(frames, frame)), seen)
+            _put(samples, int(np.searchsorted(frames, frame)), trace)
             rings += 1
         context.progress(done, len(frames))
     if not rings:
@@ -94,6 +94,8 @@ def extract_rings(
             "rings", "no laser ring was found in any frame", frames=frames.tolist(),
             hint="is the laser on, the probe inside the pipe, and the exposure long enough?",
         )  # fmt: skip
+    if parameters.left_out:
+        samples.validity[left_out(samples, parameters.left_out)] = RingValidity.OUT_OF_VIEW
     _compare_rings(samples)
     lattices = lattices_of(samples)
     take_out(lattices, samples)
@@ -186,16 +188,6 @@ def _first_trace(
         clips = trace.response._replace(clip_level=clip_level_of(grey, bgr, line))
         return replace(trace, response=noise_response(grey, sectors, trace.fit, clips))
     return None
-
-
-def _outside(places: ImagePlaces, trace: RingTrace, sectors: Sectors) -> RingTrace:
-    """Return a ring without the samples that lie in dirty places of the image."""
-    if not places:
-        return trace
-    psi = sectors.azimuth_rad
-    uv = sectors.centre_px + trace.fit.radius_px[:, None] * np.stack([np.cos(psi), np.sin(psi)], -1)
-    hidden = ~clear_of(places, uv)
-    return replace(trace, validity=np.where(hidden, RingValidity.OUT_OF_VIEW, trace.validity))
 
 
 def _empty(frames: Int, sectors: Sectors, scratch: Scratch) -> RingSamples:

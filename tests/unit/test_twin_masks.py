@@ -1,18 +1,16 @@
 """What a twin found on the window is kept out of the next run's photo and rings."""
 
 import json
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from pipeline.api.dirt import dirt_of
 from pipeline.api.run import configuration
-from pipeline.artefacts.measured import RingValidity
+from pipeline.artefacts.measured import RingSamples, RingValidity
 from pipeline.errors import InputError
 from pipeline.geometry.image_places import clear_of
-from stages.rings.extract import _outside
-from stages.rings.trace import RingTrace
+from stages.rings.behind_dirt import left_out
 
 
 def _dirty(tmp_path, fixed_to="image", name="droplet", **parameters):
@@ -57,15 +55,54 @@ def test_rings_leave_out_what_moves_the_line(tmp_path, name, parameters, left_ou
     assert tree["texture"]["left_out"]
 
 
-def test_a_ring_has_no_sample_where_the_window_is_dirty():
-    psi = np.linspace(-np.pi, np.pi, 360, endpoint=False)
-    sectors = SimpleNamespace(azimuth_rad=psi, centre_px=np.array([200.0, 200.0]))
-    fit = SimpleNamespace(radius_px=np.full(360, 100.0))
-    trace = RingTrace(fit, np.full(360, RingValidity.VALID, np.uint8), 1.2, None)
-    validity = _outside(((300.0, 200.0, 12.0),), trace, sectors).validity
-    hidden = np.flatnonzero(validity == RingValidity.OUT_OF_VIEW)
-    np.testing.assert_array_equal(hidden, np.arange(174, 187))
-    assert _outside((), trace, sectors) is trace
+def _rings(count, drop=None, way_px=1.0, noise_px=0.05):
+    """Rings about (200, 200) whose middle wanders; a drop (u, v, radius, power) magnifies what it shows."""
+    random, psi = np.random.default_rng(4), np.linspace(-np.pi, np.pi, 360, endpoint=False)
+    middle = 200 + way_px * random.standard_normal((count, 1, 2))
+    outward = np.stack([np.cos(psi), np.sin(psi)], -1)
+    radius = 100 + ((middle - 200) * outward).sum(-1)
+    if drop is not None:
+        u, v, reach, power = drop
+        line = 200 + radius[..., None] * outward - (u, v)
+        away = np.hypot(*np.moveaxis(line, -1, 0))
+        # Near its middle a drop shows at Δ what is at (1 − p) Δ; the line comes to lie farther out.
+        moved = power / (1 - power) / (1 + np.exp(away - reach))
+        radius = radius + moved * (line * outward).sum(-1)
+    radius = (radius + noise_px * random.standard_normal(radius.shape)).astype(np.float32)
+    same, valid = np.full_like(radius, 0.05), np.zeros(radius.shape, np.uint8)
+    assert RingValidity.VALID == 0
+    return RingSamples(np.arange(count), psi, np.array([200.0, 200.0]), radius, same, same, same, valid)
+
+
+def test_a_ring_has_no_sample_where_the_window_is_dirty_and_rings_are_too_few_to_tell():
+    hidden = left_out(_rings(1, way_px=0.0, noise_px=0.0), ((300.0, 200.0, 12.0),))
+    np.testing.assert_array_equal(np.flatnonzero(hidden[0]), np.arange(174, 187))
+    assert not left_out(_rings(1), ()).any()
+    assert not left_out(_rings(1), ((200.0, 200.0, 50.0),)).any()
+
+
+def test_a_line_that_a_place_of_the_image_leaves_alone_is_measured_there():
+    """A drop beside the line, found in blocks of pixels, reached over it: an eighth of the wall was lost."""
+    beside = _rings(60, drop=(270.0, 200.0, 14.0, 0.6))
+    assert left_out(beside, ((270.0, 200.0, 36.0),)).mean() < 0.01
+    assert left_out(_rings(8), ((270.0, 200.0, 36.0),)).any(0).sum() > 20
+
+
+@pytest.mark.parametrize("at_u", [300.0, 290.0, 312.0])
+def test_a_line_that_a_drop_moves_or_magnifies_is_left_out(at_u):
+    """Amid a drop the line stays where it is; but its way, as a dent's depth, is magnified."""
+    drop = (at_u, 200.0, 14.0, 0.6)
+    rings, clean = _rings(60, drop), _rings(60)
+    lost = left_out(rings, ((at_u, 200.0, 36.0),)).any(0)
+    moved = np.abs(rings.radius_px - clean.radius_px).mean(0) > 0.2
+    assert moved.sum() >= 5
+    assert lost[moved].all()
+    assert lost.sum() <= moved.sum() + 24
+
+
+def test_a_line_whose_way_nothing_tells_is_left_out():
+    steady = _rings(60, way_px=0.0)
+    assert left_out(steady, ((300.0, 200.0, 12.0),)).any(0).sum() >= 13
 
 
 def test_a_folder_without_a_twin_is_refused(tmp_path):
