@@ -17,7 +17,7 @@ A long wall is gone through in stretches with overlap; what is found does not de
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from scipy.special import ndtri
@@ -32,42 +32,28 @@ from pipeline.instrument.probe import Probe
 from pipeline.machine.stage import Context, Stage
 from pipeline.recording.base import Recording
 from pipeline.recording.checks import CheckedFrames
+from stages.defects.all_round import bore_beside, goes_round, measure_all_round
 from stages.defects.along import stretches
 from stages.defects.clean import CleanWall, clean_wall
-from stages.defects.corroborate import Evidence, Witnesses, evidence_for
-from stages.defects.credibility import (
-    COUNTED,
-    MOST_SURE,
-    Credibility,
-    chance_of_depth,
-    credibility_of,
-    is_depth_known,
-)
+from stages.defects.corroborate import Witnesses, evidence_for
 from stages.defects.dark_lines import dark_lines, lies_beside
-from stages.defects.depth import allowed_by_neighbours, measure_depth
+from stages.defects.depth import Depth, allowed_by_neighbours, measure_depth
 from stages.defects.describe import Scene, describe, describe_line
 from stages.defects.detect import Detection, detect
 from stages.defects.grow import footprint, grown
-from stages.defects.noise_tail import NoiseTail, noise_tail
+from stages.defects.judge import Found, credibility_on, judged
+from stages.defects.noise_tail import noise_tail
 from stages.defects.parallax import LitPictures
 from stages.defects.parameters import DefectParameters
 from stages.defects.relief import smooth_shape_removed
 from stages.defects.segment import Region, regions_of
 from stages.defects.smear import flattened
-from stages.defects.steps import IS_STEP, is_step
 from stages.defects.surface import MeasuredWall, Surface
 from stages.defects.told import report_found, report_unconfirmed, warn_of_missed, warn_of_short_ones
 
 __all__ = ["DEFECTS", "DefectParameters", "find_defects"]
 
 _MIN_CELLS, _MIN_CIRCLES, _HALF = 1000, 8, 0.5
-# Nothing says that what stays at one place of the image, or lies where the line ends, is rather the wall.
-_WALL_OR_NOT = 0.5
-_UNSURE = "Its depth is not known to twice its σ"
-_AT_LEAST = (
-    "It is at least so deep, to ± {:.2f} mm by noise, which does not make it: the rest of σ is what pictures "
-    "that hold some of those before them may have taken off."
-)
 
 
 def find_defects(
@@ -105,9 +91,9 @@ def find_defects(
     clean = clean_wall(measured, regions)
     found = tuple(_measured(measured, regions, clean, seeds.score, scene, wall.fixed, parameters, context))
     tail = noise_tail(relief, seeds, known)
-    credibility = _credibility(found, tail, measured)
+    credibility = credibility_on(found, tail, measured)
     context.report("peaks of noise expected above the threshold", tail.above(seeds.threshold), "")
-    confirmed, unconfirmed = _judged(found, credibility, parameters.min_depth_mm)
+    confirmed, unconfirmed = judged(found, credibility, parameters.min_depth_mm)
     lines = list(_lines(measured, found, clean, scene, parameters, context))
     items, alone = _numbered(confirmed, 1), _numbered([*unconfirmed, *lines], len(confirmed) + 1)
     expected = sum(1 - d.probability for d in items)
@@ -125,45 +111,6 @@ def _numbered(found: Sequence[Defect], first: int) -> tuple[Defect, ...]:
     return tuple(replace(defect, id=n) for n, defect in enumerate(found, first))
 
 
-@dataclass(frozen=True)
-class _Found:
-    """A region that is deep enough to be reported, described as if it were surely there.
-
-    ``by_noise`` is the same with the σ that noise alone makes. It may be a ``step`` of the bore.
-    """
-
-    region: Region
-    defect: Defect
-    by_noise: Defect
-    evidence: Evidence
-    step: bool
-
-    @property
-    def flattened(self) -> bool:
-        """Whether it is deeper than noise makes it, and may have been flattened by about its depth."""
-        return is_depth_known(self.by_noise) and not is_depth_known(self.defect)
-
-    def told(self, probability: float, counts: bool) -> Defect:
-        """Return it with its probability, and if it counts in words whether its depth is a lower bound.
-
-        Of what goes all round it is none: the deepest place of so many may be a glint's on it.
-        """
-        words = _AT_LEAST.format(self.by_noise.depth_sigma_mm)
-        bound = counts and self.flattened and not self.region.all_round
-        told = f"{self.defect.statement} {words}" if bound else self.defect.statement
-        sure = self.defect.confidence * probability
-        return replace(self.defect, probability=probability, confidence=sure, statement=told)
-
-
-def _credibility(found: Sequence[_Found], tail: NoiseTail, wall: MeasuredWall) -> Credibility:
-    """Return what is to be expected by the findings on the wall; welds and steps are left out."""
-    used = [f for f in found if f.evidence.on_wall and not (f.region.all_round or f.step)]
-    column = 2 * np.pi / wall.relief.shape[1]
-    widths = [f.region.mask.shape[1] * column for f in used]
-    rings = len(np.unique(wall.cloud.cloud.frame))
-    return credibility_of([f.evidence for f in used], widths, rings, tail)
-
-
 def _measured(
     wall: MeasuredWall,
     regions: tuple[Region, ...],
@@ -173,7 +120,7 @@ def _measured(
     fixed: FixedToProbe | None,
     parameters: DefectParameters,
     context: Context,
-) -> Iterator[_Found]:
+) -> Iterator[Found]:
     """Yield the regions that were measured and are as deep as is worth reporting."""
     for done, region in enumerate(regions, 1):
         # A region that the sure points do not show is measured once more with all points.
@@ -181,22 +128,45 @@ def _measured(
             surface, here = wall.surface_about(region, every_point)
             if not _is_measured(surface, here):
                 continue
-            depth = measure_depth(here, surface, clean, parameters.draws, context.random)
-            depth = allowed_by_neighbours(depth, here, surface)
+            depth = _depth_of(region, here, surface, wall, clean, parameters, context)
             if region.sign * depth.depth_mm >= parameters.min_depth_mm:
                 top = float(region.cut(score.astype(float))[region.mask].max())
                 evidence = evidence_for(here, depth, surface, scene.seen_by, _fixed_in(region, fixed), top)
-                step = is_step(region, depth.depth_mm, wall.relief.radius_map)
+                bead = _chance_of_bead(region, wall, parameters)
                 widened = flattened(depth, here, surface, scene.seen_by.held, wall.ways_mm)
                 told = describe(here, widened, surface, scene)
-                yield _Found(region, told, replace(told, depth_sigma_mm=depth.sigma_mm), evidence, step)
+                yield Found(region, told, replace(told, depth_sigma_mm=depth.sigma_mm), evidence, bead)
                 break
         context.progress(len(regions) + done, 2 * len(regions))
 
 
+def _depth_of(
+    region: Region,
+    here: Region,
+    surface: Surface,
+    wall: MeasuredWall,
+    clean: CleanWall,
+    parameters: DefectParameters,
+    context: Context,
+) -> Depth:
+    """Return the depth of a region, of which ``here`` counts its rows from the surface's first."""
+    if region.all_round:
+        return measure_all_round(here, surface, clean, bore_beside(region, wall.relief.radius_map))
+    depth = measure_depth(here, surface, clean, parameters.draws, context.random)
+    return allowed_by_neighbours(depth, here, surface)
+
+
+def _chance_of_bead(region: Region, wall: MeasuredWall, parameters: DefectParameters) -> float:
+    """Return the probability that a region is no step of the bore."""
+    radius_map = wall.relief.radius_map
+    if not goes_round(region, radius_map):
+        return 1.0
+    return bore_beside(region, radius_map).chance_of_bead(parameters.min_depth_mm)
+
+
 def _lines(
     wall: MeasuredWall,
-    found: Sequence[_Found],
+    found: Sequence[Found],
     clean: CleanWall,
     scene: Scene,
     parameters: DefectParameters,
@@ -217,29 +187,6 @@ def _fixed_in(region: Region, fixed: FixedToProbe | None) -> Float:
         return np.zeros(region.mask.shape)
     rows = fixed.departure_mm[region.row : region.row + len(region.mask)].astype(float)
     return region.counted_from(region.row).cut(rows)
-
-
-def _judged(
-    found: Sequence[_Found], credibility: Credibility, min_depth_mm: float
-) -> tuple[list[Defect], list[Defect]]:
-    """Return what is confirmed, and what is not, with the reason."""
-    confirmed: list[Defect] = []
-    unconfirmed: list[Defect] = []
-    for f in found:
-        deep = chance_of_depth(f.by_noise, min_depth_mm)
-        real = deep if f.region.all_round else deep * credibility.chance_against_clutter(f.evidence)
-        real = min(real, MOST_SURE) * (1.0 if f.evidence.on_wall else _WALL_OR_NOT)
-        real = 0.0 if f.step else real
-        counts = f.evidence.corroborated and real >= COUNTED and is_depth_known(f.by_noise)
-        defect = f.told(real, counts)
-        if counts:
-            confirmed.append(defect)
-        else:
-            doubt = f.evidence.doubt if is_depth_known(f.by_noise) or not f.evidence.corroborated else _UNSURE
-            doubt = IS_STEP if f.step else doubt
-            words = f"{defect.statement} Not confirmed. {doubt}."
-            unconfirmed.append(replace(defect, statement=words))
-    return confirmed, unconfirmed
 
 
 def _is_measured(surface: Surface, region: Region) -> bool:
@@ -287,5 +234,5 @@ def _defects_of_run(
 
 
 DEFECTS = Stage(
-    "defects", "34", DefectParameters, _defects_of_run, "defects as instances with depth, clock and kind"
+    "defects", "35", DefectParameters, _defects_of_run, "defects as instances with depth, clock and kind"
 )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -32,6 +33,11 @@ class CleanWall:
     local_mm: Float
     clean: Bool
     scale: float
+
+    @cached_property
+    def noise_mm(self) -> float:
+        """1 σ of the clean wall's noise, 0 where none of it is clean."""
+        return self.scale * robust_spread(self.local_mm[self.clean]) if self.clean.any() else 0.0
 
     def draw(self, shape: tuple[int, int], random: np.random.Generator) -> Float:
         """Return a patch (H, W) of the clean wall, cleanest of some tries; its sign is drawn too."""

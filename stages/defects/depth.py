@@ -66,7 +66,7 @@ def measure_depth(
     Tibshirani, An Introduction to the Bootstrap, 1993, ch. 10), larger where the map's own noise is.
     """
     relief = surface.relief
-    height = region.sign * region.cut(surface.all_mm if region.all_round else surface.local_mm)
+    height = region.sign * region.cut(surface.local_mm)
     inside = region.mask & np.isfinite(height)
     height = np.where(inside, height, 0.0)
     peak = np.unravel_index(int(np.argmax(height)), height.shape)
@@ -74,20 +74,25 @@ def measure_depth(
     top = float(smooth[inside].max())
     # where points show nothing of what the map shows, the top of a defect may lie below zero
     near = inside & (smooth >= top - 0.5 * abs(top))
-    gain = _noise_gain(region, relief)
+    gain = noise_gain(region, relief)
     drawn = np.array([(smooth + gain * clean.draw(height.shape, random))[near].max() for _ in range(draws)])
     bias = float(drawn.mean()) - top
     depth = float(height[peak]) - bias
     sharpened = float((region.cut(surface.all_mm) - region.cut(surface.coarse_mm))[peak])
-    scatter = float(np.linalg.norm([drawn.std(), _SHARPENING * np.nan_to_num(sharpened)]))
+    scatter = float(np.hypot(drawn.std(), sharpening_sigma(sharpened)))
     if _is_small(relief, region, surface.points):
         noise = Noise(clean, float(gain[near].mean()), relief.cell_mm, draws, random)
         depth, scatter = _between_rings(relief, region, surface.points, noise, depth, scatter)
-    sigma = float(np.hypot(scatter, _shape_sigma(relief, region, depth, surface.points.spacing_mm)))
+    sigma = float(np.hypot(scatter, shape_sigma(relief, region, depth, surface.points.spacing_mm)))
     return Depth(region.sign * depth, sigma, bias, (int(peak[0]), int(peak[1])))
 
 
-def _noise_gain(region: Region, relief: Relief) -> Float:
+def sharpening_sigma(sharpened_mm: float) -> float:
+    """Return 1 σ of a peak of which the map's smoothing had taken so much off, mm."""
+    return _SHARPENING * abs(float(np.nan_to_num(sharpened_mm)))
+
+
+def noise_gain(region: Region, relief: Relief) -> Float:
     """Return how many times the wall's usual noise the cells of a region (H, W) have, at least 1.
 
     The line is dim on rust and at the bottom of a pit, and a codec keeps less of it: rings scatter more.
@@ -103,7 +108,7 @@ def allowed_by_neighbours(depth: Depth, region: Region, surface: Surface) -> Dep
     shows.
     """
     top, at = _tops_of_rings(depth, region, surface)
-    if region.all_round or not len(top):
+    if not len(top):
         return depth
     spacing = surface.points.spacing_mm
     beside = (np.abs(at - at[top.argmax()]) < _BESIDE * spacing) & (np.arange(len(top)) != top.argmax())
@@ -137,7 +142,7 @@ def _is_small(relief: Relief, region: Region, points: DeviationPoints) -> bool:
     first, last = region.row - margin, region.row + region.mask.shape[0] + margin
     beside = any(first < w.stop and w.start < last for w in relief.welds)
     length = region.mask.shape[0] * relief.cell_mm[0]
-    return not region.all_round and not beside and length < _FEW_RINGS * points.spacing_mm
+    return not beside and length < _FEW_RINGS * points.spacing_mm
 
 
 @dataclass(frozen=True)
@@ -171,7 +176,7 @@ def _between_rings(
     return bell.height_mm, float(np.hypot(bell.sigma_mm, _SHARPENING * (bell.height_mm - depth_mm)))
 
 
-def _shape_sigma(relief: Relief, region: Region, depth_mm: float, spacing_mm: float) -> float:
+def shape_sigma(relief: Relief, region: Region, depth_mm: float, spacing_mm: float) -> float:
     """Return 1 σ of the pipe's own shape below the defect: a ring's five harmonics, given its roughness.
 
     What the defect's own foot takes from them is at most a few per cent of its depth. Where few rings cross

@@ -10,6 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from pipeline.adjustment.robust import row_median
 from pipeline.adjustment.shared_light import HeldOver
 from pipeline.arrays import Float
 from pipeline.artefacts.cloud_along import usual_way
@@ -34,12 +35,20 @@ def flattened(depth: Depth, region: Region, surface: Surface, held: HeldOver, wa
     way_mm = usual_way(ways_mm[np.unique(surface.near.frame)])
     if not held.handed_on or not way_mm:
         return depth
-    shown = region.cut(surface.all_mm if region.all_round else surface.local_mm)[:, depth.peak[1]]
-    profile = np.fmax(np.sign(depth.depth_mm) * shown, 0.0)
+    profile = np.fmax(np.sign(depth.depth_mm) * _shown(region, surface, depth.peak[1]), 0.0)
     cell_mm = surface.relief.cell_mm[0]
     share = float(held.handed_on ** (cell_mm / way_mm))
     lost = abs(depth.depth_mm) * _lost(profile, share, cell_mm)
     return replace(depth, sigma_mm=float(np.hypot(depth.sigma_mm, lost)))
+
+
+def _shown(region: Region, surface: Surface, column: int) -> Float:
+    """Return a finding's profile (H,) along the pipe, of what goes all round the median round the pipe."""
+    return (
+        row_median(region.cut(surface.all_mm))
+        if region.all_round
+        else region.cut(surface.local_mm)[:, column]
+    )
 
 
 def _lost(profile: Float, share: float, cell_mm: float) -> float:

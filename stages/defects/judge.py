@@ -1,0 +1,99 @@
+"""Which findings are confirmed, with which probability, and why the others are not."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pipeline.artefacts.findings import Defect
+from stages.defects.all_round import IS_STEP
+from stages.defects.corroborate import Evidence
+from stages.defects.credibility import (
+    COUNTED,
+    MOST_SURE,
+    Credibility,
+    chance_of_depth,
+    credibility_of,
+    is_depth_known,
+)
+from stages.defects.noise_tail import NoiseTail
+from stages.defects.segment import Region
+from stages.defects.surface import MeasuredWall
+
+# Nothing says that what stays at one place of the image, or lies where the line ends, is rather the wall.
+_WALL_OR_NOT = 0.5
+_UNSURE = "Its depth is not known to twice its σ"
+_AT_LEAST = (
+    "It is at least so deep, to ± {:.2f} mm by noise, which does not make it: the rest of σ is what pictures "
+    "that hold some of those before them may have taken off."
+)
+
+
+@dataclass(frozen=True)
+class Found:
+    """A region that is deep enough to be reported, described as if it were surely there.
+
+    ``by_noise`` is the same with the σ that noise alone makes, ``bead`` the probability that it is no step of
+    the bore.
+    """
+
+    region: Region
+    defect: Defect
+    by_noise: Defect
+    evidence: Evidence
+    bead: float
+
+    @property
+    def step(self) -> bool:
+        """Whether it is rather a step of the bore."""
+        return self.bead < COUNTED
+
+    @property
+    def flattened(self) -> bool:
+        """Whether it is deeper than noise makes it, and may have been flattened by about its depth."""
+        return is_depth_known(self.by_noise) and not is_depth_known(self.defect)
+
+    def told(self, probability: float, counts: bool) -> Defect:
+        """Return it with its probability, and if it counts in words whether its depth is a lower bound.
+
+        Of what goes all round it is none: the deepest place of so many may be a glint's on it.
+        """
+        words = _AT_LEAST.format(self.by_noise.depth_sigma_mm)
+        bound = counts and self.flattened and not self.region.all_round
+        told = f"{self.defect.statement} {words}" if bound else self.defect.statement
+        sure = self.defect.confidence * probability
+        return replace(self.defect, probability=probability, confidence=sure, statement=told)
+
+
+def credibility_on(found: Sequence[Found], tail: NoiseTail, wall: MeasuredWall) -> Credibility:
+    """Return what is to be expected by the findings on the wall; welds and steps are left out."""
+    used = [f for f in found if f.evidence.on_wall and not (f.region.all_round or f.step)]
+    column = 2 * np.pi / wall.relief.shape[1]
+    widths = [f.region.mask.shape[1] * column for f in used]
+    rings = len(np.unique(wall.cloud.cloud.frame))
+    return credibility_of([f.evidence for f in used], widths, rings, tail)
+
+
+def judged(
+    found: Sequence[Found], credibility: Credibility, min_depth_mm: float
+) -> tuple[list[Defect], list[Defect]]:
+    """Return what is confirmed, and what is not, with the reason."""
+    confirmed: list[Defect] = []
+    unconfirmed: list[Defect] = []
+    for f in found:
+        deep = chance_of_depth(f.by_noise, min_depth_mm)
+        real = deep if f.region.all_round else deep * credibility.chance_against_clutter(f.evidence)
+        real = min(real, MOST_SURE) * (1.0 if f.evidence.on_wall else _WALL_OR_NOT)
+        real *= f.bead
+        counts = f.evidence.corroborated and real >= COUNTED and is_depth_known(f.by_noise)
+        defect = f.told(real, counts)
+        if counts:
+            confirmed.append(defect)
+        else:
+            doubt = f.evidence.doubt if is_depth_known(f.by_noise) or not f.evidence.corroborated else _UNSURE
+            doubt = f"{IS_STEP}, with a probability of {min(1 - f.bead, MOST_SURE):.2f}" if f.step else doubt
+            words = f"{defect.statement} Not confirmed. {doubt}."
+            unconfirmed.append(replace(defect, statement=words))
+    return confirmed, unconfirmed

@@ -1,0 +1,128 @@
+"""Beads with glints on them, and steps of the bore, by the median round the pipe."""
+
+import numpy as np
+import pytest
+
+from pipeline.artefacts.cloud_along import cloud_along
+from stages.defects import DefectParameters, find_defects
+from stages.defects.all_round import Bore, bore_beside, measure_all_round
+from stages.defects.clean import clean_wall
+from stages.defects.grow import millimetre_mean
+from stages.defects.relief import smooth_shape_removed
+from stages.defects.segment import Region
+from stages.defects.surface import MeasuredWall
+from tests.quiet import quiet_context
+from tests.synthetic_wall import DrawnDefect, bare_recording, grey_texture, relief, smooth_noise, wall_of
+
+DISTANCE, RADIUS, NOISE_MM = np.arange(0, 160, 0.5), 38.0, 0.03
+MIDDLE, CENTRE = 60.0, 120
+AZIMUTH = -np.pi + np.arange(360) * np.pi / 180
+SHAPE = (len(DISTANCE), len(AZIMUTH))
+CELL = (0.5, RADIUS * np.pi / 180)
+
+
+def uneven(rng, share):
+    """Return a height round the pipe (A,): a ripple of so many per cent, and half as much at random."""
+    ripple = np.sin(rng.integers(3, 25) * AZIMUTH + rng.uniform(0, 6))
+    return 1 + share * ripple + smooth_noise(rng, (1, SHAPE[1]), share / 2, 4.0)[0]
+
+
+def glints(rng, count):
+    """Return by how much (S, A) so many glints on every ring displace the line, up to 3 mm to either side."""
+    out = np.zeros(SHAPE)
+    for row in range(SHAPE[0]):
+        for column in rng.integers(0, SHAPE[1], count):
+            out[row, (column + np.arange(4)) % SHAPE[1]] = rng.choice([-1, 1]) * rng.uniform(0.5, 3)
+    return out
+
+
+def searched(radius_mm):
+    wall = wall_of(DISTANCE, AZIMUTH, radius_mm, NOISE_MM)
+    recording = bare_recording(2 * RADIUS)
+    return find_defects(recording, wall, grey_texture(wall), DefectParameters(draws=20), quiet_context())
+
+
+def drawn_bead(rng, share):
+    """Return by how much (S, A) a drawn bead or groove changes the radius."""
+    depth = rng.choice([-1, 1]) * rng.uniform(0.4, 1.5)
+    drawn = DrawnDefect("weld", MIDDLE, 0.0, rng.uniform(4, 8), 0.0, depth)
+    return relief(drawn, DISTANCE, AZIMUTH, RADIUS, rng) * uneven(rng, share)
+
+
+def measured(radius_mm):
+    """Return the depth of what goes all round a wall, of which no other finding is looked for."""
+    wall = wall_of(DISTANCE, AZIMUTH, radius_mm, NOISE_MM)
+    shape = smooth_shape_removed(wall.radius_map, DefectParameters())
+    all_mm = shape.rows(shape.welds[0]).all_mm
+    region = Region(shape.welds[0].start, 0, np.isfinite(all_mm), float(np.sign(np.median(all_mm))), True)
+    whole = MeasuredWall(shape, cloud_along(wall.cloud), 0.5)
+    surface, here = whole.surface_about(region, every_point=False)
+    return measure_all_round(
+        here, surface, clean_wall(whole, (region,)), bore_beside(region, wall.radius_map)
+    )
+
+
+@pytest.mark.parametrize(("glints_per_ring", "share"), [(0, 0.02), (0, 0.15), (3, 0.1)])
+def test_a_bead_with_glints_on_it_has_its_own_depth(glints_per_ring, share):
+    """Its depth was a glint's: 4.2 ± 0.2 mm for 0.9."""
+    for seed in range(4):
+        rng = np.random.default_rng(seed)
+        bead = drawn_bead(rng, share)
+        mean = millimetre_mean(bead, CELL)
+        true = float(mean.flat[np.argmax(np.abs(mean))])
+        told = measured(
+            RADIUS + bead + smooth_noise(rng, SHAPE, NOISE_MM, 1.5) + glints(rng, glints_per_ring)
+        )
+        assert abs(told.depth_mm - true) < 2.5 * told.sigma_mm
+        assert told.sigma_mm < max(0.12 * abs(true), 0.06)
+
+
+def test_a_bead_with_a_glint_on_it_is_found_as_a_bead_and_the_glint_apart():
+    """A bead of 0.9 mm with a glint of 2 mm was a step, at 0, between bores of one width."""
+    rng = np.random.default_rng(5)
+    drawn = DrawnDefect("weld", MIDDLE, 0.0, 6.0, 0.0, -0.9)
+    radius = RADIUS + relief(drawn, DISTANCE, AZIMUTH, RADIUS, rng) + smooth_noise(rng, SHAPE, NOISE_MM, 1.5)
+    radius[CENTRE, 100:106] -= 3.0
+    found = searched(radius)
+    (weld,) = (d for d in found.items if d.kind == "weld")
+    assert weld.probability > 0.9
+    assert abs(weld.depth_mm + 0.9) < 0.1
+    assert not any("it is a step" in d.statement for d in found.unconfirmed)
+
+
+@pytest.mark.parametrize("step_mm", [-8.0, 0.6])
+def test_a_step_with_a_glint_on_it_is_no_bead(step_mm):
+    rng = np.random.default_rng(3)
+    step = step_mm / (1 + np.exp(-(DISTANCE - MIDDLE) / 1.0))[:, None]
+    radius = RADIUS + step + smooth_noise(rng, SHAPE, NOISE_MM, 1.5)
+    radius[CENTRE - 3, 100:106] -= 3.0
+    found = searched(radius)
+    assert not any(d.clock_to - d.clock_from == 12.0 for d in found.items)
+    assert [d for d in found.unconfirmed if "it is a step" in d.statement and d.probability < 0.01]
+
+
+def test_a_bead_between_bores_of_two_widths_is_a_bead():
+    rng = np.random.default_rng(4)
+    drawn = DrawnDefect("weld", MIDDLE, 0.0, 6.0, 0.0, -1.0)
+    step = 0.3 / (1 + np.exp(-(DISTANCE - MIDDLE) / 1.0))[:, None]
+    bead = relief(drawn, DISTANCE, AZIMUTH, RADIUS, rng)
+    found = searched(RADIUS + step + bead + smooth_noise(rng, SHAPE, NOISE_MM, 1.5))
+    assert [d for d in found.items if d.kind == "weld" and d.probability > 0.9]
+
+
+def test_the_chance_of_a_bead_is_as_sure_as_the_bore_beside_it():
+    """A bead stands out alike of both sides, a step of one; half of it is as likely the one as the other."""
+    assert Bore(np.array([1.0, 1.0]), 0.05).chance_of_bead(0.2) == 1.0
+    assert Bore(np.array([1.0, 0.0]), 0.05).chance_of_bead(0.2) < 0.001
+    assert Bore(np.array([0.9, 0.3]), 0.05).chance_of_bead(0.2) == 0.5
+    assert 0.5 < Bore(np.array([1.0, 0.55]), 0.1).chance_of_bead(0.2) < 0.9
+    assert Bore(np.array([1.0, np.nan]), 0.05).chance_of_bead(0.2) == 1.0
+
+
+def test_the_scatter_of_the_bore_beside_is_found_beside_the_foot_of_a_step():
+    rng = np.random.default_rng(5)
+    errors = rng.normal(0, 0.05, SHAPE[0])[:, None]
+    step = -3.0 / (1 + np.exp(-(DISTANCE - 62) / 1.0))[:, None]
+    wall = wall_of(DISTANCE, AZIMUTH, RADIUS + errors + step + np.zeros(SHAPE))
+    bore = bore_beside(Region(110, 0, np.ones((14, SHAPE[1]), bool), -1.0, True), wall.radius_map)
+    assert bore.sigma_mm == pytest.approx(0.05, rel=0.6)
