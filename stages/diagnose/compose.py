@@ -175,7 +175,7 @@ def _identifiable(said: _Said, examined: Examined | None, encoder_otherwise: boo
 
 def _unknown(examined: Examined) -> tuple[str, ...]:
     """Return the likeliest of what the library lacks and would show so, in words."""
-    return (*of_gauge.unknown_rivals(examined), *of_gauge.growing_otherwise(examined))[:1]
+    return (*of_gauge.unknown_rivals(examined), *of_gauge.like_a_name(examined))[:1]
 
 
 def _beyond(claims: Sequence[Claim], effects: Sequence[EffectFound]) -> list[Claim]:

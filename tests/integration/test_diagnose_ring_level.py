@@ -11,16 +11,20 @@ from pipeline.physics.effect import CourseKind
 from pipeline.simulator.effects.switch import Switch, parse_switches
 from pipeline.simulator.scene import read_scene
 from stages.diagnose.effects.base import Shape, Travel
+from stages.diagnose.effects.courses import Coursed
 from stages.diagnose.effects.library import LIBRARY
 from stages.diagnose.effects.nameless import GENERIC, STEADY
 from stages.diagnose.effects.pose import MotionBlur
 from stages.diagnose.gauge.answer import effects_found, formula, verdict_of
 from stages.diagnose.gauge.examine import Examined, examine
-from stages.diagnose.gauge.fit import fit
+from stages.diagnose.gauge.fit import evidence, fit
 from stages.diagnose.gauge.formula import says_the_same
+from stages.diagnose.gauge.hypotheses import judged_of
 from stages.diagnose.gauge.run import Term
 from stages.diagnose.gauge.scan import scan
 from stages.diagnose.gauge.search import prepare
+from stages.diagnose.gauge.sets import believed
+from stages.diagnose.gauge.unknown_laws import odds_of_unknown_laws
 from stages.diagnose.inference import stated_belief
 from stages.diagnose.result import Verdict
 from tests.benchmarks.ring_level import RingLevelRun, ring_level_run
@@ -32,8 +36,8 @@ FEW = ("laser_tilt", "laser_cone", "baseline", "principal_point", "tube_tilt")
 
 
 @cache
-def measured(switches: tuple[str, ...], seed: int) -> RingLevelRun:
-    scene = read_scene(SCENE).model_copy(update={"seed": seed, "frames": 120, "frame_rate": 15.0})
+def measured(switches: tuple[str, ...], seed: int, frames: int = 120) -> RingLevelRun:
+    scene = read_scene(SCENE).model_copy(update={"seed": seed, "frames": frames, "frame_rate": frames / 8})
     return ring_level_run(scene, SCENE, parse_switches(switches) if switches else ())
 
 
@@ -120,6 +124,28 @@ def test_a_drift_is_sized_with_its_time_constant():
     for name, true in (("relative", 0.003), ("time_s", 2.2)):
         assert effect.parameters[name].value == pytest.approx(true, abs=4 * effect.parameters[name].sd)
         assert 0 < effect.parameters[name].sd < 0.25 * true
+
+
+@pytest.mark.parametrize(
+    ("hidden", "swing", "low", "high"),
+    [
+        ("centre_drift=2.8@-158/2.7s", [Term(LIBRARY["laser_rocking"], (0.126,), np.zeros(4))], 1.0, np.inf),
+        ("principal_point~ramp=2.8@-158/8s", [], 0.0, 1e-3),
+    ],
+)
+def test_an_even_growth_beside_a_swing_may_be_one_course_that_nobody_knows(hidden, swing, low, high):
+    """An optical axis that settles is none that moves evenly while a laser rocks once in the whole run."""
+    run, axis = measured((hidden,), 67, 40), LIBRARY["principal_point"]
+    measurements, start = prepare(run.measured)
+    even, stated = (
+        Term(Coursed(axis, (), CourseKind.RAMP), (8.0,), np.zeros(2)),
+        stated_belief(run.truth.stated),
+    )
+    found = fit(measurements, start, [even, *swing])
+    ratio = believed(evidence(measurements, found, ())[0], 1.0)
+    best = judged_of(measurements, found, (), stated, ratio)
+    for beyond in odds_of_unknown_laws(measurements, best, stated, ratio, {"principal_point": axis}):
+        assert low <= beyond.odds <= high
 
 
 def test_a_knock_is_named_as_a_step_at_its_time():

@@ -72,6 +72,20 @@ def test_the_simulated_sheet_is_knocked_at_its_time_and_keeps_other_changes():
     assert after.baseline_mm - before.baseline_mm == pytest.approx(0.2 * 0.2 / 8, rel=1e-6)
 
 
+@pytest.mark.parametrize("drift", ["baseline_drift", "focal_drift", "centre_drift"])
+def test_a_ramp_is_the_drift_that_the_catalogue_has_under_a_name_of_its_own(drift):
+    """Two names of one curve would share its chance, or one be given where the library lacks the other."""
+    points = ring_points(plain_probe(), BORE, 90, 1.3)
+    run_s = 8.0
+    points = replace(points, time_s=np.linspace(0, run_s, len(points.uv)))
+    model = LIBRARY[drift]
+    slowest = columns(model, points, model.shapes(run_s, 15.0)[-1])
+    ramp = columns(Coursed(model.static, (), CourseKind.RAMP), points, (run_s,))
+    left = slowest - ramp @ np.linalg.lstsq(ramp, slowest)[0]
+    assert np.linalg.norm(left) < 0.02 * np.linalg.norm(slowest)
+    assert f"{model.static.name}, ramp" not in with_courses(LIBRARY)
+
+
 @pytest.mark.parametrize("text", ["ovality~step=0.1", "encoder_scale~ramp=0.01"])
 def test_what_is_no_part_of_the_instrument_has_no_course(text):
     with pytest.raises(InputError, match="cannot change with time"):

@@ -15,10 +15,10 @@ from stages.diagnose.gauge import fit as fitting
 from stages.diagnose.gauge.confirm import Sized, partial_of, quantities
 from stages.diagnose.gauge.elimination import Reduced
 from stages.diagnose.gauge.fit import Fit
+from stages.diagnose.gauge.otherwise import OtherGrowth, other_course
 from stages.diagnose.gauge.run import Term
 from stages.diagnose.gauge.scan import freed
 from stages.diagnose.gauge.score_spread import score_inflation
-from stages.diagnose.gauge.unknown_laws import OtherGrowth
 from stages.diagnose.inference import Column, Evidence, Stated
 from tests.unit.test_diagnose_inference import FRAMES, GLOBALS, equations
 from tests.unit.wall_points import Bore, plain_probe, ring_points
@@ -50,6 +50,34 @@ def test_a_law_that_grows_otherwise_has_another_exponent_at_the_reference_and_th
     assert more == pytest.approx(0.3 * (far.radius_mm / reference - 1) * law)
     assert np.log1p(more / law).mean() / np.log(1.01) == pytest.approx(0.3, abs=0.01)
     assert other.sheet_shift_mm(near, (), np.array([0.3, 0.1])) == pytest.approx(0 * law, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("name", "shape", "size"),
+    [
+        ("laser_tilt", (), [0.2, 0.1]),
+        ("centre_drift", (50.0,), [3.0, -4.0]),
+        ("laser_rocking", (0.5,), [0.6, 0.0, 0.0, 0.8]),
+    ],
+)
+def test_a_course_that_wanders_is_as_large_as_what_it_is_held_against(name, shape, size):
+    """Of a drift so slow that little is reached, the little counts; a swing goes along its longer axis."""
+    random, run_s = np.random.default_rng(2), 8.0
+    points = ring_points(plain_probe(), Bore(50.8), 2000, 1.3)
+    points = replace(points, time_s=random.uniform(0, run_s, len(points.uv)))
+    term = Term(LIBRARY[name], shape, np.array(size))
+    other = other_course(term, cast(Any, SimpleNamespace(rings=points)), run_s)
+
+    def mean_square(model, own, amplitude):
+        shift = np.column_stack(
+            [model.image_shift_px(points, own, amplitude), model.sheet_shift_mm(points, own, amplitude)]
+        )
+        return np.mean(shift**2)
+
+    waves = [mean_square(other, (), wave) for wave in np.eye(len(other.amplitudes))[1:]]
+    longer = {"laser_rocking": np.array([0, 0, 0, 0.8])}.get(name, term.amplitude)
+    # Eight waves hold all but 7 % of the course.
+    assert sum(waves) == pytest.approx(0.93 * mean_square(term.model, shape, longer), rel=0.05)
 
 
 def test_a_time_constant_carries_the_uncertainty_of_its_shape():

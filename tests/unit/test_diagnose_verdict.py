@@ -14,6 +14,7 @@ from stages.diagnose.gauge.hypotheses import Judged
 from stages.diagnose.gauge.judge import Unfitted
 from stages.diagnose.gauge.run import Term
 from stages.diagnose.gauge.sets import Member
+from stages.diagnose.gauge.unknown_laws import Unknown
 from stages.diagnose.result import Confirmation, FitQuality, Verdict
 
 AGREES, DIFFERS = Confirmation("1", "1", True), Confirmation("1", "2", False)
@@ -23,7 +24,7 @@ def examined(
     shifts_px: tuple[float, ...] = (1.0,), patterns_px: tuple[float, ...] = (), chance: float = 0.9999,
     left: float = 0.5, unsplit: tuple[str, ...] = (),
     confirmed: tuple[tuple[Confirmation, ...], ...] = ((AGREES,),), heldout: float = 0.11,
-    unknown: float = 0.0, rival_heldout: float = 1.0, grown: float = 0.0,
+    unknown: float = 0.0, rival_heldout: float = 1.0, grown: float = 0.0, changed: float = 0.0,
 ) -> Any:  # fmt: skip
     """Return a gauge run in which effects and patterns were found that move rings by so much."""
     law = SimpleNamespace(law="laser_tilt")
@@ -50,7 +51,7 @@ def examined(
             confirmed=confirmed,
             unsplit=each,
             quality=quality,
-            unknown_laws=(grown,) * len(library),
+            unknown_laws=(Unknown(grown, changed),) * len(library),
         ),
     )
 
@@ -77,6 +78,8 @@ def examined(
         (examined(grown=0.005), Verdict.NAMED),
         (examined(grown=0.015), Verdict.CLASS),
         (examined(grown=1.5), Verdict.UNEXPLAINED),
+        (examined(changed=0.015), Verdict.CLASS),
+        (examined(changed=1.5), Verdict.UNEXPLAINED),
         (examined(unsplit=("principal_point",)), Verdict.CLASS),
     ],
 )

@@ -14,6 +14,7 @@ from stages.diagnose.gauge.hypotheses import Judged
 from stages.diagnose.gauge.judge import Verdicts
 from stages.diagnose.gauge.run import Term
 from stages.diagnose.gauge.search import shift_px
+from stages.diagnose.gauge.unknown_laws import Unknown
 from stages.diagnose.inference import SURE, UNKNOWN
 from stages.diagnose.result import Candidate, Confirmation, EffectFound, Verdict
 
@@ -40,11 +41,10 @@ def chances(examined: Examined) -> tuple[float, ...]:
     """Return for each effect of the likeliest hypothesis the chance that its name is right.
 
     To the hypotheses without it come, as odds against it: causes that this run is not expected to tell from
-    it, each as likely as it; laws that nobody knows in its place, and one more, `UNKNOWN`, where no second
-    prediction agrees; and an even chance for everything that shows that the
-    hypothesis does not hold: a prediction that fails, a remainder that is no noise, or that moves rings or
-    fiducials by more than the effect, what was held out, and other names, as many or fewer, that predict what
-    was held out better.
+    it, each as likely as it; laws and courses that nobody knows in its place, and one more, `UNKNOWN`, where
+    no second prediction agrees; and an even chance for everything that shows that the hypothesis does not
+    hold: a prediction that fails, a remainder that is no noise, or that moves rings or fiducials by more than
+    the effect, what was held out, and other names, as many or fewer, that predict what was held out better.
     """
     best, verdicts = examined.best, examined.verdicts
     if best is None or verdicts is None:
@@ -55,10 +55,10 @@ def chances(examined: Examined) -> tuple[float, ...]:
     others = better_held_out(verdicts)
     each = zip(best.library_terms, examined.unsplit, examined.confirmed, examined.unknown_laws, strict=False)
     out = []
-    for term, alike, confirmed, grown in each:
+    for term, alike, confirmed, beyond in each:
         doubt = everywhere + len(alike) + sum(not c.agrees for c in confirmed)
         doubt += (left > shift_px(best.fit, term)) + sum(term.model.law not in j.laws for j in others)
-        unknown = grown + UNKNOWN * (not any(c.agrees for c in confirmed))
+        unknown = beyond.odds + UNKNOWN * (not any(c.agrees for c in confirmed))
         out.append(verdicts.chance_of(term) / (1 + doubt + unknown))
     return tuple(out)
 
@@ -99,12 +99,17 @@ def unknown_rivals(examined: Examined) -> tuple[str, ...]:
     return tuple(dict.fromkeys(formula for formula, _ in doubted))
 
 
-def growing_otherwise(examined: Examined) -> tuple[str, ...]:
+def like_a_name(examined: Examined) -> tuple[str, ...]:
     """Return for each name that a law which nobody knows leaves unsure what that law would be like."""
     best = examined.best
     each = zip(best.library_terms, examined.unknown_laws, strict=True) if best is not None else ()
-    unsure = dict.fromkeys(t.model.law for t, odds in each if odds > 1 - SURE)
-    return tuple(f"one like {law} that grows otherwise with the radius" for law in unsure)
+    unsure = [(t.model.law, beyond) for t, beyond in each if beyond.odds > 1 - SURE]
+    return tuple(dict.fromkeys(f"one like {law} {_otherwise(beyond)}" for law, beyond in unsure))
+
+
+def _otherwise(beyond: Unknown) -> str:
+    grows = beyond.growth > beyond.course
+    return "that grows otherwise with the radius" if grows else "that changes otherwise in time"
 
 
 def beyond_line(examined: Examined) -> tuple[bool, ...]:
@@ -185,5 +190,5 @@ def verdict_of(examined: Examined) -> Verdict:
         return Verdict.PARTLY
     # A class of effects would leave out what nobody knows.
     known = any(examined.unsplit) or not unknown_rivals(examined)
-    known &= all(odds < 1 for odds in examined.unknown_laws)
+    known &= all(beyond.odds < 1 for beyond in examined.unknown_laws)
     return Verdict.CLASS if best.named and known else Verdict.UNEXPLAINED

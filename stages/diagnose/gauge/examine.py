@@ -28,7 +28,7 @@ from stages.diagnose.gauge.judge import Verdicts, judge
 from stages.diagnose.gauge.run import GaugeRun, Term
 from stages.diagnose.gauge.search import DETECTED, Search, prepare, search
 from stages.diagnose.gauge.sets import believed
-from stages.diagnose.gauge.unknown_laws import excess_exponent, odds_of_unknown_laws
+from stages.diagnose.gauge.unknown_laws import Unknown, excess_exponent, odds_of_unknown_laws
 from stages.diagnose.inference import Stated, stated_belief
 from stages.diagnose.result import Confirmation, Feasible, FitQuality, Location
 
@@ -97,8 +97,8 @@ class Examined:
         size.
     location : Location or None
     quality : FitQuality or None
-    unknown_laws : tuple of float
-        For each of the same terms the odds, beside its name, of laws that nobody knows.
+    unknown_laws : tuple of Unknown
+        For each of the same terms the odds, beside its name, of laws and courses that nobody knows.
     patterns_by_chance : float
         How often what patterns without a cause take up is expected when nothing is hidden.
     """
@@ -111,7 +111,7 @@ class Examined:
     location: Location | None = None
     quality: FitQuality | None = None
     sizes: tuple[Sized, ...] = ()
-    unknown_laws: tuple[float, ...] = ()
+    unknown_laws: tuple[Unknown, ...] = ()
     patterns_by_chance: float = 1.0
 
     @property

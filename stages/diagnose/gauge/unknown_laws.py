@@ -1,105 +1,47 @@
-"""Laws that nobody knows, in the place of one name or of several: they grow otherwise with the radius.
+"""Laws and courses that nobody knows, in the place of one name or of several.
 
 A name says how an effect grows from the middle of the picture outward. A law that the library lacks may pass
 for it as long as measurements leave that growth open. So each name is held against its own law times a free
 polynomial of the radius: a Gaussian process about the law. Its marginal likelihood pays for this freedom only
 where measurements could have told it (D. MacKay, "Bayesian interpolation", 1992). Without it, a focal length
 that the library lacked was called a shifted dome, and a shifted dome a focal length.
+
+A name also says how an effect comes in time. So each is held, too, against its law with a course that is
+free, a Brownian motion about the named one: an optical axis that drifted as no course in the library does was
+called one that moves evenly beside a laser that rocks once in the whole run.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
 
-from pipeline.arrays import Float
 from pipeline.physics.catalogue import effect
 from pipeline.physics.effect import FixedTo
-from stages.diagnose.effects.base import Amplitude, EffectModel, ImagePoints, Shape
+from stages.diagnose.effects.base import EffectModel
 from stages.diagnose.effects.courses import SEARCHED, Coursed
 from stages.diagnose.effects.kinds import Drifting
 from stages.diagnose.gauge.fit import evidence
 from stages.diagnose.gauge.formula import behaviour, pattern_of
 from stages.diagnose.gauge.hypotheses import Judged
-from stages.diagnose.gauge.run import GaugeRun, Linearised, Term
+from stages.diagnose.gauge.otherwise import other_course, other_growth
+from stages.diagnose.gauge.run import GaugeRun, Term
+from stages.diagnose.gauge.scan import span
 from stages.diagnose.gauge.sets import NAMELESS, beforehand, prior_sigma
 from stages.diagnose.inference import INSTRUMENT, Evidence, Stated, estimate, places_of
 
-_POWERS = (1, 2)
 # How far such a law may be off the named one, as a part of its size: in even steps of the logarithm over
 # what the library's own laws are off each other: over the rings of a gauge of bores of 25 and 38 mm, 122
 # pairs that differ in growth alone are off by .31, 1.4 and 3.8 in the first power (the tenth, the median, all
-# but a tenth) and by .29, 2.1 and 9.8 in the second.
+# but a tenth) and by .29, 2.1 and 9.8 in the second. Courses of the library (constant, with distance, its
+# sign, all searched in time) are off each other's best size by .32, .70 and 2.6 of it.
 _APART = (0.3, 1.0, 3.0)
 # More effects of one harmonic than this come to almost any law together: a shifted optical axis that the
 # library lacked was called a tilted sheet beside two others (`bench_diagnosis --mode leftout`, case 3002).
 _AS_ANY = 2
-
-
-@dataclass(frozen=True)
-class OtherGrowth(EffectModel):
-    """A law at a size, times powers of how far off a reference the radius is, as a part of it.
-
-    Attributes
-    ----------
-    name : str
-    law_of : EffectModel
-    own, size
-        Its shape and its amplitudes (Q,).
-    of_line : bool
-        Whether the radius is that of the wall, mm, as for a laser's sheet; else it is the polar angle, rad.
-    reference : float
-        In that unit.
-    """
-
-    name: str
-    law_of: EffectModel
-    own: Shape
-    size: Float = field(compare=False)
-    of_line: bool
-    reference: float
-    amplitudes: tuple[Amplitude, ...] = tuple(Amplitude(f"power {n}", "", 1.0) for n in _POWERS)
-
-    def image_shift_px(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
-        """Return the law's shift, changed."""
-        change = self._change(points, amplitude)
-        return change[:, None] * self.law_of.image_shift_px(points, self.own, self.size)
-
-    def sheet_shift_mm(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
-        """Return the law's shift, changed."""
-        return self._change(points, amplitude) * self.law_of.sheet_shift_mm(points, self.own, self.size)
-
-    def line_shift_px(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
-        """Return the law's shift, changed."""
-        return self._change(points, amplitude) * self.law_of.line_shift_px(points, self.own, self.size)
-
-    def wall_shift_mm(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
-        """Return the law's shift, changed."""
-        return self._change(points, amplitude) * self.law_of.wall_shift_mm(points, self.own, self.size)
-
-    def quantities(self, shape: Shape, amplitude: Float) -> dict[str, float]:
-        """Return nothing: it is held against a name and never given."""
-        return {}
-
-    def statement(self, shape: Shape, amplitude: Float) -> str:
-        """Return what it is."""
-        return f"A law like {self.law_of.law} that grows otherwise with the radius."
-
-    def _change(self, points: ImagePoints, amplitude: Float) -> Float:
-        """Return (M,) the part of the law's shift that is added."""
-        off = _radius(points, self.of_line) / self.reference - 1
-        return np.asarray(sum(a * off**n for a, n in zip(amplitude, _POWERS, strict=True)))
-
-
-def other_growth(term: Term, at: Linearised, of_line: bool) -> OtherGrowth:
-    """Return the law like a term's that grows otherwise, its reference in the middle of the rings."""
-    middle = float(np.median(_radius(at.rings, of_line)))
-    shape, amplitude = term.at(term.amplitude)
-    name = f"{term.model.name} {term.shape}, growing otherwise"
-    return OtherGrowth(name, term.model, shape, amplitude, of_line, middle)
 
 
 def excess_exponent(
@@ -108,34 +50,54 @@ def excess_exponent(
     """Return by how much d ln |δr| / d ln r exceeds the law's own in the middle of the rings, with 1 σ."""
     other = other_growth(term, best.fit.linearised, of_line=True)
     about = evidence(run, best.fit, [(other, ())], with_spread=False)[0].deflated(believed)
-    both = (*best.fit.terms, Term(other, (), np.zeros(len(_POWERS))))
+    both = (*best.fit.terms, Term(other, (), np.zeros(len(other.amplitudes))))
     found = estimate(about, stated, prior_sigma(about, both))
     at = places_of(about, other, ())[0]
     return float(found.value[at]), float(np.sqrt(found.covariance[at, at]))
 
 
+@dataclass(frozen=True)
+class Unknown:
+    """Odds beside a name: of laws that nobody knows and that grow otherwise, of courses that nobody knows."""
+
+    growth: float
+    course: float
+
+    @property
+    def odds(self) -> float:
+        """Odds of either."""
+        return self.growth + self.course
+
+
 def odds_of_unknown_laws(
     run: GaugeRun, best: Judged, stated: Stated, believed: float, library: Mapping[str, EffectModel]
-) -> tuple[float, ...]:
-    """Return for each effect of the likeliest hypothesis the odds, beside its name, of laws nobody knows.
+) -> tuple[Unknown, ...]:
+    """Return for each effect of the likeliest hypothesis the odds, beside its name, of what nobody knows.
 
-    Such a law is like one of the effects and is there in its place, or in that of several with its harmonic
-    and behaviour in time, patterns without a cause among them; or it is what several come to together, if
-    these have one direction. Two of which one has no direction of its own come to none. Laws that nobody
-    knows are of a kind (a harmonic, of the sheet or of the picture) as often as those of the library are, and
-    a name is one of these. χ² is divided by ``believed``.
+    A law that grows otherwise is like one of the effects and is there in its place, or in that of several
+    with its harmonic and behaviour in time, patterns without a cause among them; or it is what several come
+    to together, if these have one direction. Two of which one has no direction of its own come to none. Laws
+    that nobody knows are of a kind (a harmonic, of the sheet or of the picture) as often as those of the
+    library are, and a name is one of these. A course that is free may be there in the place of several with
+    one harmonic, whatever their behaviour in time is. χ² is divided by ``believed``.
     """
     laws = {model.law for model in library.values()}
     at, terms = best.fit.linearised, best.fit.terms
-    others = [other_growth(t, at, _kind(t.model)[1]) for t in best.library_terms]
-    about = evidence(run, best.fit, [(o, ()) for o in others], with_spread=False)[0].deflated(believed)
+    grown = [other_growth(t, at, _kind(t.model)[1]) for t in best.library_terms]
+    moved = [other_course(t, at, span(run)[0]) for t in best.library_terms]
+    asked = [(o, ()) for o in (*grown, *moved)]
+    about = evidence(run, best.fit, asked, with_spread=False)[0].deflated(believed)
 
     def before(kept: Sequence[Term]) -> float:
         return beforehand(run, [(t.model, t.shape) for t in kept], len(laws))
 
-    patterns = [pattern_of(t)[1:] for t in terms]
-    odds = odds_in(about, terms, [o.name for o in others], patterns, before, stated)
-    return tuple(o * known_alike(t.model, library) for o, t in zip(odds, best.library_terms, strict=True))
+    patterns = [pattern_of(t) for t in terms]
+    laid_out = [(time, harmonic) for _, time, harmonic in patterns]
+    growth = odds_in(about, terms, [o.name for o in grown], laid_out, before, stated)
+    around = [t.model.name if p[2] is None else p[2] for t, p in zip(terms, patterns, strict=True)]
+    course = odds_in(about, terms, [o.name for o in moved], around, before, stated, as_one=False)
+    each = zip(growth, course, best.library_terms, strict=True)
+    return tuple(Unknown(g * known_alike(t.model, library), c) for g, c, t in each)
 
 
 def known_alike(model: EffectModel, library: Mapping[str, EffectModel]) -> float:
@@ -163,12 +125,13 @@ def _kind(model: EffectModel) -> tuple[int | None, bool, str]:
 
 def odds_in(
     about: Evidence, terms: Sequence[Term], others: Sequence[str], pattern: Sequence[object],
-    before: Callable[[Sequence[Term]], float], stated: Stated,
+    before: Callable[[Sequence[Term]], float], stated: Stated, as_one: bool = True,
 ) -> tuple[float, ...]:  # fmt: skip
-    """Return the odds of laws that nobody knows in the place of each of the terms that ``others`` are like.
+    """Return the odds of what nobody knows in the place of each of the terms that ``others`` are like.
 
     ``about`` is the evidence over all terms and all others, ``pattern`` what terms must share to be made by
-    one law, and ``before`` −2 ln of the chance of terms beforehand.
+    one law, and ``before`` −2 ln of the chance of terms beforehand; ``as_one`` says whether terms along one
+    direction may be one law as they are.
     """
     alone, odds = _surprise(about, terms, "", 0.0, stated), np.zeros(len(others))
     for group in _groups(pattern):
@@ -178,7 +141,7 @@ def odds_in(
             kept = [t for n, t in enumerate(terms) if n == k or n not in group]
             left = [_surprise(about, kept, others[k], apart, stated) for apart in _APART]
             headed = all(len(terms[n].amplitude) == len("xy") for n in group)
-            if len(group) > _AS_ANY or (len(group) > 1 and headed):
+            if as_one and (len(group) > _AS_ANY or (len(group) > 1 and headed)):
                 left.append(_surprise(_aligned(about, terms, group, k), terms, "", 0.0, stated))
             gain = alone + before(terms) - before(kept)
             each += [np.exp((gain - one) / 2) for one in left]
@@ -224,7 +187,3 @@ def _surprise(about: Evidence, terms: Sequence[Term], other: str, apart: float, 
     before = np.full(len(grown), apart)
     before[~np.array(grown)] = prior_sigma(own, terms)
     return estimate(over, stated, before).surprise
-
-
-def _radius(points: ImagePoints, of_line: bool) -> Float:
-    return points.radius_mm if of_line else points.theta

@@ -1,0 +1,131 @@
+"""Laws like a named one that grow otherwise with the radius, or change otherwise in time."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from pipeline.arrays import Float
+from stages.diagnose.effects.base import Amplitude, EffectModel, ImagePoints, Shape
+from stages.diagnose.gauge.run import Linearised, Term
+
+_POWERS = (1, 2)
+# Waves of half a period over the run and more of a course that wanders as Brownian motion does: eight hold
+# all but 7 % of its variance, Σ 1/n².
+_WAVES = 8
+# With it such waves of 1 σ, each over its number, have a mean square of 1: (12/π²) Σ 1/(2n²) = 1.
+_UNIT = np.sqrt(12) / np.pi
+
+
+@dataclass(frozen=True)
+class Otherwise(EffectModel):
+    """A law at a size, times a change that is a part of it; held against a name and never given.
+
+    Attributes
+    ----------
+    name : str
+    law_of : EffectModel
+    own, size
+        Its shape and its amplitudes (Q,).
+    """
+
+    name: str
+    law_of: EffectModel
+    own: Shape
+    size: Float = field(compare=False)
+
+    def image_shift_px(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
+        """Return the law's shift, changed."""
+        change = self._change(points, amplitude)
+        return change[:, None] * self.law_of.image_shift_px(points, self.own, self.size)
+
+    def sheet_shift_mm(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
+        """Return the law's shift, changed."""
+        return self._change(points, amplitude) * self.law_of.sheet_shift_mm(points, self.own, self.size)
+
+    def line_shift_px(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
+        """Return the law's shift, changed."""
+        return self._change(points, amplitude) * self.law_of.line_shift_px(points, self.own, self.size)
+
+    def wall_shift_mm(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
+        """Return the law's shift, changed."""
+        return self._change(points, amplitude) * self.law_of.wall_shift_mm(points, self.own, self.size)
+
+    def quantities(self, shape: Shape, amplitude: Float) -> dict[str, float]:
+        """Return nothing: it is never given."""
+        return {}
+
+    def statement(self, shape: Shape, amplitude: Float) -> str:
+        """Return what it is."""
+        return f"A law like {self.law_of.law} that goes otherwise."
+
+    @abstractmethod
+    def _change(self, points: ImagePoints, amplitude: Float) -> Float:
+        """Return (M,) the part of the law's shift that is added."""
+
+
+@dataclass(frozen=True)
+class OtherGrowth(Otherwise):
+    """A law times powers of how far off a reference the radius is, as a part of it.
+
+    Attributes
+    ----------
+    of_line : bool
+        Whether the radius is that of the wall, mm, as for a laser's sheet; else it is the polar angle, rad.
+    reference : float
+        In that unit.
+    """
+
+    of_line: bool
+    reference: float
+    amplitudes: tuple[Amplitude, ...] = tuple(Amplitude(f"power {n}", "", 1.0) for n in _POWERS)
+
+    def _change(self, points: ImagePoints, amplitude: Float) -> Float:
+        off = _radius(points, self.of_line) / self.reference - 1
+        return np.asarray(sum(a * off**n for a, n in zip(amplitude, _POWERS, strict=True)))
+
+
+@dataclass(frozen=True)
+class OtherCourse(Otherwise):
+    """A law times a course that is free: a part that stays, and waves of half a period over the run and more.
+
+    Attributes
+    ----------
+    duration_s : float
+        Of the run.
+    """
+
+    duration_s: float
+    amplitudes: tuple[Amplitude, ...] = tuple(Amplitude(f"wave {n}", "", 1.0) for n in range(_WAVES + 1))
+
+    def _change(self, points: ImagePoints, amplitude: Float) -> Float:
+        phase = np.pi * points.time_s / self.duration_s
+        waves = (a * _UNIT / n * np.cos(n * phase) for n, a in enumerate(amplitude[1:], 1))
+        return np.asarray(sum(waves, np.full(len(phase), amplitude[0])))
+
+
+def other_growth(term: Term, at: Linearised, of_line: bool) -> OtherGrowth:
+    """Return the law like a term's that grows otherwise, its reference in the middle of the rings."""
+    middle = float(np.median(_radius(at.rings, of_line)))
+    shape, amplitude = term.at(term.amplitude)
+    name = f"{term.model.name} {term.shape}, growing otherwise"
+    return OtherGrowth(name, term.model, shape, amplitude, of_line, middle)
+
+
+def other_course(term: Term, at: Linearised, duration_s: float) -> OtherCourse:
+    """Return the law like a term's that changes otherwise in time, as large in the mean square over rings.
+
+    A swing that has two directions goes along the longer one.
+    """
+    shape, amplitude = term.at(term.amplitude)
+    parts, law, own = term.model.factored(at.rings, shape) or ((np.ones(1),), term.model, shape)
+    each = np.split(amplitude, len(parts)) * np.sqrt([[np.mean(p**2)] for p in parts])
+    _, sizes, directions = np.linalg.svd(each)
+    size = each[0] if len(parts) == 1 else sizes[0] * directions[0]
+    return OtherCourse(f"{term.model.name} {term.shape}, in another course", law, own, size, duration_s)
+
+
+def _radius(points: ImagePoints, of_line: bool) -> Float:
+    return points.radius_mm if of_line else points.theta
