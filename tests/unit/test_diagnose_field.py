@@ -8,12 +8,12 @@ import pytest
 
 from stages.diagnose.effects.library import LIBRARY
 from stages.diagnose.field.against_gauge import not_refuted
-from stages.diagnose.field.answer import _alone, _met, field_answer
+from stages.diagnose.field.answer import _alone, _knowing_encoder, _met, field_answer
 from stages.diagnose.field.evidence import FieldEvidence, scale_by_line
 from stages.diagnose.gauge.fit import fit
 from stages.diagnose.gauge.scan import Scored
 from stages.diagnose.gauge.search import prepare
-from stages.diagnose.inference import Column, Evidence, Score, Stated, stated_belief
+from stages.diagnose.inference import INSTRUMENT, Column, Evidence, Score, Stated, stated_belief
 from stages.diagnose.result import Confirmation, Diagnosis, EffectFound, Value, Verdict
 from tests.gauge_runs import made_run, measured_run, stated_probe
 
@@ -75,6 +75,40 @@ def test_a_tilt_is_a_class_with_its_sizes_and_a_gauge_run_is_asked_for():
     found = _alone(bare, answer, answer, field, with_gauge=False)
     assert found.verdict is Verdict.CLASS
     assert found.effects == ()
+
+
+def field_with_way(tilt, read_short):
+    """Evidence of a way between pictures and encoder, which a baseline changes as well, and of a tilt."""
+    way, no_ring, no_way = np.linspace(0.0, 200.0, 100), np.zeros((400, 1)), np.zeros((100, 2))
+    of_encoder, of_baseline = np.r_[no_ring, way[:, None]], np.r_[no_ring, -0.02 * way[:, None]]
+    patterns = np.concatenate([of_encoder, of_baseline, np.r_[2.0 * WAVE, no_way]], axis=1)
+    columns = [Column(INSTRUMENT, "encoder_scale")]
+    columns += [Column(n, a.name) for n in ("baseline", "laser_tilt") for a in LIBRARY[n].amplitudes]
+    noise = SIGMA * np.random.default_rng(2).standard_normal(500)
+    signal = patterns @ np.r_[read_short, 0.0, tilt, 0.0] + noise
+    information, right = patterns.T @ patterns / SIGMA**2, patterns.T @ signal / SIGMA**2
+    misfit, degrees = float(signal @ signal) / SIGMA**2, np.full(4, np.inf)
+    return FieldEvidence(None, Evidence(tuple(columns), information, right, information, misfit, degrees))
+
+
+def _in_order(known):
+    field, stated = known
+    return field, LIBRARY, stated
+
+
+def test_an_encoder_that_is_known_to_count_short_is_not_taken_for_a_baseline():
+    stated = Stated(("encoder_scale",), np.array([[0.002**-2]]))
+    unaware = field_answer(field_with_way(0.0, -0.012), LIBRARY, stated)
+    assert [s.model.name for s in unaware.shown] == ["baseline"]
+    short = EffectFound("encoder_scale", 0.99, {"relative": Value(-0.012, 0.0007)}, "It counts short.", "")
+    for verdict in (Verdict.NAMED, Verdict.CLASS):
+        found = Diagnosis("field", "gauge", verdict, 1e-9, effects=(short,))
+        answer = field_answer(*_in_order(_knowing_encoder(found, field_with_way(0.0, -0.012), stated)))
+        assert bool(answer.shown) is (verdict is Verdict.CLASS)
+    found = replace(found, verdict=Verdict.NAMED)
+    tilted = field_answer(*_in_order(_knowing_encoder(found, field_with_way(0.5, -0.012), stated)))
+    assert [s.model.name for s in tilted.shown] == ["laser_tilt"]
+    assert np.linalg.norm(tilted.shown[0].score.amplitude) == pytest.approx(0.5, rel=0.05)
 
 
 def met(agrees):

@@ -1,4 +1,4 @@
-"""Which causes that an inspection shows are refuted by a gauge run of the same probe."""
+"""An inspection against a gauge run of the same probe: causes refuted, effects borne out or contradicted."""
 
 from __future__ import annotations
 
@@ -6,12 +6,18 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from pipeline.arrays import Float
 from pipeline.physics.catalogue import EFFECTS
-from stages.diagnose.agreement import same
+from stages.diagnose.agreement import same, sized
+from stages.diagnose.effects.base import EffectModel, Shape
+from stages.diagnose.effects.courses import OWN_CLOCK, Coursed
+from stages.diagnose.field.evidence import FieldEvidence
+from stages.diagnose.gauge.confirm import partial_of
 from stages.diagnose.gauge.examine import Examined
 from stages.diagnose.gauge.fit import evidence
 from stages.diagnose.gauge.scan import Scored
-from stages.diagnose.inference import Stated, places_of, score
+from stages.diagnose.inference import Evidence, Score, Stated, places_of, score
+from stages.diagnose.result import Confirmation
 
 # Inspection and gauge confirm or refute each other only where the 1 σ of what is asked is below this share of
 # the other's size: it is then three such σ away from nothing. Debt: data/debts.md.
@@ -48,3 +54,64 @@ def not_refuted(shown: Sequence[Scored], gauge: Examined, stated: Stated) -> tup
 def _in_every_recording(scored: Scored) -> bool:
     known = EFFECTS[scored.model.name]
     return known.family in _PARTS_OF_THE_PROBE and known.time == "static" and known.name not in _OF_THE_MEDIUM
+
+
+def confirm_in_field(
+    model: EffectModel,
+    shape: Shape,
+    amplitude: Float,
+    covariance: Float,
+    found: FieldEvidence,
+    stated: Stated,
+) -> Confirmation | None:
+    """Return whether the field by itself says the same of an effect as the gauge; None when it cannot tell.
+
+    The field's estimate owes nothing to the gauge: poses from texture, a pipe of unknown size, the stated
+    instrument within its uncertainty. ``amplitude`` (Q,) and ``covariance`` (Q, Q) are the gauge's.
+    """
+    if found.run is None:
+        return None
+    own = _own_score(model, shape, found, stated)
+    size = float(np.linalg.norm(amplitude))
+    if own is None or np.sqrt(np.trace(own.covariance)) > TELLING * size:
+        return None
+    return Confirmation(
+        f"in the inspection, by the gauge run: {sized(model, shape, amplitude, covariance)}",
+        f"inspection alone: {sized(model, shape, own.amplitude, own.covariance)}",
+        same(amplitude, own.amplitude, own.covariance + covariance, size),
+    )
+
+
+def met_in_field(
+    examined: Examined, found: FieldEvidence, stated: Stated
+) -> tuple[Confirmation | None, ...]:  # fmt: skip
+    """Return, for each effect of the gauge's likeliest hypothesis, whether the field says the same."""
+    best = examined.best
+    if best is None:
+        return ()
+    out: list[Confirmation | None] = []
+    for term in best.fit.terms:
+        if isinstance(term.model, Coursed) and term.model.kind in OWN_CLOCK:
+            # What happens at a time of the gauge run need not happen in another recording.
+            out.append(None)
+            continue
+        own = partial_of("all", best.evidence, best, term, stated)
+        known = own is not None and np.isfinite(own.covariance).all()
+        covariance = own.covariance if own is not None and known else np.zeros((len(term.amplitude),) * 2)
+        try:
+            out.append(confirm_in_field(term.model, term.shape, term.amplitude, covariance, found, stated))
+        except np.linalg.LinAlgError:
+            out.append(None)
+    return tuple(out)
+
+
+def _own_score(model: EffectModel, shape: Shape, found: FieldEvidence, stated: Stated) -> Score | None:
+    whole: Evidence | None = found.whole
+    assert whole is not None
+    place = places_of(whole, model, shape)
+    if not len(place):
+        whole = found.about([(model, shape)])
+        if whole is None:
+            return None
+        place = places_of(whole, model, shape)
+    return score(whole, stated, place)

@@ -5,21 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-import numpy as np
-
-from pipeline.arrays import Float
 from pipeline.instrument.probe import Probe
 from pipeline.physics.catalogue import EFFECTS
-from stages.diagnose.agreement import same, sized
 from stages.diagnose.channels import Seen
-from stages.diagnose.effects.base import EffectModel, Shape
-from stages.diagnose.effects.courses import OWN_CLOCK, Coursed
-from stages.diagnose.field.against_gauge import TELLING, not_refuted
+from stages.diagnose.effects.base import EffectModel
+from stages.diagnose.field.against_gauge import met_in_field, not_refuted
 from stages.diagnose.field.evidence import FieldEvidence, travels
-from stages.diagnose.gauge.confirm import partial_of
-from stages.diagnose.gauge.examine import Examined
 from stages.diagnose.gauge.scan import Scored
-from stages.diagnose.inference import INSTRUMENT, Evidence, Score, Stated, places_of, score, stated_belief
+from stages.diagnose.inference import INSTRUMENT, Evidence, Stated, places_of, score, stated_belief
 from stages.diagnose.result import (
     Confirmation,
     Diagnosis,
@@ -137,19 +130,33 @@ def with_field(
     if field is None or field.field is None or field.field.run is None:
         return found
     stated = stated_belief(probe)
-    alone = field_answer(field.field, library, stated)
+    seen, stated = _knowing_encoder(found, field.field, stated)
+    alone = field_answer(seen, library, stated)
     examined = gauge.geometry if gauge is not None else None
     found = replace(found, global_p=_both(found.global_p, alone.global_p))
     if examined is not None and examined.best is not None and examined.best.fit.terms:
-        met = met_in_field(examined, field.field, stated)
+        met = met_in_field(examined, seen, stated)
         names = [t.model.law for t in examined.best.fit.terms]
         return _met(found, dict(zip(names, met, strict=True)))
     if alone.shown:
         possible = alone.shown if examined is None else not_refuted(alone.shown, examined, stated)
-        return _alone(found, alone, replace(alone, shown=possible), field.field, gauge is not None)
+        return _alone(found, alone, replace(alone, shown=possible), seen, gauge is not None)
     if found.verdict is Verdict.NOT_IDENTIFIABLE and gauge is None and travels(field.field.run):
         return replace(found, verdict=Verdict.CONSISTENT)
     return found
+
+
+def _knowing_encoder(found: Diagnosis, field: FieldEvidence, stated: Stated) -> tuple[FieldEvidence, Stated]:
+    """Return what the field says, and is believed, where an error of the encoder's scale is sure.
+
+    Taken for right, an encoder that counts short makes the wall seem nearer than it is.
+    """
+    certain = found.effects if found.verdict in (Verdict.NAMED, Verdict.PARTLY) else ()
+    for scale in (e.parameters["relative"] for e in certain if e.name == "encoder_scale"):
+        information, own = stated.information.copy(), stated.names.index("encoder_scale")
+        information[own, own] = scale.sd**-2.0
+        return field.with_encoder(scale.value), replace(stated, information=information)
+    return field, stated
 
 
 def _met(found: Diagnosis, met: Mapping[str, Confirmation | None]) -> Diagnosis:
@@ -231,64 +238,3 @@ def _union(first: Sequence[str], second: Sequence[str]) -> tuple[str, ...]:
 
 def _both(first: float, second: float) -> float:
     return min(2 * min(first, second), 1.0)
-
-
-def confirm_in_field(
-    model: EffectModel,
-    shape: Shape,
-    amplitude: Float,
-    covariance: Float,
-    found: FieldEvidence,
-    stated: Stated,
-) -> Confirmation | None:
-    """Return whether the field by itself says the same of an effect as the gauge; None when it cannot tell.
-
-    The field's estimate owes nothing to the gauge: poses from texture, a pipe of unknown size, the stated
-    instrument within its uncertainty. ``amplitude`` (Q,) and ``covariance`` (Q, Q) are the gauge's.
-    """
-    if found.run is None:
-        return None
-    own = _own_score(model, shape, found, stated)
-    size = float(np.linalg.norm(amplitude))
-    if own is None or np.sqrt(np.trace(own.covariance)) > TELLING * size:
-        return None
-    return Confirmation(
-        f"in the inspection, by the gauge run: {sized(model, shape, amplitude, covariance)}",
-        f"inspection alone: {sized(model, shape, own.amplitude, own.covariance)}",
-        same(amplitude, own.amplitude, own.covariance + covariance, size),
-    )
-
-
-def met_in_field(
-    examined: Examined, found: FieldEvidence, stated: Stated
-) -> tuple[Confirmation | None, ...]:  # fmt: skip
-    """Return, for each effect of the gauge's likeliest hypothesis, whether the field says the same."""
-    best = examined.best
-    if best is None:
-        return ()
-    out: list[Confirmation | None] = []
-    for term in best.fit.terms:
-        if isinstance(term.model, Coursed) and term.model.kind in OWN_CLOCK:
-            # What happens at a time of the gauge run need not happen in another recording.
-            out.append(None)
-            continue
-        own = partial_of("all", best.evidence, best, term, stated)
-        known = own is not None and np.isfinite(own.covariance).all()
-        covariance = own.covariance if own is not None and known else np.zeros((len(term.amplitude),) * 2)
-        try:
-            out.append(confirm_in_field(term.model, term.shape, term.amplitude, covariance, found, stated))
-        except np.linalg.LinAlgError:
-            out.append(None)
-    return tuple(out)
-
-
-def _own_score(model: EffectModel, shape: Shape, found: FieldEvidence, stated: Stated) -> Score | None:
-    whole: Evidence | None = found.whole
-    assert whole is not None
-    place = places_of(whole, model, shape)
-    if not len(place):
-        whole = found.about([(model, shape)])
-        if whole is None:
-            return None
-        place = places_of(whole, model, shape)
-    return score(whole, stated, place)

@@ -17,7 +17,7 @@ from stages.diagnose.effects.kinds import Periodic
 from stages.diagnose.field.reduce import evidence_of, reduced
 from stages.diagnose.field.run import FieldRun, ring_points
 from stages.diagnose.field.system import OWN, Asked, field_system
-from stages.diagnose.inference import Evidence
+from stages.diagnose.inference import INSTRUMENT, Column, Evidence
 from stages.diagnose.travel.evidence import TravelEvidence, travel_evidence
 from stages.diagnose.travel.sight import sight_of_trajectory
 
@@ -33,6 +33,7 @@ _FEWEST_LIT = 10
 # each with its right probe, was off by -0.09, 0.03 and 0.09 (open-1, open-3, a03). It scales the way seen.
 _LINE_PX = 0.08
 _LOST_SHARE = 0.25
+_ENCODER_SCALE = Column(INSTRUMENT, "encoder_scale")
 _LEAST_OFFSET_MM = 0.5
 _LEAST_ROLL_RAD = np.radians(5.0)
 
@@ -127,18 +128,38 @@ class FieldEvidence:
     run : FieldRun or None
         None when rings and texture alone do not determine the motion. It is not stored with the evidence:
         a stage of its own holds it.
+    encoder_scale : float
+        By what share of its reading the encoder is known to read too much; the evidence is about that.
     """
 
     travel: TravelEvidence | None
     whole: Evidence
     shortcomings: tuple[str, ...] = ()
     run: FieldRun | None = field(default=None, metadata=NOT_STORED)
+    encoder_scale: float = field(default=0.0, metadata=NOT_STORED)
 
     def about(self, asked: Asked) -> Evidence | None:
         """Return the evidence about other effects or shapes; None without a motion."""
         if self.run is None:
             return None
-        return _evidence(self.run, asked, _slips(self.run, self.travel))
+        found = _evidence(self.run, asked, _slips(self.run, self.travel))
+        return _about_encoder(found, self.encoder_scale)
+
+    def with_encoder(self, scale: float) -> FieldEvidence:
+        """Return the evidence of one who knows by what share of the way the encoder reads too much."""
+        # Of what it reads, as its column counts, and not of the way.
+        share = scale / (1 + scale)
+        return replace(self, whole=_about_encoder(self.whole, share), encoder_scale=share)
+
+
+def _about_encoder(found: Evidence, scale: float) -> Evidence:
+    """Return the evidence with the encoder's scale counted from another value than the stated one."""
+    if _ENCODER_SCALE not in found.place:
+        return found
+    own = found.place[_ENCODER_SCALE]
+    by_scale = found.information[:, own]
+    misfit = found.misfit - 2 * scale * found.right[own] + scale**2 * by_scale[own]
+    return replace(found, right=found.right - scale * by_scale, misfit=float(misfit))
 
 
 def nothing_said(recording: Recording, problem: str) -> FieldEvidence:
