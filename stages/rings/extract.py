@@ -17,7 +17,7 @@ from pipeline.instrument.probe import Probe
 from pipeline.machine.scratch import Scratch
 from pipeline.machine.stage import Context, Parameters
 from pipeline.recording.base import Illumination, Recording
-from stages.rings.behind_dirt import left_out
+from stages.rings.behind_dirt import set_right
 from stages.rings.expectation import warn_of_rings
 from stages.rings.glints import SAYING_RINGS
 from stages.rings.lattice import lattices_of, take_out, warn_of_lattices
@@ -59,7 +59,7 @@ class RingParameters(Parameters):
     left_out: ImagePlaces = Field(
         (),
         description="dirty places of the image: u, v and radius, px, of each; the line is left out there "
-        "but where it follows its ring; boresight run --twin takes them from a twin",
+        "but where it moves as its ring does; boresight run --twin takes them from a twin",
     )
 
 
@@ -95,7 +95,7 @@ def extract_rings(
             hint="is the laser on, the probe inside the pipe, and the exposure long enough?",
         )  # fmt: skip
     if parameters.left_out:
-        samples.validity[left_out(samples, parameters.left_out)] = RingValidity.OUT_OF_VIEW
+        set_right(samples, parameters.left_out)
     _compare_rings(samples)
     lattices = lattices_of(samples)
     take_out(lattices, samples)
