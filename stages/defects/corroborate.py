@@ -15,8 +15,8 @@ import numpy as np
 from scipy.ndimage import label
 
 from pipeline.adjustment.shared_light import NOTHING_HELD, HeldOver
-from pipeline.arrays import Bool, Float
-from pipeline.artefacts.measured import RingSamples, RingValidity, WallTexture
+from pipeline.arrays import Bool, Float, Int
+from pipeline.artefacts.measured import PointCloud, RingSamples, RingValidity, WallTexture
 from stages.defects.depth import Depth
 from stages.defects.parallax import LitPictures
 from stages.defects.relief import Relief
@@ -30,6 +30,9 @@ _TOP_SHARE, _DEPTH_SHARE, _NOISE_SIGMAS = 0.2, 0.25, 2.0
 _LEAST_SAMPLES = 3
 # Of any ten places of a ring one is as bright as this.
 _BRIGHT = 0.9
+# Most are half of the rings. A codec hands a glint on to a picture or two after it and before it: up to four
+# or five rings show it.
+_MOST, MANY_RINGS = 0.5, 6
 # The photo speaks for it where it is darker or brighter there than at all of so many places beside it: by
 # chance once in 41 times for either.
 _PLACES = 40
@@ -58,7 +61,8 @@ class Evidence:
     edge : bool
         Whether it is deepest beside hidden wall.
     bright : bool
-        Whether the line is brighter there than at nine of ten places of the ring that shows it deepest.
+        Whether the line is brighter there than at nine of ten places of the ring that shows it deepest, and
+        where many show it of most.
     contradicted : bool
         Whether lit pictures, taken when the line was elsewhere, show the wall without it.
     in_the_way : bool
@@ -142,7 +146,7 @@ def evidence_for(
     size = min(n * c for n, c in zip(region.mask.shape, relief.cell_mm, strict=True))
     shifted = abs(depth.depth_mm) > size
     return Evidence(
-        seen_by.held.independent(rings_behind(region, depth.depth_mm, surface)),
+        seen_by.held.independent(len(frames_behind(region, depth.depth_mm, surface))),
         None if shifted else photo_stands_out(seen_by.texture, relief, region),
         score,
         _is_fixed(region, surface, fixed_mm),
@@ -156,24 +160,39 @@ def evidence_for(
 def line_is_bright(region: Region, depth_mm: float, surface: Surface, rings: RingSamples) -> bool:
     """Whether the line is brighter in the region than at nine of ten places of the deepest ring there.
 
-    A glint or a reflection that was taken for the line is; a defect is one time in ten.
+    A glint or a reflection that was taken for the line is; a defect is one time in ten. Where more rings show
+    it than a codec hands a glint on to, most of them are asked: a glint on a defect makes it none.
     """
     points = surface.near
     i, j, inside = cells_of(points, surface.relief, region)
     height = np.sign(depth_mm) * (points.radius_mm - surface.relief.shape_at(i, j))
     if not inside.any():
         return False
-    deepest = points.frame == points.frame[np.argmax(np.where(inside, height, -np.inf))]
-    ring = np.flatnonzero(rings.frame == points.frame[deepest][0])
+    deepest = int(points.frame[np.argmax(np.where(inside, height, -np.inf))])
+    if not _is_bright(height, inside, points, rings, deepest):
+        return False
+    showing = frames_behind(region, depth_mm, surface)
+    if len(showing) < MANY_RINGS:
+        return True
+    told = [_is_bright(height, inside, points, rings, int(k)) for k in showing]
+    return float(np.mean([bright for bright in told if bright is not None])) >= _MOST
+
+
+def _is_bright(
+    height: Float, inside: Bool, points: PointCloud, rings: RingSamples, frame: int
+) -> bool | None:
+    """Whether a frame's line is bright where it stands highest ``inside``; None where that is not known."""
+    its = points.frame == frame
+    ring = np.flatnonzero(rings.frame == frame)
     used = np.flatnonzero(rings.validity[ring[0]] == RingValidity.VALID) if len(ring) else ring
-    if len(used) != deepest.sum():  # a part of the ring lies beyond these rows
-        return False
+    if len(used) != its.sum():  # a part of the ring lies beyond these rows
+        return None
     # points lie in the order of their ring's samples
-    line, there = rings.amplitude[ring[0], used], inside[deepest]
-    highest = float(height[deepest][there].max())
-    if highest <= 0:  # the deepest ring lies to the other side of the wall
-        return False
-    top = there & (height[deepest] >= highest / 2)
+    line, there = rings.amplitude[ring[0], used], inside[its]
+    highest = float(height[its][there].max())
+    if highest <= 0:  # the ring lies to the other side of the wall
+        return None
+    top = there & (height[its] >= highest / 2)
     return float(np.mean(line < np.median(line[top]))) > _BRIGHT
 
 
@@ -208,8 +227,8 @@ def _is_fixed(region: Region, surface: Surface, fixed_mm: Float) -> bool:
     return bool(explained.mean() > _FIXED_SHARE)
 
 
-def rings_behind(region: Region, depth_mm: float, surface: Surface) -> int:
-    """Return how many rings show a defect of this depth by samples that are sure."""
+def frames_behind(region: Region, depth_mm: float, surface: Surface) -> Int:
+    """Return the frames (n,) whose rings show a defect of this depth by samples that are sure."""
     relief, points = surface.relief, surface.near
     i, j, inside = cells_of(points, relief, region)
     inside &= sure_of_themselves(points)
@@ -217,7 +236,7 @@ def rings_behind(region: Region, depth_mm: float, surface: Surface) -> int:
     limit = max(_DEPTH_SHARE * abs(depth_mm), _NOISE_SIGMAS * relief.typical.sigma_mm)
     frame, ring, count = np.unique(points.frame[inside], return_inverse=True, return_counts=True)
     showing = np.bincount(ring, np.sign(depth_mm) * deviation > limit, len(frame))
-    return int(np.sum(showing >= np.maximum(_TOP_SHARE * count, _LEAST_SAMPLES)))
+    return np.asarray(frame[showing >= np.maximum(_TOP_SHARE * count, _LEAST_SAMPLES)])
 
 
 def photo_stands_out(texture: WallTexture, relief: Relief, region: Region) -> bool | None:

@@ -24,7 +24,7 @@ import numpy as np
 from scipy.special import ndtr
 
 from pipeline.artefacts.findings import Defect
-from stages.defects.corroborate import LEAST_RINGS, Evidence
+from stages.defects.corroborate import LEAST_RINGS, MANY_RINGS, Evidence
 from stages.defects.noise_tail import NoiseTail
 
 # Scores of real findings are taken to be log-uniform, from the least score to so many times it.
@@ -39,8 +39,6 @@ _PHOTO_BY_CHANCE, _PHOTO_OF_REAL = 2 / 41, 6 / 11
 # A tenth of all places count as bright, and so does a tenth of the defects, by chance. Beyond what follows
 # from the dark ones, half a bright real finding is allowed for.
 _BRIGHT_BY_CHANCE, _UNTOLD = 0.1, 0.5
-# A codec hands a glint on to a picture or two after it and before it: up to four or five rings show it.
-_MANY_RINGS = 6
 # A corroborated finding counts from this probability on: it is more likely real than not.
 COUNTED = 0.5
 # Largest probability that is stated, as counted: of 319 painted findings with .95 and more, .975 were real
@@ -95,7 +93,7 @@ class Credibility:
     def _glints(self, evidence: Evidence) -> float:
         """Return the expected number of repeated glints per real finding at which the line is as bright."""
         real = self.dark * _BRIGHT_BY_CHANCE / (1 - _BRIGHT_BY_CHANCE) + _UNTOLD
-        few = evidence.bright and evidence.rings < _MANY_RINGS
+        few = evidence.bright and evidence.rings < MANY_RINGS
         return max(self.bright - real, 0.0) / real if few else 0.0
 
     @property
@@ -139,7 +137,7 @@ def credibility_of(
     """Return what to expect in a recording of so many rings, from its findings and their widths."""
     certain = [e for e in found if tail.above(e.score) < _SURE]
     sure = Counter(max(e.rings, 1) for e in certain)
-    bright = Counter(e.bright for e in certain if e.rings < _MANY_RINGS)
+    bright = Counter(e.bright for e in certain if e.rings < MANY_RINGS)
     alone = [w for e, w in zip(found, width_rad, strict=True) if e.rings < LEAST_RINGS]
     # Two findings meet if they overlap: each reaches half its width to either side. Half of them have the
     # same sign.

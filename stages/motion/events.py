@@ -6,7 +6,6 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from pipeline.adjustment.robust import robust_spread
 from pipeline.arrays import Bool, Float, Int, runs_of
 from pipeline.artefacts.measured import MotionEvent, Trajectory
 from pipeline.geometry.axis import distance_along
@@ -38,6 +37,9 @@ _SLIP_SPREADS = 6.0
 _SLIP_STEP_MM = 0.02
 _SLIP_MM = 0.3
 """A slip is a row of steps of the encoder's slip beyond six spreads and 0.02 mm, 0.3 mm in all."""
+_QUIETEST, _OF_NORMAL = 0.25, 0.3186
+"""The spread is that of the quietest quarter of the steps in which the probe moves, as encoders may hang for
+most of a run. A quarter of normal values of 1 σ do not exceed so much."""
 _TOLD_SIGMAS = 5.0
 """Slips are told from so many σ on, each by the σ over its own way."""
 _TOLD_MM = 3.0
@@ -65,7 +67,7 @@ def find_events(
     found = [*_stops(f, t, speed, cruise), *_reversals(f, z, speed, cruise), *_gaps(f, t)]
     found += [*_duplicates(f, z, tracked), *_lost(f, tracked)]
     if has_encoder:
-        found += list(_slips(f, slip))
+        found += list(_slips(f, z, slip))
     return tuple(sorted(found, key=lambda e: (e.frame_from, e.kind)))
 
 
@@ -151,9 +153,10 @@ def _lost(f: Int, tracked: TrackedPoses) -> Iterator[MotionEvent]:
         yield MotionEvent("texture_lost", first, last, float(b - a + 1), "lit frames", note)
 
 
-def _slips(f: Int, slip: Float) -> Iterator[MotionEvent]:
-    step = np.diff(slip)
-    usual = robust_spread(step) + 1e-6
+def _slips(f: Int, z: Float, slip: Float) -> Iterator[MotionEvent]:
+    step, way = np.diff(slip), np.abs(np.diff(z))
+    moves = way >= _STOP_SHARE * np.percentile(way, _CRUISE_PERCENT)
+    usual = float(np.quantile(np.abs(step[moves]), _QUIETEST)) / _OF_NORMAL + 1e-6
     note = "The encoder and the wall's texture disagree: the encoder slipped."
     for a, b in _ends_of_runs(np.abs(step) > max(_SLIP_SPREADS * usual, _SLIP_STEP_MM)):
         size = float(slip[b + 1] - slip[a])

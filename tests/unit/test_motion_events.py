@@ -158,6 +158,14 @@ def test_a_slip_is_judged_by_its_own_way() -> None:
     assert "disagree by 900.0 mm between frame 9000 and 9180" in words[0]
 
 
+def test_an_encoder_that_hangs_for_more_than_half_of_a_run_is_told() -> None:
+    """Its hanging steps, of less than .5 mm, were taken for how much encoder and texture usually differ."""
+    jitter = 0.01 * np.random.default_rng(1).standard_normal(FRAMES)
+    words = told_of(0.4 * np.arange(FRAMES), hung(30, 100, -28.0) + jitter, 0.002)
+    assert len(words) == 1
+    assert "disagree by 28.0 mm between frame 30 and 100:" in words[0]
+
+
 def test_an_encoder_that_runs_while_the_probe_rests_is_told() -> None:
     assert len(told_of(np.zeros(600), hung(300, 330, 30.0, 600), 0.002)) == 1
 
