@@ -1,13 +1,9 @@
-"""From what each channel of each recording says to one answer, and the answer as diagnosis.json holds it."""
+"""From what each channel of each recording says to one answer."""
 
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass, is_dataclass, replace
-from enum import StrEnum
-from typing import Any
-
-import numpy as np
+from dataclasses import dataclass, replace
 
 from pipeline.instrument.probe import Probe
 from pipeline.physics.catalogue import effect
@@ -17,7 +13,6 @@ from stages.diagnose.claims import Claim, claims_of, stretch
 from stages.diagnose.gauge import answer as of_gauge
 from stages.diagnose.gauge.examine import Examined
 from stages.diagnose.result import (
-    CourseFound,
     Diagnosis,
     EffectFound,
     Location,
@@ -36,7 +31,6 @@ _AGAIN = (
     "To see what the pattern depends on, record the gauge run again: with probe or gauge rolled by 90°, at "
     "another speed, and after warming up."
 )
-_FORMAT = 1
 
 
 def composed(
@@ -51,8 +45,8 @@ def composed(
     known = [c.not_knowing(without) for c in every if c.name not in without]
     of_profile, of_travel = _unexplained_profile(field, gauge), _unexplained_travel(field, gauge)
     unnamed = len(known) < len(every) or any(not u.by_slip for u in of_travel)
-    by_slip = any(u.by_slip for u in of_travel)
-    said = _said(examined, known, unnamed, bool(of_profile), (SLIP,) if by_slip else ())
+    doubtful = (SLIP,) if any(u.by_slip for u in of_travel) else ()
+    said = _said(examined, known, unnamed, bool(of_profile), doubtful)
     asked = said.members if said.members else [e.name for e in said.effects]
     nameless = _IN_PROFILE if of_profile else of_travel[0].location if of_travel else None
     location = _location(examined, every, asked) or nameless
@@ -81,11 +75,12 @@ def composed(
 
 @dataclass(frozen=True)
 class _Said:
-    """The verdict, the effects it rests on, and the members of the class that is left."""
+    """The verdict, the effects it rests on, the class that is left, and what of that has a size."""
 
     verdict: Verdict
     effects: tuple[EffectFound, ...]
     members: tuple[str, ...]
+    unsure: tuple[EffectFound, ...] = ()
 
 
 def _said(
@@ -100,6 +95,7 @@ def _said(
     rings = verdict_of_rings(examined, bool(known))
     of_rings = of_gauge.effects_found(examined) if examined is not None else ()
     claims = _beyond(known, of_rings)
+    every = (*of_rings, *(c.found for c in claims))
     certain = (*_sure_of_rings(examined, rings, unexplained), *(c.found for c in claims if c.sure))
     doubted = [*(n for c in claims if not c.sure for n in (*c.rivals, c.name)), *doubtful]
     if rings in (Verdict.CLASS, Verdict.PARTLY, Verdict.NAMED):
@@ -108,10 +104,14 @@ def _said(
     nameless = unexplained or unnamed or _is_nameless(examined, rings)
     if certain and not doubted and not nameless:
         return _Said(Verdict.NAMED, certain, ())
+    if certain and nameless:
+        return _Said(Verdict.PARTLY, certain, ())
     if certain:
-        return _Said(Verdict.PARTLY, certain, () if nameless else classes_of(doubted))
+        return _Said(
+            Verdict.PARTLY, certain, classes_of(doubted), tuple(e for e in every if e not in certain)
+        )
     if doubted and rings is not Verdict.UNEXPLAINED:
-        return _Said(Verdict.CLASS, (*of_rings, *(c.found for c in claims)), classes_of(doubted))
+        return _Said(Verdict.CLASS, every, classes_of(doubted), every)
     if nameless:
         return _Said(Verdict.UNEXPLAINED, tuple(c.found for c in claims), ())
     return _Said(rings, (), ())
@@ -160,21 +160,22 @@ def _next(said: _Said, asked: Sequence[str]) -> str:
 
 
 def _identifiable(said: _Said, examined: Examined | None, encoder_otherwise: bool) -> str:
-    """Return what is determined all the same: the size each cause would have, or an empirical formula.
+    """Return what is determined all the same: the size each unsure cause would have, or an empirical formula.
 
-    ``encoder_otherwise`` is whether something with another course may be in the place of an encoder's effect.
+    ``encoder_otherwise``: something with another course may be in the place of an encoder's effect.
     """
-    if said.verdict is Verdict.CLASS:
-        unknown = _unknown(examined) if examined is not None else ()
-        unknown += (_OF_ENCODER,) * encoder_otherwise
-        told = [*(e.statement for e in said.effects), *(_UNKNOWN.format(f) for f in unknown)]
-        return "; or ".join(dict.fromkeys(words.rstrip(".") for words in told)) + "." if told else ""
+    if said.verdict is Verdict.CLASS or said.unsure:
+        unknown = (*_unknown(examined), *(_OF_ENCODER,) * encoder_otherwise)
+        told = [*(e.statement for e in said.unsure), *(_UNKNOWN.format(f) for f in unknown)]
+        return "; or ".join(dict.fromkeys(w.rstrip(".") for w in told)) + "." * bool(told)
     nameless = said.verdict in (Verdict.UNEXPLAINED, Verdict.PARTLY) and not said.members
     return of_gauge.formula(examined) if nameless and examined is not None else ""
 
 
-def _unknown(examined: Examined) -> tuple[str, ...]:
+def _unknown(examined: Examined | None) -> tuple[str, ...]:
     """Return the likeliest of what the library lacks and would show so, in words."""
+    if examined is None:
+        return ()
     return (*of_gauge.unknown_rivals(examined), *of_gauge.like_a_name(examined))[:1]
 
 
@@ -255,44 +256,3 @@ def _global_p(field: Seen | None, gauge: Seen | None) -> float:
             each.append(min((f.p_value for f in seen.profile.findings), default=1.0))
     showing = [p for p in each if p < 1]
     return float(min(min(showing) * len(showing), 1.0)) if showing else 1.0
-
-
-def to_json(found: Diagnosis) -> dict[str, object]:
-    """Return what diagnosis.json holds: all but the pictures."""
-    told = {k: v for k, v in _fields(found).items() if not k.endswith("_picture")}
-    return {
-        "format": _FORMAT,
-        **told,
-        "discrepancy": None,
-        "effects": [_effect(e, found) for e in found.effects],
-    }
-
-
-def _effect(found: EffectFound, answer: Diagnosis) -> dict[str, object]:
-    alone = answer.location if len(answer.effects) == 1 else None
-    undecided = answer.verdict is Verdict.CLASS and found.name in answer.members
-    return {
-        **_fields(replace(found, location=found.location or alone)),
-        "credible_set": list(answer.members) if undecided else [found.name],
-    }
-
-
-def _fields(record: object) -> dict[str, object]:
-    """Return a record's fields: of a place those that are known, of a course its numbers beside its kind."""
-    if isinstance(record, CourseFound):
-        return {"kind": record.kind, **_plain(record.parameters), "probability": _plain(record.probability)}
-    each = {"class" if k == "members" else k: _plain(v) for k, v in vars(record).items()}
-    return {k: v for k, v in each.items() if v is not None} if isinstance(record, Location) else each
-
-
-def _plain(value: Any) -> Any:
-    """Return a value as JSON has it: numbers in six figures, None for what is no number."""
-    if isinstance(value, StrEnum):
-        return str(value)
-    if isinstance(value, float):
-        return float(f"{value:.6g}") if np.isfinite(value) else None
-    if isinstance(value, tuple):
-        return [_plain(v) for v in value]
-    if isinstance(value, dict):
-        return {k: _plain(v) for k, v in value.items()}
-    return _fields(value) if is_dataclass(value) else value

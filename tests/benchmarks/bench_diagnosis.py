@@ -24,8 +24,9 @@ from pipeline.instrument.probe import Probe
 from pipeline.physics.catalogue import effect
 from pipeline.physics.effect import CourseKind
 from pipeline.simulator.effects.switch import Switch
+from stages.diagnose.as_json import to_json
 from stages.diagnose.channels import TRAVEL_EFFECTS, Seen, gauge_travel
-from stages.diagnose.compose import composed, to_json
+from stages.diagnose.compose import composed
 from stages.diagnose.drill.answer import Answer, Concealed
 from stages.diagnose.drill.score import Trial, figures, shuffled
 from stages.diagnose.effects.base import EffectModel

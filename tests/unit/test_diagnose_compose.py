@@ -108,6 +108,8 @@ def test_what_is_sure_is_named_though_something_else_remains(real_probe: Probe) 
     assert found.remainder is not None
     assert found.remainder.verdict is Verdict.CLASS
     assert "encoder_scale" in found.remainder.members
+    assert found.identifiable.startswith(SCALE.statement.rstrip("."))
+    assert PLAY.statement.rstrip(".") not in found.identifiable
     assert found.members == ()
     assert "encoder_scale" in found.record_next
 

@@ -14,7 +14,7 @@ from pipeline.cli import app
 from pipeline.instrument.probe import Probe
 from pipeline.machine.stage import Context, Of, Parameters, Stage
 from pipeline.recording.base import Recording
-from stages.diagnose.compose import to_json
+from stages.diagnose.as_json import to_json
 from stages.diagnose.diagnose import Diagnosed
 from stages.diagnose.result import Diagnosis, EffectFound, FitQuality, Location, Value, Verdict
 from tests.bad_recordings import cut_sample

@@ -27,7 +27,7 @@ from pipeline.machine.run_folder import Exporter
 from pipeline.machine.stage import Stage
 from pipeline.review.run_files import RunFiles
 from stages.catalogue import PIPELINE
-from stages.diagnose.compose import to_json
+from stages.diagnose.as_json import to_json
 from stages.diagnose.diagnose import Diagnosed, diagnosis_stages
 from stages.diagnose.drill.answer import Answer, read_answer
 from stages.diagnose.drill.cases import ANSWER

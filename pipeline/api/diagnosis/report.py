@@ -16,8 +16,8 @@ from pipeline.files.disk import replace_text
 from pipeline.pages import page_template, rendered, tidy
 from pipeline.pages.notation import measured
 from pipeline.physics.catalogue import ALL_EFFECTS
+from stages.diagnose.as_json import to_json
 from stages.diagnose.compared import OnImage
-from stages.diagnose.compose import to_json
 from stages.diagnose.result import (
     Candidate,
     Diagnosis,
