@@ -210,7 +210,7 @@ def _of_slip(step: StepFound, travel: TravelEvidence) -> Claim:
     }  # fmt: skip
     words = (
         f"The encoder's wheel slips at {step.time_s:.2f} s for about {step.lasting_s:.2f} s and its reading "
-        f"gains {step.gain_mm:+.2f} mm."
+        f"{'gains' if step.gain_mm > 0 else 'loses'} {abs(step.gain_mm):.2f} mm."
     )
     where = (step.place - 1, step.place)
     location = stretch(travel, where, FixedTo.TIME, "event")

@@ -141,6 +141,15 @@ def test_quantities_are_those_of_the_catalogue_within_its_range_and_in_the_words
     assert all(quantity in model.equation(shape, size) for quantity in found)
 
 
+def test_a_negative_size_is_told_by_the_other_word_and_never_with_a_sign():
+    short = LIBRARY["encoder_scale"].statement((), np.array([-0.0125]))
+    assert short == "The encoder reads 1.250% too little of every distance."
+    assert "too much" in LIBRARY["encoder_scale"].statement((), np.array([0.0125]))
+    for model in LIBRARY.values():
+        shape, size = model.shapes(10.0, 30.0)[0], -np.ones(len(model.amplitudes))
+        assert not set("[|]") & set(model.statement(shape, size))
+
+
 def test_a_size_outside_the_catalogues_range_is_not_possible():
     assert not LIBRARY["laser_cone"].possible((), np.array([4.0]))
     assert not LIBRARY["housing_glass"].possible((), np.array([-1.0]))

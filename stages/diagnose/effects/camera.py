@@ -33,7 +33,10 @@ class FocalScale(Scalar):
 
     name = "focal_scale"
     amplitudes = one(name, 1e-3)
-    words = "The focal length is {relative:+.3%} off: the image is that much larger than stated."
+    words = (
+        "The focal length is {relative:.3%} [longer|shorter] than stated, and the image that much "
+        "[larger|smaller]."
+    )
 
     def image_shift_px(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
         """Return κ (uv − centre)."""
@@ -45,7 +48,7 @@ class RadialDistortion(Scalar):
 
     name = "radial_distortion"
     amplitudes = one(name, 1e-3)
-    words = "The lens distorts by k = {k:+.2e} of θ³ beyond the stated."
+    words = "The lens shows everything by {k:.2e} of θ³ [farther out|farther in] than stated."
 
     def image_shift_px(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
         """Return f k θ³ outward."""
@@ -78,7 +81,7 @@ class PixelAspect(Scalar):
 
     name = "pixel_aspect"
     amplitudes = one(name, 1e-3)
-    words = "The image is {relative:+.3%} wider against its height than stated."
+    words = "The image is {relative:.3%} [wider|narrower] against its height than stated."
 
     def image_shift_px(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
         """Return (√(1+a) − 1) x and (1/√(1+a) − 1) y."""
@@ -93,7 +96,7 @@ class PupilShift(Scalar):
     name = "pupil_shift"
     amplitudes = one(name, 0.3)
     words = (
-        "The lens's entrance pupil moves forward with the angle, by {shift_mm:+.3f} mm × (θ/sin θ − 1) "
+        "The lens's entrance pupil moves [forward|back] with the angle, by {shift_mm:.3f} mm × (θ/sin θ − 1) "
         "beyond the stated."
     )
 
@@ -126,7 +129,10 @@ class BaselineDrift(Drifting):
     name = "baseline_drift"
     static = Baseline()
     amplitudes = one(name, 0.05)
-    words = "The baseline drifts by {drift_mm:+.3f} mm in the end, with a time constant of {time_s:.1f} s."
+    words = (
+        "The baseline gets {drift_mm:.3f} mm [longer|shorter] in the end, with a time constant of "
+        "{time_s:.1f} s."
+    )
 
 
 class FocalDrift(Drifting):
@@ -135,7 +141,10 @@ class FocalDrift(Drifting):
     name = "focal_drift"
     static = FocalScale()
     amplitudes = one(name, 1e-3)
-    words = "The focal length drifts by {relative:+.3%} in the end, with a time constant of {time_s:.1f} s."
+    words = (
+        "The focal length gets {relative:.3%} [longer|shorter] in the end, with a time constant of "
+        "{time_s:.1f} s."
+    )
 
 
 class CentreDrift(Drifting):

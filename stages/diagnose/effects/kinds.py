@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -12,16 +13,27 @@ from pipeline.physics.catalogue import effect
 from pipeline.physics.effect import CourseKind, Quantity
 from stages.diagnose.effects.base import Amplitude, EffectModel, Factored, ImagePoints, Product, Shape
 
+_EITHER = re.compile(r"\[([^|]*)\|([^]]*)\]")
+
 
 @dataclass(frozen=True)
 class Worded(EffectModel):
-    """An effect whose statement is a sentence with its quantities put in."""
+    """An effect whose statement is a sentence with its quantities put in.
+
+    Of ``[farther|nearer]`` the second word stands where the first quantity is negative, which is then told
+    without its sign.
+    """
 
     words: ClassVar[str]
 
     def statement(self, shape: Shape, amplitude: Float) -> str:
         """Return the effect in a plain sentence with its size."""
-        return self.words.format(**self.quantities(shape, amplitude))
+        quantities, signed = self.quantities(shape, amplitude), effect(self.name).quantities[0].name
+        if "[" in self.words:
+            word = 2 if quantities[signed] < 0 else 1
+            sizes = {**quantities, signed: abs(quantities[signed])}
+            return _EITHER.sub(lambda either: either[word], self.words).format(**sizes)
+        return self.words.format(**quantities)
 
 
 class Scalar(Worded):

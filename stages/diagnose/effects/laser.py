@@ -85,7 +85,10 @@ class Vignetting(Scalar):
 
     name = "vignetting"
     amplitudes = one(name, 0.5)
-    words = "Light falls off as cos^k θ with k {falloff:+.3f} beyond the stated, and draws the line inward."
+    words = (
+        "Light falls off as cos^k θ, k {falloff:.3f} [above|below] the stated: the line is drawn "
+        "[inward|outward]."
+    )
 
     def line_shift_px(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
         """Return σ_px² ∂ ln V/∂ρ = −k σ_px² tan θ / (dρ/dθ), σ of the sheet: the lens blurs later."""
@@ -127,7 +130,8 @@ class LaserCone(Scalar):
     name = "laser_cone"
     amplitudes = one(name, 0.1)
     words = (
-        "The laser's rays rise forward by {cone_deg:+.3f}° more than stated, all round: the sheet is a cone."
+        "The laser's rays lean {cone_deg:.3f}° more [forward|back] than stated, all round: the sheet "
+        "is a cone."
     )
 
     def sheet_shift_mm(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
@@ -142,7 +146,7 @@ class Baseline(Scalar):
 
     name = "baseline"
     amplitudes = one(name, 0.1)
-    words = "The laser sheet stands {baseline_mm:+.3f} mm farther from the camera than stated."
+    words = "The laser sheet stands {baseline_mm:.3f} mm [farther from|nearer to] the camera than stated."
 
     def sheet_shift_mm(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
         """Return δl."""

@@ -77,7 +77,7 @@ class EncoderScale(Scalar):
 
     name = "encoder_scale"
     amplitudes = one(name, 0.005)
-    words = "The encoder reads {relative:+.3%} too much of every distance."
+    words = "The encoder reads {relative:.3%} too [much|little] of every distance."
 
     def reading_shift_mm(self, travel: Travel, shape: Shape, amplitude: Float) -> Float:
         """Return κ s."""
@@ -89,7 +89,7 @@ class EncoderSlip(Worded):
 
     name = "encoder_slip"
     amplitudes = one(name, 2.0)
-    words = "The encoder's wheel slips after {time_s:.2f} s and its reading gains {slip_mm:+.2f} mm."
+    words = "The encoder's wheel slips after {time_s:.2f} s and its reading [gains|loses] {slip_mm:.2f} mm."
 
     def shapes(self, duration_s: float, frame_rate: float) -> tuple[Shape, ...]:
         """Return times within the recording, no closer than frames are."""
@@ -139,7 +139,7 @@ class TimeOffset(Scalar):
 
     name = "time_offset"
     amplitudes = one(name, 0.02)
-    words = "The encoder's readings come {delay_s:+.4f} s late against the pictures."
+    words = "The encoder's readings come {delay_s:.4f} s [late|early] against the pictures."
 
     def reading_shift_mm(self, travel: Travel, shape: Shape, amplitude: Float) -> Float:
         """Return s(t − τ) − s(t), so that visual − encoder = v τ; speed held beyond the ends."""
@@ -158,7 +158,9 @@ class MotionBlur(TimeOffset):
 
     name = "motion_blur"
     amplitudes = one(name, 0.005)
-    words = "The exposure is {exposure_s:+.4f} s longer than stated and blurs what moves."
+    words = (
+        "The exposure is {exposure_s:.4f} s [longer|shorter] than stated, and so is the blur of what moves."
+    )
 
     def reading_shift_mm(self, travel: Travel, shape: Shape, amplitude: Float) -> Float:
         """Return what readings that are late by half the exposure would be off by."""

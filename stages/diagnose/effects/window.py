@@ -28,7 +28,7 @@ class HousingGlass(Scalar):
     name = "housing_glass"
     amplitudes = one(name, 1.0)
     law_sigma = float(_BY_INDEX)
-    words = "A coaxial glass tube {thickness_mm:+.3f} mm thicker than stated stands before the wall."
+    words = "A coaxial glass tube {thickness_mm:.3f} mm [thicker|thinner] than stated stands before the wall."
 
     def image_shift_px(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
         """Return the image through the tube, less that without."""
@@ -103,7 +103,9 @@ class DomeAxial(Scalar):
 
     name = "dome_axial"
     amplitudes = one(name, 0.3)
-    words = "The glass dome's centre is {offset_mm:+.3f} mm behind the lens's viewpoint along the axis."
+    words = (
+        "The glass dome's centre is {offset_mm:.3f} mm [behind|before] the lens's viewpoint along the axis."
+    )
 
     def image_shift_px(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
         """Return the image through the dome whose centre is at −d on the axis, less that without."""
@@ -130,7 +132,8 @@ class OutsideIndex(Scalar):
     name = "outside_index"
     amplitudes = one(name, 2e-3)
     words = (
-        "The medium outside the sealed probe has an index of refraction {index_excess:+.2e} above the stated."
+        "The medium outside the sealed probe has an index of refraction {index_excess:.2e} "
+        "[above|below] the stated."
     )
 
     def image_shift_px(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
