@@ -8,10 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import norm
 
+from pipeline.arrays import Float, Int
 from stages.diagnose.travel.events import SLIP, chance, is_found
 from stages.diagnose.travel.model import EventKind, TravelFit
 from stages.diagnose.travel.sight import PLACED_SIGMA_MM
 from stages.diagnose.travel.solve import (
+    AT_ONCE,
     DELAY,
     FAR_BETTER,
     OFFSET,
@@ -77,7 +79,7 @@ class LeftOver:
 
 
 @dataclass(frozen=True)
-class _Stretch:
+class Stretch:
     """Pictures from ``first`` to before ``end`` that are off by ``size_mm``.
 
     ``gain`` is by how much it lowers χ²; χ² of ``left`` remains, with ``free`` degrees of freedom.
@@ -129,7 +131,7 @@ def left_over(fit: TravelFit, steps: Sequence[StepFound], count_mm: float) -> Le
     return LeftOver(off.size_mm, (off.first, off.end - 1), between_s, p_value, stray, by_slip)
 
 
-def _stray_pictures(fit: TravelFit, untold: list[int], off: _Stretch) -> int:
+def _stray_pictures(fit: TravelFit, untold: list[int], off: Stretch) -> int:
     """Return how many pictures, all of a stretch or all others, were taken for stray; 0 where not all."""
     events = (fit.events[k - len(SMOOTH)] for k in untold)
     taken = {e.place for e in events if e.kind is EventKind.OUTLIER}
@@ -143,7 +145,7 @@ def _of_places(fit: TravelFit, count_mm: float) -> DriftNoise:
     return DriftNoise(float(np.sqrt(PLACED_SIGMA_MM**2 + fit.noise.white_mm**2 + count_mm**2)), 0.0)
 
 
-def _simplest(fit: TravelFit, untold: list[int], noise: DriftNoise, beside: _Stretch) -> _Stretch:
+def _simplest(fit: TravelFit, untold: list[int], noise: DriftNoise, beside: Stretch) -> Stretch:
     """Return the stretch that is there ``beside`` delay and play, or beside neither where that is simpler.
 
     What is off for a while may have been taken for a delay or a play.
@@ -155,38 +157,47 @@ def _simplest(fit: TravelFit, untold: list[int], noise: DriftNoise, beside: _Str
     return alone if alone.left - beside.left < FAR_BETTER * len(lags) else beside
 
 
-def _beside(fit: TravelFit, untold: list[int], noise: DriftNoise) -> _Stretch:
+def _beside(fit: TravelFit, untold: list[int], noise: DriftNoise) -> Stretch:
     """Return the strongest stretch beside all that was found but the ``untold`` columns."""
     held = [k for k in range(len(SMOOTH)) if k != OFFSET and fit.values[k] == 0]
-    return _strongest_stretch(fit.with_columns(np.delete(fit.columns, [*held, *untold], axis=1), noise))
+    return strongest_stretch(fit.with_columns(np.delete(fit.columns, [*held, *untold], axis=1), noise))
 
 
-def _strongest_stretch(rest: Whitened) -> _Stretch:
+def strongest_stretch(rest: Whitened) -> Stretch:
     """Return the stretch that, off by a constant, explains most of what is left, of all behind a picture.
 
     What a stretch from a to b adds is a difference of sums up to b and up to a, and its information likewise.
     """
     up_to = np.pad(np.cumsum(rest.weighted), (1, 0))
-    both = np.pad(np.cumsum(np.cumsum(rest.projector, 0), 1), ((1, 0), (1, 0)))
-    information = np.diag(both)[:, None] + np.diag(both) - both - both.T
-    tried = np.triu(np.ones(both.shape, bool), 1)
-    tried[0] = False
-    tried &= information > _TOLD * np.max(information)
-    safe = np.where(tried, information, 1.0)
-    score = np.where(tried, up_to - up_to[:, None], 0.0)
-    first, end = np.unravel_index(np.argmax(score**2 / safe), both.shape)
-    size, gain = score[first, end] / safe[first, end], score[first, end] ** 2 / safe[first, end]
-    left = max(float(rest.residual @ rest.weighted - gain), 0.0)
+    places = np.arange(len(up_to))
+    ends = np.array_split(places, len(places) // AT_ONCE + 1)
+    own = np.concatenate([_shared(rest, e)[e, np.arange(len(e))] for e in ends])
+    gain, first, end, size = 0.0, 1, 1, 0.0
+    for e in ends:
+        information = own[:, None] + own[e] - 2 * _shared(rest, e)
+        tried = (places[:, None] > 0) & (places[:, None] < e) & (information > _TOLD * own.max())
+        found = np.where(tried, up_to[e] - up_to[:, None], 0.0) / np.where(tried, information, 1.0)
+        each = found**2 * information
+        at, here = np.unravel_index(np.argmax(each), each.shape)
+        if each[at, here] > gain:
+            gain, first, end, size = float(each[at, here]), int(at), int(e[here]), float(found[at, here])
+    left = max(float(rest.residual @ rest.weighted) - gain, 0.0)
     free = max(len(rest.residual) - len(rest.estimate) - _OWN, 1)
-    return _Stretch(int(first), int(end), float(size), float(gain), left, free)
+    return Stretch(first, end, size, gain, left, free)
 
 
-def _p_of(fit: TravelFit, off: _Stretch, noise: DriftNoise) -> float:
+def _shared(rest: Whitened, ends: Int) -> Float:
+    """Return the information (N + 1, E) that sums up to each picture share with those up to ``ends``."""
+    before = np.arange(len(rest.residual))[:, None] < ends
+    return np.pad(np.cumsum(rest.beyond(before.astype(float)), axis=0), ((1, 0), (0, 0)))
+
+
+def _p_of(fit: TravelFit, off: Stretch, noise: DriftNoise) -> float:
     """Return the chance of a stretch where fiducials place each picture, or by a way's random walk."""
     return _p_of_places(fit, off, noise) if fit.sight.placed else _p_of_way(fit, off)
 
 
-def _p_of_places(fit: TravelFit, off: _Stretch, noise: DriftNoise) -> float:
+def _p_of_places(fit: TravelFit, off: Stretch, noise: DriftNoise) -> float:
     """Return the chance of a stretch by errors of fiducials: neighbouring pictures share them.
 
     The size is unsure by one picture's error at least, and by more where other effects look alike.
@@ -195,7 +206,7 @@ def _p_of_places(fit: TravelFit, off: _Stretch, noise: DriftNoise) -> float:
     return min(1.0, _tries(fit) * float(2 * norm.sf(z)))
 
 
-def _p_of_way(fit: TravelFit, off: _Stretch) -> float:
+def _p_of_way(fit: TravelFit, off: Stretch) -> float:
     """Return the chance of a stretch, or of all that is left, by a way's random walk: the lesser of two."""
     one = chance(off.gain / max(off.misfit, 1.0), _tries(fit), len(fit.sight.time_s))
     return min(1.0, 2 * min(one, fit.fits_p))

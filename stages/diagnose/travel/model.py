@@ -113,14 +113,14 @@ class TravelFit:
 
         Pictures that an event leaves free are none of them.
         """
-        own = np.diag(self.whitened.projector)
+        own = self.whitened.information(np.eye(len(self.difference_mm)))
         told = own > _TOLD * np.max(own)
         return self.whitened.weighted[told] / own[told], own[told] ** -0.5
 
     def with_columns(self, columns: Float, noise: DriftNoise | None = None) -> Whitened:
         """Return the fit of other columns (N, C) in place of its own, with another noise if one is given."""
         difference_mm = self.whitened.residual + self.columns @ self.whitened.estimate
-        return whitened_fit(difference_mm, columns, (noise or self.noise).covariance(self.sight.path_mm))
+        return whitened_fit(difference_mm, columns, (noise or self.noise).precision(self.sight.path_mm))
 
     @property
     def left_over(self) -> float:
@@ -159,10 +159,10 @@ def fitted(
         noise = estimated_noise(
             richest.difference_mm, richest.columns, sight.path_mm, quantum_mm(encoder) / np.sqrt(12)
         )
-    covariance_mm = noise.covariance(sight.path_mm)
-    end, told_apart = simplest(ends, covariance_mm)
-    whitened = whitened_fit(end.difference_mm, end.columns, covariance_mm)
-    values = end.values(covariance_mm)
+    precision = noise.precision(sight.path_mm)
+    end, told_apart = simplest(ends, precision)
+    whitened = whitened_fit(end.difference_mm, end.columns, precision)
+    values = end.values(precision)
     plain = readings_at(encoder, sight.time_s) - sight.distance_mm
     # Noise is measured from the pictures' usual steps: what is left in all may be more, never less.
     covariance = max(_left_over(whitened, len(values)), 1.0) * whitened.covariance

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve
+from scipy.linalg import cho_solve_banded, cholesky_banded
 from scipy.linalg.lapack import dgelsy
 from scipy.stats import f as fisher
 
@@ -31,6 +30,8 @@ _LAGS = (2, 4, 8, 16, 32)
 # Increments a lag needs at least: one or two steps among twelve do not move their median by much.
 _PER_LAG = 12
 _REWEIGHTINGS = 30
+# So many columns as long as the run are looked at together: all of them would take its square.
+AT_ONCE = 256
 # Columns of length 1 are told apart to this share: a root of what doubles resolve.
 _SOLID = 1e-8
 
@@ -54,18 +55,18 @@ class End:
     difference_mm: Float
     columns: Float
 
-    def values(self, covariance_mm: Float) -> Float:
+    def values(self, precision: Precision) -> Float:
         """Return (4 + E,) the values; 0 of what is held, and of what this motion does not tell."""
         free = _free(self.columns, self.held)
-        fit = whitened_fit(self.difference_mm, self.columns[:, free], covariance_mm)
+        fit = whitened_fit(self.difference_mm, self.columns[:, free], precision)
         out = np.zeros(self.columns.shape[1])
         out[free] = np.where(np.isfinite(np.diag(fit.covariance)), fit.estimate, 0.0)
         return out
 
-    def misfit(self, covariance_mm: Float) -> float:
+    def misfit(self, precision: Precision) -> float:
         """Return χ² of what is left."""
         free = _free(self.columns, self.held)
-        fit = whitened_fit(self.difference_mm, self.columns[:, free], covariance_mm)
+        fit = whitened_fit(self.difference_mm, self.columns[:, free], precision)
         return float(fit.residual @ fit.weighted)
 
 
@@ -85,12 +86,12 @@ def starts(asked: Asked, delay_s: float, play_mm: float) -> list[tuple[tuple[int
     return [(held, start) for held, start in every if unknown <= set(held)]
 
 
-def simplest(ends: Sequence[End], covariance_mm: Float) -> tuple[End, bool]:
+def simplest(ends: Sequence[End], precision: Precision) -> tuple[End, bool]:
     """Return the simplest solution that no other beats by far, and whether delay and play are told apart.
 
     Delay and play can imitate or cancel each other, so that each is kept only where it improves the fit much.
     """
-    cost = [e.misfit(covariance_mm) + FAR_BETTER * (2 - len(e.held)) for e in ends]
+    cost = [e.misfit(precision) + FAR_BETTER * (2 - len(e.held)) for e in ends]
     best = int(np.argmin(cost))
     held = ends[best].held
     rivals = [c for c, e in zip(cost, ends, strict=True) if len(e.held) == 1 and e.held != held]
@@ -173,10 +174,33 @@ class DriftNoise:
     white_mm: float
     drift_mm: float
 
-    def covariance(self, path_mm: Float) -> Float:
-        """Return (N, N) at ways (N,)."""
-        walk = np.minimum(path_mm[:, None], path_mm[None, :]) - path_mm[0]
-        return np.asarray(self.white_mm**2 * np.eye(len(path_mm)) + self.drift_mm**2 * walk)
+    def precision(self, path_mm: Float) -> Precision:
+        """Return it at ways (N,), which never go back."""
+        step = np.diff(path_mm, prepend=path_mm[0])
+        band = np.zeros((2, len(path_mm)))
+        band[0] = 2 * self.white_mm**2 + self.drift_mm**2 * step
+        band[0, 0] = self.white_mm**2
+        band[1, :-1] = -(self.white_mm**2)
+        return Precision(cholesky_banded(band, lower=True))
+
+
+@dataclass(frozen=True)
+class Precision:
+    """Inverse K⁻¹ of the covariance of N differences, whose steps hang together with their neighbours alone.
+
+    Attributes
+    ----------
+    factor : (2, N)
+        Cholesky factor of the covariance of the first difference and of the steps: its diagonal, and below.
+    """
+
+    factor: Float
+
+    def times(self, values: Float) -> Float:
+        """Return K⁻¹ times values (N, ...)."""
+        steps = np.diff(values, axis=0, prepend=0 * values[:1])
+        solved = cho_solve_banded((self.factor, True), steps)
+        return np.asarray(-np.diff(solved, axis=0, append=0 * solved[:1]))
 
 
 def estimated_noise(difference_mm: Float, columns: Float, path_mm: Float, least_mm: float) -> DriftNoise:
@@ -244,8 +268,8 @@ class Whitened:
         Of the differences.
     weighted : (N,)
         K⁻¹ residual.
-    factor : (N, N)
-        Lower Cholesky factor of K; what is above its diagonal means nothing.
+    precision : Precision
+        K⁻¹.
     weighted_columns : (N, C)
         K⁻¹ columns.
     inverse : (C, C)
@@ -256,29 +280,33 @@ class Whitened:
     covariance: Float
     residual: Float
     weighted: Float
-    factor: Float
+    precision: Precision
     weighted_columns: Float
     inverse: Float
 
-    @cached_property
-    def projector(self) -> Float:
-        """(N, N) K⁻¹ less what the columns take, made when asked for: most fits are only weighed."""
-        taken = self.weighted_columns @ self.inverse @ self.weighted_columns.T
-        return np.asarray(cho_solve((self.factor, True), np.eye(len(self.residual))) - taken)
+    def beyond(self, values: Float) -> Float:
+        """Return K⁻¹ times values (N, M), less what the columns take."""
+        return self.precision.times(values) - self.weighted_columns @ self.inverse @ (
+            self.weighted_columns.T @ values
+        )
+
+    def information(self, candidates: Float) -> Float:
+        """Return (M,) that of candidate columns (N, M), each alone beside the columns."""
+        parts = np.array_split(candidates, max(candidates.shape[1] // AT_ONCE, 1), axis=1)
+        return np.concatenate([np.einsum("nm,nm->m", p, self.beyond(p)) for p in parts])
 
     def gain(self, candidates: Float) -> tuple[Float, Float]:
         """Return estimates (M,) and scores z² (M,) that each candidate column (N, M) alone would add."""
-        information = np.einsum("nm,nk,km->m", candidates, self.projector, candidates, optimize=True)
+        information = self.information(candidates)
         score = candidates.T @ self.weighted
         seen = information > 1e-9 * np.max(information, initial=1e-30)
         safe = np.where(seen, information, 1.0)
         return np.where(seen, score / safe, 0.0), np.where(seen, score**2 / safe, 0.0)
 
 
-def whitened_fit(difference_mm: Float, columns: Float, covariance: Float) -> Whitened:
+def whitened_fit(difference_mm: Float, columns: Float, precision: Precision) -> Whitened:
     """Return the generalised least-squares fit; columns that say nothing get no estimate (σ infinite)."""
-    factor = cho_factor(covariance, lower=True)
-    weighted_columns = cho_solve(factor, columns)
+    weighted_columns = precision.times(columns)
     information = columns.T @ weighted_columns
     scale = 1 / np.sqrt(np.maximum(np.diag(information), 1e-30))
     value, vector = np.linalg.eigh(information * np.outer(scale, scale))
@@ -290,8 +318,8 @@ def whitened_fit(difference_mm: Float, columns: Float, covariance: Float) -> Whi
     residual = difference_mm - columns @ estimate
     spread = inverse.copy()
     spread[hidden, hidden] = np.inf
-    weighted = cho_solve(factor, residual)
-    return Whitened(estimate, spread, residual, weighted, factor[0], weighted_columns, inverse)
+    weighted = precision.times(residual)
+    return Whitened(estimate, spread, residual, weighted, precision, weighted_columns, inverse)
 
 
 def chance_of_noise(left_over: float, free: int, pictures: int) -> float:
