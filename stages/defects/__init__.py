@@ -234,5 +234,5 @@ def _defects_of_run(
 
 
 DEFECTS = Stage(
-    "defects", "36", DefectParameters, _defects_of_run, "defects as instances with depth, clock and kind"
+    "defects", "37", DefectParameters, _defects_of_run, "defects as instances with depth, clock and kind"
 )

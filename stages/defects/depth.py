@@ -28,6 +28,7 @@ _BELL_UNKNOWN = 0.5
 # Rings beside each other are no further apart than this many of their distances; a ring's departure is that
 # of the fifth of its samples that depart most, as for what confirms a finding.
 _BESIDE, _TOP_QUANTILE, _LEAST_OF_RING = 1.6, 0.8, 3
+_SHOWN_SIGMAS = 2.0  # rings beside show a defect themselves from so many σ of its depth on
 _SHARPENING = 0.3  # 1 σ of a peak's curvature correction, relative
 # Of its depth: without it 85 and 90 % of the depths of 88 defects painted into two open recordings were in
 # their 95 % interval, with it 92 and 91 % of 82 (`python -m tests.benchmarks.bench_painted_findings`).
@@ -105,18 +106,21 @@ def allowed_by_neighbours(depth: Depth, region: Region, surface: Surface) -> Dep
 
     A wall seen along a line of sight falls off from ring to ring by no more than their distance (45°, the
     mean flank of a hemisphere): what one ring shows beyond that is no part of the wall that the next one
-    shows.
+    shows. Where the rings beside show a defect themselves, it is between what they show and what they allow.
     """
     top, at = _tops_of_rings(depth, region, surface)
     if not len(top):
         return depth
     spacing = surface.points.spacing_mm
     beside = (np.abs(at - at[top.argmax()]) < _BESIDE * spacing) & (np.arange(len(top)) != top.argmax())
-    most = max(float(top[beside].max(initial=0.0)), 0.0) + spacing
+    shown = max(float(top[beside].max(initial=0.0)), 0.0)
+    most = shown + spacing
     if abs(depth.depth_mm) <= most:
         return depth
-    sigma = float(np.hypot(depth.sigma_mm, most / 2))
-    return replace(depth, depth_mm=float(np.sign(depth.depth_mm)) * most, sigma_mm=sigma)
+    known = shown >= _SHOWN_SIGMAS * depth.sigma_mm
+    allowed, unsure = (shown + spacing / 2, spacing / 2) if known else (most, most / 2)
+    sigma = float(np.hypot(depth.sigma_mm, unsure))
+    return replace(depth, depth_mm=float(np.sign(depth.depth_mm)) * allowed, sigma_mm=sigma)
 
 
 def _tops_of_rings(depth: Depth, region: Region, surface: Surface) -> tuple[Float, Float]:
