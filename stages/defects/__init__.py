@@ -37,7 +37,7 @@ from stages.defects.along import stretches
 from stages.defects.clean import CleanWall, clean_wall
 from stages.defects.corroborate import Witnesses, evidence_for
 from stages.defects.dark_lines import dark_lines, lies_beside
-from stages.defects.depth import Depth, allowed_by_neighbours, measure_depth
+from stages.defects.depth import Depth, allowed_by_neighbours, contradicted_frame, measure_depth
 from stages.defects.describe import Scene, describe, describe_line
 from stages.defects.detect import Detection, detect
 from stages.defects.grow import footprint, grown
@@ -54,6 +54,8 @@ from stages.defects.told import report_found, report_unconfirmed, warn_of_missed
 __all__ = ["DEFECTS", "DefectParameters", "find_defects"]
 
 _MIN_CELLS, _MIN_CIRCLES, _HALF = 1000, 8, 0.5
+# A finding is measured without at most so many rings on which a glint lies (chosen).
+_MOST_LEFT_OUT = 4
 
 
 def find_defects(
@@ -129,6 +131,10 @@ def _measured(
             if not _is_measured(surface, here):
                 continue
             depth = _depth_of(region, here, surface, wall, clean, parameters, context)
+            while (frame := _contradicted(depth, here, surface)) is not None:
+                surface, _ = wall.surface_about(region, every_point, (*surface.left_out, frame))
+                depth = _depth_of(region, here, surface, wall, clean, parameters, context)
+            depth = depth if region.all_round else allowed_by_neighbours(depth, here, surface)
             if region.sign * depth.depth_mm >= parameters.min_depth_mm:
                 top = float(region.cut(score.astype(float))[region.mask].max())
                 evidence = evidence_for(here, depth, surface, scene.seen_by, _fixed_in(region, fixed), top)
@@ -152,8 +158,14 @@ def _depth_of(
     """Return the depth of a region, of which ``here`` counts its rows from the surface's first."""
     if region.all_round:
         return measure_all_round(here, surface, clean, bore_beside(region, wall.relief.radius_map))
-    depth = measure_depth(here, surface, clean, parameters.draws, context.random)
-    return allowed_by_neighbours(depth, here, surface)
+    return measure_depth(here, surface, clean, parameters.draws, context.random)
+
+
+def _contradicted(depth: Depth, here: Region, surface: Surface) -> int | None:
+    """Return the frame that a region is to be measured without, None where there is none."""
+    if here.all_round or len(surface.left_out) >= _MOST_LEFT_OUT:
+        return None
+    return contradicted_frame(depth, here, surface)
 
 
 def _chance_of_bead(region: Region, wall: MeasuredWall, parameters: DefectParameters) -> float:

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.ndimage import gaussian_filter
 from scipy.optimize import OptimizeResult, least_squares
 
-from pipeline.arrays import Float
+from pipeline.arrays import Float, Int
 from stages.defects.clean import CleanWall
 from stages.defects.relief import Relief
 from stages.defects.segment import Region
@@ -28,7 +28,7 @@ _BELL_UNKNOWN = 0.5
 # Rings beside each other are no further apart than this many of their distances; a ring's departure is that
 # of the fifth of its samples that depart most, as for what confirms a finding.
 _BESIDE, _TOP_QUANTILE, _LEAST_OF_RING = 1.6, 0.8, 3
-_SHOWN_SIGMAS = 2.0  # rings beside show a defect themselves from so many σ of its depth on
+_SHOWN_SIGMAS = 2.0  # of the wall's own unevenness, as for what confirms a finding
 _SHARPENING = 0.3  # 1 σ of a peak's curvature correction, relative
 # Of its depth: without it 85 and 90 % of the depths of 88 defects painted into two open recordings were in
 # their 95 % interval, with it 92 and 91 % of 82 (`python -m tests.benchmarks.bench_painted_findings`).
@@ -106,35 +106,70 @@ def allowed_by_neighbours(depth: Depth, region: Region, surface: Surface) -> Dep
 
     A wall seen along a line of sight falls off from ring to ring by no more than their distance (45°, the
     mean flank of a hemisphere): what one ring shows beyond that is no part of the wall that the next one
-    shows. Where the rings beside show a defect themselves, it is between what they show and what they allow.
+    shows. Where one beside shows a defect itself, it is between what that one shows and what it allows.
     """
-    top, at = _tops_of_rings(depth, region, surface)
-    if not len(top):
+    tops, spacing = _tops_of_rings(depth, region, surface), surface.points.spacing_mm
+    if not len(tops.top_mm):
         return depth
-    spacing = surface.points.spacing_mm
-    beside = (np.abs(at - at[top.argmax()]) < _BESIDE * spacing) & (np.arange(len(top)) != top.argmax())
-    shown = max(float(top[beside].max(initial=0.0)), 0.0)
-    most = shown + spacing
-    if abs(depth.depth_mm) <= most:
+    shown = max(float(tops.beside_mm.max(initial=0.0)), 0.0)
+    if abs(depth.depth_mm) <= shown + spacing:
         return depth
-    known = shown >= _SHOWN_SIGMAS * depth.sigma_mm
-    allowed, unsure = (shown + spacing / 2, spacing / 2) if known else (most, most / 2)
-    sigma = float(np.hypot(depth.sigma_mm, unsure))
-    return replace(depth, depth_mm=float(np.sign(depth.depth_mm)) * allowed, sigma_mm=sigma)
+    at_mm, sigma = shown + spacing, np.hypot(depth.sigma_mm, (shown + spacing) / 2)
+    if shown >= _SHOWN_SIGMAS * surface.relief.typical.sigma_mm:
+        at_mm, sigma = shown + spacing / 2, np.hypot(surface.relief.typical.sigma_mm, spacing / 2)
+    return replace(depth, depth_mm=float(np.sign(depth.depth_mm)) * at_mm, sigma_mm=float(sigma))
 
 
-def _tops_of_rings(depth: Depth, region: Region, surface: Surface) -> tuple[Float, Float]:
-    """Return how far each ring departs to the finding's side, and its place along the pipe."""
+def contradicted_frame(depth: Depth, region: Region, surface: Surface) -> int | None:
+    """Return the frame whose ring alone makes a depth that those beside do not allow, None where none does.
+
+    The rings on both sides of it show the finding themselves: its depth is theirs without that one.
+    """
+    tops = _tops_of_rings(depth, region, surface)
+    shown = tops.beside_mm >= _SHOWN_SIGMAS * surface.relief.typical.sigma_mm
+    if len(shown) < 2 or not shown.all():
+        return None
+    most = float(tops.beside_mm.max()) + surface.points.spacing_mm
+    return tops.deepest_frame if abs(depth.depth_mm) > most else None
+
+
+@dataclass(frozen=True)
+class _Tops:
+    """How far each ring (n,) of a ``frame`` departs to a finding's side, at which place along the pipe."""
+
+    frame: Int
+    top_mm: Float
+    at_mm: Float
+    spacing_mm: float
+
+    @property
+    def beside_mm(self) -> Float:
+        """Those (m,) of the rings beside the one that departs most."""
+        deepest = self.top_mm.argmax()
+        near = np.abs(self.at_mm - self.at_mm[deepest]) < _BESIDE * self.spacing_mm
+        return np.asarray(self.top_mm[near & (np.arange(len(near)) != deepest)])
+
+    @property
+    def deepest_frame(self) -> int:
+        """The frame of the ring that departs most."""
+        return int(self.frame[self.top_mm.argmax()])
+
+
+def _tops_of_rings(depth: Depth, region: Region, surface: Surface) -> _Tops:
+    """Return how far each ring by which the surface goes departs to the finding's side."""
     relief, points = surface.relief, surface.near
     margin = int(np.ceil(2 * surface.points.spacing_mm / relief.cell_mm[0]))
     columns = np.broadcast_to(region.mask.any(0), (len(region.mask) + 2 * margin, region.mask.shape[1]))
     wide = Region(region.row - margin, region.column, columns, region.sign)
     row, column, inside = cells_of(points, relief, wide)
+    inside &= ~np.isin(points.frame, surface.left_out)
     deviation = np.sign(depth.depth_mm) * (points.radius_mm - relief.shape_at(row, column))
-    rings = [inside & (points.frame == k) for k in np.unique(points.frame[inside])]
-    rings = [r for r in rings if r.sum() >= _LEAST_OF_RING]
-    top = np.array([np.quantile(deviation[r], _TOP_QUANTILE) for r in rings])
-    return top, np.array([float(np.mean(points.distance_mm[r])) for r in rings])
+    frame = np.unique(points.frame[inside])
+    rings = [(k, inside & (points.frame == k)) for k in frame]
+    rings = [(k, r) for k, r in rings if r.sum() >= _LEAST_OF_RING]
+    top = np.array([np.quantile(deviation[r], _TOP_QUANTILE) for _, r in rings])
+    at = np.array([float(np.mean(points.distance_mm[r])) for _, r in rings])
+    return _Tops(np.array([k for k, _ in rings], np.int64), top, at, surface.points.spacing_mm)
 
 
 def _is_small(relief: Relief, region: Region, points: DeviationPoints) -> bool:

@@ -113,6 +113,8 @@ class Surface:
     near : PointCloud
     points : DeviationPoints
         Those of them that the surface goes by, against the smooth shape.
+    left_out : tuple of int
+        Frames whose points it does not go by.
     """
 
     relief: Relief
@@ -121,6 +123,7 @@ class Surface:
     coarse_mm: Float
     near: PointCloud
     points: DeviationPoints
+    left_out: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -141,30 +144,38 @@ class MeasuredWall:
         margin = self.relief.rows_in(max(_MARGIN_MM, _MARGIN_IN_RINGS * self.spacing_mm))
         return widened(rows, self.relief.shape[0], margin)
 
-    def surface(self, rows: slice, wanted: Bool, every_point: bool = False) -> Surface:
+    def surface(
+        self, rows: slice, wanted: Bool, every_point: bool = False, without: tuple[int, ...] = ()
+    ) -> Surface:
         """Return the surface of some rows; where not ``wanted`` (rows, A), the map's own mean stands in.
 
-        It goes by the points that are sure of themselves, or by ``every_point``.
+        It goes by the points that are sure of themselves, or by ``every_point``, and ``without`` some frames.
         """
         relief = self.relief.rows(rows)
         half = relief.cell_mm[0] / 2
         near = self.cloud.between(relief.distance_mm[0] - half, relief.distance_mm[-1] + half)
         used = near if every_point else _chosen(near, sure_of_themselves(near))
+        used = _chosen(used, ~np.isin(used.frame, without)) if without else used
         points = deviation_points(relief, used, self.spacing_mm)
         coarse = millimetre_mean(relief.all_mm, relief.cell_mm)
         everything = fine_surface(relief, points, wanted, coarse)
         local = everything + relief.local_mm - relief.all_mm
-        return Surface(relief, local, everything, coarse, near, points)
+        return Surface(relief, local, everything, coarse, near, points, without)
 
-    def surface_about(self, region: Region, every_point: bool) -> tuple[Surface, Region]:
-        """Return the surface about a region, and the region with its rows counted from the first there."""
+    def surface_about(
+        self, region: Region, every_point: bool, without: tuple[int, ...] = ()
+    ) -> tuple[Surface, Region]:
+        """Return the surface about a region, and the region with its rows counted from the first there.
+
+        As in `surface`.
+        """
         part = self.with_margin(slice(region.row, region.row + region.mask.shape[0]))
         here = region.counted_from(part.wide.start)
         columns = self.relief.shape[1]
         wanted = np.zeros((part.wide.stop - part.wide.start, columns), bool)
         i, j = np.nonzero(region.mask)
         wanted[here.row + i, (region.column + j) % columns] = True
-        return self.surface(part.wide, wanted, every_point), here
+        return self.surface(part.wide, wanted, every_point, without), here
 
 
 def sure_of_themselves(points: PointCloud) -> Bool:
