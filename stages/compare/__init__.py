@@ -1,4 +1,4 @@
-"""Two walls of one pipe compared: registration, the difference all over, and what became of each finding."""
+"""Two runs through one pipe compared: registration of the walls, their difference, each finding's fate."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ from stages.compare.registration.marks import Surface
 
 
 class CompareParameters(Parameters):
-    """Parameters of the compare stage: it has none."""
+    """The stage compare has no parameters."""
 
 
 def register_walls(walls: WallPair, parameters: RegisterParameters, context: Context) -> RegisteredWalls:
@@ -66,7 +66,7 @@ def compare_findings(
 
 
 def _resolution(walls: WallPair, pair: PairedWalls) -> Resolution:
-    """Return what limits the reading of depths: the coarser of both maps, and the calibration."""
+    """Return what limits the reading of depths: smoothing of the coarser map, and calibration."""
     both = (walls.earlier, walls.now)
     smoothing, spacing = max(w.smoothing_mm for w in both), max(w.ring_spacing_mm for w in both)
     # neighbouring rings are joined by a triangle of that foot, whose 1 σ is foot / √6
@@ -83,7 +83,9 @@ COMPARISON: tuple[Stage, ...] = (REGISTER, COMPARE)
 
 # Two outlines of one defect differ by a cell or two, 1 mm, and by the registration, of which 3 σ are allowed.
 _SIGMAS, _CELLS_MM = 3.0, 1.0
-# Kinds that look alike change names from run to run: of two equally good places the same name wins.
+# Cost of pairing two findings of different kinds, where 1 is the cost of boxes that do not overlap. Kinds
+# that look alike change names from run to run, so it only decides between places that fit equally well
+# (chosen).
 _OTHER_KIND = 0.1
 _IMPOSSIBLE = 1e3
 
@@ -104,8 +106,9 @@ def put_together(
 ) -> tuple[Place, ...]:
     """Return every finding of both runs once, in order of distance.
 
-    Two are one when both go into the wall, or both inward, or both are welds, and their boxes overlap after
-    they were grown by the uncertainty of registration and grid. Of several pairings the cheapest counts.
+    Two findings are one when both go into the wall, or both inward, or both are welds, and their boxes
+    overlap after being grown by the uncertainty of registration and grid. Of all assignments the one of least
+    total cost (`_apart`) counts.
     """
     before = [moved_outline(f, registration) for f in earlier]
     after = [np.asarray(f.outline, float) for f in now]
@@ -182,7 +185,10 @@ def changes(
 
 
 def holm(p: Sequence[float]) -> list[float]:
-    """Return p-values adjusted for their number; NaN stays NaN and does not count."""
+    """Return p-values adjusted for their number; NaN stays NaN and does not count.
+
+    S. Holm, "A simple sequentially rejective multiple test procedure", 1979.
+    """
     values = np.asarray(p, float)
     order = [k for k in np.argsort(values) if np.isfinite(values[k])]
     out, highest = np.full(len(values), np.nan), 0.0
@@ -211,7 +217,7 @@ def _measured(place: Place, number: int, cutter: Cutter, resolution: Resolution)
 
 
 def _places_alike(place: Place, patch: Patch, pair: PairedWalls) -> float:
-    """Return of how many places of its size on the wall a finding is the pick; 1 where both runs have it."""
+    """Return from how many places of its size on the wall a finding was picked; 1 where both runs have it."""
     if place.now is not None and place.earlier is not None:
         return 1.0
     return pair.now.radius_mm.size / float(patch.inside.sum())
@@ -232,7 +238,10 @@ def _judged(change: Change, p_adjusted: float) -> Change:
 
 
 def _fate(change: Change) -> Fate:
-    """Return what became of a place by what is significant; a deposit or dent grows inward, below 0."""
+    """Return what became of a place, by the sign of a significant change.
+
+    Depth is positive into the wall: metal loss grows where it rises, a deposit or dent where it falls.
+    """
     place, more = change.place, change.z * (1 if change.place.kind.is_metal_loss else -1) > 0
     if place.earlier is None:
         return Fate.NEW if change.is_significant and more else Fate.ONLY_NOW

@@ -43,12 +43,12 @@ class Resolution:
 def measure_growth(
     patch: Patch, sign: int, resolution: Resolution, place_sigma_mm: tuple[float, float]
 ) -> Growth:
-    """Return a defect's growth; ``sign`` +1 for one that goes into the wall, −1 inward.
+    """Return a defect's growth; ``sign`` is +1 for one that goes into the wall, −1 for one inward.
 
-    A defect that only one wall shows is read on the other at the place of its peak, as the extreme of mere
-    noise is no depth. What the maps' resolution takes off a peak is estimated by smoothing once more, with as
-    much for its 1 σ. Noise is what the same reading makes of the walls' difference over clean wall, piece
-    by piece; the registration's σ and calibration are added.
+    A defect that only one wall shows is read on the other wall at the place of its peak, because the extreme
+    of mere noise is no depth. The maps' resolution flattens a peak; by how much is estimated by smoothing
+    once more, and the whole correction counts as its own 1 σ. Noise is taken from the same reading of pieces
+    of clean wall; the σ of registration and calibration are added to it.
     """
     now, before = sign * patch.now_mm, sign * patch.before_mm
     extremes = [float(h[patch.inside].max()) for h in (now, before)]
@@ -81,7 +81,7 @@ def measure_growth(
 
 
 def _peaks(now: Float, before: Float, inside: Bool, in_both: bool) -> list[tuple[int, int]]:
-    """Return the cell of each wall's extreme; of one that has no defect of its own, the other's."""
+    """Return the cell of each wall's extreme; a wall without a defect of its own gets that of the other."""
     own = [_argmax(h, inside) for h in (now, before)]
     if in_both:
         return own
@@ -102,14 +102,14 @@ def _lost_of_both(
     resolution: Resolution,
     in_both: bool,
 ) -> Float:
-    """Return what the maps' resolution takes off each wall's peak; nothing where there is none."""
+    """Return by how much (2,), mm, the maps' resolution lowers each wall's peak; 0 on a wall without one."""
     lost = np.array([_lost(h, p, patch, resolution) for h, p in zip((now, before), peaks, strict=True)])
     has_peak = in_both or np.array([now[peaks[0]] >= before[peaks[1]], now[peaks[0]] < before[peaks[1]]])
     return np.where(has_peak, lost, 0.0)
 
 
 def _lost(height: Float, peak: tuple[int, int], patch: Patch, resolution: Resolution) -> float:
-    """Return by how much smoothing once more as the map did lowers a peak."""
+    """Return by how much, mm, a peak falls when the map is smoothed once more as it was made."""
     kernel = [s / c for s, c in zip((resolution.along_mm, resolution.around_mm), patch.cell_mm, strict=True)]
     reach = [int(np.ceil(4 * k)) + 1 for k in kernel]
     near = tuple(slice(max(p - r, 0), p + r + 1) for p, r in zip(peak, reach, strict=True))
@@ -128,7 +128,10 @@ def _size(height: Float, patch: Patch, level: float, peak: tuple[int, int]) -> F
 
 
 def _extent(profile: Float, level: float) -> float:
-    """Return cells over which a profile, 0 outside the part, is beyond a level, ends to a part of a cell."""
+    """Return the number of cells from the first to the last at which a profile is beyond a level.
+
+    The profile is 0 outside the connected part.
+    """
     at = np.flatnonzero(profile > level)
     return float(at[-1] - at[0] + 1)
 

@@ -1,4 +1,7 @@
-"""Two registered walls on one grid, and their difference: freed of what single rings do, and as a palette."""
+"""Two registered walls on one grid, and their difference, as numbers and as palette levels.
+
+What single rings differ in (mean, centre, ovality) is taken out: it is motion and calibration, not growth.
+"""
 
 from __future__ import annotations
 
@@ -118,7 +121,7 @@ def ring_values(rows: Float, azimuth_rad: Float) -> Float:
 
 
 def registered_walls(pair: PairedWalls, is_one_calibration: bool, progress: Progress) -> RegisteredWalls:
-    """Return the walls' difference after registration, without what single rings do."""
+    """Return the walls' difference after registration, without mean, centre and ovality of single rings."""
     limit = _ENDS * _typical_sigma(pair)
     levels = np.zeros((2, *pair.now.radius_mm.shape), np.uint8)
     grown = np.full(len(pair.now.distance_mm), np.nan)

@@ -23,7 +23,7 @@ _LEAST_CLEAN = 0.9
 # fewer than 4 Student's t says hardly anything.
 _ENOUGH, _LEAST_PIECES = 40, 4
 _LEAST_SEEN = 0.5
-# Findings' feet reach beyond their outlines; so much wall beside them is not called clean.
+# The foot of a defect reaches beyond its outline, so wall this near to one is not called clean. Chosen.
 _FOOT_MM = 2.0
 
 
@@ -156,13 +156,13 @@ def smoothed(height_mm: Float, cell_mm: tuple[float, float], sigma_mm: float = _
 
 
 def at_its_peak(mask: Bool, peak: tuple[int, int]) -> Bool:
-    """Return the connected part of a mask that holds a cell."""
+    """Return the connected part of a mask to which the cell ``peak`` belongs; nothing where it is outside."""
     parts, _ = label(mask)
     return np.asarray(parts == parts[peak]) if parts[peak] else np.zeros_like(mask)
 
 
 def outline_mask(outlines: list[Float], pair: PairedWalls) -> Bool:
-    """Return which cells (S, A) of the later wall outlines cover, grown by a margin against their feet."""
+    """Return the cells (S, A) of the later wall within `_FOOT_MM` of an outline or inside of one."""
     wall = pair.now
     mask = np.zeros((len(wall.distance_mm), len(wall.azimuth_rad)), np.uint8)
     for outline in outlines:

@@ -1,4 +1,4 @@
-"""Wall, photo and error colours -> textured mesh."""
+"""The stage mesh makes a textured triangle mesh of the wall, its photo and the error colours."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from stages.mesh.join import OpenMesh
 from stages.mesh.poisson import folded_cells, joined_pieces, piece_cuts, poisson_surface, seen_part
 from stages.mesh.surface import Decimated, Surface, decimate, with_normals
 
-# Rows and points that medians are taken of.
+# Rows and points of which medians are taken: a bound on time.
 _SAMPLED_ROWS, _SAMPLED_POINTS = 2000, 1 << 20
 
 
@@ -103,7 +103,7 @@ def make_mesh(
 
 @dataclass
 class Tally:
-    """Sizes of pieces, and how far what they were made of lies off them, summed."""
+    """Sums over the pieces: triangles and vertices before decimation, and their distance from the surface."""
 
     faces: int = 0
     vertices: int = 0

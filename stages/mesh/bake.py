@@ -23,7 +23,7 @@ _UNTEXTURED = 128  # middle grey
 
 @dataclass(frozen=True)
 class TexelPlaces:
-    """Of texels (H, W): distance, mm, azimuth from −π to π, rad, and whether there is wall."""
+    """Pipe coordinates of texels, each (H, W): distance, azimuth from −π to π, and whether wall is there."""
 
     distance_mm: Float32
     azimuth_rad: Float32
@@ -154,7 +154,7 @@ _ARRAYS: dict[str, tuple[str, tuple[int, ...]]] = {
 
 @dataclass
 class TilePacker:
-    """Takes tiles in order of distance and forgets them but for their place on the disk."""
+    """Writes tiles, given in order of distance, to the disk and keeps only where they lie there."""
 
     scratch: Scratch
     _spools: dict[str, Spool] = field(init=False)

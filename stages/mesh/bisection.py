@@ -38,7 +38,7 @@ class Lattice:
 
     @cached_property
     def depth(self) -> int:
-        """Of a number of columns that has no factor 2 it is 0: every square is then two triangles."""
+        """Halvings of a block. 0 for an odd number of columns: every square is then two triangles."""
         even = (self.columns & -self.columns).bit_length() - 1
         return min(even, max(self.columns // _LEAST_BLOCKS_AROUND, 1).bit_length() - 1)
 
@@ -138,7 +138,7 @@ def worthwhile(lattice: Lattice, xyz: Float, weight: Float, triangle_cost: float
 
 
 def without_gaps(lattice: Lattice, wanted: Cuts, vertex: Bool) -> Cuts:
-    """Return the wanted cuts and all that they need; the nodes ``vertex`` (nodes,) become vertices too."""
+    """Return the wanted cuts, those that they need elsewhere, and those at the nodes ``vertex`` (nodes,)."""
     vertex = vertex.copy()
     cut = [np.zeros_like(wanted.cut[-1])]
     for level in range(lattice.finest - 1, -1, -1):
@@ -152,7 +152,7 @@ def without_gaps(lattice: Lattice, wanted: Cuts, vertex: Bool) -> Cuts:
 
 
 def triangles(lattice: Lattice, cuts: Cuts, measured: Bool, along: slice) -> Int:
-    """Return the surface of some rows of blocks, as numbers of nodes (T, 3), and what single holes leave."""
+    """Return the triangles (T, 3) of some rows of blocks as numbers of nodes, those beside holes included."""
     blocks = lattice.of_blocks(along)
     found = [
         np.moveaxis(lattice.number(corner, along), 1, 2)[cuts.leaves(level, blocks)]
@@ -162,7 +162,7 @@ def triangles(lattice: Lattice, cuts: Cuts, measured: Bool, along: slice) -> Int
 
 
 def beside_holes(lattice: Lattice, measured: Bool, along: slice) -> Int:
-    """Return the triangle (T, 3) of each square that lacks one corner, an end of its diagonal."""
+    """Return the triangle (T, 3) that is left of each square in which one end of the diagonal is a hole."""
     apex, a, b = np.moveaxis(lattice.corner[lattice.finest], 1, 0)
     once = (apex[:, 0] < (a + b - apex)[:, 0])[:, None]  # of the square's two triangles
     numbers = [lattice.number(place, along) for place in (apex, a, a + b - apex, b)]
@@ -183,7 +183,7 @@ def _pairs(level: NDArray[Any]) -> NDArray[Any]:
 def _moments(corner: Int32, xyz: Float, weight: Float) -> Float:
     """Return the weighted sums (10, T, N) of 1, x, y, z by pairs over triangles with ``corner`` (T, 6) nodes.
 
-    A node counts by a sixth in every half square at it, wherefore in whole in the middle of a wall.
+    A node counts by a sixth in each of the six half squares that meet there, hence once inside a wall.
     """
     count = weight.shape[-1]
     share = csr_matrix(

@@ -19,7 +19,7 @@ from stages.mesh.surface import Decimated, Surface
 # Steps of the conjugate gradients: the matrix, scaled by its diagonal, has eigenvalues between 1/2 and 2
 # (A. Wathen, "Realistic eigenvalue bounds for the Galerkin mass matrix", 1987): each takes away two thirds.
 _STEPS = 14
-# Share of the bound that cells without noise are taken to scatter by.
+# Scatter of cells without noise, as a share of the bound ``error_mm`` (chosen).
 _SCATTER = 0.25
 
 
@@ -30,9 +30,9 @@ class Cells:
     Attributes
     ----------
     radius_mm, noise_mm : (nodes,) float32
-        And random 1 σ; 0 where nothing was measured.
+        Radius and its random 1 σ; 0 where nothing was measured.
     distance_mm, origin_p, frame : (R,), (R, 3), (R, 3, 3)
-        Of the axis at every row.
+        Distance along the axis, and the axis' point and frame in P, at every row.
     azimuth_rad : (A,)
     error_mm, noise_factor : float
         The surface may lie off a cell by ``error_mm`` and ``noise_factor`` of its noise.
@@ -235,7 +235,7 @@ def _least_squares(
 
 
 def _piece(cells: Cells, cuts: Cuts, radius: Float, off: Float32, axis: PipeAxis, along: slice) -> Decimated:
-    """Return some rows of blocks as a surface, with the errors of its cells but those of its first row."""
+    """Return some rows of blocks as a surface with its errors; its first row counts in the piece before."""
     lattice = cells.lattice
     measured = cells.radius_mm > 0
     node, corner = np.unique(triangles(lattice, cuts, measured, along), return_inverse=True)

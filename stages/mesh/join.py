@@ -1,7 +1,7 @@
 """Cuts meshes at a plane and joins two that end there, so that no gap is left.
 
-Both borders follow the same wall a few hundredths of a millimetre apart. The first one's course is kept; the
-second one's vertices are moved onto it, and each takes over the vertices of the other.
+Both borders follow the same wall, a few hundredths of a millimetre apart. The course of the first border is
+kept. The vertices of the second are moved onto it, and each border takes over the vertices of the other.
 """
 
 from __future__ import annotations
@@ -120,7 +120,8 @@ NO_CUT = Cut(*(np.empty(0, np.int64) for _ in range(4)))
 
 
 _SAME_MM = 0.02  # vertices closer than this along a border become one
-# A border that runs once around travels one length: half of one is the largest doubt.
+# A border that runs once around a closed course travels one length of it. Whether it goes around once or not
+# is decided half way between.
 _CLOSED = 0.5
 
 

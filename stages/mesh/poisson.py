@@ -76,8 +76,8 @@ def joined_pieces(
 ) -> Iterator[tuple[OpenMesh, int]]:
     """Yield the surface from each of ``cuts_mm`` (n + 1,) to the next, neighbours joined without a gap.
 
-    Each comes with how many of the borders at its end could not be joined to the next one's. Two pieces are
-    held at a time.
+    With each piece comes the number of borders at its end that could not be joined to the next piece. Two
+    pieces are held in memory at a time.
     """
     before, border, last = NOTHING, NO_CUT, len(cuts_mm) - 2
     for k, (start, end) in enumerate(pairwise(cuts_mm)):

@@ -64,8 +64,8 @@ def vertex_normals(surface: Surface) -> Float:
 def with_normals(pieces: Iterable[Surface]) -> Iterator[tuple[Surface, Float]]:
     """Yield pieces with their vertices' normals (V, 3), which go on smoothly from piece to piece.
 
-    Unused vertices are dropped, and pieces without a triangle. Of the pieces, given in order, three at a time
-    are held.
+    Unused vertices and pieces without triangles are dropped. Pieces must be given in order; three are held in
+    memory at a time.
     """
     before: Surface | None = None
     this: Surface | None = None
@@ -103,7 +103,10 @@ def _at_border(piece: Surface) -> Surface:
 
 @dataclass(frozen=True)
 class Decimated:
-    """A surface of fewer triangles: largest and mean square distance of the original's vertices from it."""
+    """A surface of fewer triangles, the original's size, and how far its vertices lie from the new surface.
+
+    ``largest_error_mm`` and ``mean_square_mm2`` are the largest and the mean square distance.
+    """
 
     surface: Surface
     original_faces: int
@@ -117,8 +120,8 @@ def decimate(original: Surface, target_faces: int, allowance_mm: float) -> Decim
 
     The distance of every original vertex from the new surface is measured (one-sided Hausdorff distance), and
     that of the new vertices from the original, as a collapse on a flat wall may throw a vertex far along it.
-    Where one is larger than the allowance, the original is decimated again, half as much; if nothing
-    is left to take away, the original itself is returned.
+    Where one is larger than the allowance, the original is decimated again to twice as many triangles; if
+    that takes away less than a tenth of them, the original itself is returned.
     """
     goal = target_faces
     while goal < _WORTHWHILE * len(original.face):

@@ -1,4 +1,7 @@
-"""Texture: lit frames, motion and wall to the wall's photo: plan the views, part light from wall, blend."""
+"""The stage texture makes the wall's photo from lit frames, motion and wall.
+
+It chooses the views of each tile, separates light from wall, and blends the views.
+"""
 
 from __future__ import annotations
 
@@ -26,8 +29,8 @@ from stages.texture.surface import wall_surface
 from stages.texture.views import LitViews, TileViews, lit_views, seen_by, shared, thinned
 
 _WHITE = 250.0
-# What is brighter than the median wall by more is no matt wall: glints, noise where light is scarce.
-# Derived: dirty steel and concrete reflect .2, white lime and paint .8 of the light.
+# A place more times brighter than the median wall is no matt wall, but a glint, or noise where light is
+# scarce. Derived: dirty steel and concrete reflect .2, white lime and paint .8 of the light.
 _MATT_RATIO = 4.0
 Read = TypeVar("Read")
 _Reader = Callable[[Recording, Int], Iterator[tuple[int, Read | None]]]
@@ -202,7 +205,8 @@ def _texture_of_run(
 ) -> WallTexture:
     """Photograph the wall from the frames that the pictures show to be lit.
 
-    Poses and wall are those of the instrument as the motion found it, and so the pixels must be.
+    Poses and wall belong to the probe as the stage motion found it, so the pixels are projected with that
+    one.
     """
     found = probe.as_found_in(trajectory)
     return photograph_wall(frames.applied_to(recording), found, trajectory, wall, parameters, context)

@@ -1,7 +1,7 @@
 """Tiles of the flat picture blended from many views, robustly.
 
-Luma is sampled for every pixel, colours for every block of 2 by 2: the eye and video coding hold colour to be
-half as fine, and a block is sampled in less than half of the time of four pixels.
+Luma is sampled for every pixel, colour for every block of 2 by 2: video stores colour at half the resolution,
+and the eye sees it no finer. Sampling a block takes less than half the time of four pixels.
 """
 
 from __future__ import annotations
@@ -43,8 +43,8 @@ _LEAST_KNOWN = np.float32(0.25)
 class TileStack:
     """Samples of one tile's pixels in up to ``views`` views, each view's one after the other.
 
-    Used for one tile after the other: memory that the system gives anew costs more than all writing to it.
-    ``rows`` and ``columns`` are even.
+    One stack serves one tile after the other, because getting new memory from the system takes longer than
+    writing to it. ``rows`` and ``columns`` are even.
     """
 
     def __init__(self, views: int, rows: int, columns: int) -> None:

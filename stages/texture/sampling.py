@@ -16,9 +16,12 @@ from stages.texture.light import LEAST_LIGHT, irradiance
 from stages.texture.surface import WallSurface
 from stages.texture.views import LitViews, sheet_distance_mm
 
+# Cells of wall around the pipe, and their length along it in radii.
 _CELL_COLUMNS = 30
 _CELL_RADII = 0.05
+# Pictures are averaged over so many pixels each way before they are sampled.
 _SHRINK = 8
+# Grey levels that are used: darker ones are noise, brighter ones may be clipped. Debt: data/debts.md.
 _DARK, _BRIGHT = 3.0, 245.0
 
 
@@ -73,7 +76,7 @@ class LightSampler:
         self._reference = float(self._at_sheet(radius))
 
     def of(self, seen: tuple[int, Image | None]) -> LightSamples:
-        """Return the samples of a view by its luma (H, W); none where there is no image."""
+        """Return the samples of ``seen``, a view and its luma (H, W); none where the luma is None."""
         view, image = seen
         if image is None:
             return LightSamples.none()
@@ -118,7 +121,7 @@ class LightSampler:
 
 
 def joined(parts: Sequence[LightSamples], views: Int) -> LightSamples:
-    """Return the samples of several views, which are counted in an ascending list (W,) of them."""
+    """Return the samples of several views; ``view`` becomes the place in the ascending ``views`` (W,)."""
     if not parts:
         return LightSamples.none()
     samples = LightSamples(

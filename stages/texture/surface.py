@@ -124,7 +124,10 @@ def wall_surface(
 
 
 def _blocks(radius_mm: Float32) -> Iterator[tuple[slice, slice, slice]]:
-    """Yield rows, the same with more on both sides that hold some radii, and the rows within these."""
+    """Yield blocks as three slices: rows, the same widened on both sides, and the rows within the widened.
+
+    Blocks are widened until some radius in them is known.
+    """
     rows = len(radius_mm)
     for first in range(0, rows, _BLOCK_ROWS):
         last, more = min(first + _BLOCK_ROWS, rows), _MORE_ROWS

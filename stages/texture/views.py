@@ -75,9 +75,10 @@ def seen_by(
 ) -> list[TileViews]:
     """Return the views of each tile: those in which it lies near the laser sheet.
 
-    There a picture point and the wall point measured by the ring coincide whatever the errors of camera and
-    motion. Where views are rare the reach is widened until three of them show every row. Of several passes
-    the one with the most views is taken, so that a tile need not be kept until the probe returns.
+    Near the sheet a picture point and the wall point that the ring measured coincide, whatever the errors of
+    camera and motion. Where views are rare, the reach is widened until three of them show every row. If the
+    probe passes a tile several times, the pass with the most views is taken, so that the tile need not be
+    kept until the probe returns.
     """
     half_tile, lean_mm = grid.tile_rows * grid.mm_per_px / 2, views.lean * surface.mean_radius_mm
     row = _InOrder(views.distance_mm)
@@ -93,11 +94,11 @@ def thinned(plan: Sequence[TileViews], most: int) -> list[TileViews]:
 
 
 def shared(plan: Sequence[TileViews], most: int) -> list[TileViews]:
-    """Return the plan with about ``most`` views a tile where it has more, neighbouring tiles the same ones.
+    """Return the plan with at most ``most`` views a tile; neighbouring tiles keep the same views.
 
-    Frames that no tile keeps need not be read. The views of a tile are spread less evenly than by `thinned`:
-    where noise asks for all views that may be had, its photo is farther off its place (open-3-field: 0.155
-    in place of 0.085 mm in the worst of twenty patches).
+    Frames that no tile keeps need not be read. But the views of a tile are spread less evenly than by
+    `thinned`: where the pictures' noise asks for all views that may be had, the photo would lie farther off
+    its place (open-3-field: 0.155 instead of 0.085 mm in the worst of twenty patches).
     """
     rate = np.zeros(1 + max((int(t.views[-1]) for t in plan if len(t.views)), default=0))
     for tile in plan:
@@ -115,13 +116,16 @@ class _InOrder:
         self.distance_mm = distance_mm
 
     def third_nearest_mm(self, place_mm: float) -> float | None:
-        """Return how far the third nearest view is, or the farthest of fewer; None where there is none."""
+        """Return the distance of the third nearest view, with fewer views of the farthest; None of none."""
         at = int(np.searchsorted(self._sorted, place_mm))
         near = np.sort(np.abs(self._sorted[max(at - 3, 0) : at + 3] - place_mm))[:3]
         return float(near[-1]) if len(near) else None
 
     def within(self, place_mm: float, reach_mm: float) -> Int:
-        """Return the views not farther than that, in the order of frames."""
+        """Return the views not farther than ``reach_mm`` from a place, in the order of frames.
+
+        One view beyond the reach may be among them.
+        """
         ends = np.searchsorted(self._sorted, [place_mm - reach_mm, place_mm + reach_mm])
         return np.sort(self._order[ends[0] : ends[1] + 1])
 

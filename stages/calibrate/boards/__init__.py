@@ -38,7 +38,7 @@ __all__ = ["BOARDS", "CAMERA", "CameraFile", "FoundBoards", "Pictures", "Target"
 
 @dataclass(frozen=True)
 class CameraFile:
-    """A camera that is given, and the name of its file; None where none is."""
+    """A camera read from a file, and the file's name; ``camera`` is None where no file was given."""
 
     camera: Camera | None = None
     name: str = ""
@@ -70,7 +70,7 @@ def calibrate_boards(
     image_size
         Width and height, px.
     models
-        Those to try.
+        Names of the camera models to try.
     reference
         A camera to compare with; without one, the best model is compared with the next best.
 
@@ -97,7 +97,9 @@ def calibrate_boards(
         chosen,
         scores,
         uncertainty_map(chosen),
-        tuple((name, "its corners fit no camera that fits the other images") for name in outliers),
+        tuple(
+            (name, "its corners contradict the camera that the other images agree on") for name in outliers
+        ),
         other,
         None if other is None else displacement_map(chosen.camera, other),
         parameters.board_shape,
@@ -108,9 +110,10 @@ def calibrate_boards(
 def board_as_it_is(
     views: Sequence[BoardView], first: Estimate, parameters: BoardCalibrationParameters
 ) -> tuple[BoardCalibrationParameters, Part, tuple[Part, ...]]:
-    """Return parameters with a definite board shape, and the views dealt out accordingly.
+    """Return parameters with the board's shape decided, and the views divided for held-out tests.
 
-    Where the shape is left open, the one with which Kannala-Brandt predicts held-out views best is taken.
+    Where ``board_shape`` is "best", a Kannala-Brandt camera is fitted with each shape, and the shape that
+    predicts held-out views best is taken.
     """
     if parameters.board_shape != "best":
         return parameters, *deal(views, first, parameters)

@@ -1,8 +1,8 @@
 """Least squares over one camera and many board poses: residuals, their derivatives, and the covariance.
 
-Each pose couples only to its own view and to the camera: `ArrowEquations` of the normal equations.
-Residuals are weighted after Huber by iterated reweighting. A plane board may be bent: the same quadratic sag
-in all views, as in the board warp of mrcal.
+A pose acts only on its own view, the camera on all views: the normal equations have the shape of an arrow
+(`ArrowEquations`). Residuals get Huber weights by iterated reweighting. A plane board may be bent: it has the
+same quadratic sag in all views, as in the board warp of mrcal.
 """
 
 from __future__ import annotations
@@ -23,8 +23,9 @@ from pipeline.instrument.camera import Camera
 from pipeline.instrument.camera.calibration import BoardView
 
 POSE = 6
-# Corners beyond the model's reach count as so far off. A tenth and ten times of it, half and twice the trials
-# and a tenth and ten times of the gain at which a fit stops move no Kannala-Brandt camera by 1e-6 of its σ.
+# Residual, px, of a corner that lies outside the camera model's field of view. With a tenth or ten times of
+# it, with half or twice the trials, or with a tenth or ten times the gain at which a fit stops, no
+# Kannala-Brandt camera moves by 1e-6 of its σ.
 _OUT_OF_MODEL_PX = 1e4
 STOP = Stop(trials=300, enough=1e-10)
 
@@ -112,7 +113,7 @@ class Estimate:
 
 @dataclass(frozen=True)
 class Linearised:
-    """An estimate with its robust cost, and the normal equations there when they are asked for."""
+    """An estimate with its robust cost; its normal equations are formed when they are first asked for."""
 
     estimate: Estimate
     corners: Corners
@@ -134,7 +135,7 @@ class Linearised:
         return self.normal.step(damping)
 
     def decrease(self, step: tuple[Float, Float]) -> float:
-        """Return the promised decrease of the cost."""
+        """Return by how much the cost falls with a step where the residuals are linear."""
         return self.normal.decrease(step)
 
 
@@ -230,7 +231,10 @@ def pose_covariances(estimate: Estimate, corners: Corners, huber_px: float) -> F
 
 
 def _togetherness(gradients: Float, inverse: Float, variance: float) -> float:
-    """Return the scatter of the pictures' gradients (V, F) against independent corners', at least 1."""
+    """Return how many times more the gradients of pictures (V, F) scatter than independent corners would.
+
+    At least 1: the covariance is never narrowed.
+    """
     views, count = gradients.shape
     if views < 2 or count == 0 or variance == 0:
         return 1.0
@@ -239,7 +243,7 @@ def _togetherness(gradients: Float, inverse: Float, variance: float) -> float:
 
 
 def _sag(xyz_b: Float) -> Float:
-    """Return x², xy and y² about the board's centre, 1 at its half diagonal."""
+    """Return x², xy and y² (M, 3) of corners, from the board's centre in units of its half diagonal."""
     xy = xyz_b[:, :2] - (xyz_b[:, :2].min(0) + xyz_b[:, :2].max(0)) / 2
     x, y = (xy / max(float(np.linalg.norm(xy, axis=1).max()), 1e-12)).T
     return np.stack([x * x, x * y, y * y], -1)

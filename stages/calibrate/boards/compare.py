@@ -1,4 +1,8 @@
-"""Judging calibrations: held-out reprojection of dealt views, uncertainty over the image, displacement."""
+"""How good a camera calibration is.
+
+It is judged by the reprojection of views that it was not fitted to, by its uncertainty over the image, and by
+how far it displaces the image of another camera.
+"""
 
 from __future__ import annotations
 
@@ -24,22 +28,25 @@ from stages.calibrate.boards.bundle import Estimate
 from stages.calibrate.boards.fit import BoardCalibrationParameters, ModelName, fit, held_out_residuals
 from stages.calibrate.boards.survey import applied, placed, survey_board
 
+# Places across the image at which the maps of uncertainty and displacement are computed.
 _GRID_COLUMNS = 41
+# Most Gauss-Newton steps of the rotation between two cameras; steps below 1e-12 rad end them earlier.
 _TURNING_STEPS = 20
 
 
 @dataclass(frozen=True)
 class Part:
-    """Views to fit to and views held out, both with the board as the former show it.
+    """Views that a camera is fitted to, and views held out to test it.
 
     Attributes
     ----------
     inside, outside
-        ``outside`` is empty where all views are fitted to.
+        Views fitted to, and views held out; ``outside`` is empty where all views are fitted to. Both have the
+        board's corners where the views inside show them.
     first
-        A start for the views inside.
+        Start of the fit: a camera and the poses of the views inside.
     survey
-        The board as measured in the views inside; None when it is not.
+        The board as measured in the views inside; None where the board was not measured.
     """
 
     inside: list[BoardView]
@@ -51,7 +58,7 @@ class Part:
 def deal(
     views: Sequence[BoardView], first: Estimate, parameters: BoardCalibrationParameters
 ) -> tuple[Part, tuple[Part, ...]]:
-    """Return the part of all views, and those in which each of ``parameters.folds`` parts is held out."""
+    """Return a part that fits all views, and ``parameters.folds`` parts that each hold out other views."""
     index = np.arange(len(views))
     folds = min(parameters.folds, len(views))
     masks = [index % folds == fold for fold in range(folds)]
@@ -82,7 +89,7 @@ def score(
 ) -> ModelScore:
     """Return how well a model fits, and how well it predicts views that it was not fitted to.
 
-    ``parameters.board_shape`` must be a definite one, the one that the parts were dealt with.
+    ``parameters.board_shape`` must be the one that the parts were dealt with, not "best".
     """
     try:
         fitted = fit(whole.inside, whole.first, model, parameters)
@@ -108,8 +115,8 @@ def ranked(scores: Sequence[ModelScore]) -> list[CameraCalibration]:
 def uncertainty_map(calibration: CameraCalibration) -> UncertaintyMap:
     """Return 1 σ, px, of where the camera projects a direction, over the image.
 
-    A small rotation of the camera with all boards changes nothing that can be seen. So the rotation that best
-    undoes a change of parameters over the image is taken out of ``sigma_px``, not of ``raw_sigma_px``.
+    A small rotation of the camera together with all boards changes no picture. So ``sigma_px`` leaves out the
+    rotation that best undoes a change of parameters over the image; ``raw_sigma_px`` contains it.
     """
     camera = calibration.camera
     uv, ray, valid = _grid_rays(camera)
@@ -124,7 +131,7 @@ def uncertainty_map(calibration: CameraCalibration) -> UncertaintyMap:
 
 
 def displacement_map(camera: Camera, other: Camera) -> DisplacementMap:
-    """Return by how much ``other`` projects what ``camera`` sees at each pixel elsewhere.
+    """Return how far, px, ``other`` projects a direction from the pixel at which ``camera`` sees it.
 
     The rotation between the two cameras that makes the displacement least is taken out and returned.
     """

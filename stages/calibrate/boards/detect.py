@@ -1,9 +1,10 @@
 """Calibration boards, in mm in the board's frame B, and their corners found in strongly distorted images.
 
-Chessboards by OpenCV's sector-based detector (A. Duda, U. Frese, "Accurate detection and localization of
-checkerboard corners for calibration", BMVC 2018). A board that is not found whole is looked for with more
-contrast, in the darkest colour channel, and then in part: a part is as good as the whole, since the pose of
-every view is free. Corners are refined to a fraction of a pixel, where refining makes them better.
+Chessboards are found by OpenCV's sector-based detector (A. Duda, U. Frese, "Accurate detection and
+localization of checkerboard corners for calibration", BMVC 2018). A board that is not found whole is searched
+again with more contrast and in the darkest colour channel, and at last in part: part of a board serves as
+well as the whole, since the pose of every view is free. Corners are refined to a fraction of a pixel where
+that brings them nearer to a smooth image of the board.
 """
 
 from __future__ import annotations
@@ -20,13 +21,17 @@ from pipeline.adjustment.robust import Cauchy, robust_spread, root_mean_square
 from pipeline.arrays import Float, Image
 from pipeline.instrument.camera.calibration import BoardView
 
+# Corners that a view needs at least (chosen).
 LEAST_CORNERS = 12
+# Inner corners along the shorter side of a part of a chessboard, and rows or columns that it may lack
+# (chosen).
 _SHORTEST_SIDE = 4
 _MOST_MISSING = 2
+# Longer side, px, to which a picture is reduced while parts are searched: a bound on time.
 _SEARCHED_SIDE_PX = 1000
 _QUICK = cv2.CALIB_CB_ACCURACY
 _THOROUGH = cv2.CALIB_CB_EXHAUSTIVE | cv2.CALIB_CB_NORMALIZE_IMAGE | cv2.CALIB_CB_ACCURACY
-# In ten boards that are lit unevenly the same 360 corners are found with 2, 4 and 8.
+# Of OpenCV's CLAHE. In ten unevenly lit boards the same 360 corners are found with a limit of 2, 4 and 8.
 _CONTRAST_LIMIT, _CONTRAST_TILES = 4.0, (8, 8)
 
 
@@ -92,7 +97,7 @@ def detect(image: Image, board: Board, name: str) -> BoardView | None:
 
 
 def shows_whole(image: Image, board: Board) -> bool:
-    """Return whether a quick look at an image shows the board, a chessboard as a whole."""
+    """Return whether a quick search finds the board in an image; a chessboard must be seen whole."""
     grey = grey_of(image)
     if isinstance(board, Charuco):
         return _charuco(grey, board, "") is not None
@@ -109,7 +114,7 @@ def _chessboard(image: Image, board: Chessboard, name: str) -> BoardView | None:
 
 
 def _part_of_chessboard(image: Image, board: Chessboard, name: str) -> BoardView | None:
-    """Look for the largest part in a picture of moderate size, and refine it in the image itself."""
+    """Look for the largest part of the board in a reduced picture, and refine its corners in the image."""
     grey = grey_of(image)
     scale = min(_SEARCHED_SIDE_PX / max(grey.shape), 1.0)
     small = np.asarray(cv2.resize(grey, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA), np.uint8)
@@ -129,7 +134,10 @@ def largest_grid(grey: Image) -> Float | None:
 
 
 def _upright(corners: Float | None, board: Chessboard) -> Float | None:
-    """Return a grid with its rows along the board's; None where more than two rows or columns lack."""
+    """Return a grid (R, C, 2) turned so that its rows are the board's; None if it lacks too many of them.
+
+    At most `_MOST_MISSING` rows and as many columns may be missing.
+    """
     if corners is None:
         return None
     for turned in (corners, np.rot90(corners)):
@@ -190,11 +198,12 @@ _SMALLEST_WINDOW, _LARGEST_WINDOW = 2, 20
 # A corner stays when it moves by less than a thousandth of what corners err by, px.
 _STOP = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_COUNT, 100, 1e-4)
 _DEGREE = 4
-"""Of the polynomial that stands for the board's smooth picture: it leaves 0.1-0.5 px of a fisheye's."""
+"""Degree of the polynomial that stands for the board's smooth image; it fits a fisheye's to 0.1 to 0.5 px."""
 _ROUNDS = 3
 _WORSE_VIEW, _WORSE = 1.3, 3.0
-"""Misfit of a view, and of a corner in robust σ, from which the refined places are the worse ones. In
-33 rendered boards, blurred by 0 to 5 px, the places err by 0.16 px rms (detected 0.42, refined 0.25)."""
+"""From when refined places are given up: a view's misfit over that of the detected places, and a corner's
+excess of distance in robust σ. In 33 rendered boards, blurred by 0 to 5 px, the places so chosen err by
+0.16 px rms; the detected ones by 0.42, the refined ones by 0.25."""
 
 
 def refine(picture: Image, uv: Float, xyz_b: Float, share: float) -> Float:

@@ -123,8 +123,8 @@ def held_out_residuals(
 def shared_parameters(camera: Camera, corners: Corners, parameters: BoardCalibrationParameters) -> Free:
     """Return what is estimated beside the poses.
 
-    Scaramuzza's e stays 0: turning the sensor against the boards' poses changes nothing, so of c, d, e and
-    the scale of the polynomial only two shape the image.
+    Scaramuzza's e stays 0: a turn of the sensor about the optical axis is undone by turning all board poses,
+    so that c, d, e and the polynomial's scale hold only three independent numbers.
     """
     plane = bool(np.ptp(corners.xyz_b[:, 2]) < 1e-9)
     shape = BENT if plane and parameters.board_shape == "bent" else FLAT
@@ -202,7 +202,7 @@ def _refuse_unseen(calibration: CameraCalibration) -> None:
 
 
 def _refuse_undetermined(calibration: CameraCalibration, parameters: BoardCalibrationParameters) -> None:
-    """Raise when the scale at a typical corner is uncertain: relative 1 σ of the image radius there."""
+    """Raise when the image scale is too uncertain: relative 1 σ of the image radius of the median corner."""
     camera = calibration.camera
     radius = np.hypot(*(calibration.uv - camera.centre_px).T)
     typical = calibration.uv[np.argsort(radius)[len(radius) // 2]]

@@ -1,4 +1,4 @@
-"""Pictures of a board: which files they are, the corners found in them, and patterns that were not stated."""
+"""Pictures of a board: their files, the board's corners in them, and warnings of a pattern not as stated."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from stages.calibrate.boards.detect import (
 SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".pgm", ".ppm", ".webp")
 _NAME = "boards"
 _FIRST = 3
-"""Pictures looked at for another pattern than the one stated; three in about 5 s."""
+"""Pictures searched for another pattern than the stated one; three take about 5 s."""
 
 
 @dataclass(frozen=True)
@@ -134,11 +134,11 @@ def find_boards(
 
 
 _LEAST_MARKERS = 4
-"""Markers of one dictionary that make a pattern of it: single ones are read into noise."""
+"""Fewest markers of one dictionary that count as a pattern: the detector sees single ones in noise."""
 _TAGS = ("DICT_APRILTAG_36h11", "DICT_APRILTAG_25h9", "DICT_APRILTAG_16h5")
 _MARKERS = ("DICT_4X4_1000", "DICT_5X5_1000", "DICT_6X6_1000", "DICT_7X7_1000", "DICT_ARUCO_ORIGINAL")
 _LEAST_SIDE = 5
-"""Inner corners a side that make a chessboard of another size: 4 × 4 is read into noise."""
+"""Fewest inner corners a side of a chessboard of another size: the detector sees 4 × 4 in noise."""
 _CIRCLES = {
     "a grid of circles": cv2.CALIB_CB_SYMMETRIC_GRID,
     "a staggered grid of circles": cv2.CALIB_CB_ASYMMETRIC_GRID,
@@ -200,7 +200,8 @@ def _of_squares(grey: Image, stated: Board) -> tuple[str, str] | None:
 def refuse_another_pattern(files: Sequence[Path], board: Board) -> None:
     """Raise `UnusableError` where the first pictures show another pattern than the board that was stated.
 
-    A whole search takes seconds a picture; this one looks at the first pictures, until one shows the board.
+    A full search takes seconds a picture, so only the first `_FIRST` pictures are looked at, until one of
+    them shows the board.
     """
     for file in files[:_FIRST]:
         image = read_picture(file)
@@ -214,7 +215,7 @@ def refuse_another_pattern(files: Sequence[Path], board: Board) -> None:
 
 
 def read_picture(file: Path) -> Image | None:
-    """Return a picture (H, W, 3), BGR; None where the file is none.
+    """Return a picture (H, W, 3), BGR; None where the file is not a picture.
 
     Raises
     ------

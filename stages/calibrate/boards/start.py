@@ -16,18 +16,20 @@ from pipeline.instrument.camera.plumb_bob import Pinhole, Unified
 from pipeline.instrument.camera.scaramuzza import Scaramuzza
 from stages.calibrate.boards.bundle import FLAT, POSES_ONLY, STOP, Corners, Estimate, Free, cost, solve
 
-# From where the fit starts. Half and twice as many fields, half and twice the two below move no parameter of
-# Kannala-Brandt cameras by 1e-6 of its σ (three sets of 14 drawn views).
+# Half fields of view from which the fit is tried. Half and twice as many of them, and half and twice the
+# other constants of this block, move no parameter of Kannala-Brandt cameras by 1e-6 of its σ (three sets of
+# 14 drawn views).
 _HALF_FIELDS_RAD = np.geomspace(0.15, 2.6, 14)
 _SAMPLE_CORNERS = 24
-# See above.
 _START_HUBER_PX = 5.0
-# See above.
+# Least forward part of a unit ray, and corners with such a ray, that SQPnP is given; sensitivity as above.
 _NEAR_FORWARD, _LEAST_POINTS = 0.3, 4
-# Up to where a first polynomial is fitted: 1.4 and 3.1 rad move no Scaramuzza camera by 1e-6 of its σ.
+# Polar angle up to which the first polynomial is fitted: with 1.4 and 3.1 rad no Scaramuzza camera moves by
+# 1e-6 of its σ.
 _WIDEST_FIT_RAD = 2.8
-# Steps after which the fields are compared, the best of which is fitted to its end: of ten drawn sets for six
-# cameras the best after 3 steps was the best in the end, and after 8 its cost lay within .1 % of that.
+# Steps with each half field before they are compared; only the best is fitted to its end. In ten drawn sets
+# for six cameras the best after 3 steps was the best in the end, and after 8 its cost was within .1 % of
+# that.
 _COMPARED = replace(STOP, trials=8)
 _FOCAL, _ALL = Free(np.arange(2), FLAT), Free(np.arange(4), FLAT)
 

@@ -2,8 +2,8 @@
 
 Printed boards are neither flat nor true to scale everywhere. Every corner gets an offset in mm, shared by all
 views, held near zero by a prior (K. Strobl, G. Hirzinger, "More accurate pinhole camera calibration with
-imperfect planar target", ICCV workshops 2011). Camera with poses, and offsets, are solved by turns: with the
-camera and poses held, the corners do not depend on each other.
+imperfect planar target", ICCV workshops 2011). Camera and poses are solved with the offsets held, then the
+offsets with camera and poses held, by turns: held so, the corners do not depend on each other.
 """
 
 from __future__ import annotations
@@ -24,10 +24,11 @@ from stages.calibrate.boards.start import model_start, pose
 
 # Corners of two views are one when their nominal places agree so well: squares are mm wide, rounding is nm.
 _SAME_MM = 1e-3
+# Turns between camera and offsets, and how often the views are placed on the board anew (chosen).
 _TURNS = 6
 _PLACINGS = 2
 _CAMERA = Free(np.arange(8), FLAT)
-# Up to where the first camera is like the equidistant one: 1 and 3 rad lead to the same board and camera.
+# Polar angle up to which the first camera follows the equidistant one; 1 and 3 rad lead to the same result.
 _WIDEST_RAD = 2.0
 _QUARTER_TURNS = tuple(rotation_from_vector(np.array([0.0, 0.0, k * np.pi / 2])).round() for k in range(4))
 
@@ -47,10 +48,10 @@ def applied(survey: BoardSurvey, view: BoardView) -> BoardView:
 
 
 def placed(survey: BoardSurvey, view: BoardView, camera: Camera, huber_px: float) -> BoardView:
-    """Return a view at the place on the board where it agrees best, of all places that its grid fits.
+    """Return a view with its corners numbered as they agree best with the measured board.
 
-    A chessboard may be seen upside down or in part, and a part turned sideways; which, only its own
-    irregularities tell.
+    A chessboard may be seen upside down or in part, and a part turned sideways. All placements that its grid
+    allows look alike but for the board's own irregularities, so each is tried.
     """
     places = [view] if view.numbered else _placements(survey, view) or [view]
     return min(places, key=lambda v: _pose_cost(applied(survey, v), camera, huber_px))
@@ -87,7 +88,7 @@ def _refined(
     estimate: Estimate,
     parameters: BoardCalibrationParameters,
 ) -> tuple[BoardSurvey, Estimate]:
-    """Solve camera with poses, and offsets, by turns."""
+    """Return board and estimate after solving camera and poses, then the offsets, `_TURNS` times by turns."""
     index = np.concatenate([_index(survey, view.xyz_b) for view in views])
     for _ in range(_TURNS):
         corners = Corners.of([applied(survey, view) for view in views])

@@ -100,7 +100,7 @@ def _posed(
 def measure_gauge(
     recording: Recording, rings: RingSamples, probe: Probe, parameters: GaugeParameters, context: Context
 ) -> MeasuredRun:
-    """Return first poses and all that an adjustment is fed with.
+    """Measure a gauge run: return first poses and the measurements for the adjustment.
 
     Raises
     ------
@@ -167,7 +167,7 @@ def _edges(
 def _require_bores(
     rings: BoreRings, T_pc: Float, probe: Probe, gauge: Gauge, parameters: GaugeParameters
 ) -> None:
-    """Refuse rings that are too few, or of another bore than stated; no fiducial hides a whole bore."""
+    """Refuse a run with too few rings on known bore, or with a bore of another diameter than stated."""
     premises.require_rings(len(np.unique(rings.frame)), parameters)
     xyz_p = transform(T_pc[rings.frame], probe.triangulate(rings.uv))
     error = np.hypot(xyz_p[:, 0], xyz_p[:, 1]) - rings.radius_mm

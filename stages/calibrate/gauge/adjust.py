@@ -31,14 +31,17 @@ from stages.calibrate.gauge.terms import (
     slip_origin,
 )
 
-# Half and twice of it move no parameter of two drawn gauge runs by more than 0.006 of its σ.
+# An adjustment ends after a step that moves no parameter of the instrument by this much of its σ. Half and
+# twice of it move no parameter of two drawn gauge runs by more than 0.006 of its σ.
 _CONVERGED_SIGMA = 0.02
-# With loose motion only the poses are of interest. Frames that see little wander to and fro with it, and the
-# instrument by .1 to .8 of its σ, until all iterations are used up. Derived: the adjustment that follows then
-# starts within 1 σ; it ends where it did but for .05 σ (open-2's gauge).
+# The same for the first adjustment, whose motion prior is loose and of which only the poses are used. With a
+# loose prior, frames that see little swing to and fro, and with them the instrument by .1 to .8 of its σ, so
+# that a stricter bound uses up all iterations. Derived: the next adjustment starts within 1 σ; its result
+# differs by .05 σ (open-2's gauge).
 NEAR_SIGMA = 0.5
-# Frames that third differences of the motion tie together.
+# A third difference of the motion ties a frame to the three after it.
 _REACH = 3
+# The scale of `pipeline.adjustment.robust.Cauchy`, in σ.
 _CAUCHY = 2.5
 # A model whose first step brings less than this part of the needed drop of χ² is not followed further: from
 # the plain optimum the first Gauss-Newton step brings nearly all of it (13.5 of 13.8 of a rendered gauge).
@@ -47,7 +50,7 @@ _FIRST_STEP = 0.5
 
 @dataclass(frozen=True)
 class Measurements:
-    """All that the adjustment is fed with.
+    """The measurements of a gauge run that the adjustment uses.
 
     Attributes
     ----------
@@ -94,10 +97,11 @@ def adjust(
     most_steps: int | None = None,
     enough: float = _CONVERGED_SIGMA,
 ) -> Solution:
-    """Minimise all residuals together by Gauss-Newton with Cauchy weights; ``watch`` before every step.
+    """Minimise all residuals together by Gauss-Newton with Cauchy weights.
 
-    It ends after a step that moves no part of the instrument by ``enough`` of its σ, or after ``most_steps``
-    steps in place of the parameters' number.
+    ``watch`` is called before every step. The search ends after a step that moves no parameter of the
+    instrument by ``enough`` of its σ, at the latest after ``most_steps`` steps (by default
+    ``parameters.iterations``).
 
     Raises
     ------
@@ -137,11 +141,11 @@ def spread(equations: Equations) -> float:
 
 
 def instrument_covariance(solution: Solution) -> Float:
-    """Return the covariance (Q, Q) of the instrument, true also where errors of neighbours are correlated.
+    """Return the covariance (Q, Q) of the instrument; it holds also where neighbours err alike.
 
-    The variance of each correction is widened to that of the scores summed over cells of wall and edges of
-    fiducials (cluster-robust; H. White, "Asymptotic theory for econometricians", 1984, ch. 6), never
-    narrowed; correlations stay those of the equations.
+    The variance of each correction is widened, never narrowed, to the cluster-robust one (H. White,
+    "Asymptotic theory for econometricians", 1984, ch. 6), whose clusters are cells of wall and edges of
+    fiducials. Correlations stay those of the equations.
     """
     at = solution.state.layout.instrument
     covariance = solution.factor.border_covariance()
@@ -161,7 +165,9 @@ def _cluster_scores(equations: Equations, factor: Factor) -> Float:
     return cluster_covariance(scores, equations.cluster)
 
 
+# A ring is wrong whose spread about the bore is so many times that of all rings. Debt: data/debts.md.
 _WRONG_RING = 4.0
+# A fiducial is wrong that lies so far off its stated place. Debt: data/debts.md.
 _WRONG_EDGE_MM = 0.25
 
 
@@ -236,14 +242,14 @@ def solve(
 
 
 def wrong_rings(solution: Solution, measured: Measurements) -> Int:
-    """Return the frames whose ring lies off the bore by several times the usual spread."""
+    """Return the frames whose ring spreads about the bore by `_WRONG_RING` times what all rings do."""
     frame = measured.rings.frame
     each = frame_spread(frame, solution.rings.in_sigma)
     return np.unique(frame[each > _WRONG_RING * spread(solution.rings)])
 
 
 def wrong_fiducials(solution: Solution) -> Int:
-    """Return the places of fiducials found farther off their place than a print may be."""
+    """Return the fiducials, as places in the gauge's list, that lie farther off than a print may be."""
     edge = solution.state.edge_mm
     shift = np.hypot(edge[:, 2] - edge[:, 0], edge[:, 1] - edge[:, 3]) / 2
     return np.flatnonzero(shift > _WRONG_EDGE_MM)
@@ -252,10 +258,11 @@ def wrong_fiducials(solution: Solution) -> Int:
 def chosen(
     plain: Solution, measured: Measurements, parameters: GaugeParameters, watch: Watch = unwatched
 ) -> tuple[Solution, SheetModel, dict[SheetModel, float]]:
-    """Return the solution with decentring and waviness if the data ask for them.
+    """Return the solution, its sheet model, and the drop of χ² of each model tried.
 
-    The drop of χ² is divided by how much neighbours err alike, and must exceed what chance and ln n for
-    each parameter give (G. Schwarz, "Estimating the dimension of a model", 1978).
+    Decentring and waviness are taken where the data ask for them: the drop of χ², divided by how much
+    neighbours err alike, must exceed ``parameters.evidence`` and ln n for each further parameter (G. Schwarz,
+    "Estimating the dimension of a model", 1978).
     """
     edge_spread, ring_spread, alike = spread(plain.edges), spread(plain.rings), _alike(plain)
     cost = plain.cost(edge_spread, ring_spread)

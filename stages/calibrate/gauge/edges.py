@@ -1,7 +1,7 @@
 """Fiducials found in the lit frames, and offsets across their borders to sub-pixel accuracy.
 
-A corner refined on its own is off where the marker is seen foreshortened; a straight stretch of edge is not,
-because blur is alike on both of its sides.
+Refining a corner by itself displaces it where the marker is seen foreshortened. A straight stretch of edge
+is measured without such an error, because blur is the same on both of its sides.
 """
 
 from __future__ import annotations
@@ -20,11 +20,14 @@ from pipeline.system.parallel import in_threads
 from stages.calibrate.gauge.geometry import Gauge
 from stages.calibrate.gauge.state import GaugeParameters
 
+# Samples of a profile across an edge.
 _PROFILE = 21
 _SIDES = np.array([[0.0, -1.0], [1.0, 0.0], [0.0, 1.0], [-1.0, 0.0]])
+# Part of an edge, from its middle, along which profiles are taken: the corners blur (chosen).
 _SPAN = 0.7
-# An edge is used with such a step, within this part of its profile, with noise below this part of the step,
-# and as sharp as this, px. Half and twice of each leave out 2 % of 3703 edges of open-1's gauge run at most.
+# A profile is used if its step is at least so high, its place within this part of the profile, its noise
+# below this part of the step, and its blur in this range, px. With half and twice of each, at most 2 % of
+# 3703 edges of open-1's gauge run are left out.
 _LEAST_STEP_GREY, _INSIDE, _MOST_NOISE, _BLUR_PX = 8.0, 0.6, 0.12, (0.3, 2.5)
 # Least σ, and the part of the border over which a profile reaches. Debt: data/debts.md.
 _LEAST_SIGMA_PX, _OF_BORDER = 0.03, 0.85

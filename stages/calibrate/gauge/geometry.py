@@ -26,7 +26,8 @@ class Gauge:
     Attributes
     ----------
     start_mm : (S,)
-        Where each bore section starts; the first reaches back, the last reaches on without end.
+        Distance at which each bore section starts. The first also counts before its start, the last has no
+        end.
     radius_mm : (S,)
     radius_sigma_mm : float
         1 σ of each section's radius, from the tolerance of its diameter.
@@ -89,7 +90,10 @@ class Gauge:
 
 @numba.njit(cache=True, nogil=True)
 def _from_squares(distance_mm, azimuth_rad, radius_mm, at, half_mm):  # type: ignore[no-untyped-def]
-    """Return how far points (N,) are from the nearest of squares about (distance, azimuth) ``at`` (K, 2)."""
+    """Return the distance (N,), mm, of wall points from the nearest square; 0 inside.
+
+    Squares lie about (distance, azimuth) ``at`` (K, 2), with ``half_mm`` from the middle to a side.
+    """
     out = np.full(len(distance_mm), np.inf)
     for n in range(len(distance_mm)):
         for k in range(len(at)):

@@ -20,8 +20,8 @@ from stages.calibrate.gauge.state import GaugeParameters
 STAGE = "calibrate"
 _LOOKED_AT = 6
 _SIZE_TOLERANCE = 0.05
-# What else a gauge seen elsewhere than it is may come from: of pictures scaled by 3 % the bores were blamed,
-# of cut ones 24 fiducials.
+# Added to hints, since a recorder that scales or cuts the pictures looks like a wrong gauge: with pictures
+# scaled by 3 % the bores were blamed, with cut ones 24 fiducials.
 _PICTURES = "see whether the recorder scales, stretches, cuts or frames the pictures"
 _WRONG_BORE_MM = 4.0
 _WRONG_SHARE = 0.2
@@ -169,7 +169,7 @@ def _size_ratio(posed: PosedFrames, gauge: Gauge, camera: Camera) -> float:
 
 
 def _likely_cause(recording: Recording, gauge: Gauge, strangers: Sequence[int]) -> str:
-    """Return what a second look suggests: mirrored, another dictionary, other numbers, or nothing."""
+    """Return the end of a message: mirrored, another dictionary, other numbers, or "" where none fits."""
     lit = recording.frames.of(Illumination.LED, Illumination.BOTH)
     chosen = lit[:: max(len(lit) // _LOOKED_AT, 1)]
     images = [image.copy() for _, image in recording.read(chosen, "grey") if image is not None]
@@ -179,7 +179,7 @@ def _likely_cause(recording: Recording, gauge: Gauge, strangers: Sequence[int]) 
         len(known & set(detect(own, np.ascontiguousarray(i[:, ::-1]))[0].tolist())) for i in images
     )
     if mirrored >= max(2 * len(images), 1):
-        return "; in the mirrored pictures they are: picture or fiducials are mirrored"
+        return "; they are seen once the pictures are mirrored: pictures or fiducials are mirrored"
     for name in _OTHERS:
         count = sum(len(detect(detector(name), i)[0]) for i in images)
         if name[:8] != gauge.fiducials.dictionary[:8] and count >= max(3 * len(images), 1):

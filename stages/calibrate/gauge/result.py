@@ -1,4 +1,4 @@
-"""What a gauge calibration found, and what it is worth."""
+"""The result of a gauge calibration: the probe, its uncertainty, and the directions least determined."""
 
 from __future__ import annotations
 
@@ -17,9 +17,10 @@ from stages.calibrate.gauge.state import ENCODER, SheetModel
 # A parameter is named in a direction that moves it by this share of its own σ or more (chosen, for reading).
 _NAMED_SHARE = 0.3
 _AZIMUTHS = 72
-# Edges or rings that err by more than so many times their noise contradict the calibration. Speckle, paint
-# and compression leave 1.5 to 2.7 in eleven gauges of open-1, open-2 and blind-a, what is wrong with those
-# included; a baseline that drifts by .3 mm leaves 7.5, a seam of 2 px 7 and 9, pixels 2 % too wide 35.
+# Edges or rings that err by more than so many times their noise contradict the calibration. In eleven gauge
+# runs of open-1, open-2 and blind-a, with their concealed faults, they err by 1.5 to 2.7 times: speckle,
+# paint and compression. A baseline that drifts by .3 mm makes it 7.5, a seam of 2 px 7 and 9, pixels 2 % too
+# wide 35.
 _MOST_SPREAD = 5.0
 
 
@@ -27,7 +28,8 @@ _MOST_SPREAD = 5.0
 class RadiusError:
     """Error of the radius by azimuth (A,), in a bore of ``radius_mm`` with the probe on its axis.
 
-    ``before_mm`` is what the stated probe would measure too much, ``sigma_mm`` the result's own 1 σ.
+    ``before_mm`` (A,) is by how much the stated probe would measure the radius too large, by the calibrated
+    one, and ``stated_sigma_mm`` (A,) its stated 1 σ. ``sigma_mm`` (A,) is 1 σ of the calibrated probe.
     """
 
     radius_mm: float
@@ -39,7 +41,17 @@ class RadiusError:
 
 @dataclass(frozen=True)
 class WeakDirection:
-    """A combination of parameters, one posterior σ long, and the radius it moves, mm (largest by azimuth)."""
+    """A combination of parameters that the run determines little.
+
+    Attributes
+    ----------
+    change : dict of str to float
+        Change of each parameter of importance, one posterior σ of the combination.
+    radius_mm : float
+        By how much that moves the measured radius, at the azimuth where it does most.
+    prior_share : float
+        Posterior σ over prior σ of the combination; 1 where the run has told nothing.
+    """
 
     change: dict[str, float]
     radius_mm: float
@@ -169,9 +181,10 @@ def radius_error(stated: Probe, probe: Probe, radius_mm: float) -> RadiusError:
 
 
 def weak_directions(probe: Probe, unsure: Float, radius_mm: float) -> tuple[WeakDirection, ...]:
-    """Return the combinations that the run determines least, by what they move the radius, largest first.
+    """Return combinations of parameters, the one that moves the radius most first.
 
-    ``prior_share`` is the part of a direction's variance that is what was believed beforehand.
+    They are principal directions of the probe's covariance; ``unsure`` (P, Q) holds one prior σ of each
+    correction.
     """
     direction = probe.principal_uncertainties()
     azimuth = np.linspace(-np.pi, np.pi, _AZIMUTHS, endpoint=False)

@@ -20,8 +20,8 @@ ENCODER = 3
 class GaugeParameters(Parameters):
     """What the gauge calibration lets the user choose.
 
-    The laser's priors are wide on purpose: a misaligned sheet is what a gauge run is to find, so that the
-    stated uncertainty must not hold it back. The camera's are the stated ones times a factor.
+    The laser's priors are wide on purpose: a gauge run is to find a misaligned sheet, which the stated
+    uncertainty would hold back. The camera's priors are its stated uncertainties times a factor.
     """
 
     baseline_prior_mm: float = Field(1.0, gt=0, le=20, description="1 σ, mm, of the baseline beforehand")

@@ -17,8 +17,8 @@ from stages.calibrate.gauge.edges import Edges
 from stages.calibrate.gauge.geometry import BoreRings
 from stages.calibrate.gauge.state import ENCODER, GaugeParameters, Unknowns
 
-# Step of the encoder's speed, and σ of the slip of the first frame, which is 0: half and twice of them move
-# no parameter of drawn gauge runs by 1e-9 of its σ.
+# Half the span over which the encoder's speed is differenced, and 1 σ with which the first frame's slip is
+# held at 0: half and twice of them move no parameter of drawn gauge runs by 1e-9 of its σ.
 _STEP_S, _ORIGIN_SIGMA_MM = 1e-3, 1e-3
 # A ring farther than this from where it is expected is an outlier, and its derivatives are of no interest.
 _FARTHEST_PX = 3.0
@@ -126,7 +126,10 @@ def wall_cells(wall_mm: Float) -> Int:
 def encoder_equations(
     state: Unknowns, time_s: Float, encoder: Encoder, parameters: GaugeParameters
 ) -> tuple[Rows, Rows]:
-    """Return the equations distance = scale × reading one delay ago + offset + slip, and of a slow slip."""
+    """Return the equations of the encoder's readings, and those that let its slip change only slowly.
+
+    distance = scale × reading at (time − delay) + offset + slip.
+    """
     count = len(time_s)
     scale, offset, delay = state.encoder
     at_time = time_s - delay
@@ -181,7 +184,7 @@ def _usable(frame: Int, by_frame: Float, by_border: Float, residual: Float) -> R
 
 
 def _weighted(rows: Rows, sigma: Float, cluster: Int) -> Equations:
-    """Return equations with Cauchy weights about the measurements' own spread, frame by frame for the σ."""
+    """Return equations with Cauchy weights; the σ of a frame's measurements is scaled by their spread."""
     known = np.isfinite(sigma)
     in_sigma = rows.residual / np.where(known, sigma, 1.0)
     spread = sigma * frame_spread(rows.frame[:, 0], in_sigma)

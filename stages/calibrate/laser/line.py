@@ -1,8 +1,8 @@
 """The laser line on a board of known pose, measured in the board's plane.
 
-On a plane board the laser plane draws a straight line, whatever the camera. So the board is looked at
-straight on (the picture resampled on a grid in its plane), the line found by consensus of its brightest
-points, and measured by fitting a Gaussian on a constant background across it, in the picture itself.
+On a plane board the laser plane draws a straight line, whatever the camera. So the picture is resampled on a
+grid in the board's plane, and the line is found there by consensus of the brightest points. Then it is
+measured by fitting a Gaussian on a constant background to profiles across it, taken from the picture itself.
 """
 
 from __future__ import annotations
@@ -19,8 +19,10 @@ from pipeline.geometry.rigid import transform
 from pipeline.instrument.camera import Camera
 from pipeline.machine.stage import Parameters
 
+# Points that take part in the consensus, and pairs of them that are drawn: bounds on time.
 _MOST_CANDIDATES, _DRAWS = 4000, 400
-# Half and twice of each move the plane of four rendered boards by 0.07 of its σ at most.
+# Half width of the consensus, distance of profiles along the line, and of samples across it. Half and twice
+# of each move the plane of four rendered boards by 0.07 of its σ at most.
 _LINE_PX, _STATION_PX, _PROFILE_STEP_PX = 2.0, 1.0, 0.5
 _OUTLIER_SIGMAS = 3.0
 _LARGEST_GRID = 4000
@@ -63,7 +65,7 @@ class LaserPlaneParameters(Parameters):
         default=0.05,
         gt=0,
         le=1,
-        description="lines that spread less across their common direction, as a share of along, are refused",
+        description="least spread of the lines across their common direction, over their spread along it",
     )
     largest_tilt_sigma_deg: float = Field(
         default=0.5, gt=0, le=10, description="a larger 1 σ of the plane's direction is refused, deg"

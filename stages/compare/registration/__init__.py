@@ -1,4 +1,4 @@
-"""How one wall lies on another; each way asks for what both sides can give.
+"""How one wall lies on another. There are three ways, for different data.
 
 ``by_marks``: two runs of one pipe, whatever their starts, slips and turns: pieces of wall are recognised by
 relief and texture, and shift and roll may change along the pipe. It says how surely the walls are the same.

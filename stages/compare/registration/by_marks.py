@@ -106,10 +106,10 @@ def _refuse_strangers(matches: Matches, chance: float, limits: RegisterParameter
 
 
 def _stations(matches: Matches) -> _Stations:
-    """Return the mean of the agreeing blocks at each distance; σ is that of a single place on the wall.
+    """Return the mean of the agreeing blocks at each distance, with the 1 σ of a single place on the wall.
 
-    It is the scatter of the blocks around the turn, which also holds what a tilt of one run's axis against
-    the other's does, and the scatter of stations against their neighbours.
+    That σ joins the scatter of the blocks around the pipe, to which a tilt between both axes contributes, and
+    the scatter of stations against their neighbours.
     """
     good = matches.agree
     at, group = np.unique(matches.at_mm[good], return_inverse=True)
@@ -129,7 +129,7 @@ def _grouped(values: Float, group: NDArray[np.int64], number: NDArray[np.int64])
 
 
 def _weld_pairs(stations: _Stations, welds_mm: Float, earlier: Surface, now: Surface) -> tuple[WeldPair, ...]:
-    """Return the welds that the later run shows where the texture says, to within their own width."""
+    """Return the welds that the later run shows within their own width of where the texture puts them."""
     found = (_weld_place(float(s), float(s) + stations.shift_at(float(s))[0], earlier, now) for s in welds_mm)
     return tuple(
         WeldPair(float(s), place) for s, place in zip(welds_mm, found, strict=True) if place is not None
@@ -137,7 +137,7 @@ def _weld_pairs(stations: _Stations, welds_mm: Float, earlier: Surface, now: Sur
 
 
 def _with_welds(stations: _Stations, pairs: tuple[WeldPair, ...], now: Surface) -> _Stations:
-    """Return the stations and one more at every weld, where weld and texture both say what the shift is."""
+    """Return the stations and one more at every weld, with the weighted mean of weld and texture as shift."""
     if not pairs:
         return stations
     weld_sigma = now.wall.step_mm / np.sqrt(12)

@@ -36,8 +36,8 @@ class PointsPose:
 def register_points(points: WallPoints, reference: ReferenceSurface) -> PointsPose:
     """Return the pose of least squared distances along the wall's normals, robustly.
 
-    Starts: the reference's frame as it is, and the long axes of both brought together, either way round, at
-    twelve rolls. A pipe without features fixes neither roll nor shift: then any of them serves.
+    The fit is started from the run's own frame, and from the long axes of both laid together, either way
+    round, at twelve rolls each. A pipe without features determines neither roll nor shift: then any will do.
 
     Raises
     ------

@@ -1,8 +1,8 @@
 """How a wall lies on a reference map, by least squares of the radius.
 
-A run cannot know where its pipe frame's origin lies: shift along the pipe, roll, and the first pose, seen as
-first and second order terms of the centre line, are taken out. The distance scale is found and reported.
-Radius and shape stay.
+A run cannot know where the reference has its origin. So shift along the pipe, roll, and the first pose, which
+shows as a constant, linear and quadratic offset of the centre line, are taken out of the difference. The
+distance scale is estimated and reported. Differences of radius and shape stay.
 """
 
 from __future__ import annotations
@@ -23,16 +23,18 @@ from pipeline.errors import UnusableError
 _FIT_POINTS, _SEARCH_POINTS = 10_000, 2000
 # Steps of that search: finer than half the width of the smallest defect that is reported, 3 mm.
 _SHIFT_STEP_MM, _ROLL_STEP_RAD = 0.5, math.radians(1)
-# 1 σ of the smoothing before, at least: interpolating white noise halfway between cells lowers it, which
-# would draw the alignment there.
+# Least 1 σ of the smoothing beforehand. Interpolation halfway between cells lowers white noise, and the
+# alignment would be drawn to such places.
 _SMOOTH_MM, _SMOOTH_CELLS = 1.0, 1.5
 
 
 @dataclass(frozen=True)
 class Alignment:
-    """What was taken out: reference distance = middle + scale (distance − middle) + shift, azimuth + roll.
+    """How a run is moved onto the reference.
 
-    ``pose_mm`` (6,): amplitudes of cos ψ, sin ψ, and of both times x and x², x from −1 to 1 along the run.
+    Its distance on the reference is middle + (1 + scale_error) (distance − middle) + shift, its azimuth is
+    azimuth + roll. ``pose_mm`` (6,) are the amplitudes of cos ψ, sin ψ, and of both times x and x², with x
+    from −1 to 1 along the run.
     """
 
     shift_mm: float
@@ -93,7 +95,7 @@ def samples_of(wall: WallMap, at_most: int) -> WallSamples:
 
 
 def _search(samples: WallSamples, reference: WallMap, max_shift_mm: float, max_roll_rad: float) -> Float:
-    """Return the best of a grid of shifts and rolls, everything else 0 but the pose, which is linear."""
+    """Return the best of a grid of shifts and rolls; scale error is 0, the linear pose is solved for."""
     best: tuple[float, Float] | None = None
     few = slice(None, None, max(1, len(samples.x) // _SEARCH_POINTS))
     thin = WallSamples(samples.middle_mm, *(a[few] for a in (
@@ -133,7 +135,10 @@ def pose_design(samples: WallSamples) -> Float:
 
 
 def _nuisance_design(samples: WallSamples) -> Float:
-    """Return the pose and a constant, which else would pull shift and scale; only the pose is taken out."""
+    """Return columns (N, 7) of the pose and of a constant radius; only the pose is taken out of the result.
+
+    Without its own column, a constant radius would bias shift and scale.
+    """
     return np.concatenate([pose_design(samples), np.ones((len(samples.x), 1))], -1)
 
 
