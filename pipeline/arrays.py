@@ -23,7 +23,7 @@ def runs_of(mask: Bool) -> list[slice]:
 
 
 def read_only(array: NDArray[Any]) -> NDArray[Any]:
-    """Return a C-contiguous view, or a copy, that cannot be written to: compiled code then knows one kind."""
+    """Return a C-contiguous view or copy that cannot be written to: kernels are compiled for this kind."""
     view = np.ascontiguousarray(array).view()
     view.flags.writeable = False
     return view

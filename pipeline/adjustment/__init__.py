@@ -1,10 +1,10 @@
-"""Least squares for motion, calibration and diagnosis, which give it terms: residuals with their derivatives.
+"""Least squares for motion, calibration and diagnosis. They give it residuals with their derivatives.
 
 ``bordered``: normal equations of frames (a block band), of landmarks and of a border of global unknowns,
 with marginal covariances; its compiled sums are in ``elimination``. ``normal_equations``: dense ones with
-marginalisation by the Schur complement, and the factor of banded ones. ``robust``: losses, robust
-spread, and scores of equations that err alike (sandwich covariance). ``motion_priors``: smooth motion and
-slow drift. ``levenberg_marquardt``: the search.
+marginalisation by the Schur complement, and the factor of banded ones. ``robust``: robust losses and spreads,
+and the covariance of equations whose errors are correlated (sandwich estimator). ``motion_priors``: smooth
+motion and slow drift. ``levenberg_marquardt``: the iteration to the minimum.
 
 Why not a library: gtsam 4.3.0 and pyceres 2.6 have wheels, scikit-sparse has none for this Python. On 400
 frames, 2,000 landmarks and 20,000 observations of two coordinates (one core, Jacobians known beforehand),

@@ -1,8 +1,8 @@
 """Normal equations of frames, landmarks and a few global numbers: banded, bordered, landmarks eliminated.
 
 The unknowns are ``BLOCK`` numbers for each frame (banded, because no landmark is followed for long), a border
-of global numbers, and three for each landmark, which leave by the Schur complement. B. Triggs et al.,
-"Bundle adjustment: a modern synthesis", 2000, § 6.
+of global numbers, and three coordinates for each landmark, which the Schur complement eliminates. B. Triggs
+et al., "Bundle adjustment: a modern synthesis", 2000, § 6.
 """
 
 from __future__ import annotations
@@ -19,7 +19,8 @@ from pipeline.adjustment.rows import LandmarkRows, Rows
 from pipeline.arrays import Float, Int
 from pipeline.system.parallel import side_by_side
 
-# Observations whose derivatives by the instrument stay in the processor's cache while they are multiplied.
+# Observations multiplied at a time: so few that their derivatives by the instrument stay in the processor's
+# cache.
 _IN_CACHE = 1024
 
 
@@ -40,10 +41,12 @@ class BorderedSystem:
         add_rows(rows.frame, rows.by_frame, rows.by_border, rows.residual, rows.weight, *self._sums.arrays)
 
     def add_landmarks(self, rows: LandmarkRows, damping: float = 0.0) -> tuple[Float, Float]:
-        """Add texture and eliminate its landmarks; return their inverse information and right sides.
+        """Add texture and eliminate its landmarks.
 
-        The landmarks' own information is raised by a relative ``damping``. They are added up in two shares,
-        always the same ones, each on a thread of its own.
+        Return the inverse information (L, 3, 3) and the right side (L, 3) of each landmark.
+
+        A relative ``damping`` raises the diagonal of each landmark's information. Two threads sum one half of
+        the landmarks each; the halves are always the same, so that the sums have the same bytes.
         """
         count, weight, surface_weight = len(rows.start) - 1, rows.weight, rows.surface_weight
         self._add_instrument(rows, weight)
@@ -93,7 +96,7 @@ class BorderedSystem:
         border, right = halfway[:, :-1], halfway[:, -1]
         reduced = corner - border.T @ border
         if not np.isfinite(reduced).all():
-            raise np.linalg.LinAlgError("its equations are not finite")
+            raise np.linalg.LinAlgError("the normal equations are not finite")
         return Factor(banded, border, cho_factor(reduced), right, sums.right_border - border.T @ right)
 
 
@@ -123,7 +126,7 @@ class Factor:
 
     @cached_property
     def solved_border(self) -> Float:
-        """Return by how much frames (7 N, B) fall when the border grows."""
+        """Return by how much the frames' unknowns (7 N, B) decrease for each unit of a border unknown."""
         return self.band.back(self.border)
 
     def step(self) -> tuple[Float, Float]:
@@ -132,7 +135,7 @@ class Factor:
         return self.frames_after(border), border
 
     def border_covariance(self) -> Float:
-        """Return (B, B)."""
+        """Return the covariance (B, B) of the border's unknowns."""
         return np.asarray(cho_solve(self.corner, np.eye(self.border.shape[1])))
 
     def joint_covariance(self, frames: Int) -> Float:
@@ -146,12 +149,12 @@ class Factor:
         return np.asarray(own.reshape(len(frames), BLOCK, len(frames), BLOCK))
 
     def border_information(self) -> Float:
-        """Return (B, B), the frames eliminated."""
+        """Return the information (B, B) of the border's unknowns, the frames eliminated."""
         upper = np.triu(self.corner[0])
         return np.asarray(upper.T @ upper)
 
     def border_rows(self, rows: Rows) -> Float:
-        """Return how residuals (M, B) of equations of one frame each follow the border when frames do."""
+        """Return derivatives (M, B) of residuals by the border, each equation's one frame following it."""
         of_frame = self.solved_border.reshape(-1, BLOCK, self.border.shape[1])
         out = rows.by_border.copy()
         for frame in np.unique(rows.frame[:, 0]):

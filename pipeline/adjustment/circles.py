@@ -11,7 +11,8 @@ LEAST_COVERED = 0.3
 """Share of the circle that a ring must show to have a centre. Not measured."""
 _AT_ONCE = 256
 _ROUNDS = 5
-"""Reweighted fits of a circle; on the open recordings the last changes nothing that matters. Not measured."""
+"""Fits of a circle, each weighted by the residuals of the one before. Chosen: not measured on any set of
+rings."""
 _OUTLYING = 3.0
 """Spreads at which a sample weighs half in the fit of a circle. Not measured."""
 _FARTHEST_SAMPLE = 2.0
@@ -71,7 +72,8 @@ def _robust_circles(xy: Float, near: Bool) -> Float:
 def _start(xy: Float, near: Bool) -> tuple[Float, Float]:
     """Return circles through all samples, or through those of the arc whose circle clearly more lie on.
 
-    With them how far off samples may be to count, mm²: mirrored ones lie on another circle as well, and many.
+    With them comes the largest deviation, mm², of samples that count: the many mirrored ones share another
+    circle.
     """
     found, azimuths = _fitted(xy, near), near.shape[1]
     most = np.full(len(xy), np.inf)
@@ -98,6 +100,6 @@ def _fitted(xy: Float, weight: Float | Bool) -> Float:
 
 
 def _off(xy: Float, found: Float, near: Bool) -> Float:
-    """Return how far off their circles the ``near`` samples (F, A) are, mm²; NaN for others."""
+    """Return the algebraic distance (F, A), mm², of ``near`` samples from their circles; NaN for others."""
     on_circle = np.einsum("fai,fi->fa", xy, found[:, :2]) + found[:, 2:]
     return np.where(near, np.sum(xy * xy, -1) - on_circle, np.nan)

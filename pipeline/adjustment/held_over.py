@@ -17,19 +17,20 @@ from pipeline.adjustment.robust import robust_spread
 from pipeline.adjustment.shared_light import HeldOver
 from pipeline.arrays import Float, Int
 
-# Samples of the running mean that is taken out: what is left is 1 mm long in a pipe of 100 mm with 1440
-# samples. The rings of open-1 and open-3, 1.2 and 0.5 mm apart, are alike by 0.05 and 0.16 in it.
+# Samples of the running mean that is subtracted: structure shorter than about 1 mm is left, in a pipe of 100
+# mm with 1440 samples. Rings of open-1 and open-3, 1.2 and 0.5 mm apart, correlate by 0.05 and 0.16 in it.
 _FINE = 5
-# Farther apart than so many samples, places of the wall share nothing of it.
+# Rings farther apart along the pipe than so many samples show other wall, which shares none of this
+# structure.
 _APART = 2.0
-# Values are cut off at so many spreads, and known in most of the running mean.
+# Values are clipped at so many spreads; they count where this share of the running mean's samples is known.
 _MOST, _KNOWN = 4.0, 0.8
-# Rings apart that are compared, and pairs of them on long runs.
+# Largest lag, in rings, that is compared, and about how many pairs of rings for each lag on long runs.
 _LAGS, _PAIRS = 16, 400
 
 
 def held_over(structures: Sequence[Float], distance_mm: Float, sample_mm: float) -> HeldOver:
-    """Return how alike rings are in values (F, A) of their samples, NaN where unknown.
+    """Return how much rings correlate in values (F, A) of their samples, NaN where unknown, by their lag.
 
     ``distance_mm`` (F,) is how far along the pipe each ring lies: where the probe stands, rings are alike
     because the wall is. ``sample_mm`` lies between two samples of a ring.
@@ -45,7 +46,7 @@ def held_over(structures: Sequence[Float], distance_mm: Float, sample_mm: float)
 
 
 def _likeness(fine: Sequence[Float], first: Int, lag: int) -> float:
-    """Return the correlation of rings ``first`` (n,) with those so many later, 0 where there is none."""
+    """Return the correlation of rings ``first`` (n,) with those ``lag`` later, 0 where nothing is known."""
     together, apart = 0.0, 0.0
     for values in fine:
         a, b = values[first], values[first + lag]
@@ -56,7 +57,7 @@ def _likeness(fine: Sequence[Float], first: Int, lag: int) -> float:
 
 
 def _fine(values: Float) -> Float:
-    """Return what values (F, A) have beyond their running mean around the ring, in spreads of it."""
+    """Return values (F, A) less their running mean around the ring, over the spread of that difference."""
     known = np.isfinite(values)
     share = uniform_filter1d(known.astype(float), _FINE, axis=1, mode="wrap")
     mean = uniform_filter1d(np.where(known, values, 0.0), _FINE, axis=1, mode="wrap")

@@ -13,8 +13,8 @@ from typing import Any, Generic, Protocol, TypeVar
 import numpy as np
 
 _LEAST_DAMPING, _FIRST_DAMPING, _MOST_DAMPING = 1e-12, 1e-7, 1e6
-"""Relative damping: without effect but for rounding; of the first step that is damped at all; where steps are
-so short that none can help."""
+"""Relative damping: the smallest, which only guards against rounding; that of the first step that is damped
+at all; the largest, with which steps are too short to help."""
 _GROWTH = 8.0
 """Factor of the damping after the first failure; Nielsen has 2, but starts at far larger damping. Not
 measured."""
@@ -58,11 +58,11 @@ class Minimum(Generic[State, Equations]):
     ----------
     state
     equations
-        There.
+        Linearised at that state.
     trials : int
         Steps tried.
     settled : bool
-        Whether no step promises anything any more.
+        Whether no further step promised a decrease; False when ``Stop.trials`` ended the search.
     """
 
     state: State
@@ -107,7 +107,8 @@ class Stop:
     enough : float
         When a step of slight damping promises less than this share of the cost.
     doubtful : float
-        When a step that failed had promised less than this: derivatives may leave out as much.
+        When a step that failed had promised a smaller decrease than this, which approximate derivatives can
+        feign.
     """
 
     trials: int

@@ -1,4 +1,4 @@
-"""Medians and spreads place by place over a wall: noise behind a part of the window is no average."""
+"""Medians and robust spreads of each place of a wall: behind some parts of the window there is more noise."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from pipeline.adjustment.robust import robust_spread
 from pipeline.arrays import Float, Float32
 from pipeline.system.parallel import side_by_side
 
-# Places have such a length along the pipe; of so many sectors each is 13 mm wide in a pipe of 100 mm. It
+# Length of a place along the pipe, and sectors around it: each is 13 mm wide in a pipe of 100 mm. A place
 # holds some 300 independent cells, which tell its spread to 6 %; 10 mm of defect fill less than half of it.
 _PLACE_MM, _SECTORS = 32.0, 24
-# Fewer cells do not tell a place's own spread: that of the whole wall stands in.
+# Fewer cells do not tell a place's own spread: the median spread of all places stands in.
 _FEWEST_CELLS = 100
 
 

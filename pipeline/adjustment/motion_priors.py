@@ -1,9 +1,9 @@
-"""Priors of a motion: it is smooth, and what an encoder slips hardly changes from frame to frame.
+"""Priors of a motion: it is smooth, and the encoder's slip hardly changes from frame to frame.
 
 The prior of smooth motion is a random process: the third differences of position and turn from frame to frame
 are independent and normal, 1 σ ``sigma``. Acceleration is then a random walk, and jerk is white.
 
-How large ``sigma`` is, a run shows in the frames where its poses are well known, say every h-th. The third
+A run shows how large ``sigma`` is by the frames whose poses are well known, say every h-th. The third
 difference over h frames is that of every frame, summed three times over h frames in a row,
 
     (1 − L^h)³ = (1 + L + … + L^(h−1))³ (1 − L)³    (L takes the value of the frame before),
@@ -38,11 +38,11 @@ _JERK_SIGMAS = 5.0
 _FEWEST_FRAMES = 8
 """Known frames below which the smoothness of the motion is not estimated. Not measured."""
 TREMBLING_GROWTH = np.sqrt(20.0)
-"""By how much third differences of independent values exceed these, in 1 σ: the root of 1 + 9 + 9 + 1."""
+"""1 σ of third differences of independent values over that of the values: the root of 1 + 9 + 9 + 1."""
 
 
 def third_difference_growth(stride: float) -> float:
-    """Return by how much third differences over ``stride`` frames exceed those over one, in 1 σ."""
+    """Return the ratio of the 1 σ of third differences over ``stride`` frames to that over one frame."""
     return float(np.sqrt((11 * stride**5 + 5 * stride**3 + 4 * stride) / 20))
 
 
@@ -74,8 +74,8 @@ def trembling(T_pc: Float, time_s: Float, known: Int) -> Float:
     """Return the 1 σ (6,) of position, mm, and turn, rad, that changes independently from frame to frame.
 
     Third differences over one and over two gaps tell it from motion: those of white jerk grow with the gap as
-    `third_difference_growth`, those of trembling have a variance of 1 + 9 + 9 + 1 at any gap. What poses
-    themselves err by from frame to frame counts as trembling. With fewer than sixteen frames it is 0.
+    `third_difference_growth`, those of trembling have a variance of 1 + 9 + 9 + 1 at any gap. Errors of the
+    poses that change from frame to frame count as trembling. With fewer than sixteen frames it is 0.
 
     Parameters
     ----------
@@ -99,9 +99,9 @@ def trembling_of_places(place: Float, known: Int) -> Float:
 
 
 def most_trembling_of_places(place: Float) -> Float:
-    """Return the largest 1 σ (D,) that places (K, D) can tremble by, if nothing of what they do is motion.
+    """Return an upper bound of the 1 σ (D,) by which places (K, D) tremble, as if none of it were motion.
 
-    An estimate of `trembling` is 0 as well where jerks hide it: then it is not known, and this is large.
+    `trembling` gives 0 also where jerks hide the trembling; this bound is large there.
     """
     third = place[3:] - 3 * place[2:-1] + 3 * place[1:-2] - place[:-3]
     return np.asarray(robust_spreads(third, axis=0) / TREMBLING_GROWTH)
@@ -128,8 +128,8 @@ def _third_difference_of_poses(T_pc: Float, time_s: Float, known: Int, gaps: int
 def jerking_sigma(T_pc: Float, time_s: Float, sigma: Float) -> Float:
     """Return the 1 σ (N − 3, 6) of each third difference: ``sigma`` (6,), or its own size where that is more.
 
-    A probe that stops or turns back jerks a hundred times as much as on its way. Where the prior does not
-    expect that, it pulls the poses one way, and an effect that gives way to the pull seems to be there.
+    A probe that stops or turns back jerks a hundred times as much as on its way. A prior that does not expect
+    this pulls the poses to one side, and an effect that fits the pull seems to be there.
 
     Parameters
     ----------

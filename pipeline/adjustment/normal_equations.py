@@ -25,7 +25,7 @@ _SMALLEST = 1e-300
 
 
 def solved(matrix: Float, right: Float, rcond: float = 1e-15) -> Float:
-    """Return the solution (N, ...) of a semidefinite system (N, N); directions unseen stay 0."""
+    """Return the solution (N, ...) of a semidefinite system (N, N); undetermined directions stay 0."""
     scale = unit_scale(matrix)
     column = scale.reshape(-1, *(1,) * (right.ndim - 1))
     scaled = matrix * scale * scale[:, None]
@@ -70,7 +70,7 @@ class Marginal:
     follow : (N, K)
         How all unknowns follow those kept.
     step : (N,)
-        Step of those eliminated, the others staying.
+        Step of the eliminated unknowns while the kept ones stay.
     gain : float
         By how much that step lowers the sum of squares.
     """
@@ -88,8 +88,8 @@ def marginalised(information: Float, right: Float, out: Int, rcond: float | None
     Parameters
     ----------
     rcond
-        Where given, unknowns tied to each other leave by least squares, and directions weaker than this part
-        of the strongest do not move; else they must all be determined.
+        Where given, unknowns are eliminated by least squares, and directions weaker than this part of the
+        strongest do not move. Where None, all must be determined.
 
     Raises
     ------
@@ -156,7 +156,7 @@ class ArrowEquations:
         return information, gradients
 
 
-_AT_ONCE = 16  # frames a column
+_AT_ONCE = 16  # frames in each dense column
 
 
 @dataclass(frozen=True)

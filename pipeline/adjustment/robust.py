@@ -5,10 +5,10 @@ The cost of a loss ρ is what its weight minimises when the equations are solved
 P. Huber, "Robust statistics", 1981, § 7.8; S. Geman, D. McClure, "Statistical methods for tomographic image
 reconstruction", 1987.
 
-Equations err alike that are neighbours on the wall or corners of one picture. The variance of their score is
-that of its sums over clusters, which are taken for independent, times C / (C − 1) for the C clusters
-(H. White, "Asymptotic theory for econometricians", 1984, ch. 6; A. Cameron, D. Miller, "A practitioner's
-guide to cluster-robust inference", 2015).
+Errors are correlated between neighbours on the wall and between corners of one picture. The variance of the
+score of such equations is that of its sums over clusters, taken as independent, times C / (C − 1) for C
+clusters (H. White, "Asymptotic theory for econometricians", 1984, ch. 6; A. Cameron, D. Miller, "A
+practitioner's guide to cluster-robust inference", 2015).
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ MAD_TO_SIGMA = 1.4826
 TUKEY = 4.685
 """Spreads beyond which a residual does not count: 95 % efficiency on normal noise (Beaton & Tukey 1974)."""
 _HARMONICS = 2
-# Means over 1.5° stand for the columns of a row: narrower than the second harmonic by 120 times.
+# Means over sectors of 1.5° stand for the columns of a row: one period of the second harmonic has 120.
 _SECTORS = 240
 
 
@@ -36,7 +36,7 @@ def root_mean_square(values: Float) -> float:
 
 
 def left_out_sd(without: Float) -> Float:
-    """Return the 1 σ (...) of a figure by what it is without each of N parts of the data (N, ...).
+    """Return the 1 σ (...) of a figure from its values (N, ...) without each of N parts of the data.
 
     The jackknife (B. Efron, "The jackknife, the bootstrap and other resampling plans", 1982).
     """
@@ -91,7 +91,7 @@ def _few(clusters: int) -> float:
 
 
 def independent_count(values: Float) -> float:
-    """Return how many independent values have a mean as uncertain as these (n,), which follow each other.
+    """Return how many independent values would have a mean as uncertain as that of a correlated series (n,).
 
     Their autocorrelation is summed up to where it is first negative (C. Geyer, "Practical Markov chain Monte
     Carlo", 1992).

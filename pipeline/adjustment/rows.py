@@ -20,7 +20,9 @@ class Rows:
     frame : (M, F) int
         The F frames of each equation.
     by_frame : (M, F, 7)
+        Derivatives of the residuals by the unknowns of these frames.
     by_border : (M, B)
+        Derivatives by the unknowns of the border.
     residual, sigma : (M,)
     loss : Loss
     """

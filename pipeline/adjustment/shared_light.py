@@ -1,6 +1,6 @@
-"""How alike rings are because a codec repeats light, and by how much less they say together.
+"""How much rings correlate because a codec repeats light, and how much less they tell together.
 
-It is kept with the wall, which pages open: without SciPy.
+The class is stored with the wall and read by pages, so that this module does without SciPy.
 """
 
 from __future__ import annotations
@@ -11,15 +11,15 @@ import numpy as np
 
 from pipeline.arrays import Float
 
-# What is less alike counts as new: σ from the scatter of such rings is too small by 1 − √(1 − 0.1) = 5 %.
+# Smaller correlation counts as none: σ from the scatter of such rings is too small by 1 − √(1 − 0.1) = 5 %.
 _NOTHING = 0.1
 # Likeness of neighbouring rings in open-1, open-2 and open-3: 0.05, 0.05 and 0.16; in 7 copies at crf 30, by
 # HEVC and with all spoilings 0.36 to 0.79, of which two told a false finding with probabilities of 0.89 and
 # 0.98; behind filters against noise that flattened a pit by a fifth 0.23 to 0.79.
 _USUAL = 0.2
-# Likeness of 120 rings of some 400 independent samples errs by as much, of rings far apart.
+# Error of the likeness of rings far apart, by 120 rings of some 400 independent samples.
 _LIKENESS_ERRS = 0.01
-# Shares that may be handed on. Beyond the last the fall over 16 rings is hardly told from none.
+# Shares handed on that are tried. With a larger one, the fall over 16 rings can hardly be told from none.
 _SHARES = np.arange(0.02, 0.985, 0.01)
 # Two lags leave open whether something is the same in all rings: it is taken to be handed on.
 _LAGS_OF_A_PLATEAU = 3
@@ -33,7 +33,7 @@ class HeldOver:
 
     @property
     def rings(self) -> int:
-        """How many rings apart next to nothing is shared; as far as was looked, where there are none."""
+        """Lag from which next to nothing is shared, or the largest lag compared where there is none."""
         below = self.likeness <= _NOTHING
         return int(np.argmax(below)) if below.any() else len(self.likeness) - 1
 
@@ -44,7 +44,7 @@ class HeldOver:
 
     @property
     def handed_on(self) -> float:
-        """Which share of a ring is handed on to the next one, in [0, 1): the largest that likeness allows.
+        """Share of a ring that is handed on to the next one, in [0, 1): the largest that the likeness allows.
 
         What is new in every ring, as noise of another codec, lowers all likeness; what is the same in all, as
         rows of the sensor or speckle, raises it: only how it falls off from ring to ring counts.
@@ -56,16 +56,16 @@ class HeldOver:
         return float(np.maximum(_SHARES, falling)[may_be].max(initial=0.0).clip(max=_SHARES[-1]))
 
     def independent(self, count: int) -> int:
-        """Return by how many rings that share nothing so many in a row are outweighed, rounded.
+        """Return how many independent rings tell as much as ``count`` rings in a row, rounded.
 
-        The variance of their mean is Σ_ij ρ_(i−j) / n² of one's. Next to nothing shared counts as nothing.
+        The variance of their mean is Σ_ij ρ_(i−j) / n² of that of one ring. Likeness below 0.1 counts as 0.
         """
         apart = np.arange(1, min(len(self.likeness), count))
         shared = np.where(self.likeness > _NOTHING, self.likeness, 0.0)[apart]
         return round(count / (1 + 2 * float(shared @ (1 - apart / count)))) if count > 1 else count
 
     def gain_in_mean(self, width: float) -> float:
-        """Return how many times the σ of a Gaussian mean over ``width`` ring spacings is that of other rings.
+        """Return the factor by which correlation raises the σ of a Gaussian mean over ``width`` rings.
 
         The variance of Σ w_i x_i is Σ_k ρ_k Σ_i w_i w_(i+k), and a Gaussian's Σ_i w_i w_(i+k) falls off as
         exp(−k² / 4 w²).
@@ -80,7 +80,7 @@ NOTHING_HELD = HeldOver(np.ones(1))
 
 
 def _falling_parts(likeness: Float) -> tuple[Float, Float]:
-    """Return by each of the shares the part of likeness (L,) at lag 1 that falls off, and the RMS misfit.
+    """Return, for each share, the part of the likeness (L,) at lag 1 that falls off, and the RMS misfit.
 
     A plateau and a geometric fall, neither below zero, are fitted by least squares.
     """

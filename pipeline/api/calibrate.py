@@ -71,7 +71,7 @@ def calibrate(
     config : path or str, optional
         A file of parameters of the stages `premises`, `rings` and `gauge`.
     settings : sequence of str
-        Single parameters, each ``stage.name=value``; they go before those of ``config``.
+        Single parameters, each ``stage.name=value``; they override those of ``config``.
     display : Display, optional
         Is told how the stages stand; nothing is shown when it is left out.
 
@@ -86,7 +86,7 @@ def calibrate(
     UnusableError
         When the recording is well formed, but a stage cannot measure what it must.
     Cancelled
-        When the user stopped it with Ctrl-C; the same call goes on where it was.
+        When the user stopped it with Ctrl-C; the same call continues from there.
     """
     file = None if config is None else file_or_shipped(Path(config), PARAMETERS)
     configuration = resolve(STAGES, file, settings)

@@ -120,7 +120,7 @@ def _residuals(result: GaugeCalibration) -> dict[str, float]:
 
 
 def _laser(probe: Probe) -> dict[str, dict[str, float | str | None]]:
-    """Return the sheet in an engineer's terms; no σ of the direction where the tilt is less than its own."""
+    """Return the sheet in an engineer's terms; a tilt smaller than its σ has no σ of its direction."""
     values, step = _sheet_terms(probe.laser), 1e-7
     moved = [probe.laser.with_parameters(probe.laser.parameters + d) for d in step * np.eye(len(_SHEET))]
     jacobian = (np.array([_sheet_terms(sheet) for sheet in moved]) - values).T / step

@@ -10,10 +10,11 @@ from pipeline.errors import InputError
 from pipeline.files.json_yaml import read_json
 
 _PLACE = ("u_px", "v_px", "radius_px")
-# A spot's edge reaches beyond the place where it was found. Derived for Gaussian spots that take 10 to 50 %:
+# A spot reaches beyond the radius at which it was found. Derived for Gaussian spots that take 10 to 50 %:
 # their change falls to 3 %, where they are found, at 1.5 to 2.4 of their σ, and to 1 % at 2.1 to 2.8.
 _WIDER = 1.5
-# Where a drop is found, texture is drawn aside by .3 px still, most of which lies within a quarter more.
+# At the radius found for a drop, texture is still displaced by 0.3 px; most of that ends within a quarter
+# more.
 _WIDER_DROP = 1.2
 # 1 σ of a sharp line, and how far a rim may move it: light that changes by a share g per px across a line of
 # width w moves it by g w². A ring's sample is measured to about as much.

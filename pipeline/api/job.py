@@ -177,7 +177,7 @@ def result_of(job: Job, kind: type[Kind]) -> Kind:
     Raises
     ------
     InputError
-        When it is not there: the folder was meddled with since.
+        When it is not there, since somebody changed the folder meanwhile.
     """
     step = job.plan.maker(kind)
     for folder in (job.folder, *job.lent):

@@ -1,4 +1,4 @@
-"""A scene like a run: its pipe, its way, its probe and its light, for `boresight simulate --like`."""
+"""A scene like a run: its pipe, its path, its probe and its light, for `boresight simulate --like`."""
 
 from __future__ import annotations
 
@@ -41,12 +41,13 @@ MEASURED = "measured.npz"
 _BEYOND_MM = 250.0
 """Length of photo that is mirrored beyond each end: a camera looks farther ahead than the run has seen."""
 _ROUNDS, _LOOKED_AT = 3, 3
-"""Rounds in which the lights are set, since clipping bends them, and frames of each light for it."""
+"""Rounds in which the lights are set (several, because clipped light is not linear), and frames of each light
+compared."""
 _LIT = 10.0
 """Grey levels above black from which a pixel tells of a light."""
 _LARGE_WELL_E = 1e9
-"""Electrons at which a pixel clips that has no shot noise: at full scale it has 3e-5 of that then. Chosen."""
-# Grey levels above are clipped or nearly so.
+"""Full well, electrons, of a camera without shot noise: at full scale 3e-5 of the signal are left. Chosen."""
+# Grey levels above this are clipped or nearly so.
 _CLEAR_OF_WHITE = 250.0
 _DEFECT = ("kind", "distance_mm", "azimuth_deg", "length_mm", "width_mm", "depth_mm")
 
@@ -58,11 +59,11 @@ class Changed:
     Attributes
     ----------
     speed : float
-        By which the way is gone faster.
+        Factor on the speed of the probe.
     probe : Path or None
         File of another probe.
     defects : sequence of str
-        To put in, each ``KIND,DISTANCE,AZIMUTH,LENGTH,WIDTH,DEPTH`` in mm and deg, as in
+        Defects to put in, each ``KIND,DISTANCE,AZIMUTH,LENGTH,WIDTH,DEPTH`` in mm and deg, as in
         ``pit,120,45,6,5,1.2``.
     """
 
@@ -97,7 +98,7 @@ def scene_like(run: Path, name: str, folder: Path, changed: Changed) -> Scene:
 
 
 def _values(run: Run, recording: Recording, frames: CheckedFrames, probe: Path, name: str) -> dict[str, Any]:
-    """Return the scene but for its lights and sensor."""
+    """Return the values of the scene without lights and sensor."""
     radius = float(np.nanmean(run.wall.radius_map.radius_mm))
     return {
         "name": name,
@@ -176,7 +177,7 @@ def _photometry(run: Run, frames: CheckedFrames, recording: Recording, folder: P
 
 
 def _grey_of_colour(recording: Recording, frames: CheckedFrames) -> tuple[float, float]:
-    """Return offset and slope of grey levels over the luma of B, G, R, which a video's range may shift."""
+    """Return offset and slope of grey levels over the luma of B, G, R: a video's range may change both."""
     chosen = frames.frame[np.linspace(0, len(frames.frame) - 1, _LOOKED_AT).astype(int)]
     grey, colour = (
         [image.astype(float) for _, image in recording.read(chosen, form) if image is not None]

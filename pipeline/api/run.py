@@ -54,7 +54,7 @@ def run(
     config : path or str, optional
         A file of parameters, or the name of a shipped one (`shipped_names`).
     settings : sequence of str
-        Single parameters, each ``stage.name=value``; they go before those of ``config``.
+        Single parameters, each ``stage.name=value``; they override those of ``config``.
     twin : path, optional
         Folder of `twin` on an earlier run of this recording: dirt and drops that it found are kept out of
         photo and rings, and so of findings.
@@ -78,7 +78,7 @@ def run(
     UnusableError
         When the recording is well formed, but a stage cannot measure what it must.
     Cancelled
-        When the user stopped it with Ctrl-C; the same call goes on where it was.
+        When the user stopped it with Ctrl-C; the same call continues from there.
     """
     parameters = configuration(config, [*dirt_of(twin), *settings])
     job = prepare(recording, folder, probe=probe, configuration=parameters)

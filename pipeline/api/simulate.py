@@ -71,7 +71,7 @@ def simulate(
         Effects to switch on, each as on the command line: ``laser_tilt`` at its typical size, or with its
         sizes, such as ``laser_tilt=0.6@40``.
     seed : int, optional
-        In place of the scene's.
+        Seed in place of the scene's.
     frames : int, optional
         Render only so many, from the first.
     seal : bool
@@ -112,7 +112,7 @@ def simulate_like(
     frames: int | None = None,
     progress: Progress | None = None,
 ) -> Simulated:
-    """Render a recording of a run's pipe by its probe and in its light, with what is to be other.
+    """Render a recording of a run's pipe with its probe and its light, changed where asked.
 
     The truth holds the scene and the measured pipe, so that `simulate` takes it again.
 
@@ -127,13 +127,13 @@ def simulate_like(
     effects : sequence of str
         Effects to switch on, as in `simulate`; the folder of a diagnosis stands for all that it found.
     speed : float
-        By which the way is gone faster.
+        Factor on the speed of the probe.
     probe : path, optional
         File of another probe.
     defects : sequence of str
-        To put in: each ``KIND,DISTANCE,AZIMUTH,LENGTH,WIDTH,DEPTH`` in mm and deg.
+        Defects to put in: each ``KIND,DISTANCE,AZIMUTH,LENGTH,WIDTH,DEPTH`` in mm and deg.
     seed : int
-        Of noise and of the defects' shapes.
+        Seed of the noise and of the defects' shapes.
     frames : int, optional
         Render only so many, from the first.
     progress : callable, optional
@@ -198,7 +198,7 @@ def simulate_pairs(
     truth : path, optional
         Folder of all truths; beside ``folder`` when it is left out.
     seed : int
-        Of the draw; the same seed draws the same pairs.
+        Seed of the draw; the same seed draws the same pairs.
     frames, seal, progress
         As in `simulate`.
 

@@ -40,19 +40,21 @@ def twin(
 ) -> Twin:
     """Re-render frames of a run, compare them with the recorded ones, and say where and why they differ.
 
-    What the run holds is not computed again, unless the program or, with ``diagnosis``, the probe is another.
+    What the run holds is not computed again, unless the program has changed or ``diagnosis`` brings another
+    probe.
 
     Parameters
     ----------
     run : path
-        A run folder, best of a run with ``premises.withhold=10``: frames that no stage has measured.
+        A run folder; best of a run with ``premises.withhold=10``, of which no stage has measured the frames
+        withheld.
     output : path
         Folder for twin.json and twin.html.
     diagnosis : path, optional
         Folder of a diagnosis, whose corrected probe takes the place of the run's: wall, motion and photo are
         worked out again with it.
     settings : sequence of str
-        Single parameters, each ``stage.name=value``; they go before those of the run.
+        Single parameters, each ``stage.name=value``; they override those of the run.
     display : Display, optional
         Is told how the stages stand; nothing is shown when it is left out.
 
@@ -63,7 +65,7 @@ def twin(
     UnusableError
         When no frame can be re-rendered.
     Cancelled
-        When the user stopped it with Ctrl-C; the same call goes on where it was.
+        When the user stopped it with Ctrl-C; the same call continues from there.
     """
     shown = display or SilentDisplay()
     job = twin_job(Path(run), Path(output), None if diagnosis is None else Path(diagnosis), settings, shown)
@@ -79,7 +81,7 @@ class TwinOf:
     ----------
     run : str
     again : tuple of str
-        Stages that are computed again since the program or their parameters are others.
+        Stages that are computed again because the program or their parameters have changed.
     diagnosed : bool
         Whether the corrected probe of a diagnosis takes the place of the run's, and all is computed again.
     """
@@ -94,7 +96,7 @@ def twin_job(
 ) -> Job:
     """Open the inputs of a twin without starting it; raises as `twin`.
 
-    With a diagnosis, its gauge run is first held against it, which takes half a minute.
+    A diagnosis is first compared with the pictures of its gauge run, which takes half a minute.
     """
     record = read_run_record(run)
     probe, tried = record.probe, DiagnosisTried()

@@ -12,13 +12,14 @@ from pipeline.artefacts.measured import PointCloud
 
 # Points in a chunk: some MB, for memory's sake.
 _AT_ONCE = 1 << 16
-# Rings less than this part of the usual way apart are of a probe that stands, as in premises (chosen).
+# Rings closer than this part of the usual step are of a probe that stands; the same part as in premises
+# (chosen).
 _MOVES = 0.25
 
 
 @dataclass(frozen=True)
 class CloudAlong:
-    """A cloud in chunks, of each of which it is known where along the pipe it lies.
+    """A cloud in chunks, with the stretch of pipe in which each chunk lies.
 
     Attributes
     ----------
@@ -41,7 +42,7 @@ class CloudAlong:
         return PointCloud(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
 
     def ring_spacing_mm(self) -> float:
-        """Return the median distance between neighbouring rings, where a probe moved that mostly stood."""
+        """Return the median distance of neighbouring rings; of a probe that mostly stood, where it moved."""
         _, middle = self._rings()
         gone, apart = np.abs(np.diff(middle)), np.diff(np.sort(middle))
         moves = _MOVES * usual_way(gone)
@@ -52,7 +53,7 @@ class CloudAlong:
     def ways_mm(self) -> Float:
         """Return how far the probe went to each frame's ring (F,) since the ring before, in order of time.
 
-        It is 0 of frames without a ring, and behind such as are missing.
+        It is 0 for frames without a ring, and for the first ring after missing ones.
         """
         frame, middle = self._rings()
         ways = np.zeros(int(frame.max(initial=-1)) + 1)
@@ -75,7 +76,7 @@ class CloudAlong:
 
 
 def usual_way(ways: Float) -> float:
-    """Return the step in which, or in longer ones, a half of all the way (n,) was gone; 0 without any.
+    """Return the step for which half of the way was gone in steps (n,) at least as long; 0 without any.
 
     A probe that stands adds pictures and no way, so that its pictures do not count.
     """

@@ -18,7 +18,7 @@ from pipeline.artefacts.wall_map import WallMap
 
 # Corners (distance mm, azimuth rad) of a closed polygon; the azimuth runs on beyond ±π rather than jumping.
 Outline = tuple[tuple[float, float], ...]
-# Probability that any one of all changes is declared where nothing changed. Chosen.
+# Probability that at least one change is declared where nothing changed. Chosen.
 FAMILY_ERROR = 0.01
 
 
@@ -274,8 +274,8 @@ class Change:
         None for welds, which registered the runs, and where a run did not see it.
     z, p, p_adjusted : float
         Growth of the depth over its σ, how probable that is without any, and the same after Holm's step-down
-        over all findings (Scand. J. Statist. 6, 1979); NaN without growth. A finding of one run only was
-        found where that run stands out most, so that its p counts for all places of its size on the wall.
+        over all findings (Scand. J. Statist. 6, 1979); NaN without growth. A finding of one run only is where
+        that run stands out most: its p is corrected for all such places.
     """
 
     place: Place

@@ -160,7 +160,7 @@ class Defects:
     smallest_depth_mm : float
         Depth from which a defect of 3 mm × 3 mm is found in nine of ten cases.
     unconfirmed : tuple of Defect
-        What one ring alone shows, or is rather false than real: to be looked at, not to be counted.
+        What one ring alone shows, or what is more probably false than real: to be looked at, not counted.
     """
 
     items: tuple[Defect, ...]

@@ -73,7 +73,7 @@ class RingSamples:
         return np.asarray(self.centre_px + self.radius_px[..., None].astype(np.float64) * direction)
 
     def reduced(self, times: Float) -> RingSamples:
-        """Return the rings seen in pictures that were so many times (F,) too large about the centre."""
+        """Return the rings with each picture's radii divided by ``times`` (F,), its excess in size."""
         return replace(self, radius_px=(self.radius_px / times[:, None]).astype(np.float32))
 
     def placed_in(self, points: RingPoints) -> RingSamples:
@@ -200,8 +200,7 @@ class Trajectory:
     pieces : tuple of PipePiece
         Straight lengths and bends in the order of distance; empty where they were not looked for.
     image_scale, image_scale_sigma : (N,) or None
-        By how many times pictures are larger than the probe's camera has them, and its 1 σ; None where the
-        scale did not drift.
+        Size of the pictures over that of the probe's camera, and its 1 σ; None where the scale did not drift.
     radius_doubt : float
         Relative 1 σ of all radii where encoder and stated diameter contradict the probe, else 0.
     knock : LaserKnock or None
@@ -268,7 +267,8 @@ class PointCloud:
 class Wall:
     """Result of accumulation: cloud, radius map, and the axis both refer to.
 
-    ``fixed`` is what stays at one place of the image, if anything; a codec has ``held`` its rings alike.
+    ``fixed`` is what stays at one place of the image, None for nothing; ``held`` how alike a codec made
+    rings.
     """
 
     cloud: PointCloud

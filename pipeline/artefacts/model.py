@@ -122,7 +122,7 @@ class MeshTile:
         Positions, mm, and unit normals toward the inside of the pipe, in P.
     uv : (V, 2) float32
         Texture coordinates in [0, 1], (0, 0) at the top left corner of the texture. Vertices on the border of
-        a chart are there once for each chart.
+        charts are repeated for each chart.
     face : (T, 3) int32
         Counter-clockwise seen from inside.
     photo_bgr : (H, W, 3) uint8
@@ -219,8 +219,8 @@ class TexturedMesh:
     wall_triangles : int
         Triangles before thinning out.
     decimation_error_mm : float
-        Largest distance of what the surface was made of from it, as verified: of the radius map's cells, with
-        their noise, or of the vertices of an undecimated Poisson surface.
+        Largest distance, as verified, between this surface and what it was made from: the radius map's cells,
+        with their noise, or the vertices of a Poisson surface before it was thinned out.
     decimation_rms_mm : float
         Root mean square of the same distances.
     """

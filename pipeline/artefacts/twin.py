@@ -19,7 +19,7 @@ class NamedFigure:
 
 @dataclass(frozen=True)
 class RegionFit:
-    """χ² per pixel of what pixels of one kind show, before and after what was found is put in.
+    """χ² per pixel, of pixels of one kind, before and after what was found is put into the rendering.
 
     Kinds: ``line_core`` and ``line_flank`` within and beyond one width of the laser line, ``wall`` lit by
     the LEDs, ``dark`` surroundings, ``edge`` of the view. χ² is NaN where pixels are not compared: at the
@@ -201,7 +201,7 @@ class GaugeTwin:
     sigmas : float
         By how many σ, taken from frame to frame, χ² falls when the effects are switched on.
     kept : tuple of bool
-        Of each effect, whether frames fit better with it than with the others alone; the others are
+        Of each effect, whether frames fit better with it than with the other effects alone; if not, it is
         withdrawn.
     chi2_wrong, sigmas_wrong : float
         χ² per pixel with the effects the other way round, a wrong diagnosis of the same size, and by how many

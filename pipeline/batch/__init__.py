@@ -25,7 +25,7 @@ _BAGS = (".bag", ".mcap")
 
 
 def find_recordings(folder: Path) -> dict[str, Path]:
-    """Return all recordings below a folder by a name that is also fit for a folder.
+    """Return all recordings below a folder, each under a name that can also name a folder.
 
     Raises
     ------
@@ -58,7 +58,7 @@ _STDERR_LINES = 4
 
 @dataclass(frozen=True)
 class Work:
-    """A recording, where its run goes, and the words for ``boresight run`` beside these two."""
+    """A recording, the folder of its run, and further options of ``boresight run``."""
 
     name: str
     recording: Path
@@ -136,7 +136,7 @@ SHOWN_METRICS = ("inspected length", "wall seen", "mean diameter", "defects", "d
 
 
 def write_summary(outcomes: Iterable[BatchOutcome], folder: Path) -> None:
-    """Write batch.json and batch.html; the order is that of the names, whoever came first.
+    """Write batch.json and batch.html, ordered by name, whichever run ended first.
 
     Raises
     ------

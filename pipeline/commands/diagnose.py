@@ -54,7 +54,7 @@ def diagnose(
 
 def _show(answer: Answer, output: Path, console: Console) -> None:
     chance = "not known" if answer.global_p is None else f"{answer.global_p:.2g}"
-    console.print(f"Verdict: {answer.verdict} (chance that nothing is left out: {chance})")
+    console.print(f"Verdict: {answer.verdict} (chance alone would show as much with probability: {chance})")
     for e in answer.effects:
         console.print(f"  {e.name} ({e.probability:.1%}): {e.statement}")
     console.print(f"Report: {output / 'diagnosis.html'}")

@@ -193,7 +193,7 @@ def error_budget(
     ] = None,
     accuracy_mm: Annotated[
         list[float] | None,
-        typer.Option(help="wished accuracy for the tolerances, mm (default: 0.1 and 0.02)"),
+        typer.Option(help="required accuracy for the tolerances, mm (default: 0.1 and 0.02)"),
     ] = None,
     draws: Annotated[
         int, typer.Option(min=0, max=65536, help="Monte Carlo draws through the exact chain; 0 for none")
@@ -215,9 +215,6 @@ def error_budget(
     allowed = {a: tolerances(budget, a) for a in accuracy_mm or ACCURACIES_MM}
     study = baseline_study(scan, given)
     drawn = monte_carlo(budget, _enough(draws)) if draws else None
-    # matplotlib takes a second to load
-    from pipeline.commands.error_budget import budget_document, write_budget
-
     document = budget_document(budget, drawn, _enough(draws), study, allowed, name)
     folder = output if output is not None else None if as_json else Path("error-budget")
     if folder is not None:
@@ -269,7 +266,7 @@ def _show(document: dict[str, Any], console: Console) -> None:
                   f"(within 10 % from {best['good_from_mm']:g} mm on).")  # fmt: skip
     for wished in document["tolerances"]:
         first = ", ".join(f"{t['name']} {t['alone']:.3g} {t['unit']}" for t in wished["sources"][:6])
-        console.print(f"Each alone would cost {wished['accuracy_mm']:g} mm: {first}.")
+        console.print(f"Each of these alone would cost {wished['accuracy_mm']:g} mm: {first}.")
 
 
 def _columns(figures: dict[str, Any]) -> tuple[str, str, str]:

@@ -139,7 +139,7 @@ def error_model(
         float | None, typer.Option(help="camera to laser sheet, mm (default: the probe's, else 22)")
     ] = None,
     accuracy_mm: Annotated[
-        float | None, typer.Option(help="wished accuracy, mm: gives the tilt it allows (page: 0.1)")
+        float | None, typer.Option(help="required accuracy, mm: gives the tilt it allows (page: 0.1)")
     ] = None,
     tilt_direction_deg: Annotated[
         float, typer.Option(help="azimuth in C toward which the sheet leans forward, deg")
@@ -177,7 +177,7 @@ def error_model(
 def error_numbers(
     scan: MisalignedScan, camera: Camera | None, accuracy_mm: float | None
 ) -> dict[str, float | None]:
-    """Return the numbers of ``--json``; the allowed tilt for a wished accuracy, else without."""
+    """Return the numbers of ``--json``, with the allowed tilt where an accuracy is required."""
     numbers: dict[str, float | None] = dict(asdict(misalignment_error(scan, camera)))
     if accuracy_mm is not None:
         allowed = allowed_tilt_deg(scan, accuracy_mm)
@@ -189,9 +189,6 @@ def write_error_model(
     scan: MisalignedScan, camera: Camera | None, camera_name: str, accuracy_mm: float, folder: Path
 ) -> None:
     """Write fig4 and fig5 (PNG, SVG) and the interactive ``error-model.html``."""
-    # matplotlib takes a second to load, which --json alone need not wait for
-    from pipeline.commands.error_model import ring_figure, save_figure, tilt_figure
-
     with written_together(folder, last="error-model.html") as new:
         save_figure(ring_figure(scan), new, "fig4-ring")
         save_figure(tilt_figure(scan, accuracy_mm), new, "fig5-tilt")

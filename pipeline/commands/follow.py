@@ -1,4 +1,4 @@
-"""``boresight run --follow``: a recording still being written, shown on a live page until it rests."""
+"""``boresight run --follow``: a recording shown on a live page while it is still written."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class Snapshot:
 
 
 def snapshots(place: Path, quiet_s: float, poll_s: float, wish: threading.Event) -> Iterator[Snapshot]:
-    """Yield the recording each time it has grown, and once more when it rests.
+    """Yield the recording each time it has grown, and once more when it no longer grows.
 
     Parameters
     ----------
@@ -98,12 +98,12 @@ def _bytes(file: Path) -> int:
         return 0
 
 
-# Size of the chart, px, and points drawn in it: two a pixel.
+# Size of the chart, px, and points drawn in it: two for each pixel of its width.
 _WIDTH, _HEIGHT, _SHOWN = 1000, 260, 2000
 
 
 def write_live_page(name: str, sections: Sequence[PreliminarySection], state: str, folder: Path) -> None:
-    """Replace ``live.html`` at one stroke; it loads itself anew every two seconds while it is growing.
+    """Replace ``live.html`` at one stroke; while the recording grows, the page reloads every two seconds.
 
     Raises
     ------
@@ -149,7 +149,7 @@ _UNWRITTEN_FRAMES = 8
 
 
 def follow(place: Path, output: Path, probe: Path | None, quiet_s: float, console: Console) -> None:
-    """Show a growing recording on ``live.html`` until it rests.
+    """Show a growing recording on ``live.html`` until it no longer grows.
 
     Raises
     ------
@@ -192,7 +192,7 @@ def _context(logger: logging.Logger, wish: threading.Event) -> Context:
 def new_sections(
     snapshot: Snapshot, probe: Path | None, after: int, context: Context
 ) -> tuple[PreliminarySection, ...]:
-    """Return the sections behind a frame; what cannot be read before the recording rests is tried again."""
+    """Return the sections after a frame; what a growing recording holds in part only is left for later."""
     try:
         return _sections(snapshot, probe, after, context)
     except InputError:

@@ -39,7 +39,7 @@ _PICTURE_PX = 300
 _STRIP_PX, _STRIP_STEP_PX, _STRIP_COLUMNS, _STRIP_SCALE = 10.0, 0.25, 360, 2
 # The eye's response, so that a faint ghost or tail is seen beside the line.
 _DISPLAY_GAMMA = 0.45
-# Smallest light that a difference is stretched to: below it there is rounding only.
+# Smallest difference of light that is shown in full colour: below it there is rounding only.
 _LEAST_FULL_SCALE = 1e-4
 # About so many marks on an axis.
 _TICKS = 4
@@ -71,7 +71,7 @@ def line_png(exhibit: Exhibit) -> bytes:
 
 
 def difference_png(exhibit: Exhibit) -> tuple[bytes, float]:
-    """Return what the effect changes there, red more and blue less light, and the light of full colour."""
+    """Return what the effect changes, red more and blue less light, and the change shown in full colour."""
     change = _around(exhibit, changed=True) - _around(exhibit, changed=False)
     full = max(float(np.quantile(np.abs(change), 0.999)), _LEAST_FULL_SCALE)
     share = np.clip(change / full, -1, 1)
@@ -83,7 +83,7 @@ def ring_plots(exhibit: Exhibit) -> list[Plot]:
     """Return the radius error around the ring, and light, width and skewness where the profile is changed."""
     azimuth = np.degrees(exhibit.azimuth_rad)
     residuals = exhibit.residual.values()
-    names = tuple(f"{2 * r / 25.4:g} inch" for r in exhibit.residual)
+    names = tuple(map(_inch, exhibit.residual))
     shown = [("residual on the ring", "µm", [1000 * r.error_mm for r in residuals], 0.5)]
     if exhibit.switch.effect.channel is Channel.PROFILE or not exhibit.shows_on_ring:
         shown += [

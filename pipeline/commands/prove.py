@@ -63,7 +63,7 @@ def rows_of(done: Sequence[Worked]) -> tuple[Figure, ...]:
         for case in done
         if case.wall is not None and case.trials[0].concealed
     ]
-    words = "Wall error after correction, of the oracle's, median"
+    words = "Median wall error after correction, over the oracle's"
     value = median(ratios) if ratios else None
     wall = Figure("wall_error", words, "≤ 1.1", value, len(ratios), None)
     return (*figures([trial for case in done for trial in case.trials]), wall)
@@ -170,7 +170,7 @@ def _shuffled(done: Sequence[Worked]) -> list[Worked]:
 
 
 def _told(done: Worked, console: Console) -> Worked:
-    """Tell on the console of a case that gave no answer."""
+    """Report on the console a case that gave no answer."""
     words = "no answer" if done.trials else "not rendered"
     for failure in done.failures:
         console.print(f"{words}: {failure}", style="red", highlight=False)

@@ -51,6 +51,7 @@ from stages.premises import PREMISES
 from stages.rings import RINGS
 
 ANSWERS, ANSWERS_WITHOUT = "answers", "answers-without"
+# Exit status of `boresight simulate` for a scene that cannot show what it is meant to show.
 _REFUSED_SCENE = 3
 _GO_ON = "mend what it names, then give the same command again: what is there is kept"
 
@@ -183,6 +184,7 @@ _SCENE = "truth_scene.yaml"
 _CACHE = "wall_errors.json"
 # Samples off by more than so many spreads lie on edges of the wall: the instrument is not the cause.
 _OUTLYING = 5.0
+# Of the samples of a ring only every so many-th is compared, to save time.
 _EVERY = 4
 _STAGES = (PREMISES, RINGS)
 

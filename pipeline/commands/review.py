@@ -32,14 +32,15 @@ def review(
         typer.Option(min=0, max=65535, help="port on 127.0.0.1; 0 takes that of last time, or a free one"),
     ] = 0,
     export: Annotated[
-        Path | None, typer.Option(metavar="FOLDER", help="write the page as files, read-only, and end")
+        Path | None, typer.Option(metavar="FOLDER", help="write the page as read-only files and stop")
     ] = None,
     browser: Annotated[bool, typer.Option("--browser/--no-browser", help="open the page")] = True,
     compare: Annotated[
         Path | None, typer.Option(metavar="EARLIER", help="folder of an earlier run of the same pipe")
     ] = None,
     twin: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="folder of a twin of this run, for a page of its own")
+        Path | None,
+        typer.Option(metavar="DIR", help="folder of boresight twin on this run: adds its page"),
     ] = None,
     years: Annotated[
         float | None,
@@ -51,7 +52,7 @@ def review(
     assignments: Annotated[
         list[str] | None,
         typer.Option(
-            "--set", metavar="STAGE.NAME=VALUE", help="one of them, such as register.least_share=0.5"
+            "--set", metavar="STAGE.NAME=VALUE", help="one parameter, such as register.least_share=0.5"
         ),
     ] = None,
 ) -> None:
@@ -63,7 +64,7 @@ def review(
     compared, beside = _compared(opened, compare, years, config, assignments or ()), _twin_page(twin)
     with as_file(files("pipeline.review").joinpath("page", "dist")) as page:
         if not (page / "index.html").is_file():
-            raise InputError(page, "has no page", hint="install boresight whole")
+            raise InputError(page, "has no page", hint="install boresight again: its page was not built")
         if export is not None:
             from pipeline.review.export import (
                 export_review,  # it draws papers; the page need not wait for that

@@ -278,7 +278,7 @@ def _draw_distribution(axes: Axes, d: Differences) -> None:
         x = np.linspace(-limit, limit, 200)
         s = 1000 * d.sigma_mm[:: max(1, len(d.sigma_mm) // 2000)]
         stated = np.mean(np.exp(-(x[:, None] ** 2) / (2 * s**2)) / (s * np.sqrt(2 * np.pi)), -1)
-        axes.plot(x, stated, color="#b04a00", ls="--", label="as the stated σ has it")
+        axes.plot(x, stated, color="#b04a00", ls="--", label="expected from the stated σ")
     axes.set(xlabel="run − reference, µm", yticks=[])
     axes.set_title("Distribution", fontsize=11)
     tidy(axes)

@@ -129,7 +129,7 @@ def write_model(mesh: TexturedMesh, folder: Path) -> None:
 def complete(
     builder: GlbBuilder, primitives: list[gltf.Primitive], centre_mm: Sequence[float] = (0.0, 0.0, 0.0)
 ) -> None:
-    """Make primitives, their places counted from a centre in P, the one mesh of a document."""
+    """Make primitives, whose positions are relative to a centre in P, the one mesh of a document."""
     document = builder.document
     document.meshes = [gltf.Mesh(name="pipe wall", primitives=primitives)]
     x, y, z = (float(c) / 1000 for c in centre_mm)
@@ -153,7 +153,7 @@ def complete(
 def tile_primitive(
     builder: GlbBuilder, tile: MeshTile, number: int, centre_mm: Float | None = None
 ) -> gltf.Primitive:
-    """Return a tile's primitive: one geometry, its places counted from a centre; a material a variant."""
+    """Return a tile's primitive: one geometry relative to a centre, and one material for each variant."""
     place = tile.vertex_p if centre_mm is None else (tile.vertex_p - centre_mm).astype(np.float32)
     small = len(tile.vertex_p) <= np.iinfo(np.uint16).max
     index = tile.face.ravel().astype(np.uint16 if small else np.uint32)
@@ -175,7 +175,7 @@ def tile_primitive(
 
 
 def _materials(builder: GlbBuilder, tile: MeshTile, number: int) -> Sequence[int]:
-    """Return the tile's materials in the order of the variants; all are unlit, hence true in every viewer."""
+    """Return the tile's materials in the order of the variants, unlit: no viewer changes their colours."""
     errors = {e.variant: e for e in tile.errors}
     # The photo holds the light of the camera's own lamps; a viewer's would come on top of it.
     photo = builder.material(f"photo {number}", _jpeg(tile.photo_bgr), "image/jpeg", _UNLIT)

@@ -19,9 +19,9 @@ if TYPE_CHECKING:
 
 # Common viewers and graphics cards refuse pictures with a side of more than 16384 px.
 _MOST_ROWS = 16384
-# Of figures: of PNG's 9 levels the one above which they hardly shrink any more.
+# PNG level of figures: with a higher one of the 9 they hardly shrink any more.
 _COMPRESSION = 3
-# Of photos, which are noisy: looking for runs of one byte alone takes .6 of level 3's time and 5 % less room.
+# PNG strategy of photos, which are noisy: run lengths alone take 0.6 of level 3's time and 5 % less room.
 _PHOTO = (cv2.IMWRITE_PNG_STRATEGY, cv2.IMWRITE_PNG_STRATEGY_RLE)
 # Of an overlay's figure: dots per inch, mm of pipe per inch, the longest figure (12000 px at 120 dpi, which
 # viewers still open).

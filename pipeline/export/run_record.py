@@ -128,9 +128,10 @@ def _of_trajectory(trajectory: Trajectory) -> Iterator[Number]:
 
 
 def _scale_sigma(trajectory: Trajectory, distance_mm: Float) -> float:
-    """Return the relative 1 σ of distances: of the way to the farthest frame, at least calibration's own.
+    """Return the relative 1 σ of the distance to the farthest frame, at least that of the calibration.
 
-    After a way there and back the end is better known than the scale; the calibration's part does not cancel.
+    After driving there and back the end is better known than the scale: the calibration's part does not
+    cancel.
     """
     farthest_mm = float(np.abs(distance_mm - distance_mm[0]).max())
     if not np.isfinite(trajectory.distance_sigma_mm) or farthest_mm == 0:
@@ -159,7 +160,7 @@ def _of_wall(wall: Wall) -> Iterator[Number]:
 def mean_diameter(radius: WallMap) -> tuple[float, float]:
     """Return the mean diameter of what was seen, mm, and its 1 σ.
 
-    What the calibration leaves open is common to all cells and stays; noise is nothing beside it.
+    The calibration's error is common to all cells and stays in the mean; noise averages out.
     """
     seen = np.isfinite(radius.radius_mm)
     common = radius.sigma_mm[seen].astype(float) ** 2 - radius.sigma_random_mm[seen].astype(float) ** 2

@@ -27,7 +27,7 @@ _TABLE = (
 
 
 def write_sections(sections: Sections, folder: Path) -> None:
-    """Write ``sections.csv``: a row a station; empty where too little was seen."""
+    """Write ``sections.csv``: one row for each station; cells are empty where too little was seen."""
     names = [f.name for f in fields(Sections)]
     columns = [np.degrees(getattr(sections, n)) if n in _DEGREES else getattr(sections, n) for n in names]
     with (folder / "sections.csv").open("w", newline="", encoding="utf-8") as file:
@@ -67,7 +67,7 @@ def _record(defect: Defect) -> dict[str, object]:
 
 
 def _cell(column: str, value: object) -> str:
-    """Return a cell's text; numbers of frames stand apart by blanks, clock positions are ``h:mm``."""
+    """Return a cell's text: frame numbers separated by blanks, clock positions as ``h:mm``."""
     if "clock" in column and isinstance(value, float):
         return notation.clock(value)
     if isinstance(value, list):
@@ -121,7 +121,7 @@ def write_centreline(trajectory: Trajectory, folder: Path) -> None:
 
 
 def _points(trajectory: Trajectory) -> tuple[Float, Float, Float]:
-    """Return distances (n,), points (n, 3) in P and their 1 σ (n, 3) over the way that the camera drove."""
+    """Return distances (n,), points (n, 3) in P and their 1 σ (n, 3) over the way of the camera, mm."""
     s = distance_along(trajectory.axis, trajectory.T_pc)
     first, last = float(s.min()), float(s.max())
     step = max(_STEP_MM, (last - first) / _MOST_POINTS)
@@ -159,7 +159,7 @@ def _parts(
 
 
 def _geojson(pieces: tuple[PipePiece, ...], distance: Float, xyz: Float) -> dict[str, object]:
-    """Return a feature for each piece: RFC 7946, but for coordinates in metres of P, which knows no map."""
+    """Return a feature for each piece: as in RFC 7946, but in metres of P, which has no place on a map."""
     features = []
     for piece, line in _parts(pieces, distance, xyz):
         properties = {name: text for name, text in zip(_PIECE, _row(piece), strict=True) if text}

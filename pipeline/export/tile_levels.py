@@ -19,8 +19,7 @@ from pipeline.geometry.axis import PipeAxis, from_pipe
 
 # A tube keeps at least 36 facets (10°): its chord errs by 0.4 % of the radius.
 _LEAST_COLUMNS = 36
-# Every fourth cell is tested for the level's error: a sample for a bound that viewers only choose levels
-# by.
+# Every fourth cell is tested for the level's error: viewers only choose a level by it.
 _TESTED = 4
 # Colour where there is no photo: middle grey.
 _GREY = 128
@@ -163,7 +162,7 @@ def _means(radius_mm: Float32, row: Int, half: int, step: int) -> Float:
 
 
 def _largest_error(radius_mm: Float32, row: Int, step: int, coarse: Float) -> float:
-    """Return by how much the fine map differs from the coarse one most, tested at every fourth cell."""
+    """Return the largest difference of the fine map from the coarse one, mm, tested at every fourth cell."""
     rows = np.arange(row[0], row[-1] + 1, _TESTED)
     columns = np.arange(0, radius_mm.shape[1], _TESTED)
     i = np.clip(np.searchsorted(row, rows, side="right") - 1, 0, len(row) - 2)

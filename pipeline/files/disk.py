@@ -42,7 +42,7 @@ class FileRecord:
 
 @dataclass(frozen=True)
 class FileStamp:
-    """What differs after a file was changed; to be asked for equality alone, since clocks are set back.
+    """What differs after a file was changed; compare for equality only, since clocks may be set back.
 
     The time of the last change of the inode, which no program can set, is part of it.
     """

@@ -45,7 +45,7 @@ def axis_through(origin_p: Float, x_p: Float, distance_from_mm: float) -> PipeAx
     origin_p : (K, 3)
         Points along the axis in P, mm.
     x_p : (3,)
-        Direction in P to which the first frame's x is next.
+        Direction in P that the first frame's x comes nearest to.
     distance_from_mm : float
         Distance of the first point.
     """

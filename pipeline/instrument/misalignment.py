@@ -17,9 +17,9 @@ from pipeline.errors import InputError
 from pipeline.instrument.camera import Camera
 from pipeline.instrument.laser import LaserSheet
 
-# Share of the ring below which neither a circle nor a first harmonic is told from a third of its arc.
+# With less of the ring in view, neither a circle nor a first harmonic can be fitted well (chosen).
 _LEAST_SEEN = 0.25
-# Half a degree apart: the largest of a first harmonic is met within 1e-5 of it.
+# Half a degree apart: one of them meets the maximum of a first harmonic to 1e-5 of its amplitude.
 AZIMUTHS = 720
 
 

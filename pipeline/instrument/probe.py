@@ -108,7 +108,7 @@ class Probe:
         return self.with_parameters(trajectory.instrument, trajectory.instrument_covariance)
 
     def after(self, knock: LaserKnock) -> Probe:
-        """Return the probe with its laser knocked, and no surer than that is known."""
+        """Return the probe with its laser knocked, its covariance raised by that of the knock."""
         first, count = len(self.camera.parameter_names), len(knock.change)
         parameters, covariance = self.parameters, self.covariance.copy()
         parameters[first : first + count] += knock.change

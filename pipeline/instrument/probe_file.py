@@ -2,8 +2,8 @@
 
 In the section ``standard_uncertainty``, ``focal_px`` is common to fx and fy; ``centre_px``, ``tilt_deg`` and
 ``decentre_mm`` hold for each axis on its own; ``distortion`` lists the camera's other parameters in their
-order; ``opening_angle_deg`` is twice the cone's; ``waviness_rad`` holds for each of its coefficients. What
-is not stated is 0.
+order; ``opening_angle_deg`` is twice the cone's; ``waviness_rad`` holds for each of its coefficients. What is
+not stated is 0, but ``encoder_scale``, which is then that of `Probe`.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ _LASER_KEYS = (
     "decentre_mm", "decentre_direction_deg", "waviness_rad",
 )  # fmt: skip
 _WAVES = len(LaserSheet(1.0).waviness)
-# Rows that are written with four digits are orthonormal to this.
+# Rows written with four digits are orthonormal to this.
 _ROTATION = 1e-3
 
 
@@ -120,7 +120,7 @@ def read_probe(file: Path) -> Probe:
 
 
 def probe_from(document: Section) -> Probe:
-    """Return the probe that a mapping with the keys of a probe file tells of; see `read_probe`."""
+    """Return the probe that a mapping with the keys of a probe file describes; see `read_probe`."""
     document.refuse_unknown(_KEYS)
     camera = camera_from_mapping(document.section("camera").values, document.file)
     laser = _laser(document.section("laser"))
@@ -135,7 +135,7 @@ def probe_from(document: Section) -> Probe:
         camera, laser, covariance,
         shutter=_shutter(_optional(document, "shutter")),
         lighting=_lighting(_optional(document, "lighting")),
-        encoder_scale_sigma=stated.number("encoder_scale", least=0) if stated.has("encoder_scale") else 0.002,
+        encoder_scale_sigma=_number_or(stated, "encoder_scale", Probe.encoder_scale_sigma, least=0),
         calibrated_from=document.text("calibrated_from") if document.has("calibrated_from") else "",
         imu=_imu(document.section("imu")) if document.has("imu") else None,
     )  # fmt: skip
@@ -172,6 +172,13 @@ def write_probe(probe: Probe, path: Path, made_by: MadeBy | None = None) -> None
 def _optional(document: Section, key: str) -> Section:
     """Return the section below a key, empty when it is absent."""
     return document.section(key) if document.has(key) else Section(document.file, {}, key)
+
+
+def _number_or(
+    section: Section, key: str, usual: float, *, least: float = -math.inf, above: float = -math.inf
+) -> float:
+    """Return the number below a key, ``usual`` when it is absent."""
+    return section.number(key, least=least, above=above) if section.has(key) else usual
 
 
 def _laser(section: Section) -> LaserSheet:
@@ -226,8 +233,8 @@ def _shutter(section: Section) -> Shutter:
     usual = Shutter()
     return Shutter(
         section.choice("kind", ("global", "rolling")) if section.has("kind") else usual.kind,
-        section.number("exposure_s", above=0) if section.has("exposure_s") else usual.exposure_s,
-        section.number("readout_s", least=0) if section.has("readout_s") else usual.readout_s,
+        _number_or(section, "exposure_s", usual.exposure_s, above=0),
+        _number_or(section, "readout_s", usual.readout_s, least=0),
     )
 
 
@@ -237,14 +244,15 @@ def _lighting(section: Section) -> Lighting:
     return Lighting(
         section.choice("kind", ("led_ring",)) if section.has("kind") else usual.kind,
         section.integer("leds", least=1) if section.has("leds") else usual.leds,
-        section.number("radius_mm", least=0) if section.has("radius_mm") else usual.radius_mm,
-        section.number("z_mm") if section.has("z_mm") else usual.z_mm,
+        _number_or(section, "radius_mm", usual.radius_mm, least=0),
+        _number_or(section, "z_mm", usual.z_mm),
     )
 
 
 def _imu(section: Section) -> ImuMount:
     """Return the mount that a section states: rows of ``R_ci``, and noise densities as Kalibr has them."""
-    section.refuse_unknown(tuple(ImuMount.__dataclass_fields__))
+    names = tuple(ImuMount.__dataclass_fields__)
+    section.refuse_unknown(names)
     rows = section.require("R_ci", "three rows of three numbers")
     try:
         R_ci = np.array(rows, float)
@@ -254,17 +262,7 @@ def _imu(section: Section) -> ImuMount:
     if not proper or np.linalg.det(R_ci) < 0:
         raise section.fail("R_ci", "is not a rotation", "orthonormal rows of determinant +1")
     usual = ImuMount(R_ci)
-
-    def stated(name: str) -> float:
-        return section.number(name, above=0) if section.has(name) else float(getattr(usual, name))
-
-    return ImuMount(
-        R_ci,
-        stated("gyroscope_noise_density"),
-        stated("gyroscope_random_walk"),
-        stated("accelerometer_noise_density"),
-        stated("accelerometer_bias"),
-    )
+    return ImuMount(R_ci, *(_number_or(section, n, getattr(usual, n), above=0) for n in names[1:]))
 
 
 def _covariance(section: Section, names: tuple[str, ...]) -> Float:

@@ -266,7 +266,7 @@ class _Text:
 
 @cache
 def _read(file: Path, changed_ns: int, size: int) -> _Text:
-    """Return what a file holds that was last changed then; all stages and exporters ask for it."""
+    """Return digest and imports of a file, read once for each time of change and size that it has."""
     text = file.read_text(encoding="utf-8")
     return _Text(hashlib.sha256(text.encode()).digest(), tuple(_imported(text)))
 

@@ -258,7 +258,7 @@ class Writer:
             self._writing[exporter.name] = self._pool.submit(self._write, exporter, key, arguments)
 
     def check(self) -> None:
-        """Raise what a write raised that has ended."""
+        """Raise the error of a write that has failed, if any has."""
         for name, future in self._writing.items():
             if future.done() and future.exception() is not None:
                 self.failed = f"writing {name}"

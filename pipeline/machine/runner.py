@@ -45,7 +45,7 @@ class Runner:
     record
         Called with the outcome at every change; writes run.json.
     headline
-        Returns the numbers that anyone asks for first of the artefacts it is given, by class.
+        Returns the headline numbers of the artefacts that it is given by class.
     display, logger, wish, workers
         Where progress goes, where messages go, the user's wish to stop, and how many threads to use.
     made_by
@@ -185,7 +185,7 @@ class Runner:
         return stored
 
     def _artefact(self, step: Step, numbers: list[Number]) -> object:
-        """Call a stage; what became of its input meanwhile goes before whatever else it raises."""
+        """Call a stage; that an input changed meanwhile is raised in place of any other error."""
         inputs: dict[str, object] = dict.fromkeys(step.stage.may_lack())
         inputs |= {argument: self._artefacts[kind] for argument, kind in step.inputs}
         context = self._context(step, numbers)
@@ -262,7 +262,7 @@ class Runner:
             self._publish_ready()
 
     def _end(self, state: State, problem: str) -> None:
-        """Record how a run ended that did not complete; a full disk may be why, and refuse the record too."""
+        """Record how a run ended that did not complete; a full disk that caused it may refuse the record."""
         self._logger.info("ended: %s: %s", state.value, problem)
         for name, outcome in self._outcomes.items():
             if outcome.state == State.RUNNING:

@@ -15,6 +15,7 @@ from numpy.typing import DTypeLike, NDArray
 
 from pipeline.files.disk import disk_errors_named
 
+# From 32 MiB on an array is mapped from a file.
 _MAP_FROM_BYTES = 1 << 25
 
 

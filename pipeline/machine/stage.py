@@ -31,7 +31,7 @@ class Progress(Protocol):
 
 
 def unheard(done: int, total: int) -> None:
-    """Take progress that nobody asked for."""
+    """Ignore progress, where nobody asked for it."""
 
 
 class Warn(Protocol):
@@ -61,7 +61,8 @@ class Context:
     warn
         Warnings for people.
     random
-        Generator seeded from the key of the result, so that a repeated run draws the same numbers.
+        Generator seeded from the stage's parameters and the sources, so that a repeated run draws the same
+        numbers.
     workers
         How many threads or processes the stage may use.
     scratch

@@ -66,7 +66,7 @@ def test_the_first_lines_give_the_size_with_its_sigma_and_what_it_means_for_the_
     write_page(WHOLE, Shown(), tmp_path)
     page = (tmp_path / "diagnosis.html").read_text()
     assert "angle by which the sheet leans forward: 0.600 ± 0.010 deg" in page
-    assert "shows the wall up to 0.100 mm beside where texture and motion place it" in page
+    assert "places the wall up to 0.100 mm from where texture and motion place it" in page
     assert "with what was found, 0.001 mm are left" in page
 
 

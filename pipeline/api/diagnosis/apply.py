@@ -27,9 +27,9 @@ from stages.diagnose.result import EffectFound
 
 _NEAR_MM, _NEAR_HOURS = 8.0, 1.5
 _EVEN = 0.2
-# What shows the geometry; the model is made of the corrected run alone.
 # Depth changes and radius changes below these, mm, are not told: no inspection decides on less (chosen).
 _LEAST_DEPTH_CHANGE_MM, _LEAST_RADIUS_CHANGE_MM = 0.01, 0.005
+# Stages and files that show the geometry: of the stated run no more is made.
 _GEOMETRY = frozenset({"rings", "triangulate", "motion", "accumulate", "texture", "defects"})
 _FILES = frozenset({"trajectory.csv", "radius_map.npz", "defects.json"})
 

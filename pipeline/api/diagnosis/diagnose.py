@@ -109,7 +109,7 @@ def diagnose(
     config : path or str, optional
         A file of parameters, or the name of a shipped one (`shipped_names`).
     settings : sequence of str
-        Single parameters, each ``stage.name=value``; they go before those of ``config``.
+        Single parameters, each ``stage.name=value``; they override those of ``config``.
     display : Display, optional
         Is told how the stages stand; nothing is shown when it is left out.
 
@@ -126,7 +126,7 @@ def diagnose(
     UnusableError
         When a recording is well formed, but a stage cannot measure what it must.
     Cancelled
-        When the user stopped it with Ctrl-C; the same call goes on where it was.
+        When the user stopped it with Ctrl-C; the same call continues from there.
     """
     lent = None if run is None else Path(run)
     record = None if lent is None else read_run_record(lent)

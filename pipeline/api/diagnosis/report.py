@@ -78,7 +78,7 @@ def headline(found: Diagnosis) -> str:
 
 
 def sizes(found: EffectFound) -> tuple[str, ...]:
-    """Return each estimated size of an effect in words, with its 1 σ; what is counted has none."""
+    """Return each size of an effect that has a σ, in words."""
     law = ALL_EFFECTS.get(found.name)
     known = {q.name: (q.meaning, q.unit) for q in law.quantities} if law is not None else {}
     out = []
@@ -104,9 +104,9 @@ def size_of_mismatch(found: Diagnosis) -> str:
     rings = found.ring_picture
     before, after = (float(np.nanmax(np.abs(_quantiles(mm)[0]))) for mm in (rings.before_mm, rings.after_mm))
     return (
-        f"With the stated instrument the ring shows the wall up to {before:.3f} mm beside where texture and "
-        f"motion place it (median of frames, worst azimuth); with what was found, {after:.3f} mm are left. "
-        "The same command with the option “apply” measures the pipe anew and tells what changes."
+        f"With the stated instrument the ring places the wall up to {before:.3f} mm from where texture and "
+        f"motion place it (median of frames, worst azimuth); with what was found put right, {after:.3f} mm "
+        "are left. The same command with the option “apply” measures the pipe again and says what changes."
     )
 
 
@@ -188,7 +188,7 @@ def reading_figure(picture: ReadingPicture) -> bytes:
 
 
 def image_figure(shown: OnImage) -> bytes:
-    """Return the residual on the image, before and after, drawn outward so many times as large."""
+    """Return the residual on the image, before and after, drawn outward and enlarged."""
     figure = Figure(figsize=(9.6, 5.0), layout="constrained")
     both = figure.subplots(1, 2, sharex=True, sharey=True)
     limit = max(float(np.percentile(np.abs(shown.before_px), _QUANTILE)), 0.05)

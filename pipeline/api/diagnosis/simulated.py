@@ -30,7 +30,7 @@ from stages.rings import RINGS
 from stages.twin.gauge_line import GAUGE_LINE
 
 _SURE = 0.5
-"""Probability from which an effect counts as found: it is likelier there than not."""
+"""Probability from which an effect counts as found: it is more probably there than not."""
 _OF_LINE = ("laser", "camera", "window")
 
 
@@ -80,7 +80,7 @@ def switches_of(file: Path) -> Switches:
     for said in answer.effects:
         switch = _switch(said) if said.probability >= _SURE or math.isnan(said.probability) else None
         if switch is None:
-            unsaid.append(f"The simulator is not told of {said.name.replace('_', ' ')}: {_why(said)}.")
+            unsaid.append(f"{said.name.replace('_', ' ').capitalize()} is not simulated: {_why(said)}.")
         else:
             found.append(switch)
             effects.append(said)
@@ -91,7 +91,7 @@ def switches_of(file: Path) -> Switches:
 def _why(said: NamedEffect) -> str:
     if said.probability < _SURE:
         return f"its probability is {said.probability:.2g}"
-    return "it has no law for it, or not for such a size"
+    return "the simulator has no law for it, or none for such a size"
 
 
 def _switch(said: NamedEffect) -> Switch | None:
@@ -164,8 +164,8 @@ def try_diagnosis(diagnosis: Path, folder: Path, display: Display) -> DiagnosisT
     )
     if gauge is None:
         sentence = (
-            "The diagnosis had no gauge run. In an inspection wall and poses are measured with the very "
-            "instrument that is in doubt, so that its error cannot be told from the wall's shape: record one."
+            "The diagnosis had no gauge run. An inspection measures wall and poses with the very instrument "
+            "that is in doubt, whose error then looks like the wall's own shape: record a gauge run."
         )
         return DiagnosisTried(cannot_tell=(*said.unsaid, *still, sentence))
     if not said.of_line:

@@ -23,7 +23,7 @@ TOP_RAD = -1.5 * np.pi  # 6 o'clock, a turn below +π/2
 # Pixels of one picture of the whole wall, and of one about a finding: the page stays below 8 MB.
 _PIXELS, _CROP_PX = 1_100_000, 180
 _PAPER = 235
-_FINENESS = 0.25  # of a picture much shrunk, rows are left out that would show less than this far apart
+_FINENESS = 0.25  # px of the shrunk picture: of rows that would lie closer, some are left out beforehand
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ class Gallery:
         return tuple(out)
 
     def crops(self, defect: Defect) -> tuple[str, str]:
-        """Return photo and deviation around a defect, as addresses; empty where there is none."""
+        """Return photo and deviation around a defect as data URIs; empty where there is none."""
         window = window_about(defect, self.radius_mm, _CROP_PX)
         deviation = self.overlays[0][1] if self.overlays else None
         shown = [jpeg_uri(seen_through(i, window)) if i is not None else "" for i in (self.photo, deviation)]
@@ -232,7 +232,13 @@ def _remapped(image: Byte, x: Float, y: Float, nearest: bool, shrink: tuple[floa
 
 
 def jpeg_uri(bgr: Byte, quality: int = 82) -> str:
-    """Return a picture (H, W, 3) or (H, W) as a JPEG inside an address."""
+    """Return a picture (H, W, 3) BGR or (H, W) grey as the data URI of a JPEG.
+
+    Raises
+    ------
+    OSError
+        When it cannot be encoded.
+    """
     encoded, jpeg = cv2.imencode(".jpg", bgr, [cv2.IMWRITE_JPEG_QUALITY, quality])
     if not encoded:
         raise OSError("a picture of the page cannot be encoded as JPEG")

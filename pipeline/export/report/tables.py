@@ -96,9 +96,7 @@ def _inspected(summary: RunSummary) -> Card:
     lines = [
         f"nominal diameter {recording.pipe.nominal_diameter_mm:g} mm",
         f"{len(recording.frames.frame)} frames at {recording.frame_rate:g} per second",
-        f"run made {notation.moment(summary.created)}"
-        if summary.created
-        else "date: the recording does not state one",
+        f"run made {notation.moment(summary.created)}" if summary.created else "date of the run not known",
     ]
     value = "no wall"
     if summary.wall is not None:

@@ -22,7 +22,7 @@ _BASELINES_MM = range(10, 101, 3)
 
 @dataclass(frozen=True)
 class Tolerance:
-    """What one systematic source may be for a wished accuracy of the radius at the worst azimuth.
+    """How large one systematic source may be for a required accuracy of the radius at the worst azimuth.
 
     Attributes
     ----------

@@ -130,8 +130,8 @@ def radius_error(
 def radius_jacobian(scan: RingScan) -> Float:
     """Return d (triangulated radius) / d (true parameters) (A, P), pose known: −n · d X/d parameters.
 
-    The believed instrument is held: of the wall point the true one makes, it moves by minus the derivative
-    of its own triangulation.
+    The believed instrument triangulates with fixed parameters. Other true parameters move the pixel of a wall
+    point; with both changed alike the point would stay, hence the minus sign.
     """
     by_parameters = scan.probe.triangulate_jacobian(scan.pixels)[1]
     return -np.asarray(np.einsum("ni,nip->np", scan.normals, by_parameters[:, :2]))
@@ -150,7 +150,7 @@ def disturbance_jacobian(scan: RingScan) -> Float:
 
 
 def without_centre(scan: RingScan, error_mm: Float) -> Float:
-    """Return what a fitted circle's centre leaves of small radius errors (A, ...)."""
+    """Return small radius errors (A, ...) without the part that the centre of a fitted circle takes up."""
     design = np.concatenate([scan.normals, np.ones((scan.azimuths, 1))], -1)
     flat = error_mm.reshape(scan.azimuths, -1)
     shift = np.linalg.lstsq(design, flat, rcond=None)[0][:2]

@@ -1,4 +1,4 @@
-"""Kalibr's camchain YAML, one camera a file, and camodocal's YAML, which is only read.
+"""Kalibr's camchain YAML with one camera in a file, and camodocal's YAML, which is only read.
 
 Kalibr: pinhole-equi, pinhole-radtan and omni-radtan. Camodocal (also inside VINS configurations):
 KANNALA_BRANDT, MEI and PINHOLE.
