@@ -35,6 +35,8 @@ from pipeline.pages import rendered, tidy
 
 # Baseline of the physics notes; see `implied_baselines_mm` for what the paper's figures imply.
 PAPER_BASELINE_MM = 22.0
+# What the paper states without its baseline: bore of 4 inch, mm; tilt, deg; error of the radius, mm.
+_PAPER_CASE = (101.6, 0.05, 0.1)
 # Table of a camera that the page does not know: every degree up to 110°, every 7.5° around; the page is
 # linear between.
 _THETA_STEP_RAD, _THETA_COUNT, _PSI_COUNT = math.radians(1), 111, 48
@@ -73,7 +75,7 @@ def tilt_figure(scan: MisalignedScan, accuracy_mm: float) -> Figure:
         )
     axes.axhline(accuracy_mm, color=_MUTED, lw=1, ls=(0, (1, 2)), label=f"{accuracy_mm:g} mm")
     _finish(axes, "tilt of the sheet φ, °", "largest radial error, mm")
-    radial, euclidean = implied_baselines_mm(4 * INCH_MM, 0.05, 0.1)
+    radial, euclidean = implied_baselines_mm(*_PAPER_CASE)
     axes.set_title(
         f"Largest error over tilt at baseline {scan.baseline_mm:.4g} mm\n"
         f"(the paper's 0.1 mm at 0.05° in 4 inch implies {radial:.1f} mm, Euclidean {euclidean:.1f} mm)",
@@ -200,7 +202,7 @@ def error_model_page(
     scan: MisalignedScan, camera: Camera | None, camera_name: str, accuracy_mm: float
 ) -> str:
     """Return the interactive page as one file that needs nothing else."""
-    radial, euclidean = implied_baselines_mm(101.6, 0.05, 0.1)
+    radial, euclidean = implied_baselines_mm(*_PAPER_CASE)
     start = {
         **asdict(scan),
         "accuracy_mm": accuracy_mm,
@@ -253,7 +255,7 @@ def _show(scan: MisalignedScan, numbers: dict[str, float | None], folder: Path) 
     )
     for name, value in numbers.items():
         console.print(f"  {name:<24}{'none' if value is None else f'{value:.4f}'}")
-    radial, euclidean = implied_baselines_mm(101.6, 0.05, 0.1)
+    radial, euclidean = implied_baselines_mm(*_PAPER_CASE)
     console.print(
         "The larger error is on the side the sheet leans away from. The paper's 0.1 mm at 0.05° in "
         f"a 4 inch pipe implies a baseline of {radial:.1f} mm (radial) or {euclidean:.1f} mm (Euclidean). "

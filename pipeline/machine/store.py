@@ -19,6 +19,7 @@ from pipeline.machine.outcome import Number
 
 _FORMAT = 1
 _MANIFEST = "manifest.json"
+# From 4 MiB on an array that is read back is mapped from its file.
 _MAP_FROM_BYTES = 1 << 22
 
 

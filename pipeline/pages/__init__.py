@@ -17,7 +17,7 @@ Format = Literal["png", "svg"]
 
 
 def data_uri(picture: bytes) -> str:
-    """Return a PNG, JPEG or SVG picture as an address that holds it, so that a page is one file."""
+    """Return a PNG, JPEG or SVG picture as a data URI, so that a page is one file."""
     kinds = {b"\x89PNG": "png", b"\xff\xd8": "jpeg"}
     kind = next((kind for start, kind in kinds.items() if picture.startswith(start)), "svg+xml")
     return f"data:image/{kind};base64,{b64encode(picture).decode('ascii')}"
@@ -59,7 +59,7 @@ def tidy(axes: Axes) -> None:
 
 
 def rendered(figure: Figure, kind: Format = "png", dpi: float = 130, salt: str = "boresight") -> bytes:
-    """Return a figure as a picture; the same figure gives the same bytes. ``salt`` is of an SVG's names."""
+    """Return a figure as a picture, always the same bytes; ``salt`` seeds the ids inside an SVG."""
     from matplotlib import rc_context
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 

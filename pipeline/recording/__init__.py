@@ -44,7 +44,7 @@ def _refusal_by_start(path: Path, start: bytes) -> str | None:
     if not path.is_file():
         return "it is not a file"
     with path.open("rb") as opened:
-        return None if opened.read(len(start)) == start else "it does not start as one"
+        return None if opened.read(len(start)) == start else "its first bytes are not those of one"
 
 
 _READERS = (

@@ -88,7 +88,7 @@ class Illumination(StrEnum):
 
 @dataclass(frozen=True)
 class FrameTable:
-    """One row a frame: number (N,), time in s (N,) and illumination (N,) of `Illumination` values."""
+    """One row for each frame: number (N,), time in s (N,) and illumination (N,) of `Illumination` values."""
 
     frame: Int
     time_s: Float
@@ -246,8 +246,8 @@ class Recording:
     imu
         None where there is none.
     stays : (h, w) bool or None
-        Where something stays in the lit pictures, reduced by a whole factor, while the wall moves; None:
-        nowhere, or not looked for.
+        Pixels of the lit pictures, reduced by a whole factor, at which something stays while the wall moves;
+        None where there are none, or nobody looked.
     """
 
     name: str

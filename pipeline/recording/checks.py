@@ -103,7 +103,7 @@ class CheckedFrames:
     stays : (h, w) bool or None
         As in `Recording`.
     interlaced : bool
-        Odd rows were taken at another time than even ones, which alone are used.
+        Whether odd rows were taken at another time than even ones; then the even ones alone are used.
     """
 
     frame: Int

@@ -33,11 +33,12 @@ from pipeline.recording.video import AHEAD, FEW, VideoSource
 Made = TypeVar("Made")
 Form = Literal["grey", "split", "bgr"]
 _FORMS: tuple[Form, ...] = ("grey", "split", "bgr")
-"""What is kept of a frame: its luma, with chroma of half its size, all; each is made of those behind it."""
+"""What is kept of a frame: luma; luma with chroma of half its size; all. Each can be made from a later
+one."""
 # Frames are kept as they are decoded, 2 to 6 MB each at 1600 x 1200: 4 GiB hold half a minute of such video.
 # Frames beyond it are decoded again. A disk that is nearly full is left to the results.
 _MOST_BYTES, _SHARE_OF_FREE = 4 << 30, 0.25
-# Bytes taken of the disk at a time: room found block by block while writing costs the system twice as much.
+# Bytes reserved on the disk at a time: room found block by block while writing costs twice the system time.
 _GROWTH = 1 << 27
 
 
@@ -187,7 +188,7 @@ class DecodedOnce:
     store : FrameStore
     dim, lit : frozenset of int
         Frames in the laser's light, of which the luma alone is kept, and in the lamps', whose chroma is
-        halved until it is asked for: a run does without, and what is kept costs time.
+        halved until it is asked for: a run does not need more, and writing more costs time.
     """
 
     video: VideoSource

@@ -1,4 +1,4 @@
-"""What of an encoder's readings cannot be: a counter that begins anew counts on, jumps are told."""
+"""Encoder readings that cannot be true: a counter that restarts is continued, and jumps are warned of."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ import numpy as np
 from pipeline.arrays import Float, Int
 from pipeline.recording.base import Encoder, FrameTable
 
-# A step of the encoder is a jump when it is so long, and so many times the usual largest (this quantile of
-# the steps by which it moves at all) and what it moves by just before and after: the median of five steps, or
-# of two tenths of a second, since between readings of 30 a second others may have been put.
+# A step of the encoder is a jump when it is longer than 1 mm, than ten times the usual largest step (this
+# quantile of the steps that are not 0), and than ten times the median of the steps around it: of five, or of
+# those within 0.2 s, since a recorder may insert readings between those that come 30 times a second.
 _LARGEST, _JUMP_FACTOR, _BESIDE, _BESIDE_S, _JUMP_MM = 0.95, 10.0, 5, 0.2, 1.0
 
 
 def checked_encoder(encoder: Encoder | None, frames: FrameTable) -> tuple[Encoder | None, tuple[str, ...]]:
-    """Return an encoder that counts on, and what is suspicious: it covers a part only, pauses, or jumps."""
+    """Return the encoder with its counter continued, and warnings: covers a part only, pauses, jumps."""
     if encoder is None or frames.frame.size == 0:
         return encoder, ()
     encoder, began_anew = counted_on(encoder)
@@ -38,7 +38,7 @@ def _slack_s(encoder: Encoder, frames: FrameTable) -> float:
 
 
 def counted_on(encoder: Encoder) -> tuple[Encoder, tuple[str, ...]]:
-    """Return an encoder whose counter began anew on and on as if it had counted on, and what was noticed.
+    """Return an encoder whose counter restarts again and again as if it had counted on, and a warning of it.
 
     Such a counter jumps back, always by all that it can count. A wheel that slips goes on from where it is.
     """
@@ -65,8 +65,8 @@ def counted_on(encoder: Encoder) -> tuple[Encoder, tuple[str, ...]]:
 def _jumps(encoder: Encoder) -> Int:
     """Return the readings (K,) after which the encoder jumps.
 
-    One that counts coarsely stands for most readings, and so does a probe that waits: only steps that move
-    tell what is usual, and setting out is no jump, since the encoder then goes on as fast.
+    A coarse encoder repeats most readings, and so does that of a probe that waits: only steps that are not 0
+    tell what is usual. Setting out is no jump, since the encoder then goes on as fast.
     """
     step_mm = np.abs(np.diff(encoder.distance_mm))
     if not step_mm.any():
@@ -80,7 +80,7 @@ def _jumps(encoder: Encoder) -> Int:
 
 
 def _usual_largest(step_mm: Float) -> float:
-    """Return the usual largest, mm, of steps (N,) by which the encoder moves; a jump does not raise it."""
+    """Return the usual largest size, mm, of the steps (N,) that are not 0; a jump does not raise it."""
     size_mm = np.abs(step_mm)
     return float(np.quantile(size_mm[size_mm > 0], _LARGEST, method="lower"))
 

@@ -12,10 +12,10 @@ from pipeline.errors import InputError
 from pipeline.recording.base import FrameTable
 
 # Rounding moves a stamp by half a unit; a line laid through many rounded stamps is off by less than a tenth.
-# Their errors are those of a saw: the line's slope may be off by some of the σ of independent ones.
+# Their errors repeat like a saw's teeth: the line's slope may be off by some σ of independent errors.
 _WITHIN_UNITS, _SIGMAS = 0.6, 3.0
-# A unit of time is longer than a frame by a tenth at least, else rounding makes no two stamps equal. It holds
-# at most half as many frames again as the stated rate says, and one: a clock that stood still holds more.
+# The unit of time is at least 1.1 frames long, else rounding makes no two stamps equal. It holds at most 1.5
+# times the frames of the stated rate, and one more: a unit in which the clock stood still holds more.
 _SHORTEST, _LONGEST = 1.1, 1.5
 # Stamps are multiples of their unit but for the digits of a float.
 _EXACT = 1e-6
@@ -24,8 +24,8 @@ _EXACT = 1e-6
 def without_rounding(file: Path, table: FrameTable, rate: float) -> tuple[FrameTable, tuple[str, ...]]:
     """Return a table whose times rise strictly, and what was noticed: equal stamps, if rounded, are parted.
 
-    Times are those of an even rhythm where it lies within the rounding of all stamps, else frames with equal
-    stamps share the time that rounds to these evenly. ``rate`` is the stated frame rate, 1/s.
+    Times are those of an even rhythm where it lies within the rounding of all stamps; else frames with equal
+    stamps are spread evenly over the time that rounds to their stamp. ``rate`` is the stated frame rate, 1/s.
 
     Raises
     ------
@@ -58,7 +58,7 @@ def without_rounding(file: Path, table: FrameTable, rate: float) -> tuple[FrameT
 def _even_rhythm(table: FrameTable, unit_s: float, stated_s: float) -> Float | None:
     """Return the even times (N,) of which all stamps are rounded, None where there are none.
 
-    It has the stated period where the stamps do not tell another: in few seconds they tell little.
+    Their period is the stated one unless the stamps clearly show another: a few seconds show little.
     """
     place = table.frame - table.frame.mean()
     fitted_s = float(place @ table.time_s / (place @ place))

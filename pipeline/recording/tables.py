@@ -49,7 +49,7 @@ def frame_table(file: Path, text: str) -> FrameTable:
         time_s.append(_finite(file, line, "time_s", time))
         illumination.append(_light(file, line, light))
     if not frame:
-        raise InputError(file, "lists no frames", expected="one line a frame")
+        raise InputError(file, "lists no frames", expected="one line for each frame")
     refuse_backward(file, frame, "frame", strictly=True)
     refuse_backward(file, time_s, "time_s", strictly=False)
     return FrameTable(np.array(frame, np.int64), np.array(time_s), np.array(illumination, np.str_))

@@ -24,7 +24,7 @@ _THREADS = 4
 _RESTART_FRAMES = 8
 # A decoder holds back at most this many frames: 16 for reordering and one a thread.
 _HELD_BACK = 16 + _THREADS
-# Frames made ready while one is worked on, and from how many on a thread of its own is worth it.
+# Frames decoded ahead of the one worked on, and the number from which a thread of its own is worth it.
 AHEAD, FEW = 12, 3
 # Times of a frame in video and table are the same when they differ by less than this part of a period.
 _SAME_TIME = 0.25
@@ -209,7 +209,7 @@ def _decoded(
 ) -> Iterator[av.VideoFrame | None]:
     """Yield decoded frames in order of presentation; None where the decoder met damage.
 
-    Just the packets presented at the times ``only`` are decoded, where times are known.
+    Only packets whose time of presentation is in ``only`` are decoded; all where times are not known.
     """
     packets = container.demux(stream)
     while (packet := _next_packet(packets)) is not None:

@@ -52,7 +52,10 @@ class Strength:
 def strength(
     depth_mm: float, length_mm: float, bore_mm: float, wall_mm: float, yield_mpa: float
 ) -> Strength | None:
-    """Return the failure pressure of metal loss; None where the criteria do not apply."""
+    """Return the failure pressure of metal loss in a pipe of inner diameter ``bore_mm``.
+
+    None where the criteria do not apply: without loss, or beyond `LARGEST_LOSS`.
+    """
     if not 0 < depth_mm <= LARGEST_LOSS * wall_mm:
         return None
     outer = bore_mm + 2 * wall_mm

@@ -24,6 +24,7 @@ from pipeline.review.review import Review, State
 if TYPE_CHECKING:
     from pipeline.review.compared import Compared
 
+# Cross-sections written along the pipe, and bytes of the largest model that is put into one page.
 _SECTIONS = 400
 _LARGEST_MODEL = 200 << 20
 

@@ -21,7 +21,7 @@ PHOTO = "photo"
 TILE_PX = 512
 # A shrunk pixel is the mean of this many samples each way, so that an overview need not read everything.
 _SAMPLES = 4
-# Of what in the radius map a layer is made.
+# The array of the radius map that each layer shows.
 _STORED = {
     "deviation": "radius_mm", WALL_LOSS: "radius_mm", "deviation_nominal": "radius_mm",
     "uncertainty": "sigma_mm", "misalignment": "misalignment_mm",
@@ -39,7 +39,7 @@ class Values:
     ----------
     cells : (S, A)
     less : (A,)
-        What is taken from every row.
+        What is subtracted from every row, mm.
     """
 
     cells: Float32

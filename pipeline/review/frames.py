@@ -25,6 +25,7 @@ _QUALITY = 88
 _BEST_POLAR_RAD = 1.05
 # How far a pixel's ray is followed to the wall, in radii and steps of 0.5 %.
 _NEAREST_RADII, _FARTHEST_RADII, _REACHES = 0.3, 30.0, 900
+# Frames from within so many radii of a spot are looked at; runs whose finders are kept in memory.
 _NEAR_RADII = 8.0
 _KEPT = 2
 

@@ -19,6 +19,8 @@ from pipeline.pages import notation
 from pipeline.review.decisions.replay import Finding, Measured, Outline
 from pipeline.review.run_files import RunFiles, measured_findings
 
+# Width of the wall around an outline that its depth refers to; σ from which a direction is sure; fewest cells
+# of that wall which give its median.
 _AROUND_MM = 6.0
 _SURE_SIGMA = 2.0
 _LEAST_AROUND = 20

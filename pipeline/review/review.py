@@ -21,7 +21,7 @@ from pipeline.review.measuring import OutlineGauge
 from pipeline.review.run_files import RunFiles, measured_findings
 
 FOLDER = "review"
-# Two findings are the same when their middles are no farther apart than this, or than half their length.
+# A new finding is an old one when their middles are no farther apart than this, or than half its length.
 _APART_MM = 5.0
 
 
@@ -201,7 +201,7 @@ def open_review(files: RunFiles) -> Review:
 
 
 def same_findings(old: Iterable[Finding], new: Iterable[Finding]) -> dict[str, str]:
-    """Return which new finding each old one is: of the same kind, its middle within the other's extent."""
+    """Return which new finding each old one is: the nearest of its kind within `_reach_mm`, by their ids."""
     free = list(new)
     found: dict[str, str] = {}
     for finding in old:
@@ -260,7 +260,7 @@ def _reach_mm(finding: Finding) -> float:
 
 
 def _apart_mm(one: Finding, other: Finding) -> float:
-    """Return the distance along the pipe, and around it in units of the finding's own width."""
+    """Return how far two findings' middles are apart, mm: along the pipe and around it taken together."""
     (s0, a0), (s1, a1) = _middle(one), _middle(other)
     turn = (a1 - a0 + np.pi) % (2 * np.pi) - np.pi
     span = max(np.ptp([a for _, a in one.outline]), 1e-6)

@@ -26,6 +26,7 @@ from pipeline.recording.checks import CheckedFrames
 from pipeline.review.decisions.replay import Finding, Measured
 
 _Artefact = TypeVar("_Artefact")
+# The stage that makes each result.
 _MAKERS: dict[type, str] = {
     Overlays: "overlays", Trajectory: "motion", Wall: "accumulate", RingSamples: "rings",
     CheckedFrames: "premises", Sections: "sections", WallTexture: "texture", RingPoints: "triangulate",
@@ -49,7 +50,7 @@ class RunFiles:
 
     @property
     def version(self) -> str:
-        """Changes whenever the run is computed again; by content, since clocks are set back."""
+        """Hash of run.json, which changes whenever the run is computed again; its time would not do."""
         try:
             return hashlib.sha256(self.file("run.json").read_bytes()).hexdigest()
         except OSError:

@@ -22,8 +22,10 @@ from pipeline.review.run_files import RunFiles
 # each cell still averages some hundred pixels of a frame.
 _POLAR, _AROUND = 20, 24
 _LEAST_POLAR_RAD, _MOST_POLAR_RAD = 0.25, 1.75
+# Rays for each cell around; lit frames that are averaged.
 _CELL_POINTS = 5
 _NEIGHBOURS = 4
+# Grey levels of photo and frame that count: above rounding, below clipping.
 _DARK, _BRIGHT = 3, 250
 # Half as wide again as what the photo leaves out beside the laser's line, since brightness is smoothed here.
 _LASER_BAND_MM = 1.5
@@ -90,7 +92,7 @@ def _stand_in(files: RunFiles, _version: str, frame: int, distance: float, azimu
 
 
 def stand_in(files: RunFiles, frame: int, distance: float, azimuth: float) -> Stand:
-    """Return the stand of a frame of a run; raises as `stand_of`. The page asks for it twice."""
+    """Return the stand of a frame of a run, kept since the page asks for it twice; raises as `stand_of`."""
     return _stand_in(files, files.version, frame, distance, azimuth)
 
 
@@ -164,7 +166,7 @@ def _light(finder: FrameFinder, photo: WallTexture, frame: int, polar_rad: Float
 
 
 def _last_row(light: Float) -> int:
-    """Return the last row that lies within the lens; it begins at the brightest."""
+    """Return the last row that lies within the lens, looked for from the brightest on."""
     mean = light.mean(1)
     brightest = int(mean.argmax())
     dark = np.flatnonzero(mean[brightest:] < _BEYOND_LENS * mean[brightest])
@@ -172,7 +174,7 @@ def _last_row(light: Float) -> int:
 
 
 def _lit_beside(finder: FrameFinder, frame: int) -> Iterator[tuple[int, Image]]:
-    """Yield the lit frames nearest in time to a frame, other than it, with their pictures."""
+    """Yield the lit frames nearest in time to a frame, without itself, with their pictures."""
     table, posed = finder.recording.frames, finder.trajectory.frame
     is_lit = np.isin(table.illumination, [Illumination.LED, Illumination.BOTH])
     lit = np.setdiff1d(np.intersect1d(table.frame[is_lit], posed), [frame])

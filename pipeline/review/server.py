@@ -279,7 +279,7 @@ def _number(request: Request, name: str) -> float:
     except ValueError as error:
         raise InputError("request", f"{name} is {text[:40]!r}", expected="a number") from error
     if not abs(value) < 1e9:  # mm: a thousand kilometres
-        raise InputError("request", f"{name} is {text[:40]!r}", expected="a number within reason")
+        raise InputError("request", f"{name} is {text[:40]!r}", expected="a number between -1e9 and 1e9")
     return value
 
 

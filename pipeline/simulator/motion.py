@@ -151,9 +151,9 @@ class Odometer:
         return at
 
 
-# Knots of the spline over an easing time, and steps of the integration between two knots.
+# Knots of the spline in an easing time.
 _KNOTS_AN_EASING = 8
-# See above.
+# Steps of the integration between two knots.
 _FINE = 16
 
 

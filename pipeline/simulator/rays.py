@@ -1,4 +1,4 @@
-"""Viewing rays of the true camera, from a table that is computed once an instrument."""
+"""Viewing rays of the true camera, from a table that is computed once for each instrument."""
 
 from __future__ import annotations
 

@@ -41,7 +41,7 @@ class LightScene(Parameters):
 
     level: float = Field(0.6, gt=0, le=50, description="brightest wall on the axis' side over full scale")
     lobe: float = Field(1.0, ge=0, le=20, description="exponent of the emission cos^m; 1: bare LED")
-    even: float = Field(0.15, ge=0, le=1, description="share that is even over the forward half: bounce")
+    even: float = Field(0.15, ge=0, le=1, description="share emitted evenly forward, for bounced light")
     colour_bgr: Bgr = Field((1.0, 1.0, 1.0), description="share of each channel")
 
 
@@ -90,8 +90,8 @@ class MotionScene(Parameters):
     measured: str | None = Field(
         None, description="way of a run (NPZ of simulate --like), relative to the scene's folder"
     )
-    speed: float = Field(1.0, gt=0, le=100, description="by which a measured way is gone faster")
-    easing_s: float = Field(0.2, gt=0, le=10, description="over which speeds run into each other")
+    speed: float = Field(1.0, gt=0, le=100, description="factor on the speed of a measured way")
+    easing_s: float = Field(0.2, gt=0, le=10, description="time in which one speed passes into the next, s")
     x_mm: SwayScene = Field(default_factory=lambda: SwayScene.model_validate({}))
     y_mm: SwayScene = Field(default_factory=lambda: SwayScene.model_validate({}))
     yaw_deg: SwayScene = Field(default_factory=lambda: SwayScene.model_validate({}))
@@ -116,8 +116,8 @@ class OdometerScene(Parameters):
 class Rendering(Parameters):
     """How finely a frame is computed."""
 
-    line_samples: int = Field(3, ge=1, le=16, description="samples a pixel and side where the line is")
-    wall_samples: int = Field(1, ge=1, le=8, description="samples a pixel and side elsewhere")
+    line_samples: int = Field(3, ge=1, le=16, description="samples along a pixel's side where the line is")
+    wall_samples: int = Field(1, ge=1, le=8, description="samples along a pixel's side elsewhere")
     time_samples: int = Field(1, ge=1, le=64, description="moments within an exposure")
 
 

@@ -18,7 +18,7 @@ from pipeline.simulator.kernel import kernel
 from pipeline.simulator.raycast import first_hit, normal_at
 from pipeline.simulator.rays import viewing_rays
 from pipeline.simulator.surface import Surface
-from pipeline.simulator.truth import SceneTruth
+from pipeline.simulator.truth import SceneTruth, row_late_s
 from pipeline.simulator.wall.grid import Wall
 from pipeline.simulator.window import refracted
 
@@ -195,9 +195,6 @@ def density_at(table: ProfileTable, height: float) -> float:
 
 # Newton's steps converge quadratically.
 _NEWTON = 12
-# Sheet rays around the turn: linear between nodes 0.25° apart errs by (0.25°)²/8 = 2.4e-6 of a first
-# harmonic.
-_SHEET_NODES = 1440
 
 
 def room_mm(truth: SceneTruth, frame: int, uv: Float) -> Float:
@@ -208,9 +205,7 @@ def room_mm(truth: SceneTruth, frame: int, uv: Float) -> Float:
     time_s = float(truth.frames.time_s[frame])
     instrument = truth.instrument_at(time_s)
     point_c = _on_sheet(instrument, *viewing_rays(instrument.camera, uv))
-    rows = instrument.camera.model.image_size[1]
-    readout = instrument.shutter.readout_s if instrument.shutter.kind == "rolling" else 0.0
-    seen_s = time_s + truth.late_s(instrument) + ((uv[:, 1] + 0.5) / rows - 0.5) * readout
+    seen_s = time_s + truth.late_s(instrument) + row_late_s(instrument, uv[:, 1])
     T_pc = truth.motion.pose(seen_s, truth.wall.axis)
     s, psi, r = to_pipe(truth.wall.axis, transform(T_pc, np.nan_to_num(point_c)))
     return np.where(np.isfinite(point_c[:, 2]), wall_radius(truth.wall, s, psi) - r, np.nan)
@@ -218,7 +213,7 @@ def room_mm(truth: SceneTruth, frame: int, uv: Float) -> Float:
 
 def _on_sheet(instrument: TrueInstrument, origin: Float, ray: Float) -> Float:
     """Return where viewing rays (A, 3) meet the sheet, in C: fixed-point steps of its azimuth."""
-    nodes = -np.pi + 2 * np.pi * np.arange(_SHEET_NODES) / _SHEET_NODES
+    nodes = -np.pi + 2 * np.pi * np.arange(_NODES) / _NODES
     start, way = sheet_rays(instrument.laser, nodes)
     slope = way[:, 2] / np.hypot(way[:, 0], way[:, 1])
     height = start[:, 2] - slope * np.hypot(start[:, 0], start[:, 1])

@@ -6,6 +6,8 @@ import math
 from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
+import numpy as np
+
 from pipeline.arrays import Float
 from pipeline.errors import InputError
 from pipeline.instrument.probe import Probe
@@ -82,6 +84,13 @@ class SceneTruth:
         if self.odometer is None:
             return None
         return self.odometer.readings(self.motion, float(self.frames.time_s[-1]) + 2.0 / self.frame_rate)
+
+
+def row_late_s(instrument: TrueInstrument, row: Float) -> Float:
+    """Return how much later than the frame's middle row rows (...) are exposed, s; 0 for a global shutter."""
+    rows = instrument.camera.model.image_size[1]
+    readout_s = instrument.shutter.readout_s if instrument.shutter.kind == "rolling" else 0.0
+    return np.asarray(((row + 0.5) / rows - 0.5) * readout_s)
 
 
 def cartesian(size: float, direction_deg: float) -> tuple[float, float]:

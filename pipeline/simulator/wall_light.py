@@ -17,8 +17,9 @@ from pipeline.simulator.view import REFERENCE_MM, View, Work, to_wall
 
 # How near to the wall a hit must lie, mm: less than a hundredth of a pixel even where the wall is grazed.
 _CLOSE_MM = 5e-4
-# How far from a hit wall is searched that could stand in the light, mm: farther off it would have to stand in
-# by more than 10 mm to hide an LED. And by how much it must stand in, tenfold the error of the map's cells.
+# How far from a hit the wall that could shade it is looked for, mm: wall farther off would have to stand in
+# by more than 10 mm to hide an LED. And by how much it must stand in, mm: ten times the error of the map's
+# cells.
 _SHADOW_MM, _STANDS_IN_MM = 40.0, 0.01
 # Spacing of the table of what the wall throws on itself: far below a bore's radius, its scale.
 GLOW_STEP_MM = 0.5

@@ -20,6 +20,7 @@ from threadpoolctl import threadpool_limits
 
 Item = TypeVar("Item")
 Made = TypeVar("Made")
+# Items for each thread that are made before they are asked for.
 _AHEAD = 2
 _BESIDE = ThreadPoolExecutor(1 << 10, "beside")
 """Threads of `side_by_side`. Idle ones are taken first, since starting one costs as much as much of the work
@@ -87,6 +88,7 @@ pickle.dump(result, answer, protocol=5)
 answer.close()
 os._exit(0)
 """
+# Characters of a dead process' error output that the exception quotes.
 _STDERR_TAIL = 400
 
 

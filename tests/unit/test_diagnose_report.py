@@ -67,7 +67,7 @@ def test_the_first_lines_give_the_size_with_its_sigma_and_what_it_means_for_the_
     page = (tmp_path / "diagnosis.html").read_text()
     assert "angle by which the sheet leans forward: 0.600 ± 0.010 deg" in page
     assert "places the wall up to 0.100 mm from where texture and motion place it" in page
-    assert "with what was found, 0.001 mm are left" in page
+    assert "with what was found put right, 0.001 mm are left" in page
 
 
 def test_causes_of_a_class_that_say_the_same_are_said_once(tmp_path):

@@ -7,10 +7,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pipeline.arrays import Float
 from pipeline.errors import InputError
 from pipeline.instrument.camera import Camera
-from pipeline.simulator.effects.surroundings import mean_radius_mm
+from pipeline.simulator.effects.surroundings import on_the_ring
 from pipeline.simulator.instrument import Dust, Flicker, Sector, TrueInstrument, lamp_azimuth_rad
 from pipeline.simulator.truth import SceneTruth, cartesian, with_camera, with_laser, with_sensor
 
@@ -109,7 +108,7 @@ def rolling_shutter(truth: SceneTruth, readout_s: float) -> SceneTruth:
 
 
 def motion_blur(truth: SceneTruth, exposure_s: float) -> SceneTruth:
-    """Expose longer than stated from the same start, with the same light in all: frames are late by half.
+    """Expose longer from the same start, the same light in all; the middle comes later by half of that.
 
     Raises
     ------
@@ -223,15 +222,15 @@ def defocus(truth: SceneTruth, middle_px: float, edge_px: float) -> SceneTruth:
 
 def window_scatter(truth: SceneTruth, share: float, azimuth_deg: float, width_deg: float) -> SceneTruth:
     """Put a spot on the front glass that scatters light instead of taking it away."""
-    centre, sigma = _on_the_ring(truth, azimuth_deg, width_deg)
-    spot = Dust(share, (float(centre[0]), float(centre[1])), (sigma, sigma))
+    centre, sigma = on_the_ring(truth, azimuth_deg, width_deg)
+    spot = Dust(share, centre, (sigma, sigma))
     return with_sensor(truth, scatter=(*truth.instrument.sensor.scatter, spot))
 
 
 def droplet(truth: SceneTruth, power: float, azimuth_deg: float, width_deg: float) -> SceneTruth:
     """Put a drop on the front glass; its radius is twice the width, where a spot of that width ends."""
-    centre, sigma = _on_the_ring(truth, azimuth_deg, width_deg)
-    drop = Dust(power, (float(centre[0]), float(centre[1])), (2 * sigma, 2 * sigma))
+    centre, sigma = on_the_ring(truth, azimuth_deg, width_deg)
+    drop = Dust(power, centre, (2 * sigma, 2 * sigma))
     return with_sensor(truth, drops=(*truth.instrument.sensor.drops, drop))
 
 
@@ -258,11 +257,3 @@ def dark_pattern(truth: SceneTruth, relative: float) -> SceneTruth:
 def interreflection(truth: SceneTruth, relative: float) -> SceneTruth:
     """Let the wall light itself, once."""
     return replace(truth, wall=replace(truth.wall, interreflection=relative))
-
-
-def _on_the_ring(truth: SceneTruth, azimuth_deg: float, width_deg: float) -> tuple[Float, float]:
-    """Return where a centred pipe shows the line at an azimuth, and a width around the ring, px."""
-    model, azimuth, radius = truth.instrument.camera.model, math.radians(azimuth_deg), mean_radius_mm(truth)
-    place = np.array([radius * math.cos(azimuth), radius * math.sin(azimuth), truth.stated.laser.baseline_mm])
-    uv = model.project(place).uv
-    return uv, math.radians(width_deg) * float(np.linalg.norm(uv - model.centre_px))

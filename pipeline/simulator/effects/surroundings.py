@@ -180,13 +180,18 @@ def fixed_pattern(truth: SceneTruth, relative: float) -> SceneTruth:
 
 def dust(truth: SceneTruth, attenuation: float, azimuth_deg: float, width_deg: float) -> SceneTruth:
     """Put a spot on the front glass where the line is seen in a centred pipe."""
-    model, azimuth = truth.instrument.camera.model, math.radians(azimuth_deg)
-    radius = mean_radius_mm(truth)
+    centre_px, sigma = on_the_ring(truth, azimuth_deg, width_deg)
+    spot = Dust(attenuation, centre_px, (sigma, sigma))
+    return with_sensor(truth, dust=(*truth.instrument.sensor.dust, spot))
+
+
+def on_the_ring(truth: SceneTruth, azimuth_deg: float, width_deg: float) -> tuple[tuple[float, float], float]:
+    """Return where a centred pipe shows the line at an azimuth, and a width around the ring, px."""
+    model, azimuth, radius = truth.instrument.camera.model, math.radians(azimuth_deg), mean_radius_mm(truth)
     place = np.array([radius * math.cos(azimuth), radius * math.sin(azimuth), truth.stated.laser.baseline_mm])
     uv = model.project(place).uv
-    sigma = math.radians(width_deg) * float(np.linalg.norm(uv - model.centre_px))
-    spot = Dust(attenuation, (float(uv[0]), float(uv[1])), (sigma, sigma))
-    return with_sensor(truth, dust=(*truth.instrument.sensor.dust, spot))
+    width_px = math.radians(width_deg) * float(np.linalg.norm(uv - model.centre_px))
+    return (float(uv[0]), float(uv[1])), width_px
 
 
 def line_peak(truth: SceneTruth) -> float:

@@ -137,7 +137,7 @@ def _kind(text: str) -> CourseKind:
 def the_other_way(switch: Switch) -> Switch:
     """Return an effect of the same size the other way round, or of twice the size where it has one way only.
 
-    It is a wrong answer about as far from the right one as none is.
+    As an answer it is about as far from the right one as naming no effect.
     """
     values, quantities = list(switch.values), switch.effect.quantities
     direction = next((k for k, q in enumerate(quantities) if q.name in _DIRECTIONS), None)

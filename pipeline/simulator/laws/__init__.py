@@ -19,7 +19,7 @@ from pipeline.simulator.motion import Motion, Odometer, constant
 from pipeline.simulator.rays import viewing_rays
 from pipeline.simulator.scene import Rendering
 from pipeline.simulator.sheet import sheet_table
-from pipeline.simulator.truth import SceneTruth
+from pipeline.simulator.truth import SceneTruth, row_late_s
 from pipeline.simulator.wall.grid import Wall, WallGrid
 
 # The instrument of the notes: baseline 22 mm, equidistant lens of 360 px/rad, 2 MP.
@@ -145,7 +145,7 @@ EXPONENT_TOLERANCE = 0.03
 
 
 def harmonic(azimuth_rad: Float, value: Float, order: int) -> complex:
-    """Return c of Re(c e^{-imψ}) in least squares with all lower orders: amplitude |c|, crest arg(c)/m."""
+    """Return c of Re(c e^{-imψ}), fitted with orders 0 to 6 and up to m: amplitude |c|, crest arg(c)/m."""
     orders = range(max(order, 6) + 1)
     columns = [f(m * azimuth_rad) for m in orders for f in (np.cos, np.sin) if m or f is np.cos]
     known = np.isfinite(value)
@@ -212,7 +212,7 @@ def trace_ring(truth: SceneTruth, time_s: float = 0.0, azimuths: int = _TRACED_A
 def _height(truth: SceneTruth, instrument: TrueInstrument, time_s: float, uv: Float) -> tuple[Float, Float]:
     """Return how far ahead of the sheet pixels (N, 2) see the wall, and the points (N, 3) in C."""
     origin, ray = viewing_rays(instrument.camera, uv)
-    T_pc = truth.motion.pose(_row_time(instrument, time_s, uv[:, 1]), truth.wall.axis)
+    T_pc = truth.motion.pose(time_s + row_late_s(instrument, uv[:, 1]), truth.wall.axis)
     R_pc = T_pc[:, :3, :3]
     way = _to_wall(truth, transform(T_pc, origin), np.einsum("nij,nj->ni", R_pc, ray))
     point = origin + way[:, None] * ray
@@ -221,12 +221,6 @@ def _height(truth: SceneTruth, instrument: TrueInstrument, time_s: float, uv: Fl
     psi, q = np.arctan2(point[:, 1], point[:, 0]), np.hypot(point[:, 0], point[:, 1])
     base, slope = (np.interp(psi, nodes, part[0], period=2 * np.pi) for part in (table.height, table.slope))
     return point[:, 2] - base - q * slope, point
-
-
-def _row_time(instrument: TrueInstrument, time_s: float, row: Float) -> Float:
-    rows = instrument.camera.model.image_size[1]
-    readout = instrument.shutter.readout_s if instrument.shutter.kind == "rolling" else 0.0
-    return np.asarray(time_s + ((row + 0.5) / rows - 0.5) * readout)
 
 
 def _to_wall(truth: SceneTruth, origin_p: Float, ray_p: Float) -> Float:

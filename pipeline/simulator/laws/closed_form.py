@@ -24,7 +24,7 @@ def theta_of(r: float) -> float:
 
 
 def lever_of(r: float) -> float:
-    """Return S, mm of radius a radian of polar angle."""
+    """Return S, mm of radius for each radian of polar angle."""
     return (BASELINE_MM**2 + r**2) / BASELINE_MM
 
 

@@ -34,7 +34,7 @@ class Premise:
     unit : str
     at_most : bool
     frames : tuple of int
-        Looked at.
+        Frames that were looked at.
     hint : str
         What to change in the scene when it does not hold.
     """
@@ -85,7 +85,7 @@ def require(premises: Sequence[Premise]) -> tuple[Premise, ...]:
     broken = [p for p in premises if not p.holds]
     if broken:
         first, others = broken[0], ", ".join(p.name for p in broken[1:])
-        also = f"; nor do hold: {others}" if others else ""
+        also = f"; these do not hold either: {others}" if others else ""
         raise UnusableError(
             STAGE, f"{first.name}: {first.measured:.4g} {first.unit}".rstrip() + also,
             limit=first.bound, frames=first.frames, hint=first.hint,
@@ -97,7 +97,7 @@ def require(premises: Sequence[Premise]) -> tuple[Premise, ...]:
 _FIXED_PX = 0.005
 # The same for relative light and width of the line. Chosen, not measured.
 _FIXED_SHAPE = 0.003
-# An effect must exceed the floor so many times (3 σ) for a scene to show it.
+# An effect must exceed the noise floor so many times (3 σ) for a scene to show it.
 _TIMES_THE_FLOOR = 3.0
 # Of N independent azimuths, a harmonic's amplitude has 1 σ of σ √(2/N); 72 are taken as independent.
 _HARMONICS = 36
@@ -130,7 +130,7 @@ class SeenRing:
 
 
 def effect_premises(plain: SceneTruth, switches: Sequence[Switch]) -> list[Premise]:
-    """Return by how much every effect but those on pictures alone exceeds the floor, all others being on.
+    """Return by how many times each effect on more than pictures exceeds the noise floor, the others on.
 
     Parameters
     ----------
