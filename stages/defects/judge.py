@@ -56,13 +56,9 @@ class Found:
         return is_depth_known(self.by_noise) and not is_depth_known(self.defect)
 
     def told(self, probability: float, counts: bool) -> Defect:
-        """Return it with its probability, and if it counts in words whether its depth is a lower bound.
-
-        Of what goes all round it is none: the deepest place of so many may be a glint's on it.
-        """
+        """Return it with its probability, and if it counts in words whether its depth is a lower bound."""
         words = _AT_LEAST.format(self.by_noise.depth_sigma_mm)
-        bound = counts and self.flattened and not self.region.all_round
-        told = f"{self.defect.statement} {words}" if bound else self.defect.statement
+        told = f"{self.defect.statement} {words}" if counts and self.flattened else self.defect.statement
         sure = self.defect.confidence * probability
         return replace(self.defect, probability=probability, confidence=sure, statement=told)
 
