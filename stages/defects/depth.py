@@ -144,9 +144,9 @@ class _Tops:
 
     @property
     def beside_mm(self) -> Float:
-        """Those (m,) of the rings beside the one that departs most."""
-        deepest = self.top_mm.argmax()
-        near = np.abs(self.at_mm - self.at_mm[deepest]) < _BESIDE * self.spacing_mm
+        """Those (m,) of the rings beside the one that departs most; none where there is no ring."""
+        deepest = self.top_mm.argmax() if len(self.top_mm) else 0
+        near = np.abs(self.at_mm - self.at_mm[deepest : deepest + 1]) < _BESIDE * self.spacing_mm
         return np.asarray(self.top_mm[near & (np.arange(len(near)) != deepest)])
 
     @property
