@@ -1,4 +1,4 @@
-"""Wall -> error-colour overlays: deviation, 1 σ uncertainty, misalignment error.
+"""The stage overlays colours the wall by deviation, by uncertainty (1 σ) and by the error of a misalignment.
 
 Colour maps are safe for colour-blind readers and even in lightness: a blue-white-red map of ColorBrewer for
 signed values, `cividis` (Nuñez, Anderton, Renslow 2018) for values that only grow.
@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from pipeline.adjustment.robust import robust_spread
+from pipeline.adjustment.robust import basis_of, robust_spread
 from pipeline.arrays import Byte, Float
 from pipeline.artefacts.measured import RadiusMap, Wall
 from pipeline.artefacts.model import Overlay, Overlays
@@ -22,8 +22,8 @@ from pipeline.recording.base import Recording
 
 # Colour of what was not measured: middle grey, which no colour map has.
 _NOT_MEASURED_BGR = (128, 128, 128)
-# Centre and oval: the shape of a sound pipe.
-_HARMONICS = (1, 2)
+# A sound pipe has two harmonics beside its mean radius: it lies off centre, and it is oval.
+_HARMONICS = 2
 # 95 % efficiency for normal errors (P. Huber, "Robust statistics", 1981).
 _HUBER = 1.345
 # Rows and cells worked on at a time, for memory's sake.
@@ -94,7 +94,7 @@ def fitted_pipe(radius_map: RadiusMap) -> Float:
     columns = np.array_split(np.flatnonzero(seen), max(radius_map.radius_mm.size // _AT_ONCE, 1))
     medians = [np.nanmedian(radius_map.radius_mm[:, c].astype(float), axis=0) for c in columns if len(c)]
     profile = np.concatenate(medians)
-    basis = _harmonic_basis(radius_map.azimuth_rad)
+    basis = basis_of(radius_map.azimuth_rad, _HARMONICS)
     weight = np.ones(len(profile))
     for _ in range(20):
         root = np.sqrt(weight)
@@ -103,11 +103,6 @@ def fitted_pipe(radius_map: RadiusMap) -> Float:
         scale = max(robust_spread(size), 1e-9)
         weight = np.minimum(1, _HUBER * scale / np.maximum(size, 1e-12))
     return np.asarray(basis @ coefficients)
-
-
-def _harmonic_basis(azimuth_rad: Float) -> Float:
-    waves = [f(m * azimuth_rad) for m in _HARMONICS for f in (np.cos, np.sin)]
-    return np.stack([np.ones_like(azimuth_rad), *waves], -1)
 
 
 def _signed(
@@ -126,7 +121,7 @@ def _growing(
 
 
 def _range(size_mm: NDArray[np.floating], parameters: OverlayParameters) -> float:
-    """Return the round upper end (two digits) below which the wished share of the wall lies."""
+    """Return the upper end of the colours, mm: the share ``shown_quantile`` lies below it, two digits."""
     some = size_mm[:: max(size_mm.size // _AT_ONCE, 1)]
     measured = some[np.isfinite(some)]
     size = float(np.quantile(measured, parameters.shown_quantile)) if len(measured) else 0.0

@@ -1,6 +1,7 @@
 """Preliminary sections of a recording that is still being written: a circle through every ring.
 
-Motion, wall and axis need the whole recording, so that the probe's pose affects every figure.
+Motion, wall and axis are known only once the recording is complete. Until then the probe's pose is not, so
+every figure still contains its tilt and its offset from the pipe's axis.
 """
 
 from __future__ import annotations
@@ -10,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipeline.adjustment.normal_equations import covariance_of
-from pipeline.adjustment.robust import independent_count, spread_about_median
+from pipeline.adjustment.robust import basis_of, independent_count, spread_about_median
 from pipeline.arrays import Float
 from pipeline.errors import UnusableError
 from pipeline.instrument.misalignment import fit_circle
@@ -23,7 +24,7 @@ from stages.triangulate import TriangulateParameters, triangulate_rings
 # A quarter of the preview's 360 azimuths: a circle through less is badly determined.
 _LEAST_POINTS = 90
 _TRIANGULATE = TriangulateParameters(largest_departure=0.2)
-# Harmonics of the shape that a radius does not follow: ovality and what pipes have beside it.
+# Harmonics of the pipe's shape, ovality among them, that are not taken for noise (chosen).
 _HARMONICS = 4
 
 
@@ -78,7 +79,10 @@ def _behind(recording: Recording, after_frame: int) -> Recording:
 def section_of(
     frame: int, time_s: float, distance_mm: float, xyz_c: Float, uv: Float, probe: Probe
 ) -> PreliminarySection:
-    """Fit the circle twice, the second time without what lies off the first: deposits, branches."""
+    """Return the section of one frame, from points (A, 3), mm in C, and pixels (A, 2) of its ring.
+
+    The circle is fitted twice, the second time without what lies off the first: deposits, branches.
+    """
     there = np.isfinite(xyz_c).all(-1)
     xy = xyz_c[there, :2]
     centre, radius = fit_circle(xy)
@@ -97,8 +101,7 @@ def _radius_sigma(arm: Float) -> float:
     ring; where part of the ring is missing, the harmonics' own uncertainty counts.
     """
     azimuth, radius = np.arctan2(arm[:, 1], arm[:, 0]), np.linalg.norm(arm, axis=-1)
-    shape = [f(k * azimuth) for k in range(1, _HARMONICS + 1) for f in (np.cos, np.sin)]
-    design = np.stack([np.ones_like(azimuth), *shape], -1)
+    design = basis_of(azimuth, _HARMONICS)
     noise = radius - design @ np.linalg.lstsq(design, radius, rcond=None)[0]
     variance = float(noise @ noise) / (len(arm) - design.shape[1])
     alike = len(noise) / independent_count(noise)

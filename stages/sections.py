@@ -1,7 +1,7 @@
-"""Wall to cross-sections: diameters, ovality under each named definition, centre, each with its 1 σ.
+"""The stage sections measures cross-sections: diameters, ovality by each definition, centre, with their 1 σ.
 
-A station's slab is averaged along the pipe, its shape is a truncated Fourier series about the fitted centre,
-and calliper diameters are read from that series: extremes of raw samples would grow with the noise.
+At each station a slab of wall is averaged along the pipe, and a truncated Fourier series about the fitted
+centre is its shape. Calliper diameters are read from that series: extremes of raw samples grow with noise.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 from pydantic import Field
 
+from pipeline.adjustment.robust import basis_of
 from pipeline.arrays import Bool, Float
 from pipeline.artefacts.findings import Sections
 from pipeline.artefacts.measured import RadiusMap, Wall
@@ -19,7 +20,8 @@ from pipeline.machine.stage import Context, Parameters, Stage
 from pipeline.recording.base import Recording
 
 _DIRECTIONS: Float = np.linspace(0, np.pi, 360, endpoint=False)
-# Largest gap, in periods of a harmonic: in the middle of such a gap the series is as certain as one sample.
+# Largest unseen arc, in periods of the highest harmonic: in its middle the series is as certain as one
+# sample.
 _LONGEST_GAP = 5 / 6
 # Ovality is the second harmonic: with fewer there is no section to report.
 _LEAST_HARMONICS = 2
@@ -44,7 +46,7 @@ class SectionParameters(Parameters):
 
 @dataclass(frozen=True)
 class _Slab:
-    """Mean radius (A,), its noise variance (A,), calibration variance and seen fraction of a station."""
+    """A station's mean radius (A,), its variance by noise (A,) and by calibration, and the fraction seen."""
 
     radius_mm: Float
     variance_mm2: Float
@@ -118,18 +120,15 @@ def _slab(radius_map: RadiusMap, station: float, spacing_mm: float) -> _Slab:
 
 
 def _determined_harmonics(seen: Bool, most: int) -> int:
-    """Return how many harmonics samples (A,) around a turn determine, by the longest unseen arc."""
+    """Return how many harmonics, at most ``most``, the ``seen`` azimuths (A,) determine.
+
+    The longest unseen arc decides.
+    """
     edges = np.flatnonzero(np.concatenate([seen, seen]))
     if not edges.size:
         return 0
     gap = int(np.diff(edges).max(initial=1)) - 1
     return most if gap == 0 else min(most, int(_LONGEST_GAP * len(seen) / gap))
-
-
-def _basis(azimuth_rad: Float, harmonics: int) -> Float:
-    """Return the Fourier basis (N, 1 + 2 harmonics)."""
-    waves = [f(m * azimuth_rad) for m in range(1, harmonics + 1) for f in (np.cos, np.sin)]
-    return np.stack([np.ones_like(azimuth_rad), *waves], -1)
 
 
 def _fit_shape(azimuth_rad: Float, slab: _Slab, harmonics: int) -> _Shape:
@@ -140,7 +139,7 @@ def _fit_shape(azimuth_rad: Float, slab: _Slab, harmonics: int) -> _Shape:
     for _ in range(4):
         xy = radius[:, None] * np.stack([np.cos(psi), np.sin(psi)], -1) - centre
         about = np.hypot(*xy.T)
-        basis = _basis(np.arctan2(xy[:, 1], xy[:, 0]), harmonics)
+        basis = basis_of(np.arctan2(xy[:, 1], xy[:, 0]), harmonics)
         coefficients = np.linalg.lstsq(basis, about, rcond=None)[0]
         centre = centre + coefficients[1:3]
     residual = np.full(len(azimuth_rad), np.nan)
@@ -199,7 +198,7 @@ def _measures(station: float, slab: _Slab, shape: _Shape, nominal_mm: float) -> 
 
 def _calliper_basis(harmonics: int) -> Float:
     """Return (360, 1 + 2 harmonics): coefficients to diameter D(ψ) = r(ψ) + r(ψ + π), ψ over half a turn."""
-    return _basis(_DIRECTIONS, harmonics) + _basis(_DIRECTIONS + np.pi, harmonics)
+    return basis_of(_DIRECTIONS, harmonics) + basis_of(_DIRECTIONS + np.pi, harmonics)
 
 
 def _unmeasured(station: float, coverage: float) -> Float:

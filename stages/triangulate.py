@@ -1,4 +1,4 @@
-"""Ring samples and instrument to wall points in C, with the image noise of each point."""
+"""The stage triangulate turns ring samples into wall points in C, each with its image noise."""
 
 from __future__ import annotations
 
@@ -18,14 +18,15 @@ from pipeline.system.parallel import in_threads
 
 # Frames a thread takes at a time.
 _CHUNK_FRAMES = 16
-# Rings that the report's median is taken of.
+# Rings of which the report's median is taken: a bound on time.
 _REPORTED_RINGS = 500
-# Standing water mirrors the line: what is seen below its surface lies outside the pipe. So far outside the
-# circle, in radii, no pipe is oval; the share of the circle, and of the rings, is that of no branch.
+# Standing water mirrors the line, whose image below the surface then lies outside the pipe. No oval pipe lies
+# so far, in radii, outside its circle, and no branch over so much of the circle in so many of the rings
+# (chosen).
 _FAR_OUTSIDE, _WIDE, _MOST_RINGS = 0.25, 0.1, 0.5
-# Spreads about the circle up to which a sample beside them still counts as wall.
+# A sample beside a mirrored one still counts as wall up to so many spreads from the circle.
 _BESIDE = 3.0
-# So many samples of a ring are enough to tell its circle.
+# Samples of a ring that are enough to fit its circle: a bound on time.
 _ENOUGH = 180
 # Samples of the running median: four on each side, so that a feature of five is kept.
 _NEIGHBOURS = 9
@@ -88,16 +89,15 @@ def triangulate_rings(
 def off_the_ring(rho_mm: Float32, largest_departure: float) -> Bool:
     """Return where samples lie off the ring that their neighbours form.
 
-    A dent, a step or a branch is wider than half of the nine neighbours and is kept. A feature that is
-    narrower and as deep as a fifth of the pipe's radius cannot be wall: no light would come out of such a
-    hole.
+    A dent, a step or a branch is wider than half of the nine neighbours and is kept. A narrower feature as
+    deep as a fifth of the pipe's radius (the default) cannot be wall: no light would come out of such a hole.
 
     Parameters
     ----------
     rho_mm : (F, A)
         Distance from the camera's axis; NaN where there is no sample.
     largest_departure
-        From the median of the nine neighbours there are along the ring, as a part of it.
+        Largest difference from the median of the nine nearest samples along the ring, as a share of it.
     """
     out = np.zeros(rho_mm.shape, bool)
     for row, rho in zip(out, rho_mm, strict=True):
@@ -111,8 +111,8 @@ def off_the_ring(rho_mm: Float32, largest_departure: float) -> Bool:
 def outside_the_pipe(xyz_c: Float32) -> Bool:
     """Return where points (F, A, 3) lie far outside the circle of their ring over a wide arc, in most rings.
 
-    With them go the points beside them, up to where they are as near to the circle as others, and whole rings
-    whose circle is as much wider than the usual one: it is drawn by what is mirrored.
+    Marked too are the points beside them, up to the first that is as near to the circle as usual, and whole
+    rings whose circle is as much too wide, since mirrored points have determined it.
     """
     out = np.zeros(xyz_c.shape[:2], bool)
     few = xyz_c[:, :: max(xyz_c.shape[1] // _ENOUGH, 1), :2]
@@ -135,7 +135,7 @@ def _off_circle(xy: Float32, centre: Float, radius: Float) -> Float:
 
 
 def _grown(seed: Bool, into: Bool) -> Bool:
-    """Return ``seed`` (A,) and what is joined to it around the circle ``into``."""
+    """Return ``seed`` (A,) and all of ``into`` (A,) that is connected to it around the circle."""
     twice = binary_propagation(np.tile(seed, 2), mask=np.tile(into, 2))
     return np.asarray(twice[: len(seed)] | twice[len(seed) :])
 

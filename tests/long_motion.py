@@ -89,7 +89,7 @@ def _observe(
     records["landmark"], records["frame"] = number + landmark, frame
     records["uv"] = uv + SIGMA_PX * random.standard_normal(uv.shape)
     records["sigma"] = SIGMA_PX
-    row, column = grid.position(xyz * [1, 1, 1.002])
+    row, column = 1.002 * s / step_mm, (psi + np.pi) * (grid.columns / (2 * np.pi))
     records["at"] = np.stack([row, column], -1)[landmark]
     store.open.append(records)
     store.write()

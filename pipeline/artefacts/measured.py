@@ -72,6 +72,11 @@ class RingSamples:
         direction = np.stack([np.cos(self.azimuth_rad), np.sin(self.azimuth_rad)], -1)
         return np.asarray(self.centre_px + self.radius_px[..., None].astype(np.float64) * direction)
 
+    def some(self, rows: slice) -> RingSamples:
+        """Return some of the rings: those of a slice of the F frames."""
+        per_frame = ("frame", "radius_px", "sigma_px", "width_px", "amplitude", "validity")
+        return replace(self, **{name: getattr(self, name)[rows] for name in per_frame})
+
     def reduced(self, times: Float) -> RingSamples:
         """Return the rings with each picture's radii divided by ``times`` (F,), its excess in size."""
         return replace(self, radius_px=(self.radius_px / times[:, None]).astype(np.float32))

@@ -19,8 +19,8 @@ _MOST_RINGS_IN_STEP = 2
 """Rings in a row that a step may leave between the two bores; with more it is a reducer. Chamfers of gauges
 hold one. A choice."""
 _PLACE_MM = 0.5
-"""1 σ of where a reducer lies against landmarks on it: half the way from ring to ring. Without it four of
-five drawn ones were .03 to .4 mm farther off along the pipe, one .1 mm less."""
+"""1 σ of the place of a reducer against landmarks on it: half the way from ring to ring. Without it, four of
+five drawn reducers came out .03 to .4 mm farther off along the pipe, the fifth .1 mm less far."""
 
 
 @dataclass(frozen=True)
@@ -124,7 +124,7 @@ ONE_BORE = Bore(np.zeros(0), np.zeros(1))
 
 
 def warn_of_steps(bore: Bore, context: Context) -> None:
-    """Say where the bore steps (not in a reducer), and what cannot be relied on there."""
+    """Warn where the bore steps (not in a reducer), and which results are unreliable there."""
     if not len(bore.at_mm):
         return
     change = 2 * np.diff(bore.wider_mm)

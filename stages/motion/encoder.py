@@ -24,8 +24,8 @@ is no news."""
 _NAMED = 4
 """Runs of frames without a reading that are named, the longest."""
 _COUNTS = 1.5
-"""Between two readings lies more than one count of a counter that logs what it counts only if some are
-missing: half-way between one and two."""
+"""Counts between two readings from which readings are missing, where a counter logs only what it counts: such
+readings are one count apart, so the bound lies half-way between one and two."""
 _LEAST_STEPS = 8
 """Steps by which an encoder is judged at least. Not measured."""
 _CONTRADICTED = 0.3
@@ -35,7 +35,7 @@ _DIFFERENCE_MM = 0.5
 """Smaller differences of a step never count, since texture may err as much in a single frame. Not
 measured."""
 _COARSE = 3.5
-"""Nor do differences within so many σ of a reading, one quantum of a coarse counter: q is √12 σ."""
+"""Differences within so many σ of a reading do not count either: one quantum of a coarse counter is √12 σ."""
 _USUAL_PERCENT = 90.0
 _LIKE_USUAL = 3.0
 """An encoder caught up if its jump is what the probe went meanwhile, within this factor of its mean speed.

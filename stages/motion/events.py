@@ -41,9 +41,9 @@ _QUIETEST, _OF_NORMAL = 0.25, 0.3186
 """The spread is that of the quietest quarter of the steps in which the probe moves, as encoders may hang for
 most of a run. A quarter of normal values of 1 σ do not exceed so much."""
 _TOLD_SIGMAS = 5.0
-"""Slips are told from so many σ on, each by the σ over its own way."""
+"""A slip is reported from so many σ on, with the σ over the slip's own way."""
 _TOLD_MM = 3.0
-"""Smaller slips are not told (chosen): rings bridge as much, and a wheel at rest has some play."""
+"""Smaller slips are not reported (chosen): rings bridge them, and a wheel at rest has some play."""
 
 
 def find_events(

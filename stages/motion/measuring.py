@@ -1,4 +1,4 @@
-"""What motion is estimated from: the wall's texture, followed; the rings and their bore; the encoder."""
+"""Gathers what motion is estimated from: tracked texture of the wall, rings with their bore, and encoder."""
 
 from __future__ import annotations
 
@@ -34,8 +34,8 @@ _LEAST_TRACKED = 0.5
 _FEWEST_COLUMNS = 240
 """Fewest columns of a strip, in thin pipes: ten cells of ``cell_px`` around."""
 _FOLLOWED_ANEW = 2
-"""Times that texture is followed anew where the bore changes, which is known better each time. Without
-an encoder texture seems to move faster by as much as a bore is narrower."""
+"""Times that texture is tracked again in a reducer, each time with a better known bore. Without an encoder,
+texture seems to move faster by as much as the bore is narrower."""
 
 
 def measure_run(
@@ -49,7 +49,7 @@ def measure_run(
 ) -> MeasuredRun:
     """Track the wall's texture and gather what was measured: texture, rings, times and encoder.
 
-    Without ``use_encoder`` the encoder has no say, so that it can be compared with what is seen.
+    Without ``use_encoder`` the encoder is left out, so that it can be compared with what the pictures show.
 
     Raises
     ------
@@ -136,7 +136,7 @@ def _in_bore(
 ) -> _Followed:
     """Return first guesses of the poses, and the bore that the rings show by them.
 
-    In a reducer an ``encoder`` says better where than texture that was followed on a cylinder.
+    In a reducer an ``encoder`` gives better distances than texture that was tracked on a cylinder.
     """
     T_pc, place = predictor.between(texture.poses), places_of(view.recording, circles.frame)
     at_mm = T_pc[place, 2, 3] + view.probe.laser.baseline_mm

@@ -1,4 +1,4 @@
-"""Pictures that a recorder mirrors, told by how the stated probe would have to be to see what they show."""
+"""Recognises pictures that a recorder mirrors or turns: a probe mirrored likewise fits them better."""
 
 from __future__ import annotations
 
@@ -11,19 +11,20 @@ from pipeline.instrument.probe import Probe
 _WAYS = {"mirrored left to right": "x", "mirrored upside down": "y", "turned by 180°": "xy"}
 """What a recorder may do to pictures, and along which axes of the image they are mirrored then."""
 _SURE = float(np.log(1000))
-"""Log odds against the pictures being as stated, from which on it is told: a choice."""
+"""Least log odds of mirrored pictures against pictures as stated. A choice."""
 _FITS, _LEAST_VARIANCE = 5.0, 1e-6
-"""A mirrored probe fits where it is moved by so many times what it usually would be at most: one that is
-right is moved farther once in 10⁵ recordings. The least variance is in stated ones."""
+"""A mirrored probe fits if the data move it by at most so many times what they usually move a right one: more
+happens once in 10⁵ recordings. The least variance is in units of the stated variance."""
 _WHOLLY = 0.01
-"""A mirrored probe counts where what is uncertain of the stated one can make it up to this part. A choice."""
+"""A mirrored probe is considered if the stated probe's uncertain directions compose it up to this part of the
+change. A choice."""
 
 
 def mirrored_way(probe: Probe, trajectory: Trajectory) -> str:
     """Return how the pictures of a run are mirrored, empty where they are not or nothing tells it.
 
-    A mirrored probe has its principal point, and what its lens and laser lack in symmetry, on the other side.
-    The run's estimate of the instrument, freed of what was stated, is compared with either.
+    In mirrored pictures the principal point and every asymmetry of lens and laser lie on the other side. The
+    run's estimate of the instrument, with the prior taken out, is compared with both.
     """
     if trajectory.instrument is None or trajectory.instrument_covariance is None:
         return ""

@@ -1,4 +1,4 @@
-"""The estimate in the pipe frame P of the run, and what is told of it: figures, and where it may be off."""
+"""The trajectory in the pipe frame P, its figures for the report, and warnings where it may be wrong."""
 
 from __future__ import annotations
 
@@ -95,12 +95,13 @@ def trajectory_of(run: JoinedRun, frames: FrameTable, probe: Probe, has_encoder:
 
 
 def doubting_instrument(trajectory: Trajectory, probe: Probe, lasting: float, shakes: bool) -> Trajectory:
-    """Return a trajectory whose instrument is as unsure as it was moved, where what moved it is in doubt.
+    """Return the trajectory, with the instrument's correction added to its σ where that is doubtful.
 
-    Where matches contradict the motion, they moved it by what they share: a lamp mirrored in a polished wall
-    made radii 0.3 mm too large. Where the camera ``shakes`` or the probe does not fit, the picture may move
-    in place of the probe: shaken by 2 px at random, it made radii 0.06 mm too small.
-    Distances are as unsure as the pipe's radius is by that: a wrong probe scales both alike.
+    A correction is doubtful where matches contradict the motion (``lasting``), since their common error then
+    made it: a lamp mirrored in a polished wall made radii 0.3 mm too large. It is so too where the
+    camera ``shakes`` or the probe does not fit, since the picture may have moved and not the probe: pictures
+    shaken by 2 px at random made radii 0.06 mm too small. Distances get the same relative σ as the radius,
+    because a wrong probe scales both alike.
     """
     if trajectory.instrument is None or trajectory.instrument_covariance is None:
         return trajectory
@@ -168,8 +169,7 @@ def report_motion(
 ) -> None:
     """Report the figures of a motion, and warn where it may be off by more than its σ.
 
-    Whether the camera ``shakes`` is told by `camera_trembles`. The pipe comes out ``wider`` than nominal by
-    that share.
+    ``shakes`` is what `camera_trembles` says; ``wider`` is the pipe's diameter over the nominal one, less 1.
     """
     report_steps(context, estimate.trials, estimate.unsettled)
     context.report("landmarks", texture.store.landmarks, "")
@@ -220,16 +220,17 @@ def _warn_of_texture(lasting: float, tracked: TrackedPoses, observations: int, c
         context.warn(
             f"matches of texture contradict the motion by {lasting:.1f} times their σ, alike in neighbouring "
             "pictures, where good recordings have 0.5 at most: reflections, compression or lights that move "
-            "with the probe are taken for the wall. Distance and roll may be off by more than their σ; that "
-            "of radii holds by how much the probe was moved. What to do: compare distance and diameter with "
-            "known ones, record with less compression"
+            "with the probe are taken for the wall. Distance and roll may be off by more than their σ; the σ "
+            "of radii includes by how much the probe was corrected. What to do: compare distance and "
+            "diameter with known ones, record with less compression"
         )
 
 
 def camera_trembles(trajectory: Trajectory, texture: TrackedPoses, seen: SeenCentres) -> bool:
-    """Return whether the camera's turn differs from picture to picture by more than poses err by.
+    """Return whether the camera's direction changes from picture to picture by more than poses err.
 
-    A camera that trembles moves the ring as well. Where the ring stays, matches tremble, as by glints.
+    A trembling camera moves the ring in the picture as well. If the ring stays in place, the matches of
+    texture tremble instead, for example on glints.
     """
     shaken = trembling(trajectory.T_pc, trajectory.time_s, texture.frames)
     told = trembles(shaken) and not texture.mostly_lost

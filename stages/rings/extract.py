@@ -1,4 +1,4 @@
-"""Every laser frame of a recording -> ring samples."""
+"""Measures the laser line in every laser frame of a recording."""
 
 from __future__ import annotations
 
@@ -38,12 +38,11 @@ _LINE_WIDTHS, _WALL_WIDTHS = 0.7, 4.0
 # Of the wall's pixels beside the line every fourth tells its colours: of open-3's 46000 in a frame this moves
 # the line by .003 of its σ.
 _WALL_EVERY = 4
-# Clipped pixels are looked for so many widths to either side of the line. Where it is amid them but for half
-# a width, it was found by both flanks.
+# Clipped pixels are looked for up to so many line widths on either side of the line. If the line lies in
+# their middle to half a width, both of its flanks were fitted.
 _CLIP_WIDTHS, _CLIP_STEP, _ASIDE_WIDTHS = 3.0, 0.5, 0.5
-# Where more of them clip, the wall does so too, and nothing is seen of the line.
+# If a larger share of them clips, the wall clips too, and the line is not seen.
 _MOST_CLIPPED = 0.5
-_PER_RING = ("frame", "radius_px", "sigma_px", "width_px", "amplitude", "validity")
 
 
 class RingParameters(Parameters):
@@ -110,7 +109,7 @@ def extract_rings(
 
 
 def _typical(samples: RingSamples, wander: Wander) -> float:
-    """Return the wander of a line of middling height."""
+    """Return the wander, px, of a line of median height."""
     valid = samples.valid
     return float(wander.at(float(np.median(samples.amplitude[valid])))) if valid.any() else 0.0
 
@@ -144,11 +143,12 @@ def _lit_traces(images: Images, probe: Probe, sectors: Sectors) -> Iterator[Foun
 
 
 def _without_dips(trace: RingTrace, bgr: Byte, sectors: Sectors, channel: int) -> RingTrace:
-    """Return a ring without the samples that are not amid the pixels at which the laser's channel clips.
+    """Return a ring with the samples rejected that do not lie in the middle of the clipped pixels.
 
-    The other channels go on rising there, and the mixture dips where the line is brightest: on a bright wall
-    the line came out beside itself, which looked like deposits. The others are as unsure as the line's centre
-    of gravity is with all its light there and with none.
+    Where the laser's channel clips, the other channels rise further and the mixture has a dip at the
+    brightest place of the line. On a bright wall the line was then found beside its true place, which looked
+    like deposits. The σ of samples that stay is widened by how far the clipped pixels can pull the line's
+    centre.
     """
     across = np.arange(-_CLIP_WIDTHS, _CLIP_WIDTHS + _CLIP_STEP / 2, _CLIP_STEP)
     radius = np.nan_to_num(trace.fit.radius_px)[:, None] + across * trace.width_px
@@ -207,9 +207,9 @@ def _put(samples: RingSamples, row: int, trace: RingTrace) -> None:
 
 
 def _compare_rings(samples: RingSamples) -> None:
-    """Reject samples that their neighbours contradict, some rings at a time, each with those about it.
+    """Reject samples that their neighbours contradict, in place, some rings at a time.
 
-    What was found in the images is compared, not what was rejected before.
+    Each block is compared with the rings around it as they were found in the images, before any rejection.
     """
     count = len(samples.frame)
     validity, sigma_px = samples.validity[:0], samples.sigma_px[:0]
@@ -218,7 +218,7 @@ def _compare_rings(samples: RingSamples) -> None:
         wide = slice(max(first - SAYING_RINGS, 0), min(rows.stop + SAYING_RINGS, count))
         own = slice(first - wide.start, rows.stop - wide.start)
         found = replace(
-            _rows(samples, wide),
+            samples.some(wide),
             validity=np.concatenate([validity, samples.validity[wide.start + len(validity) : wide.stop]]),
             sigma_px=np.concatenate([sigma_px, samples.sigma_px[wide.start + len(sigma_px) : wide.stop]]),
         )
@@ -228,15 +228,9 @@ def _compare_rings(samples: RingSamples) -> None:
         samples.validity[rows], samples.sigma_px[rows] = told[0][own], told[1][own]
 
 
-def _rows(samples: RingSamples, rows: slice) -> RingSamples:
-    """Return some of the rings."""
-    return replace(samples, **{name: getattr(samples, name)[rows] for name in _PER_RING})
-
-
 def _some(samples: RingSamples) -> RingSamples:
-    """Return some hundred of the rings, which are told apart no better by more of them."""
-    some = slice(None, None, max(len(samples.frame) // _AT_ONCE, 1))
-    return _rows(samples, some)
+    """Return some hundred of the rings, spread evenly: statistics of them are known well enough."""
+    return samples.some(slice(None, None, max(len(samples.frame) // _AT_ONCE, 1)))
 
 
 def _report(context: Context, samples: RingSamples, wander: float) -> None:

@@ -40,7 +40,7 @@ def project_tile(
     gain: float,
     reach_mm: float,
     gap_mm: float,
-    left_out: ImagePlaces = (),
+    left_out: ImagePlaces,
 ) -> TileProjection:
     """Project the nodes of a tile exactly and the pixels between them by linear interpolation.
 

@@ -256,7 +256,7 @@ def wrong_fiducials(solution: Solution) -> Int:
 
 
 def chosen(
-    plain: Solution, measured: Measurements, parameters: GaugeParameters, watch: Watch = unwatched
+    plain: Solution, measured: Measurements, parameters: GaugeParameters, watch: Watch
 ) -> tuple[Solution, SheetModel, dict[SheetModel, float]]:
     """Return the solution, its sheet model, and the drop of χ² of each model tried.
 

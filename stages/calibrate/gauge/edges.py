@@ -23,7 +23,7 @@ from stages.calibrate.gauge.state import GaugeParameters
 # Samples of a profile across an edge.
 _PROFILE = 21
 _SIDES = np.array([[0.0, -1.0], [1.0, 0.0], [0.0, 1.0], [-1.0, 0.0]])
-# Part of an edge, from its middle, along which profiles are taken: the corners blur (chosen).
+# Part of an edge, from its middle, along which profiles are taken. Debt: data/debts.md.
 _SPAN = 0.7
 # A profile is used if its step is at least so high, its place within this part of the profile, its noise
 # below this part of the step, and its blur in this range, px. With half and twice of each, at most 2 % of

@@ -1,8 +1,8 @@
 """The delay of the encoder's clock against the pictures' clock, estimated from the motion.
 
-The reading is the distance, scaled, at a shifted time; what is left is rounding, and a random walk that holds
-slips of the wheel and drifts of the estimate. Whitened by both, the difference is fitted robustly at every
-delay, and the strength of the walk is the likeliest.
+A reading is the scaled distance at a shifted time. What remains is rounding, and a random walk that stands
+for slips of the wheel and drifts of the estimate. The difference is whitened by both and fitted robustly at
+every delay; of several strengths of the walk the likeliest is taken.
 """
 
 from __future__ import annotations
@@ -21,32 +21,33 @@ from stages.motion.bundle_adjustment.solver import Estimate
 from stages.motion.encoder import EncoderReadings
 
 _LONGEST_S = 1.0
-"""Delays looked at, by whole frames, since between two frames the rounding of both is averaged: beyond a
-second the encoder is another motion's (`stages.motion.encoder.contradicted`)."""
+"""Longest delay tried: an encoder that is off by more than a second shows another motion and is left out
+(`stages.motion.encoder.contradicted`). Delays are tried by whole frames, because between two frames the
+rounding of both would be averaged."""
 _WALKS_MM = np.geomspace(0.002, 0.064, 6)
 """Strengths of the walk tried, mm a frame: motion by texture walks by .002 in open-1, slips are more."""
 _FRAMES = 400
 """Frames compared at most: a matrix of that size takes a hundredth of a second."""
 _FEWEST = 30
 _SURE = 5.0
-"""Delays of fewer σ are none: by chance one in a million is more."""
+"""Delays of fewer σ count as none: one in a million is larger by chance."""
 _MOVES = 3.0
-"""Delays that count move readings by more than three times their rounding, beside shift and scale: less does
-no harm, and at even speed any delay moves them by 1.4 times, since both readings are rounded."""
+"""A delay matters if it moves the readings, after a shift and a scale, by more than three times their
+rounding. Less does no harm; at even speed any delay moves them by 1.4 times, since both are rounded."""
 _ROUNDS = 5
 _STANDS = 1e-12
 """Share of a reading's square beside its shift from which it moves at all: less is rounding."""
 _REDESCENT = 2.5
-"""Whitened differences of more pull less: those of a slip, which would else be taken for a delay."""
+"""Larger whitened differences are weighted down: they belong to slips, which could be taken for a delay."""
 
 
 @dataclass(frozen=True)
 class EncoderDelay:
     """How late the encoder's times are against those of the pictures, s, with its 1 σ.
 
-    ``better`` is by how much no delay at all is less likely, as a logarithm: where the speed is even, one
-    delay is nearly as good as another, though the best of them may be sharp. ``moves`` is by how many σ of a
-    reading the delay moves them, rms, beside shift and scale.
+    ``better`` is the log likelihood of the delay over that of none. It is needed beside σ: at even speed one
+    delay is nearly as likely as another, even where the optimum is sharp. ``moves`` is by how many σ of a
+    reading, rms, the delay moves the readings after a shift and a scale.
     """
 
     delay_s: float

@@ -20,8 +20,8 @@ _DOUBTFUL, _SERIOUS = 3.0, 5.0
 """Differences, in σ, from which texture that was much lost makes distances unsure, and from which that is
 told (chosen): by chance once in 370 and once in 1.7 million recordings."""
 _TELLS_NOTHING = 10.0
-"""Times the encoder's σ from which texture's is so large that 3 to 5 of it draw a distance by less than half
-of the encoder's own σ: in_sigma / √(1 + 10²)."""
+"""If texture's σ is so many times the encoder's, a contradiction of 3 to 5 σ moves distances by half of the
+encoder's σ at most, namely by 3 to 5 / √(1 + 10²) of it."""
 _ALIKE = 2.0
 """Factor within which diameter and way err alike. A zoomed picture changes radii by θ / sin θ cos θ times as
 much, 3.0 at 65°, and ways by about as much as radii: 2.6 and 2.0 % for 1 % of zoom (open-1-field)."""
@@ -63,7 +63,7 @@ class EncoderScale:
         return self.in_sigma > (_DOUBTFUL if tells else _SERIOUS)
 
     def beside_lost_texture(self) -> EncoderScale:
-        """Return the scale without trust in texture, which keeps how far that was off."""
+        """Return the scale without trust in texture; ``lost_in_sigma`` records how far texture was off."""
         return replace(self.without_trust_in_texture(), lost_in_sigma=self.in_sigma)
 
     def without_trust_in_texture(self) -> EncoderScale:

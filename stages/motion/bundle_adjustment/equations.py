@@ -49,7 +49,7 @@ _AT_ONCE, _THREADS = 16384, 2
 
 @dataclass(frozen=True)
 class Measurements:
-    """All that the adjustment is fed with.
+    """The measurements that the adjustment uses.
 
     Attributes
     ----------

@@ -65,7 +65,7 @@ class ScaleDrift:
     stated_mm : float
         1 σ of the pipe's radius without any of it.
     contradicted : bool
-        Whether it was not found again with it when it was taken out.
+        Whether the run with the drift corrected did not confirm it: see `with_steady_scale`.
     """
 
     at_frames: Float
@@ -85,11 +85,11 @@ class ScaleDrift:
         return self.p_steady < _SURE_P and one_way and not self.contradicted
 
     def not_told(self) -> ScaleDrift:
-        """Return the course as one that is neither told nor ambiguous."""
+        """Return the drift as one that is neither certain (`told`) nor `ambiguous`."""
         return replace(self, p_steady=1.0, p_neither=1.0)
 
     def not_told_from_width(self) -> ScaleDrift:
-        """Return the course as one that a pipe that widens explains as well."""
+        """Return the drift as one that a widening pipe explains as well."""
         return replace(self, p_steady=1.0, p_even=1.0)
 
     @property

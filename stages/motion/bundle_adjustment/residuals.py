@@ -72,7 +72,8 @@ def _basis_slope(state: State, distance_mm: Float) -> Float:
 def ring_rows(state: State, rings: RingBins, loss: Loss) -> Rows:
     """Return the equations: every ring bin lies on the pipe's smooth surface.
 
-    How wide the bore is where a ring lies, the ring itself has shown: that does not say how far along it is.
+    In a reducer, the width at a ring's place was read from the ring itself, so it says nothing of how far
+    along the pipe the ring lies.
     """
     T = state.T_pc[rings.frame]
     along, moved_mm = camera_moved(state)

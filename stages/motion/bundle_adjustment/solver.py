@@ -49,8 +49,8 @@ drawn shift of .4 px shortened the pipe by 1.4 %. At three times it the pull is 
 _SHORTEST_MM = 1.0
 """Ways are compared as if they were at least so long: a probe that stands has none."""
 _ROUNDS, _MORE = 3, 1.2
-"""Times that the smoothness of trembling pictures is looked at again while it grows by a fifth: the prior of
-a motion not known yet holds down strong trembling. Not measured."""
+"""The smoothness of trembling pictures is estimated up to so many times more, as long as it grows by a fifth:
+the first, loose prior still holds down strong trembling. Not measured."""
 _IN_LINE = 4
 """Frames with texture from which the motion at an end of a run is taken: their poses' noise hardly matters,
 and the motion has not changed much. Not measured."""
@@ -104,11 +104,11 @@ def estimate_state(
 
 
 def _loosely(start: State, measured: Measurements, parameters: MotionParameters, watch: Watch) -> State:
-    """Adjust with loose motion; anew, with a frame held that texture places, where the ends swing.
+    """Adjust with a loose motion prior. If the ends of the run swing, do so again with another frame held.
 
-    While motion is loose, a ring alone leaves open how the camera is turned: the first pose may lie on a
-    swing of some degrees, with which all others turn. Robust smoothness, once it is known, never brings that
-    back.
+    With a loose prior, a ring alone does not determine how the camera is turned. If the first pose, which is
+    held, then lies on a swing of some degrees, all others turn with it, and the robust smoothness of the next
+    adjustment never removes that. So a frame is held whose pose texture determines.
     """
     loose = adjust(start, measured, parameters, ROUGHLY, watch).state
     seen = np.unique(measured.tracks.frame)
@@ -152,9 +152,9 @@ def scale_between_halves(
 ) -> float:
     """Return the 1 σ of distances, relative, from adjustments to near and to far matches alone.
 
-    Compression and light shift matches alike that are seen under one polar angle. The residuals do not show
-    it, but the halves then differ from the whole (by chance as much as the whole's own σ): the farther one
-    counts.
+    Compression and light shift all matches under one polar angle alike. Residuals do not show it, but the way
+    found from either half of the matches then differs from that of all. The larger difference is returned; by
+    chance alone it is as large as the σ of the whole estimate.
     """
     tracks = measured.tracks
     away = np.linalg.norm(tracks.uv - measured.probe.camera.centre_px, axis=1)
@@ -178,8 +178,8 @@ def excess_of(in_sigma: Float) -> float:
 def lasting_excess(in_sigma: Float, landmark: Int) -> float:
     """Return the part of the errors (M, 2), in σ, that a landmark's neighbouring observations share.
 
-    Noise is new in every picture: it shows whole in the difference of two, and distance hardly feels it.
-    What lasts moves poses along.
+    Noise is independent in every picture: it appears in full in the difference of two of them and hardly
+    affects distance. An error that lasts moves the poses.
     """
     step = np.diff(in_sigma, axis=0)[np.diff(landmark) == 0] / np.sqrt(2)
     return float(np.sqrt(max(excess_of(in_sigma) ** 2 - excess_of(step) ** 2, 0.0)))
@@ -218,7 +218,7 @@ def estimate_with_shared(
     shared: Float,
     smooth_sigma: Float,
     parameters: MotionParameters,
-    watch: Watch = unwatched,
+    watch: Watch,
 ) -> Estimate:
     """Adjust from a window's own optimum with the shared parameters (S,) held.
 

@@ -1,8 +1,8 @@
 """Loop closure: where the probe passes a wall again, the drift since the first time is measured and removed.
 
-Distance and roll come from registering unrolled frames; sideways and in direction the pipe itself is the
-measure, since rings place its axis well in every window. What the closures show is distributed over the chain
-of windows (`pose_graph`).
+Distance and roll are measured by registering unrolled frames. Position across the pipe and direction are
+measured by the pipe's axis, which the rings determine well in every window. The differences are distributed
+over the chain of windows (`pose_graph`).
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from stages.motion.windows.error_chain import ErrorChain, ErrorSums
 from stages.motion.windows.submap_joining import JoinedRun
 
 _LEAST_PROBABILITY = 1e-6
-"""A revisit that would lie so far off what all others predict in one of a million runs is taken for wrong."""
+"""A revisit counts as wrong if it lies as far off the prediction of all others as happens once in 10⁶."""
 _REACH_SIGMA = 5.0
 _LEAST_REACH_PX = 4.0
 """Shifts are looked for up to so many σ of their prediction, and some strip samples more for its rounding."""
@@ -129,8 +129,9 @@ def close_loops(
 class ShiftPredictor:
     """Where the wall should lie at each revisit, learning from the revisits already registered.
 
-    Drift grows with the way between two frames, so the reach hardly grows from one revisit to the next, and
-    hardly anything else can be taken for the wall. The prediction is the conditional mean of a Gaussian.
+    Drift grows with the way between two frames. With every revisit learnt, the range searched at the next one
+    stays small, so that hardly any other wall can be taken for the right one. The prediction is the
+    conditional mean of a Gaussian.
 
     Attributes
     ----------
@@ -250,7 +251,7 @@ def _judged(
 ) -> tuple[tuple[bool, ...], tuple[Verdict, ...]]:
     """Return which loops are closed, and every revisit's verdict.
 
-    Where as many contradict the rest as do not, nobody can tell which are wrong: none is closed.
+    If at least as many revisits contradict the rest as agree, it is unknown which are wrong: none is closed.
     """
     verdicts = [r.verdict for r in registered]
     wrong: set[int] = set()

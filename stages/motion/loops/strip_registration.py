@@ -1,4 +1,4 @@
-"""Strip registration: whether two unrolled strips show the same wall, and by how much it lies elsewhere.
+"""Strip registration: whether two unrolled strips show the same wall, and how far it is shifted between them.
 
 First all shifts within reach are tried at half resolution by normalised correlation of what is usable in both
 (D. Padfield, "Masked object registration in the Fourier domain", 2012); then patches are matched one by one.

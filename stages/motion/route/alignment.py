@@ -1,7 +1,7 @@
 """Alignment: the straight lengths and bends of which a pipe's axis is made.
 
 Pipes are laid of straight lengths joined by bends of constant radius. A bend is put in only where the axis
-turns by more than its own noise and the camera's heading systematic explain (binary segmentation: A. Olshen
+turns by more than its noise and the camera's drift of heading explain (binary segmentation: A. Olshen
 et al., "Circular binary segmentation for the analysis of array-based DNA copy number data", 2004).
 """
 

@@ -34,8 +34,8 @@ chips state 1 to 3 % and 1 to 2 %. The same all the way, so that bends that the 
 _LEAST_FORCE_M_S2 = 0.01
 """Smallest 1 σ of a mean force that is believed: a milligravity."""
 _TURNING, _APART = 3.0, 0.5
-"""A camera turns enough to judge a gyroscope from three σ of it on; then the two may differ by half. A mount
-that is wrong by 30° makes them differ by that."""
+"""A gyroscope is judged if the camera turns by three of its σ or more. The two may then differ by half of the
+turn; a mount that is wrong by 30° makes them differ by as much."""
 _NOT_GRAVITY = 0.1
 """Share by which the usual force may differ from gravity before it is not used. Consumer accelerometers err
 by 4 % at most (their data sheets)."""
@@ -94,7 +94,7 @@ def inertia_at(
 def contradicts(inertia: Inertia, R_pc: Float) -> bool:
     """Return whether gyroscope and camera turn differently beyond a bias: another mount, unit or clock.
 
-    Where the camera turns by no more than the gyroscope errs nothing is told, and the IMU is believed.
+    If the camera turns by no more than the gyroscope errs, nothing can be said, and the IMU is believed.
     """
     step_s = inertia.step_s[:, None]
     seen = vector_from_rotation(np.swapaxes(R_pc[:-1], 1, 2) @ R_pc[1:]) / step_s

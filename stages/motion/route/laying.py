@@ -1,4 +1,4 @@
-"""Laying the route: lengths and bends of the pipe; the run is turned to agree with these, a plan, an IMU."""
+"""Finds the pipe's straight lengths and bends, and turns the run to agree with them, a plan and an IMU."""
 
 from __future__ import annotations
 
@@ -41,8 +41,8 @@ def lay_route(
     ``turn_variance`` (N, 3), rad², is that of the turns that the camera saw up to each frame, in C, without
     its drift.
 
-    Straightness says nothing over less than half of a tube: without plan and IMU shorter runs stay as they
-    are, but for the list of their pieces.
+    Over less than half of a tube straightness says nothing. So without plan and IMU, shorter runs are not
+    turned; they only get the list of their pieces.
     """
     found = _with_pieces(trajectory)
     nodes, frame = _nodes(found, turn_variance)
@@ -94,7 +94,10 @@ def _nodes(trajectory: Trajectory, turn_variance: Float) -> tuple[Nodes, Int]:
 
 
 def _length_of(distance_mm: np.ndarray, pieces: tuple[PipePiece, ...]) -> Int:
-    """Return which straight length each distance lies in, −1 in a bend; those without a node do not count."""
+    """Return the number of the straight length in which each distance lies; −1 in a bend.
+
+    Lengths in which no distance lies get no number.
+    """
     out = np.full(len(distance_mm), -1)
     for j, piece in enumerate(p for p in pieces if p.kind == "straight"):
         out[(distance_mm >= piece.from_mm - 1e-6) & (distance_mm <= piece.to_mm + 1e-6)] = j
@@ -253,8 +256,9 @@ def _carried(old: PipeAxis, new: PipeAxis, s: Float, turn: Float, T_pc: Float) -
 def _covariance(trajectory: Trajectory, s: Float, distance_mm: Float, rotations: Rotations) -> Float:
     """Return the poses' covariance (N, 6, 6).
 
-    Across the pipe a place errs by the turns before it, times the way since. Along it errs as it did before,
-    in proportion to the way: behind a bend the lengths before it err across. What is beyond that is random.
+    Across the pipe, a place errs by the turns before it times the way since. Along the pipe, the earlier
+    variance is kept as an error in proportion to the way, so that behind a bend it acts across; the rest of
+    it is random.
     """
     count, node = len(distance_mm), frames_at(trajectory.axis, distance_mm)
     step = np.diff(node[0], axis=0)

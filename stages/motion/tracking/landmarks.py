@@ -26,9 +26,9 @@ the row and column of the strip where the landmark was found first."""
 _MOSTLY = 0.5
 """Share of the frames without texture from which it tells nothing of the whole run. Chosen."""
 _MUCH = 0.25
-"""Share of the lit pictures without texture from which the rest speaks against no encoder and no probe: good
-recordings have none (chosen). Of VP9 at .5 Mbit/s a half had none, what the codec had kept of the others came
-out 4.8 % short, and the encoder, which was right, was thrown away."""
+"""If a larger share of the lit pictures shows no texture, the rest contradicts neither encoder nor probe
+(chosen; in good recordings no picture is without). In VP9 at .5 Mbit/s half of the pictures had none. The
+texture left in the others made the way 4.8 % too short, and the encoder, which was right, was discarded."""
 
 
 @dataclass

@@ -82,11 +82,6 @@ class StripGrid:
         r = self.radius_mm + self.bore.wider_at(row * self.step_mm)
         return np.stack(np.broadcast_arrays(r * np.cos(psi), r * np.sin(psi), row * self.step_mm), -1)
 
-    def position(self, xyz: Float) -> tuple[Float, Float]:
-        """Return strip row and column (...) of points (..., 3)."""
-        psi = np.arctan2(xyz[..., 1], xyz[..., 0])
-        return xyz[..., 2] / self.step_mm, (psi + np.pi) * (self.columns / (2 * np.pi))
-
 
 @dataclass(frozen=True)
 class Strip:

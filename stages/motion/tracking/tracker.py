@@ -191,7 +191,8 @@ class TextureTracker:
     def _in_view(self, strip: Strip, guess: Float) -> Bool:
         """Return whether patches at strip positions (L, 2) are seen whole, even if these err a little.
 
-        At a border only those patches would be found that err inward, and all of them together would pull.
+        Otherwise, at a border only patches that err inward would be found, and together they would bias
+        poses.
         """
         margin = self._map.half + _BORDER_PX
         whole = whole_patches(strip.usable, margin)
@@ -209,7 +210,7 @@ class TextureTracker:
         m.misses[found.landmark] = np.where(good, 0, m.misses[found.landmark] + missing)
         m.retired[found.landmark] |= m.misses[found.landmark] > _MOST_MISSES
         if found.lost:
-            # They are elsewhere: what is seen now is followed anew, or later frames would not agree either.
+            # They were matched in wrong places. New landmarks are started, else later frames would fail too.
             m.retired[index] = True
             return
         at = found.at[good]

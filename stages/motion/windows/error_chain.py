@@ -1,7 +1,8 @@
 """How pose errors accumulate along a chain of submaps.
 
-Errors are a Gauss-Markov chain: within a window as its adjustment has them, from window to window by the
-anchors, and the same in all by the shared parameters. D. Simon, "Optimal state estimation", 2006, § 3.1.
+Errors form a Gauss-Markov chain (D. Simon, "Optimal state estimation", 2006, § 3.1). Within a window they
+have the covariance of its adjustment. From window to window they are carried on by the anchors, and the
+parameters that all windows share err alike in all of them.
 """
 
 from __future__ import annotations
@@ -105,8 +106,8 @@ class ErrorChain:
     def turn_variances(self) -> Float:
         """Return the variance (K, 3) of turns in C gathered up to each frame, the shared parameters given.
 
-        It grows along the run and is that of turns seen one after the other: where the way is curved, what
-        was unsure of the heading at its start does not become roll here.
+        It is the variance of turns added up from frame to frame, so it only grows along the run: on a curved
+        way, an error of heading at the start is not counted as roll later on.
         """
         before, found = np.zeros(3), []
         for link in self.links:

@@ -49,9 +49,9 @@ _IN_LOST = 0.05
 """Relative 1 σ of distances where much texture was lost and nothing else tells them: by VP9 at .5 Mbit/s,
 which left half of the pictures without texture, a way came out 4.8 % short (one recording)."""
 _ROUNDS, _NOISIER = 4, 1.5
-"""Times that the noise of readings is looked at again while it is half as large again as taken: the poses
-follow readings that are believed too much. Good recordings show 0.5 to 1.2 times what is taken (open-1 to
-open-3, a05)."""
+"""The noise of the encoder's readings is estimated up to so many times, as long as it comes out 1.5 times the
+noise assumed before: poses follow readings that are trusted too much, which hides their noise. In good
+recordings it is 0.5 to 1.2 times the noise assumed (open-1 to open-3, a05)."""
 
 
 @dataclass(frozen=True)
@@ -132,7 +132,7 @@ class _Adjusted:
         return replace(self, run=run, measured=run.measured(self.window, self.parameters))
 
     def with_texture_off(self, times: float) -> _Adjusted:
-        """Return it adjusted to matches that err by so many times as much, alone and together."""
+        """Return it adjusted again, with matches whose common and own errors are so many times larger."""
         given = self.parameters
         wider = {"match_bias_px": times * given.match_bias_px, "alike": times**2 * given.alike}
         return replace(self, parameters=given.model_copy(update=wider)).again(self.estimate.state)
@@ -261,8 +261,8 @@ def _without_encoder(first: _Adjusted) -> Estimate:
 def with_shared_error(parameters: MotionParameters, reprojection_px: float) -> MotionParameters:
     """Return the parameters with the radial error that matches may share, as large as this recording's is.
 
-    What blurs or compresses pictures moves all matches near one polar angle alike, and a scale along the
-    pipe can take that up unseen; how much of it there is, is judged by what the matches do not agree on.
+    Blur and compression move all matches near one polar angle alike. A scale along the pipe absorbs such an
+    error without a residual, so its size is judged by how much the matches disagree (`_SHARED_ERROR`).
     """
     shared = _SHARED_ERROR * reprojection_px
     if shared <= parameters.match_bias_px:
@@ -271,10 +271,11 @@ def with_shared_error(parameters: MotionParameters, reprojection_px: float) -> M
 
 
 def scale_by_lag(lag_px: float, grid: StripGrid, camera: Camera) -> float:
-    """Return the relative 1 σ of distances by templates that are cut ``lag_px`` off, where they come in view.
+    """Return the relative 1 σ of distances, if templates are cut ``lag_px`` off when they come into view.
 
-    A codec drops the texture of the dim wall far ahead and carries it on from the picture before. Matches all
-    the way past the camera are off by less and less, which is one with a longer way; no residual shows it.
+    A codec drops the texture of the dim wall far ahead and repeats it from the picture before. While the
+    camera passes such a template, its error shrinks, exactly as if the probe had moved farther: no residual
+    shows it.
     """
     ends = np.array([[grid.radius_mm, 0, grid.far_mm + ahead] for ahead in (-0.5, 0.5)])
     px_per_mm = float(np.linalg.norm(np.diff(camera.project(ends).uv, axis=0)))

@@ -45,13 +45,13 @@ class MeasuredRun:
     circles : RingCircles
         Through the rings.
     image_scale : (N,) or None
-        By how many times the pictures are larger than the probe's camera has them, where that drifts.
+        Size of the pictures over that of the probe's camera; None where their scale does not drift.
     jump : RingJump or None
         Where the rings jump.
     knock : LaserKnock or None
         What the laser did there.
     farthest_rad : float
-        Smallest polar angle of matches that count.
+        Smallest polar angle of matches of texture that are used: the wall farthest ahead.
     """
 
     texture: TrackedTexture
@@ -77,7 +77,7 @@ class MeasuredRun:
         """Return what was measured in a window, frames and distance counted from its first."""
         part = slice(window.first, window.last)
         rows = slice(*np.searchsorted(self.ring_place, [window.first, window.last]))
-        rings, place = _some_rings(self.rings, rows), self.ring_place[rows] - window.first
+        rings, place = self.rings.some(rows), self.ring_place[rows] - window.first
         rings = rings if self.image_scale is None else rings.reduced(self.image_scale[self.ring_place[rows]])
         bins = self._bins(rings, place, parameters)
         tracks = _behind(self.texture.between(window.first, window.last), self.start_mm(window))
@@ -100,7 +100,7 @@ class MeasuredRun:
         after = replace(self.probe.after(self.knock), covariance=self.probe.covariance)
         parts = (slice(0, first), self.probe), (slice(first, None), after)
         return RingBins.joined(
-            [ring_bins(_some_rings(rings, rows), place[rows], probe, bins, wall_mm) for rows, probe in parts]
+            [ring_bins(rings.some(rows), place[rows], probe, bins, wall_mm) for rows, probe in parts]
         )
 
     def start(self, window: Window, measured: Measurements, parameters: MotionParameters) -> State:
@@ -122,11 +122,6 @@ class MeasuredRun:
     def start_mm(self, window: Window) -> float:
         """Return the distance of a window's first frame, from which its own are counted."""
         return float(self.T_pc[window.first, 2, 3]) if window.first else 0.0
-
-
-def _some_rings(rings: RingSamples, rows: slice) -> RingSamples:
-    per_frame = ("frame", "radius_px", "sigma_px", "width_px", "amplitude", "validity")
-    return replace(rings, **{name: getattr(rings, name)[rows] for name in per_frame})
 
 
 def _behind(tracks: Tracks, start_mm: float) -> Tracks:

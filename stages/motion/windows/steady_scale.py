@@ -19,9 +19,9 @@ from stages.motion.windows.submaps import Window
 _ROUNDS = 2
 """Times that the scale is taken out: the second finds what the linear step before it left."""
 _FOUND_AGAIN = 0.5
-"""Of a drift that was taken out so much at least is there when it is looked for anew (chosen). Behind a
-filter against noise, whose matches lag behind the wall, .55 % were taken out of a steady scale, and .07 %
-found then: the wall came out .8 mm wider at one end."""
+"""A correction is kept only if the drift estimated afterwards, correction included, differs from it by at
+most this share of it (chosen). Behind a noise filter, whose matches lag behind the wall, .55 % were taken
+out of a steady scale and .07 % were found afterwards: the wall came out .8 mm wider at one end."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ class SteadyRun:
 
     @property
     def distance_sigma(self) -> float:
-        """Return the relative 1 σ of distances by it: they follow the rings, or hold to the encoder."""
+        """Return the relative 1 σ that a drift adds to distances, which follow the rings or the encoder."""
         if not (self.drift.told or self.drift.contradicted):
             return 0.0
         by_rings = abs(self.drift.ring_mm) * self.drift.offset_sigma / self.estimate.state.nominal_radius_mm
@@ -73,9 +73,9 @@ def with_steady_scale(
 ) -> SteadyRun:
     """Test the image scale for drift in a window, and correct it where the window is the whole run.
 
-    A large drift is told and not taken out. In a reducer nothing is told: rings and texture depart there as
-    they do where the image scale drifts. Without texture in most pictures, nothing tells it from a pipe that
-    widens. A drift that is not found again with it when it is taken out contradicts itself: it stays in.
+    A large drift is reported and not corrected. In a reducer nothing is reported, because rings and texture
+    differ there as they do where the image scale drifts. Where most pictures show no texture, a drift cannot
+    be told from a pipe that widens. A correction that the corrected run does not confirm is undone.
 
     Raises
     ------

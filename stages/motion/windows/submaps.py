@@ -157,7 +157,7 @@ def fuse_shared(
     return SharedParameters(mean + covariance @ right, covariance)
 
 
-def submap_of(estimate: Estimate, window: Window, anchor: int, last: int, windows: int = 1) -> Submap:
+def submap_of(estimate: Estimate, window: Window, anchor: int, last: int, windows: int) -> Submap:
     """Return the submap of a window; its errors are stated from ``anchor`` up to frame ``last`` of it.
 
     Everything else, landmarks above all, is marginalised. ``windows`` is the number of windows of the run.
