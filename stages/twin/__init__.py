@@ -11,6 +11,7 @@ from threadpoolctl import threadpool_limits
 from pipeline.arrays import Bool, Float32, Int
 from pipeline.artefacts.measured import RingSamples, Trajectory, Wall, WallTexture
 from pipeline.artefacts.twin import Mismatch, Twin
+from pipeline.artefacts.wall_map import FixedToProbe
 from pipeline.errors import UnusableError
 from pipeline.instrument.probe import Probe
 from pipeline.machine.stage import Context, Parameters, Stage
@@ -18,6 +19,7 @@ from pipeline.recording.base import Illumination, Recording
 from pipeline.recording.checks import CheckedFrames
 from stages.twin.causes import causes
 from stages.twin.compare import Comparison, block_ratios, block_textures
+from stages.twin.fixed_line import on_line
 from stages.twin.fixed_pattern import pattern_figures
 from stages.twin.glints import told_apart
 from stages.twin.lamp_power import lamp_power
@@ -30,13 +32,7 @@ from stages.twin.locate import (
     places_displaced,
     places_in_image,
 )
-from stages.twin.name import (
-    cannot_tell,
-    clipped,
-    left_over,
-    noise_figures,
-    state_figures,
-)
+from stages.twin.name import cannot_tell, clipped, left_over, noise_figures, state_figures
 from stages.twin.on_wall import ring_step_mm, unnamed
 from stages.twin.pixels import defective_pixels
 from stages.twin.render import Region, Renderer
@@ -186,14 +182,14 @@ def compare_with_twin(
     """
     with threadpool_limits(1, "blas"):
         scene = scene_of(probe, trajectory, wall, texture, photometry.blur_px)
-        return compared_with(scene, recording, frames, rings, photometry, parameters, context)
+        return compared_with(scene, recording, frames, rings, photometry, parameters, context, wall.fixed)
 
 
 def compared_with(
     scene: Scene, recording: Recording, frames: CheckedFrames, rings: RingSamples, photometry: Photometry,
-    parameters: TwinParameters, context: Context,
+    parameters: TwinParameters, context: Context, fixed: FixedToProbe | None = None,
 ) -> Twin:  # fmt: skip
-    """Return what the frames of a scene show; see `compare_with_twin`."""
+    """Return what frames of a scene show, with what is ``fixed`` of its line; see `compare_with_twin`."""
     compared, _ = _split(frames, scene.trajectory, parameters.compared)
     if frames.withheld is None:
         context.warn(_NONE_WITHHELD)
@@ -216,7 +212,8 @@ def compared_with(
     failed = any("led_dead" in m.name for m in over_time)
     whole, withdrawn = sums.named(samples, recording, failed)
     on_window, unsure = beside_blur(sums.on_window(samples), whole)
-    on_window, glints = told_apart(on_window, sums.glints(whole))
+    bent = on_line(fixed, scene.ring, on_window)
+    on_window, glints = told_apart((*on_window, *bent), sums.glints(whole, bent))
     apart_mm, clear = ring_step_mm(rings, scene.trajectory), (*on_window, *glints)
     line_rad = float(np.arctan2(scene.ring.radius_mm, scene.ring.ahead_mm))
     found: tuple[Mismatch, ...] = (
@@ -287,7 +284,7 @@ PHOTOMETRY = Stage(
 )
 TWIN = Stage(
     "twin",
-    "35",
+    "36",
     TwinParameters,
     compare_with_twin,
     "recorded frames beside the same frames, re-rendered from what the run has measured",

@@ -122,13 +122,15 @@ class SpotsOfFrames:
             )
         return found
 
-    def found(self, lit_wall: float = 0.0) -> tuple[Mismatch, ...]:
+    def found(self, lit_wall: float = 0.0, bent: Sequence[Mismatch] = ()) -> tuple[Mismatch, ...]:
         """Return the places where spots come back, and a count of the other spots.
 
         ``lit_wall`` is how bright, in grey levels, other light makes wall that is dark in the twin: what is
-        not far brighter is the palest of the wall.
+        not far brighter is the palest of the wall. Spots at places of the image where light is ``bent`` are
+        wall from elsewhere.
         """
         places, left = list[Mismatch](), [s for s in self.spots if s.grey > _PALEST * lit_wall]
+        left = [s for s in left if not any(_lies_in(m, s) for m in bent)]
         while left:
             tried = {order: _largest_group(left, order) for order in ("image", "wall")}
             count = {order: _frames_of(group) for order, group in tried.items()}
@@ -233,6 +235,12 @@ def told_apart(
     """
     kept = [g for g in glints if not any(w.name and _at_one_place(w, g) for w in window)]
     return tuple(w for w in window if w.name or not any(_at_one_place(w, g) for g in kept)), tuple(kept)
+
+
+def _lies_in(place: Mismatch, spot: Spot) -> bool:
+    at = {p.name: p.value for p in place.place}
+    away = np.hypot(at["u_px"] - spot.image[0], at["v_px"] - spot.image[1])
+    return bool(away < at["radius_px"] + spot.radius_px)
 
 
 def _at_one_place(one: Mismatch, other: Mismatch) -> bool:

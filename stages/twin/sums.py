@@ -100,11 +100,14 @@ class Sums:
         judged = [w.judged(to) for w, to in zip(self.window, fixed_to, strict=True)]
         return told_once([m for m in judged if m is not None])
 
-    def glints(self, whole: Sequence[Mismatch]) -> tuple[Mismatch, ...]:
-        """Return spots that are far brighter than foretold, beside laws of ``whole`` pictures that stand."""
+    def glints(self, whole: Sequence[Mismatch], bent: Sequence[Mismatch] = ()) -> tuple[Mismatch, ...]:
+        """Return spots that are far brighter than foretold, beside laws of ``whole`` pictures that stand.
+
+        Spots of lit frames are none at places where light is ``bent``.
+        """
         stray = [m.parameters[0].value for m in whole if set(m.names) & set(STRAY_NAMES)]
         lit, laser = self.spots
-        return (*lit.found(), *laser.found(max(stray, default=0.0)))
+        return (*lit.found(bent=bent), *laser.found(max(stray, default=0.0)))
 
     def cells(self) -> tuple[Cells | None, Cells | None]:
         """Return the sectors of lit frames and of the line, for steady lamps and an even, steady laser.

@@ -1,0 +1,50 @@
+"""What moves the line at one place of the image is told by the rings, where lit frames show nothing."""
+
+import numpy as np
+import pytest
+
+from pipeline.artefacts.twin import Mismatch, NamedFigure
+from pipeline.artefacts.wall_map import FixedPlace, FixedToProbe
+from pipeline.recording.base import Illumination
+from stages.twin.fixed_line import on_line
+from stages.twin.glints import Spot, SpotsOfFrames
+from stages.twin.scene import Ring
+
+_RING = Ring((400.0, 300.0), 200.0, 50.0, 22.0)
+
+
+def _fixed(on_probe=True):
+    place = FixedPlace(np.pi / 2, 0.2, -0.8, 60.0, 4, 90, on_probe)
+    return FixedToProbe(np.zeros((3, 3), np.float32), (place,))
+
+
+def _at(u, v, radius):
+    place = (NamedFigure(n, x, 4.0, "px") for n, x in (("u_px", u), ("v_px", v), ("radius_px", radius)))
+    return Mismatch("droplet", "intensity", "image", tuple(place), (), 0.0, 2.0, 1.0, "")
+
+
+def test_a_place_of_the_image_that_moves_the_line_is_told_without_a_name():
+    (found,) = on_line(_fixed(), _RING, ())
+    assert (found.name, found.channel, found.fixed_to) == ("", "line", "image")
+    assert [p.value for p in found.place] == pytest.approx([400, 500, 20])
+    assert found.parameters[0].value == -0.8
+    assert "-0.80 mm" in found.statement
+
+
+def test_a_groove_along_the_pipe_and_what_is_told_already_are_not():
+    assert not on_line(None, _RING, ())
+    assert not on_line(_fixed(on_probe=False), _RING, ())
+    assert not on_line(_fixed(), _RING, [_at(410.0, 490.0, 15.0)])
+    assert on_line(_fixed(), _RING, [_at(200.0, 300.0, 15.0)])
+
+
+def test_wall_from_elsewhere_that_a_drop_shows_is_no_glint():
+    spots = SpotsOfFrames(Illumination.LED, _RING)
+    for frame in range(8):
+        spots.frame.append(frame)
+        spots.excess.append(np.zeros((75, 100), np.float32))
+        at = (395.0 + 30 * (frame % 2), 505.0 - 25 * (frame % 3))
+        spots.spots.append(Spot(frame, at, (90.0 * frame, 40.0 * frame), 6.0, 70.0))
+    assert spots.found()
+    assert not spots.found(bent=[_at(400.0, 500.0, 60.0)])
+    assert spots.found(bent=[_at(100.0, 500.0, 60.0)])
