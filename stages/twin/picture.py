@@ -19,6 +19,7 @@ from pipeline.arrays import Bool, Float, Float32, Int
 from pipeline.artefacts.twin import Mismatch, NamedFigure
 from stages.twin.cells import chance_of, sigmas
 from stages.twin.compare import of_blocks
+from stages.twin.darkness import level_of_no_wall
 from stages.twin.gate import Suspected
 from stages.twin.locate import FALSE_ALARM
 from stages.twin.render import Region, TwinFrame
@@ -127,19 +128,16 @@ class WholePictures:
             return
         value, *columns = (a[whole].astype(float) for a in small[1:])
         sizes = np.array([_size_beside_one(value, c) for c in columns])
-        sizes[:, -1] -= self._level_outside(above, free & (twin.region != Region.EDGE))
+        if self.scene.outside is None:
+            sizes[:, -1] = np.nan
+        else:
+            sizes[:, -1] -= level_of_no_wall(above, free & (twin.region != Region.EDGE) & self.scene.outside)
         self.stray.append(sizes)
         self.frame["stray"].append(frame)
         around = ring_profile(self.scene.ring, above, twin, free & (twin.region != Region.EDGE))
         if around is not None:
             self.ghost.append(around)
             self.frame["ghost"].append(frame)
-
-    def _level_outside(self, above: Float32, use: Bool) -> float:
-        """Return the mean level of what sees no wall; NaN where the picture has no such place."""
-        outside = self.scene.outside
-        dark = above[use & outside] if outside is not None else above[:0]
-        return float(dark.mean(dtype=float)) if dark.size >= TILE**2 else float("nan")
 
     def add_clipped(self, frame: int, above: Float32, twin: TwinFrame, free: Bool) -> None:
         """Take any frame: what leaks from clipped pixels along columns, and along rows for comparison."""

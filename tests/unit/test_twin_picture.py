@@ -208,13 +208,16 @@ def test_stray_light_is_named_for_what_it_falls_on():
     assert _named(laser=lambda p, r: p + 5) == []
 
 
-def _stray_names(light, scene=SCENE):
-    """Names that stand of light that the wall's reflectance, 1 on average, throws back with the LEDs off."""
+def _stray_names(light, scene=SCENE, dark=OUTSIDE):
+    """Names that stand of light that the wall's reflectance, 1 on average, throws back with the LEDs off.
+
+    The wall ends where it is ``dark``; the scene tells how far the LEDs light it.
+    """
     random, whole, shown = np.random.default_rng(2), WholePictures(scene), {}
     for frame in range(FRAMES):
         wall, line = _lit(random), _line()
         lit = _twin((wall.level * np.exp(-((AWAY / 80) ** 2))).astype(np.float32), wall.region)
-        seen = _noisy(line.level + np.where(OUTSIDE, 0, light(wall.level / 90)), random)
+        seen = _noisy(line.level + np.where(dark, 0, light(wall.level / 90)), random)
         whole.add_laser(frame, seen, line, seen < WHITE, lit)
         shown[frame] = _shown(seen, line, lit, frame, whole)
     kept, withdrawn = judged(whole.suspected(np.zeros(4)), lambda frames: [(f, shown[f]) for f in frames])
@@ -225,6 +228,14 @@ def _stray_names(light, scene=SCENE):
 def test_even_light_on_wall_that_the_lamps_light_unevenly_is_ambient_light():
     """Its law had been the lamps' own light, which falls off: it was named interreflection."""
     assert _stray_names(lambda pale: 22 * pale) == ["ambient_light"]
+
+
+def test_even_light_on_wall_that_no_lamp_reaches_is_told_by_what_is_darker_still():
+    """Wall behind the LEDs had stood for black: other light on it hid the light on all of the wall."""
+    reached = SimpleNamespace(**{**vars(SCENE), "outside": AWAY > 110})
+    assert _stray_names(lambda pale: 22 * pale, reached) == ["ambient_light"]
+    assert _stray_names(lambda pale: 6 * (pale - 1), reached) == []
+    assert _stray_names(lambda pale: 6 * (pale - 1), reached, AWAY > 110) == []
 
 
 @pytest.mark.parametrize("haze", [0.0, 20.0, -6.0])
