@@ -212,7 +212,7 @@ def compared_with(
     failed = any("led_dead" in m.name for m in over_time)
     whole, withdrawn = sums.named(samples, recording, failed)
     on_window, unsure = beside_blur(sums.on_window(samples), whole)
-    bent = on_line(fixed, scene.ring, on_window)
+    bent = on_line(fixed, rings, scene.ring, on_window)
     on_window, glints = told_apart((*on_window, *bent), sums.glints(whole, bent))
     apart_mm, clear = ring_step_mm(rings, scene.trajectory), (*on_window, *glints)
     line_rad = float(np.arctan2(scene.ring.radius_mm, scene.ring.ahead_mm))

@@ -11,6 +11,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from pipeline.arrays import Bool, Float, runs_of
+from pipeline.artefacts.measured import RingSamples
 from pipeline.artefacts.twin import Mismatch, NamedFigure
 from pipeline.artefacts.wall_map import FixedPlace, FixedToProbe
 from stages.twin.scene import Ring
@@ -18,22 +20,49 @@ from stages.twin.scene import Ring
 _FOUND = 8.0
 """Robust σ, of all sectors over as long a way, from which a place is found: its departure is known to an
 eighth at least, and noise does not make one."""
+_SEEN = 0.5
+"""Share of rings that show an azimuth, below which the line is not seen there. Chosen."""
 
 
-def on_line(fixed: FixedToProbe | None, ring: Ring, others: Sequence[Mismatch]) -> tuple[Mismatch, ...]:
+def on_line(
+    fixed: FixedToProbe | None, samples: RingSamples, ring: Ring, others: Sequence[Mismatch]
+) -> tuple[Mismatch, ...]:
     """Return places at which the line lies aside, beside ``others`` that have a place in the image.
 
-    Places that a groove along the pipe would make as well are left out.
+    Places that a groove along the pipe would make as well are left out. Amid a drop the line may not be seen
+    at all: azimuths that join a place, and at which most rings have no line, belong to it.
     """
-    if fixed is None:
-        return ()
-    made = (_mismatch(place, ring) for place in fixed.places if place.on_probe)
+    places = () if fixed is None else tuple(p for p in fixed.places if p.on_probe)
+    at = [_within(p, samples.azimuth_rad) for p in places]
+    joined = _parts(np.any([samples.valid.mean(0) < _SEEN, *at], axis=0)) if places else []
+    made = []
+    for part in joined:
+        own = [p for p, inside in zip(places, at, strict=True) if (part & inside).any()]
+        if own:
+            made.append(
+                _mismatch(part, samples.azimuth_rad, max(own, key=lambda p: abs(p.departure_mm)), ring)
+            )
     return tuple(m for m in made if not any(_touch(m, other) for other in others))
 
 
-def _mismatch(place: FixedPlace, ring: Ring) -> Mismatch:
-    look = ring.at(place.frame_from, place.azimuth_rad)
-    radius, nan = max(ring.radius_px * place.width_rad / 2, 1.0), float("nan")
+def _within(place: FixedPlace, azimuth_rad: Float) -> Bool:
+    """Return which azimuths (A,) a place covers: the nearest at least."""
+    away = np.abs(np.angle(np.exp(1j * (azimuth_rad - place.azimuth_rad))))
+    return np.asarray(away <= max(place.width_rad / 2, float(away.min())))
+
+
+def _parts(marked: Bool) -> list[Bool]:
+    """Return the stretches of marked azimuths (A,) of a circle."""
+    start = int(np.argmin(marked))
+    parts = runs_of(np.roll(marked, -start))
+    index = np.arange(len(marked))
+    return [np.isin(index, (index[run] + start) % len(marked)) for run in parts]
+
+
+def _mismatch(part: Bool, azimuth_rad: Float, place: FixedPlace, ring: Ring) -> Mismatch:
+    middle = float(np.angle(np.exp(1j * azimuth_rad[part]).sum()))
+    look, nan = ring.at(place.frame_from, middle), float("nan")
+    radius = max(ring.radius_px * np.pi * float(part.mean()), 1.0)
     at = zip(("u_px", "v_px", "radius_px"), (look.u_px, look.v_px, radius), strict=True)
     return Mismatch(
         "", "line", "image", tuple(NamedFigure(n, float(x), radius / 2, "px") for n, x in at),

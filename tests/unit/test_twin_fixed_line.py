@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from pipeline.artefacts.measured import RingSamples, RingValidity
 from pipeline.artefacts.twin import Mismatch, NamedFigure
 from pipeline.artefacts.wall_map import FixedPlace, FixedToProbe
 from pipeline.recording.base import Illumination
@@ -13,9 +14,20 @@ from stages.twin.scene import Ring
 _RING = Ring((400.0, 300.0), 200.0, 50.0, 22.0)
 
 
-def _fixed(on_probe=True):
+def _fixed(*more, on_probe=True):
     place = FixedPlace(np.pi / 2, 0.2, -0.8, 60.0, 4, 90, on_probe)
-    return FixedToProbe(np.zeros((3, 3), np.float32), (place,))
+    return FixedToProbe(np.zeros((3, 3), np.float32), (place, *more))
+
+
+def _rings(lost_deg=()):
+    """Rings of a sample a degree, most of which lost the line between two azimuths."""
+    psi = np.radians(np.arange(-180.0, 180.0))
+    validity = np.full((10, 360), RingValidity.VALID, np.uint8)
+    if lost_deg:
+        inside = (psi > np.radians(lost_deg[0])) & (psi < np.radians(lost_deg[1]))
+        validity[:8, inside] = RingValidity.WIDTH
+    made = [np.ones((10, 360), np.float32) for _ in range(4)]
+    return RingSamples(np.arange(10), psi, np.array([400.0, 300.0]), *made, validity)
 
 
 def _at(u, v, radius):
@@ -24,18 +36,30 @@ def _at(u, v, radius):
 
 
 def test_a_place_of_the_image_that_moves_the_line_is_told_without_a_name():
-    (found,) = on_line(_fixed(), _RING, ())
+    (found,) = on_line(_fixed(), _rings(), _RING, ())
     assert (found.name, found.channel, found.fixed_to) == ("", "line", "image")
-    assert [p.value for p in found.place] == pytest.approx([400, 500, 20])
+    assert [p.value for p in found.place] == pytest.approx([400, 500, 20], abs=2)
     assert found.parameters[0].value == -0.8
     assert "-0.80 mm" in found.statement
 
 
 def test_a_groove_along_the_pipe_and_what_is_told_already_are_not():
-    assert not on_line(None, _RING, ())
-    assert not on_line(_fixed(on_probe=False), _RING, ())
-    assert not on_line(_fixed(), _RING, [_at(410.0, 490.0, 15.0)])
-    assert on_line(_fixed(), _RING, [_at(200.0, 300.0, 15.0)])
+    assert not on_line(None, _rings(), _RING, ())
+    assert not on_line(_fixed(on_probe=False), _rings(), _RING, ())
+    assert not on_line(_fixed(), _rings(), _RING, [_at(410.0, 490.0, 15.0)])
+    assert on_line(_fixed(), _rings(), _RING, [_at(200.0, 300.0, 15.0)])
+
+
+def test_a_drop_amid_which_the_line_is_not_seen_is_one_place_from_rim_to_rim():
+    """A drop of 43 px was nothing at all: the line left the rings at both rims and was not found between."""
+    other = FixedPlace(np.radians(116.0), 0.04, 0.7, 60.0, 0, 90, on_probe=True)
+    (found,) = on_line(_fixed(other), _rings(lost_deg=(90.0, 116.0)), _RING, ())
+    u, v, radius = (p.value for p in found.place)
+    middle = np.radians(100.7)
+    assert np.hypot(u - 400 - 200 * np.cos(middle), v - 300 - 200 * np.sin(middle)) < 5
+    assert radius == pytest.approx(200 * np.radians(16.4), abs=5)
+    assert len(on_line(_fixed(other), _rings(), _RING, ())) == 2
+    assert len(on_line(_fixed(other), _rings(lost_deg=(-60.0, -40.0)), _RING, ())) == 2
 
 
 def test_wall_from_elsewhere_that_a_drop_shows_is_no_glint():
