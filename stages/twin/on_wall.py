@@ -6,6 +6,8 @@ seen from the side, as wet or polished wall is, whose mirrored light falls off f
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import cv2
 import numpy as np
 from scipy.ndimage import gaussian_filter
@@ -78,7 +80,9 @@ def _regions_of_wall(
         if together[label == k].max() < _FEWEST_CELLS:
             continue
         use = label[samples.along, samples.around] == k
-        size, told = _gloss_of(samples, use)
+        size, told = min(
+            (_gloss_of(*s) for s in ((samples, use), _beside_image(samples, use))), key=_sureness
+        )
         shines = told > _SURE and size > _LEAST_SHINE
         value, spread = (shine, shine_sd) if shines else (mean, sd)
         by_slope = _shine_of_slope(samples, use, line_rad) if shines else 1.0
@@ -88,6 +92,23 @@ def _regions_of_wall(
             gloss_sd = size / max(told, 1e-9) if shines else 0.0
             found.append(_on_wall(region, value, spread, cells, samples, use, gloss_sd))
     return tuple(found)
+
+
+def _beside_image(samples: BlockSamples, use: Bool) -> tuple[BlockSamples, Bool]:
+    """Return blocks less what other wall shows there in the image, and which of ``use`` (N,) count.
+
+    What stays in the image brightens all wall that passes by. Places at which no other wall was seen do not
+    tell it from wall that shines.
+    """
+    cell, other = samples.orders["image"], ~use
+    count = np.bincount(cell[other], minlength=cell.max() + 1)
+    total = np.bincount(cell[other], samples.change[other], len(count))
+    there = total / np.maximum(count, 1)
+    return replace(samples, change=samples.change - there[cell]), use & (count[cell] >= FEWEST_FRAMES)
+
+
+def _sureness(told: tuple[float, float]) -> float:
+    return told[1]
 
 
 def _most(values: Float, cells: Int) -> float:

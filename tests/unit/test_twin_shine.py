@@ -128,6 +128,14 @@ def test_wall_that_shines_or_is_dark_is_told_and_has_no_name():
     assert not [m for m in duller if m.parameters[0].name == "shine"]
 
 
+@pytest.mark.parametrize("far_px", [30, 300])
+def test_what_stays_in_the_image_makes_no_wall_shine(far_px):
+    """Beside a drop, or where the photo holds what scatters, all wall that passes brightens outwards."""
+    at_place = (abs(U - 72) < 25) & (abs(V - 60) < far_px)
+    found = _wall(lambda patch, aside: 0.7 * at_place * (aside - 0.8))
+    assert not [m for m in found if m.fixed_to == "wall" and m.parameters[0].name == "shine"]
+
+
 def test_steep_wall_is_as_bright_as_its_slope_is_known():
     plain = plain_bore()
     s, psi = np.meshgrid(plain.distance_mm - 100, np.radians(np.arange(360) - 180) - 0.8, indexing="ij")
