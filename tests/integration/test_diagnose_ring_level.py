@@ -95,6 +95,14 @@ def test_a_size_that_cannot_be_is_no_evidence():
     assert scan(measurements, nothing, {"motion_blur": ShorterExposure()}, stated) == []
 
 
+def test_a_wave_in_the_fraction_of_a_pixel_has_its_size_though_bins_average_over_it():
+    run = measured(("pixel_locking=0.06",), 65)
+    measurements, start = prepare(run.measured)
+    nothing, stated = fit(measurements, start, ()), stated_belief(run.truth.stated)
+    (found,) = scan(measurements, nothing, {"pixel_locking": LIBRARY["pixel_locking"]}, stated)
+    assert found.score.amplitude == pytest.approx(0.06, rel=0.2)
+
+
 def test_a_tilt_that_the_library_lacks_is_not_misnamed_but_described():
     found = seen(("laser_tilt=0.3@-70",), tuple(n for n in FEW if n != "laser_tilt"), 62)
     assert verdict_of(found) is Verdict.UNEXPLAINED

@@ -132,6 +132,8 @@ class BoreRings:
         Stated radius of the bore there.
     wall_mm : (M, 2)
         Distance and way around (azimuth × radius) of the point: neighbours on the wall err alike.
+    across_px : (M,)
+        By how much the image radius changes from one side of the bin to the other.
     left_out : dict of str to int
         Samples left out, by reason.
     """
@@ -143,6 +145,7 @@ class BoreRings:
     section: Int
     radius_mm: Float
     wall_mm: Float
+    across_px: Float
     left_out: dict[str, int]
 
     def select(self, keep: Bool) -> BoreRings:
@@ -188,15 +191,19 @@ def _condensed(
     keep = (seen.sum(2) >= _LEAST_SHARE * size) & (lowest == highest)
     share = (weight / np.maximum(total, 1e-12)[..., None])[keep]
     image_azimuth = np.broadcast_to(rings.azimuth_rad, use.shape)
-    radius, azimuth, distance = (
-        np.sum(share * np.nan_to_num(x[:, cut].astype(float)).reshape(shape)[keep], 1)
+    samples = [
+        np.nan_to_num(x[:, cut].astype(float)).reshape(shape)[keep]
         for x in (rings.radius_px, image_azimuth, distance_mm)
-    )
+    ]
+    radius, azimuth, distance = (np.sum(share * x, 1) for x in samples)
+    off = samples[1] - azimuth[:, None]
+    slope = np.sum(share * off * samples[0], 1) / np.maximum(np.sum(share * off**2, 1), 1e-12)
     middle = np.where(seen, azimuth_rad[:, cut].reshape(shape), np.nan)[keep]
     around = np.nanmax(middle, 1) * gauge.radius_mm[lowest[keep]]
     outward = np.stack([np.cos(azimuth), np.sin(azimuth)], -1)
     frame = np.broadcast_to(index[:, None], keep.shape)[keep]
     return BoreRings(
         frame, rings.centre_px + radius[:, None] * outward, outward, 1 / np.sqrt(total[keep]),
-        lowest[keep], gauge.radius_mm[lowest[keep]], np.stack([distance, around], -1), left_out,
+        lowest[keep], gauge.radius_mm[lowest[keep]], np.stack([distance, around], -1),
+        slope * 2 * np.pi / bins, left_out,
     )  # fmt: skip

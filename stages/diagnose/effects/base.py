@@ -54,6 +54,8 @@ class ImagePoints:
         effects that follow the distance predict nothing.
     per_px_c : (M, 3), optional
         Way of the line's point in C, mm per px that it is found farther out; none off the line.
+    across_px : (M,), optional
+        By how much the image radius changes over the samples that a point is the mean of.
     albedo_slope_per_mm : (M,), optional
         ∂ ln A of the wall's albedo along the pipe; without it the albedo moves no line.
     """
@@ -73,6 +75,14 @@ class ImagePoints:
     distance_mm: Float | None = None
     albedo_slope_per_mm: Float | None = None
     per_px_c: Float | None = None
+    across_px: Float | None = None
+
+    @cached_property
+    def fraction(self) -> Float:
+        """(M, 2) cosine and sine of 2πρ of the image radius ρ, px, each the mean over a point's samples."""
+        rho = np.linalg.norm(self.uv - self.probe.camera.centre_px, axis=1)
+        left = np.sinc(self.across_px) if self.across_px is not None else np.ones(len(rho))
+        return np.asarray(left[:, None] * np.stack([np.cos(2 * np.pi * rho), np.sin(2 * np.pi * rho)], -1))
 
     @cached_property
     def patterns(self) -> dict[tuple[str, Shape, bool], Float]:

@@ -232,8 +232,7 @@ class FractionTerm(Nameless):
         """Return a cos 2πρ + b sin 2πρ of the line's image radius ρ, nothing on texture."""
         if not points.on_line:
             return np.zeros(len(points.uv))
-        rho = np.linalg.norm(points.uv - points.probe.camera.centre_px, axis=1)
-        return cosine(2 * np.pi * rho, amplitude)
+        return np.asarray(points.fraction @ amplitude)
 
     def goes_with(self, shape: Shape) -> tuple[FixedTo, str, int | None]:
         """Return the camera's pixels."""

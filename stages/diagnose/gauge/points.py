@@ -102,7 +102,7 @@ def ring_points(
     points = ImagePoints(
         state.probe, rings.frame, time_s[rings.frame] - time_s[0], rings.uv, xyz_c, normal_c, along_c,
         rings.outward, moving.speed_mm_s[rings.frame], True, width_px,
-        np.arctan2(xyz_p[:, 1], xyz_p[:, 0]), xyz_p[:, 2], per_px_c=along_ray,
+        np.arctan2(xyz_p[:, 1], xyz_p[:, 0]), xyz_p[:, 2], per_px_c=along_ray, across_px=rings.across_px,
     )  # fmt: skip
     return moved(points, moving, rings.outward)
 
