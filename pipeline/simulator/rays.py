@@ -74,15 +74,18 @@ def viewing_rays(camera: TrueCamera, uv: Float) -> tuple[Float, Float]:
 
 def _without_distortion(camera: TrueCamera, uv: Float) -> Float:
     """Return where the model alone would put what decentring and pixel sides put at ``uv``."""
-    offset = (uv - camera.model.centre_px) / np.array([1 + camera.aspect / 2, 1 - camera.aspect / 2])
-    if any(camera.decentring):
-        focal = focal_px(camera)
-        seen, m = offset / focal, offset / focal
-        p = np.array(camera.decentring)
-        for _ in range(_DECENTRING_STEPS):
-            m = seen - (np.sum(m * m, -1, keepdims=True) * p + 2 * m * np.sum(m * p, -1, keepdims=True))
-        offset = focal * m
-    return np.asarray(offset + camera.model.centre_px)
+    centre = camera.model.centre_px
+    seen = centre + (uv - centre) / np.array([1 + camera.aspect / 2, 1 - camera.aspect / 2])
+    if not any(camera.decentring):
+        return np.asarray(seen)
+    p, place = focal_px(camera) * np.array(camera.decentring), seen
+    for _ in range(_DECENTRING_STEPS):
+        ray = camera.model.unproject(place).ray
+        across = np.hypot(ray[..., 0], ray[..., 1])
+        # The angle and its azimuth, not the image radius, which a model's distortion makes another one.
+        m = ray[..., :2] * (np.arctan2(across, ray[..., 2]) / np.maximum(across, 1e-12))[..., None]
+        place = seen - (np.sum(m * m, -1, keepdims=True) * p + 2 * m * np.sum(m * p, -1, keepdims=True))
+    return np.asarray(place)
 
 
 def focal_px(camera: TrueCamera) -> float:

@@ -61,9 +61,6 @@ class SensorTilt(Directed):
 
     name = "sensor_tilt"
     amplitudes = along_x_and_y(name, 5e-4)
-    # In drawn cases this effect is estimated 4 to 8 % too small, although its law holds to 0.3 %. The
-    # reason is not known; the value covers the difference. Debt: data/debts.md.
-    law_sigma = 0.06
     words = (
         "The sensor is tilted or the lenses are decentred: p = {p:.2e} beyond the stated, toward "
         "{direction_deg:.1f}°."
