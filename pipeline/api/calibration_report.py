@@ -19,6 +19,8 @@ from pipeline.instrument.probe import Probe
 from pipeline.pages import page_template, rendered
 from stages.calibrate.gauge.result import GaugeCalibration, RadiusError, WeakDirection
 
+# From this share of its prior σ on, a combination of parameters counts as undetermined (chosen); combinations
+# listed; side of the cells, px, whose median residual a map shows.
 _UNDETERMINED = 0.7
 _SHOWN = 6
 _CELL_PX = 40

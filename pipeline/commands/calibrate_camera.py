@@ -73,7 +73,8 @@ def calibrate_camera(
     board_shape: Annotated[
         BoardShape | None,
         typer.Option(
-            help="take the board for flat, estimate its sag, or where each corner is; best: the better"
+            help="take the board as flat, estimate its sag, or estimate every corner; "
+            "best: the better of the last two"
         ),
     ] = None,
     folds: Annotated[int | None, typer.Option(min=2, max=50, help="parts for held-out reprojection")] = None,

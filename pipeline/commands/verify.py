@@ -225,6 +225,7 @@ def _show(document: dict[str, Any], folder: Path) -> None:
     typer.echo(f"Certificate: {folder / 'certificate.html'}")
 
 
+# Cells of the pictured map along the pipe and around it: about as many as the picture has room for.
 _STATIONS, _SECTORS = 300, 120
 
 

@@ -160,7 +160,7 @@ def written_together(folder: Path, last: str) -> Iterator[Path]:
     """Lend a folder for files that belong together, which take their places in ``folder`` at the end.
 
     The file ``last`` is taken away first and put there last: where it is, all of them are, and all of one
-    call. Of a call that fails or is killed before, nothing is left but what an earlier one wrote.
+    call. A call that fails or is killed before it takes ``last`` away leaves what an earlier one wrote.
 
     Raises
     ------

@@ -43,6 +43,7 @@ def parse_json(text: str | bytes) -> Any:
         raise ValueError("it is nested too deeply") from error
 
 
+# A file of settings has some kB; a larger one than this is not one, and is refused unread.
 LARGEST_YAML_BYTES = 1_000_000
 # Likeness of two keys, of 1, from which one is taken for the other misspelt; frames and frame_rate have 0.63.
 _MISSPELT = 0.8

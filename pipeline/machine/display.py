@@ -49,7 +49,7 @@ class SilentDisplay:
 
 
 class ProgressDisplay:
-    """One bar for the whole, one beneath it for each running stage, and a line for each that ended.
+    """One bar for the whole run, one beneath it for each running stage, and a line for each stage that ended.
 
     Attributes
     ----------
@@ -58,7 +58,7 @@ class ProgressDisplay:
     """
 
     def __init__(self, console: Console, *, warn_at_once: bool = True) -> None:
-        """Print warnings when their stage ends; else count them there, and the caller prints them."""
+        """Print the warnings of a stage when it ends, or only their number, for the caller to print them."""
         self._progress = Progress(
             TextColumn("{task.description:<20}"),
             BarColumn(),

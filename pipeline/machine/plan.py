@@ -93,7 +93,7 @@ class Plan:
         return next((s for s in self.steps if s.output == kind), None)
 
     def input_hashes(self) -> dict[str, str]:
-        """Return the hash of every source by what it is: ``recording``, ``probe``; or ``gauge``, its role."""
+        """Return the hash of every source by name: ``recording``, ``probe``, or a role such as ``gauge``."""
         return {role_of(s.kind) or plain(s.kind).__name__.lower(): s.key for s in self.sources if s.key}
 
     def key(self) -> str:
@@ -167,13 +167,13 @@ def make_plan(stages: Sequence[Stage], configuration: Configuration, sources: Se
 
 
 def _found(kind: type, stage: Stage, made: Mapping[type, str]) -> type:
-    """Return the class of a stage's own recording where there is one, else the one that all share."""
+    """Return the class of the stage's own recording where a step makes it, else the class all share."""
     own = of_role(kind, stage.role) if kind == plain(kind) else kind
     return own if own in made else kind
 
 
 def _wired(stage: Stage, made: Mapping[type, str], stages: Sequence[Stage]) -> dict[str, type]:
-    """Return the classes of a stage's arguments, without those that may be None and that nothing makes."""
+    """Return the class of each argument of a stage; optional arguments that no stage makes are left out."""
     found = {name: _found(kind, stage, made) for name, kind in stage.inputs().items()}
     known = {*made, *(s.output() for s in stages)}
     return {name: kind for name, kind in found.items() if kind in known or name not in stage.may_lack()}

@@ -23,8 +23,8 @@ from pipeline.machine.store import Provenance, Store, Stored
 from pipeline.system.native import give_back_memory
 from pipeline.system.parallel import one_library_thread
 
-_LONGEST_PROBLEM = 300
-_LOOK_S = 0.2  # a signal that reaches another thread is seen after so long
+_LONGEST_PROBLEM = 300  # characters of an unexpected error that run.json quotes; the log has all of it
+_LOOK_S = 0.2  # longest wait, after which the main thread looks whether the user wishes to stop
 
 
 class FailedError(BoresightError):
@@ -185,7 +185,7 @@ class Runner:
         return stored
 
     def _artefact(self, step: Step, numbers: list[Number]) -> object:
-        """Call a stage; that an input changed meanwhile is raised in place of any other error."""
+        """Call a stage. Where an input changed meanwhile, that is raised in place of any other error."""
         inputs: dict[str, object] = dict.fromkeys(step.stage.may_lack())
         inputs |= {argument: self._artefacts[kind] for argument, kind in step.inputs}
         context = self._context(step, numbers)
@@ -285,7 +285,7 @@ class Runner:
 
 
 def _next(waiting: list[Step], running: Collection[Step], at_once: int) -> Step | None:
-    """Take the first step off the list that needs nothing still to be made; None while there is no room."""
+    """Take the first step off the list whose inputs are all made; None while too many steps are running."""
     missing = {s.output for s in (*waiting, *running)}
     ready = (s for s in waiting if not any(kind in missing for _, kind in s.inputs))
     step = next(ready, None) if len(running) < at_once else None

@@ -127,7 +127,8 @@ class Stage:
     summary
         One line for ``boresight stages``.
     section
-        Section of the configuration with its parameters, where it is not its name: stages may share one.
+        Section of the configuration that holds its parameters, where that is not ``name``: several stages may
+        share a section.
     role
         Which of several recordings it works on: see `for_role`.
     """
@@ -153,8 +154,9 @@ class Stage:
     def for_role(self, role: str) -> Stage:
         """Return the stage as the one that works on one of several recordings.
 
-        It takes every artefact of that recording, and where there is none the one that all share. Its results
-        have the keys that they have without a role, so that a run of the recording alone holds them too.
+        The stage takes the artefacts made of that recording; where there is no such artefact, it takes the
+        one that all recordings share. Its results have the same keys as without a role, so that they can be
+        reused from a run of that recording alone.
         """
         return replace(self, role=role)
 

@@ -1,4 +1,4 @@
-"""Results on disk: one folder each, its manifest written last; what has a whole manifest is whole."""
+"""Results on disk, one folder each. The manifest is written last: where it is whole, the result is."""
 
 from __future__ import annotations
 

@@ -25,7 +25,7 @@ IMAGE_TOPICS = ("/camera/image_raw", "/camera/image_raw/compressed", "/camera/im
 ILLUMINATION_TOPIC, ILLUMINATION_TYPE = "/illumination", "std_msgs/msg/String"
 ENCODER_TOPIC, ENCODER_TYPE = "/encoder/distance_mm", "std_msgs/msg/Float64"
 IMU_TOPIC, IMU_TYPE = "/imu/data", "sensor_msgs/msg/Imu"
-# Stamps of the camera's driver count when they run with the recorder's clock to within this time.
+# The camera driver's stamps are used when they agree with the recorder's clock to within this time.
 _SAME_CLOCK_NS = 5_000_000_000
 _KINDS = tuple(k.value for k in Illumination)
 COMPRESSED_TYPE = "sensor_msgs/msg/CompressedImage"

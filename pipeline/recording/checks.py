@@ -1,6 +1,6 @@
-"""What does not fit together in a recording: mended and named in a warning, or refused.
+"""Contradictions within a recording: each is mended and named in a warning, or refused.
 
-`CheckedFrames` are the tables as the pictures bear them out: in which light each frame was taken, and when.
+`CheckedFrames` is the table of frames as the pictures show it: in which light each was taken, and when.
 """
 
 from __future__ import annotations
@@ -83,7 +83,7 @@ WITHHELD = "withheld"
 
 @dataclass(frozen=True)
 class CheckedFrames:
-    """The table of frames and the encoder's unit after they were held against the pictures.
+    """The table of frames and the encoder's unit after they were compared with the pictures.
 
     Attributes
     ----------

@@ -38,9 +38,10 @@ def _slack_s(encoder: Encoder, frames: FrameTable) -> float:
 
 
 def counted_on(encoder: Encoder) -> tuple[Encoder, tuple[str, ...]]:
-    """Return an encoder whose counter restarts again and again as if it had counted on, and a warning of it.
+    """Return the readings of a counter that restarts as if it had counted on, and a warning of that.
 
-    Such a counter jumps back, always by all that it can count. A wheel that slips goes on from where it is.
+    Such a counter always jumps back by its whole range; after a slip of the wheel the reading goes on from
+    where it is.
     """
     jumps = _jumps(encoder)
     if not jumps.size:

@@ -1,7 +1,7 @@
 """A recording that is still being written: every look at its folder reads what is new in it.
 
-Of a Matroska video the last cluster, which may be half there, is read again; of other kinds of video, and of
-bags, the whole. Files are not hashed: what is shown of a growing recording is not a result.
+Of a Matroska video only the last cluster, which may be incomplete, is read again. Other kinds of video, and
+bags, are read again as a whole. Files are not hashed: what is shown of a growing recording is not a result.
 """
 
 from __future__ import annotations

@@ -1,7 +1,8 @@
 """The end of a Matroska file that is still being written, as a file of its own.
 
-Behind the head of the file (what comes before its first cluster) clusters stand for themselves: head and all
-from some cluster on are again a Matroska file (RFC 9559, § 5.1.3). So what is new can be read alone.
+Clusters do not depend on each other. So the head of the file (what comes before its first cluster), followed
+by everything from any later cluster on, is again a Matroska file (RFC 9559, § 5.1.3), and what is new can be
+read alone.
 """
 
 from __future__ import annotations
@@ -14,6 +15,8 @@ _CLUSTER = b"\x1f\x43\xb6\x75"
 _TIMESTAMP, _CRC32 = 0xE7, 0xBF
 _CRC32_BYTES = 6
 _LONGEST_START = 4 + 8 + _CRC32_BYTES + 1
+# The first cluster is looked for in so many bytes from the start (heads have some kB), and the last one in
+# pieces of so many bytes from the end.
 _HEAD_BYTES = 1 << 20
 _AT_ONCE = 1 << 20
 

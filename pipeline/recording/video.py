@@ -56,8 +56,9 @@ class VideoSource:
     def numbered_by(self, table: FrameTable) -> VideoSource:
         """Return the source with numbers taken from a table of frames by their times.
 
-        A file that lost frames on its way to the disk has fewer than the table lists: counting them would
-        give those behind the gap the light of others. Where times do not agree, frames stay counted.
+        A file that lost frames while it was written has fewer than the table lists. If frames were numbered
+        by counting, those after the gap would get the light of others. Where the times do not agree, frames
+        are numbered by counting all the same.
         """
         if not self.index.timed or self.numbers.size >= table.frame.size or table.frame.size < 2:
             return self

@@ -17,6 +17,8 @@ import numpy as np
 
 from pipeline.arrays import Bool, Int
 
+# H.264: types of NAL units that hold a slice (ITU-T H.264, table 7-1); the first byte of a description whose
+# units carry their length (ISO/IEC 14496-15). FFV1: bytes of the footer of each slice (RFC 9043).
 _SLICES = (1, 2, 3, 4, 5)
 _LENGTH_PREFIXED = 1
 _FOOTER_BYTES = 8
@@ -86,8 +88,8 @@ class VideoIndex:
     def with_gaps(self, gaps: Int) -> VideoIndex:
         """Return the index of a file from which frames are missing right before the frames ``gaps``.
 
-        The missing ones may be part of the prediction of those shown after them, and of those shown before
-        them by no more than the reordering, up to the next keyframe.
+        Up to the next keyframe, frames shown after the gap may be predicted from the missing ones; so may
+        frames that are shown before it by no more than the decoder reorders.
         """
         if self.intra:
             return self

@@ -23,6 +23,7 @@ from pipeline.review.model_stretches import StretchedModel
 from pipeline.review.review import Seal, State
 from pipeline.review.run_files import RunFiles
 
+# Colours in which a legend's gradient is given.
 _LEGEND_STEPS = 64
 # What the page needs of a finding as the run measured it; the rest comes with the state.
 _TOLD = ("id", "statement", "pof_class", "pacp_suggestion", "en13508_suggestion")

@@ -66,7 +66,7 @@ class OutlineGauge:
         at_row = (point[:, 0] - wall.distance_mm[rows[0]]) / wall.step_mm
         at_column = (point[:, 1] - wall.azimuth_rad[0]) / wall.step_rad - first
         inside = cells_within(np.stack([at_column, at_row], -1), (len(rows), count))
-        reach = np.array([count and _AROUND_MM / (radius * wall.step_rad), _AROUND_MM / wall.step_mm])
+        reach = np.array([_AROUND_MM / (radius * wall.step_rad), _AROUND_MM / wall.step_mm])
         size = tuple(int(2 * np.ceil(r) + 1) for r in reach)
         grown = cv2.dilate(inside.astype(np.uint8), cv2.getStructuringElement(cv2.MORPH_ELLIPSE, size))
         columns = (first + np.arange(count)) % len(wall.azimuth_rad)

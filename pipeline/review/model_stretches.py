@@ -27,7 +27,7 @@ from pipeline.review.run_files import RunFiles
 
 Json = dict[str, Any]
 _GLTF, _JSON, _BINARY = 0x46546C67, 0x4E4F534A, 0x004E4942
-_LARGEST_DOCUMENT = 256 << 20
+_LARGEST_DOCUMENT = 256 << 20  # bytes of JSON that are read at most; a larger one is refused
 _VARIANTS = "KHR_materials_variants"
 _MOST_STATIONS = 2000  # of an axis: at 100 m one every 5 cm
 

@@ -19,6 +19,7 @@ from pipeline.export.report.tables import REASONS
 from pipeline.review.documents import cleaned
 from pipeline.review.run_files import RunFiles
 
+# Points of a curve, about one for each pixel of its width; bytes of a diagnosis page that is still read.
 _MOST_POINTS = 600
 _LARGEST_PAGE = 64 << 20
 _PICTURE = re.compile(r"data:image/(png|jpeg);base64,[A-Za-z0-9+/=]+")

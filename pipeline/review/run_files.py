@@ -50,7 +50,7 @@ class RunFiles:
 
     @property
     def version(self) -> str:
-        """Hash of run.json, which changes whenever the run is computed again; its time would not do."""
+        """Hash of run.json, which changes whenever the run is computed again; its file time may not."""
         try:
             return hashlib.sha256(self.file("run.json").read_bytes()).hexdigest()
         except OSError:

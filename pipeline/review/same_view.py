@@ -49,8 +49,8 @@ class Stand:
     polar_rad : (2,)
         Angles to the optical axis of the first and last row of `light`; the lens shows nothing beyond.
     light : (T, A)
-        Recorded grey level over that of the evenly lit photo, by the angle to the optical axis and the
-        azimuth about it; columns are uniform from −π, the first in the middle of its cell.
+        Recorded grey level divided by that of the evenly lit photo. Rows are angles to the optical axis;
+        columns are azimuths about it, evenly spaced, the first half a cell after −π.
     """
 
     frame: int

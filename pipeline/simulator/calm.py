@@ -1,4 +1,4 @@
-"""Hits from a good start, where the wall is calm enough that a ray can meet it only once."""
+"""Hits from a good first guess, where the wall is so smooth that a ray can meet it only once."""
 
 from __future__ import annotations
 
@@ -97,13 +97,13 @@ def hit_near(
     surface: Surface, clear: Float, ray: Float, way: float, s: float, close: float, o: Float, R: Float,
     hit: Float,
 ) -> bool:  # fmt: skip
-    """Find a hit from a way and a distance close to it: see `first_hit`, whose outputs these are.
+    """Find a hit, given a way along the ray and a distance close to it; the outputs are `first_hit`'s.
 
     Returns
     -------
     bool
-        False where the search does not end, or where the ray might meet the wall before: then `first_hit`
-        must tell.
+        False where the search does not converge, or where the ray might meet the wall earlier: then
+        `first_hit` has to be called.
     """
     straight = surface.axis_s.shape[0] == 2
     base, a0, b0, c0, da, db, dc = 0.0, ray[0], ray[1], ray[2], ray[3], ray[4], ray[5]

@@ -24,7 +24,7 @@ _DIRECTION = "direction_deg"
 
 
 class Pairing(Parameters):
-    """A gauge scene and an inspection scene that fit one probe; the files are beside the prior's."""
+    """A gauge scene and an inspection scene for one probe, named relative to the prior's file."""
 
     gauge: str = Field(min_length=1, description="scene file of the gauge run")
     field: str = Field(min_length=1, description="scene file of the inspection")

@@ -8,7 +8,7 @@ from pipeline.arrays import Float
 from pipeline.simulator.kernel import kernel
 from pipeline.simulator.surface import NEAR_BLOCKS, WIDE_BLOCKS, Surface
 
-# A step of a ray stays within the blocks that a floor looks ahead by so much, mm.
+# A step of a ray ends so many mm before the end of the stretch for which a floor (the least radius) holds.
 _SPARE = 0.1
 # Longest step near the wall: about a cell of the relief (0.25 mm), so that no feature is stepped over.
 _FINE_MM = 0.3
@@ -17,7 +17,7 @@ _LEAST_STEP_MM = 2e-5
 # How far from a section's plane a point of a bent pipe may lie: off by this times radius over bend, below
 # the precision of a hit.
 _SECTION_MM = 1e-5
-# Way after which a ray counts as lost: farther than any light in a pipe of this kind reaches.
+# Way along a ray, mm, after which it counts as lost: farther than any light reaches in such a pipe.
 _FAR_MM = 2000.0
 
 

@@ -83,7 +83,7 @@ class Shot:
     seed : int
         Of the speckle and of the pixels' dark signals and defects.
     row_gain : (rows or 1,)
-        Power of all lights, over the usual, in each row's exposure.
+        Power of all lights in each row's exposure, relative to their mean power.
     """
 
     instrument: TrueInstrument

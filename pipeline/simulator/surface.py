@@ -13,7 +13,7 @@ from pipeline.geometry.rigid import from_parts, inverse
 from pipeline.simulator.kernel import kernel
 from pipeline.simulator.wall.grid import Wall
 
-# Blocks of a millimetre that the two floors look ahead.
+# The near and the wide floor are the least radius over so many blocks of 1 mm to both sides.
 NEAR_BLOCKS, WIDE_BLOCKS = 2, 32
 # The wall's steepness is tabled by sectors of azimuth, so that a pit slows the rays of its own sector alone.
 SECTORS = 32
@@ -23,7 +23,7 @@ _AXIS_STEP_MM = 0.25
 
 
 class Surface(NamedTuple):
-    """A wall laid out for the kernels, in a frame W of its own.
+    """A wall as arrays for the kernels, in a frame W of its own.
 
     W is P for a bent pipe. For a straight one its z is the axis and its origin distance 0.
 
@@ -116,7 +116,7 @@ def _own_frame(axis: PipeAxis) -> Float:
 
 
 def _floor(wall: Wall) -> Float:
-    """Return the least radius (2, blocks) near and less near every millimetre."""
+    """Return the least radius (2, blocks) within `NEAR_BLOCKS` and `WIDE_BLOCKS` of every millimetre."""
     block = np.floor(wall.shape.step_mm * np.arange(wall.shape.rows)).astype(int)
     least = np.full(block[-1] + 1, np.inf)
     np.minimum.at(least, block, wall.radius_mm.min(1).astype(float))
@@ -136,7 +136,7 @@ def _steepest(wall: Wall) -> Float:
 
 
 def _most_by_sector(wall: Wall, value: Float32, beside: int) -> Float:
-    """Return the most (blocks, SECTORS) of values (rows, columns) in a block, a sector, and those beside."""
+    """Return the maximum of values (rows, columns) over each block and sector and the ones beside them."""
     grid = wall.shape
     block = np.floor(grid.step_mm * np.arange(grid.rows)).astype(int)
     sector = (SECTORS * np.arange(grid.columns)) // grid.columns

@@ -255,5 +255,5 @@ def _hash(path: Path, nonce: str) -> str:
 
 
 def _files(folder: Path) -> list[Path]:
-    """Return the plain files of a folder, by name; those of sub-folders by their own names are not used."""
+    """Return the files that lie directly in a folder, sorted by name; sub-folders are not looked into."""
     return sorted(p for p in folder.iterdir() if p.is_file())

@@ -1,8 +1,9 @@
 """Kernels of a first run, compiled by a second process while the run reads its recording.
 
-Numba compiles a kernel when it is first called and keeps it in its cache. After an installation that takes
-longer than the run itself, on one core of two. Which kernels there are and what they are called with stands
-in ``configs/kernels/run.yaml``; one that is not listed is compiled when it is called, as it always was.
+Numba compiles a kernel when it is first called and keeps it in its cache. In the first run after an
+installation, compiling takes longer than the run itself, on one core of two. ``configs/kernels/run.yaml``
+lists the kernels and the types of their arguments; a kernel that is not listed there is compiled when it is
+first called.
 """
 
 from __future__ import annotations
@@ -38,12 +39,13 @@ _TYPE = re.compile(
 
 @contextmanager
 def compiled_ahead(kernels: Kernels) -> Iterator[None]:
-    """Have kernels that Numba's cache lacks compiled meanwhile; results are the same with and without.
+    """Compile kernels that Numba's cache lacks while the caller works; no result depends on it.
 
-    Kernels that all seem to be there are read by a thread of this process, which takes .3 s: stages would
-    wait for them. Should Numba refuse what is kept, as after an update of it, the thread compiles them anew,
-    slower than a second process would. A kernel that cannot be compiled ends what is done here, and the stage
-    that calls it says why. Where the second process is not done when the run is, what it is at is given up.
+    Where the cache seems to hold all kernels, a thread of this process loads them (0.3 s), so that no stage
+    has to wait for that. If Numba refuses what the cache holds, for instance after Numba was updated, the
+    thread compiles the kernels again, slower than a second process would. A kernel that cannot be compiled
+    ends the compiling; the stage that calls the kernel reports why. A second process that is still compiling
+    when the run is done is stopped.
     """
     if all(_is_kept(dispatcher) for dispatcher, _ in _found(kernels)):
         with ThreadPoolExecutor(1, "kernels") as aside:

@@ -25,7 +25,10 @@ from stages.catalogue import PIPELINE
 from stages.diagnose.correct import encoder_effects, with_true_readings
 from stages.diagnose.result import EffectFound
 
+# Defects of two runs that lie closer than this, mm along the pipe and hours on the clock, are the same one
+# (chosen).
 _NEAR_MM, _NEAR_HOURS = 8.0, 1.5
+# Radius changes that scatter by less than this share of their size are told as one "all round" (chosen).
 _EVEN = 0.2
 # Depth changes and radius changes below these, mm, are not told: no inspection decides on less (chosen).
 _LEAST_DEPTH_CHANGE_MM, _LEAST_RADIUS_CHANGE_MM = 0.01, 0.005

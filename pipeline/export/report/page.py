@@ -105,6 +105,7 @@ def round_ticks(low: float, high: float, about: int) -> Float:
     return np.asarray(np.round(np.arange(np.ceil(low / step), np.floor(high / step) + 1) * step, 10) + 0.0)
 
 
+# Marks on one picture, above which their numbers are left out. Chosen by eye.
 _MOST_NUMBERED = 40
 
 

@@ -172,6 +172,7 @@ def _counted(found: tuple[Defect, ...]) -> str:
 
 
 REASONS = {v: SAMPLE_REASONS[v.name.lower()] for v in RingValidity}
+# Frames that a cell lists before it only counts the others.
 _SHOWN = 24
 
 

@@ -42,7 +42,7 @@ class CameraCalibration:
     ----------
     camera
     covariance : (P, P)
-        Of ``camera.parameters``, the boards' poses marginalised, from the residuals' own spread.
+        Of ``camera.parameters``, with the boards' poses marginalised; scaled by the spread of the residuals.
     names : tuple of str
         The V views used.
     T_cb : (V, 4, 4)
@@ -80,7 +80,7 @@ class CameraCalibration:
 
 @dataclass(frozen=True)
 class ModelScore:
-    """How a camera model did on the same views as others.
+    """How well one camera model predicts the views; all models are tried on the same ones.
 
     Attributes
     ----------

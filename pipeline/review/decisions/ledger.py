@@ -15,6 +15,7 @@ from pipeline.errors import BoresightError, InputError
 from pipeline.files.disk import disk_errors_named
 from pipeline.review.decisions import Action, action_of
 
+# Time that an action waits for another process that is writing, before it is refused. Chosen.
 _BUSY_S = 10.0
 _KEPT = "free space or mend its permissions, then do the last step again; what was decided before is kept"
 # What the disk refuses, in whatever variant; anything else is the fault of the file's content.

@@ -1,6 +1,8 @@
 """What each effect of the catalogue does to picture, ring and encoder, and how alike two effects are.
 
-Likeness is the angle between their patterns on the ring, or else on line or odometer. All is computed.
+Likeness is |cosine| of the angle between two patterns: of the radius error around the ring or, for effects
+without one, of the line's profile or the odometer's reading. Nothing is typed in: all is computed from
+renderings.
 """
 
 from __future__ import annotations
@@ -94,7 +96,7 @@ _GREEN = 1
 STATES = {"off-centre probe": 1, "pipe of another radius": 0}
 # Typical 1 σ of a frame's light, width and skewness along one azimuth, in which they are weighed together.
 _PROFILE_SIGMA = (0.05, 0.05, 0.15)
-# What is alike beyond so many is not listed.
+# At most so many likenesses are listed for an effect.
 _MOST_ALIKE = 5
 
 
@@ -135,7 +137,7 @@ class Residual:
 
 @dataclass(frozen=True)
 class Exhibit:
-    """What an effect does at its size.
+    """What one effect does at the size of its switch.
 
     Attributes
     ----------
@@ -228,11 +230,11 @@ class Likeness:
 
 
 def likenesses(exhibits: Sequence[Exhibit], least: float = 0.9) -> dict[str, list[Likeness]]:
-    """Return for each effect what looks like it in one bore, first what does so in all three.
+    """Return for each effect the others that look like it in one bore, the likest over all three first.
 
-    Compared are radius errors over azimuth; of effects that leave the radius alone the motion less the
-    encoder's reading, or else light, width and skewness of the line. An effect with a direction of its own
-    is turned to where it is most alike.
+    Radius errors over azimuth are compared. For effects that do not change the radius, the motion less the
+    encoder's reading is compared or, where there is none, light, width and skewness of the line. An effect
+    with a direction is turned to the direction in which the two are most alike.
     """
     return {e.name: _alike(e, exhibits, least)[:_MOST_ALIKE] for e in exhibits}
 
@@ -245,7 +247,7 @@ def _alike(one: Exhibit, exhibits: Sequence[Exhibit], least: float) -> list[Like
 
 
 def _kind(exhibit: Exhibit) -> str:
-    """Return what of an effect is compared."""
+    """Return which pattern of an effect is compared: ``ring``, ``line`` or ``course``."""
     if exhibit.shows_on_ring:
         return "ring"
     return "line" if exhibit.course is None else "course"
@@ -266,7 +268,7 @@ def _effect_likeness(one: Exhibit, other: Exhibit) -> Likeness:
 
 
 def _state_likeness(one: Exhibit, name: str, order: int) -> Likeness:
-    """Return the share of the radius error that a state takes up, fitted in each bore by itself."""
+    """Return how much of the radius error one of `STATES` explains when it is fitted in each bore apart."""
     wave = np.exp(1j * order * one.azimuth_rad)
     basis = np.stack([wave.real, wave.imag] if order else [wave.real], -1)
     taken, whole = {}, {}
@@ -279,7 +281,7 @@ def _state_likeness(one: Exhibit, name: str, order: int) -> Likeness:
 
 
 def _pattern(exhibit: Exhibit, radii: Sequence[float]) -> Float:
-    """Return what is compared, (rows, A)."""
+    """Return the pattern that is compared, (rows, A), over the bores of ``radii``."""
     residuals = [exhibit.residual[r] for r in radii]
     if exhibit.shows_on_ring:
         return np.stack([r.error_mm for r in residuals])

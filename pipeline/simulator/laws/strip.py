@@ -1,4 +1,4 @@
-"""The line's profile as rendered, on a narrow strip of the sensor at azimuth 0: fast, and the real engine."""
+"""The line's profile on a narrow strip of the sensor at azimuth 0: quick, yet by the real renderer."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def profiles(truth: SceneTruth, *switches: Switch) -> Profiles:
 
 
 def exposed_profiles(truth: SceneTruth, *switches: Switch) -> Profiles:
-    """Return the line's profiles in a frame as recorded, next to no noise in it but rounding."""
+    """Return the line's profiles in a frame as recorded, with hardly any noise but that of rounding."""
     changed = with_sensor(switch_on(truth, switches), full_well_e=1e12, read_noise_e=0.0)
     return _cut(renderer_of(changed).frame(0)[..., _GREEN].astype(float) / 255.0)
 

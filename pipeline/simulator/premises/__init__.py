@@ -95,7 +95,7 @@ def require(premises: Sequence[Premise]) -> tuple[Premise, ...]:
 
 # Errors of a stored picture that do not average out over frames: interpolation, rounding, codec.
 _FIXED_PX = 0.005
-# The same for relative light and width of the line. Chosen, not measured.
+# The same errors for relative light and relative width of the line. Chosen, not measured.
 _FIXED_SHAPE = 0.003
 # An effect must exceed the noise floor so many times (3 σ) for a scene to show it.
 _TIMES_THE_FLOOR = 3.0
@@ -130,7 +130,9 @@ class SeenRing:
 
 
 def effect_premises(plain: SceneTruth, switches: Sequence[Switch]) -> list[Premise]:
-    """Return by how many times each effect on more than pictures exceeds the noise floor, the others on.
+    """Return how many times the noise floor each effect changes the recording by, the others switched on.
+
+    Effects of the family ``picture`` are left out.
 
     Parameters
     ----------
