@@ -112,7 +112,7 @@ def wall_coverage(wall: WallMap) -> float:
 
 
 def bore_differences(wall: WallMap, diameter_mm: float, tolerance_mm: float) -> Differences:
-    """Return the differences of a wall from a known bore; the tolerance is a uniform ± of its radius."""
+    """Return the differences of a wall's radius from a known bore's, which is uniform within ± tolerance."""
     known = np.isfinite(wall.radius_mm)
     station, azimuth = np.nonzero(known)
     bore = tolerance_mm**2 / 3
@@ -197,7 +197,7 @@ class KnownBore:
 
 @dataclass(frozen=True)
 class Verification:
-    """How both were brought together (None where nothing had to be), the differences and their figures."""
+    """The alignment of run and reference (None against a known bore), their differences and the figures."""
 
     kind: str
     alignment: Alignment | PointsPose | None

@@ -1,4 +1,4 @@
-"""Premises: the tables of a recording are compared with its pictures before anything relies on them."""
+"""The stage premises compares a recording's tables with its pictures before any stage relies on them."""
 
 from __future__ import annotations
 
@@ -44,8 +44,8 @@ from stages.premises.stays import places_that_stay
 
 _LASER, _LED, _BOTH = Illumination.LASER.value, Illumination.LED.value, Illumination.BOTH.value
 Labels = NDArray[np.str_]
-# Where all pictures look alike, the light that at least this share of the rows states is believed: the other
-# rows are slips of the pen. With a smaller share the table itself is refused.
+# If all pictures look alike, the light stated by at least this share of the rows is believed and the other
+# rows count as mistakes. If no light has such a share, the table is refused.
 _MOST_ROWS = 2 / 3
 # Lights that change more often than this from picture to picture are switched on purpose.
 _SWITCHED = 0.1
@@ -103,10 +103,10 @@ def check_premises(
 class _Seen:
     """What the pictures of a recording show.
 
-    ``light`` (F,) is the `Light` of every picture. ``in_order`` (F,) is the same, but unknown for pictures
-    outside the pipe or out of order, and ``shown`` (F,) is that, or the stated lights where pictures do not
-    tell lights apart. ``outside`` and ``astray`` (F,) are as in `LeftOut`; something ``stays`` (h, w) in the
-    picture while the wall moves.
+    ``light`` (F,) is the `Light` of every picture; ``in_order`` (F,) is the same, but unknown for pictures
+    outside the pipe or out of order; ``shown`` (F,) is ``in_order``, or the stated lights where pictures do
+    not show two. ``outside`` and ``astray`` (F,) are as in `LeftOut`. ``stays`` (h, w) is where something
+    stays in the picture while the wall moves.
     """
 
     pictures: Pictures
@@ -180,7 +180,7 @@ def _compared(recording: Recording, probe: Probe, seen: _Seen, found: _Matched, 
 def _progressive(
     recording: Recording, probe: Probe, parameters: PremisesParameters, context: Context
 ) -> tuple[Recording, Pictures, bool]:
-    """Return the recording, its pictures, and whether they are interlaced: then both have even rows only."""
+    """Return recording, pictures, and whether they are interlaced; if so, both contain even rows only."""
     pictures = look_at_pictures(recording, probe, context)
     if not interlaced(pictures):
         return recording, pictures, False
@@ -196,7 +196,7 @@ def _copies(recording: Recording, table: FrameTable, pictures: Pictures, light: 
 
 
 def _table(recording: Recording) -> FrameTable:
-    """Return all rows of the table of frames if its first rows are those of the pictures."""
+    """Return the whole table of frames if its first rows are the pictures' frames, else only their rows."""
     frame, listed = recording.frames.frame, recording.listed
     whole = listed is not None and np.array_equal(listed.frame[: len(frame)], frame)
     return listed if whole and listed is not None else recording.frames
@@ -213,7 +213,7 @@ def _stated(table: FrameTable, row: Int) -> Labels:
 def _light(frames: FrameTable, pictures: Pictures) -> Int:
     """Return the `Light` (F,) of every picture.
 
-    Where all look alike although the table states two lights, it is the one that most rows state.
+    If all pictures look alike although the table states two lights, the light of most rows is returned.
     """
     light, stated = light_seen(pictures), _lights_of(frames.illumination)
     _refuse_one_light(frames, stated, light)
@@ -231,7 +231,7 @@ def _light(frames: FrameTable, pictures: Pictures) -> Int:
 
 
 def _refuse_one_light(frames: FrameTable, stated: Int, light: Int) -> None:
-    """Refuse a table that states one light of pictures in two that are switched on purpose."""
+    """Refuse a table that states a single light, where the pictures show two that alternate."""
     names, known = np.unique(frames.illumination), light[light != Light.UNKNOWN]
     if len(names) != 1 or names[0] == _BOTH or not known.size or np.mean(np.diff(known) != 0) < _SWITCHED:
         return
@@ -246,7 +246,7 @@ def _refuse_one_light(frames: FrameTable, stated: Int, light: Int) -> None:
 
 
 def _aligned(frames: FrameTable, table: FrameTable, pictures: Pictures, light: Int) -> Alignment:
-    """Return which row belongs to which picture: they follow in order where the table states one light."""
+    """Return which row belongs to which picture; with a single stated light, rows and pictures go in step."""
     count, stated = len(frames.frame), _lights_of(table.illumination)
     wrong = (light != Light.UNKNOWN) & (light != stated[:count])
     if len(np.unique(stated)) < 2:
@@ -261,7 +261,7 @@ def _aligned(frames: FrameTable, table: FrameTable, pictures: Pictures, light: I
 
 
 def _labels(table: FrameTable, alignment: Alignment, light: Int, pictures: Pictures) -> Labels:
-    """Return the illumination (F,) of every picture: as it shows, or as its row states if it shows none."""
+    """Return the illumination (F,) of every picture: what it shows, or where it does not tell, its row's."""
     stated = _stated(table, alignment.row)
     led, both = stated == _LED, stated == _BOTH
     wall = _LED if led.sum() >= both.sum() else _BOTH

@@ -1,4 +1,4 @@
-"""Whether the pictures are stored in reverse order, told by the encoder read backwards in time."""
+"""Recognises pictures that are stored in reverse order: the encoder fits them if read backwards in time."""
 
 from __future__ import annotations
 
@@ -10,20 +10,21 @@ from pipeline.errors import UnusableError
 from pipeline.recording.base import Encoder
 from stages.premises.losses import Steps
 
-# Motion that fits twice as well backwards in time is backwards: in 29 recordings that are not, open-1 to a12,
-# it fits 1.24 times as well at best, and in all 14 gauges when reversed 2.2 times or more. Few steps tell
-# nothing.
+# The pictures count as reversed if their motion fits the encoder twice as well backwards in time. In 29 sound
+# recordings (open-1 to a12) it fits at most 1.24 times as well, in all 14 gauge runs, reversed, 2.2 times or
+# more. With fewer steps nothing is said.
 _TWICE, _LEAST_TOLD = 2.0, 20
-# The encoder's clock may be off meanwhile, by a second here. With a tenth, of 60 drawn runs that stop and go
-# up to 15 were refused where it was off by more; with a second none, and all 120 that ran backwards were.
-# Tried every 12.5 ms: no delay is further from one tried than a fifth of a frame at 30 frames a second.
+# Delays of the encoder's clock, s, that are tried before pictures count as reversed. With ±0.1 s, up to 15 of
+# 60 drawn runs that stop and go were wrongly refused where the clock was off by more; with ±1 s none was, and
+# all 120 reversed ones were. At steps of 12.5 ms no delay is farther from one tried than a fifth of a frame
+# at 30 frames a second.
 _LATE_S = np.linspace(-1, 1, 161)
 
 
 def runs_forwards(encoder: Encoder | None, time_s: Float, steps: Steps) -> bool:
-    """Return whether the wall's motion tells that the pictures are stored first to last.
+    """Return whether the wall's motion shows that the pictures are stored first to last.
 
-    It may be too steady to tell, or too few steps are known.
+    False also if it cannot: without an encoder, at a steady speed, or with too few known steps.
 
     Parameters
     ----------
@@ -37,8 +38,8 @@ def runs_forwards(encoder: Encoder | None, time_s: Float, steps: Steps) -> bool:
     Raises
     ------
     UnusableError
-        When the encoder read backwards in time fits twice as well as it does as it is, whichever its sign and
-        unit, and though its clock were a second off: who goes there and back looks alike both ways.
+        When the encoder fits twice as well backwards in time as forwards, whatever its sign and unit, and
+        even if its clock is a second off. A run there and back is the same both ways and never refused.
     """
     if encoder is None:
         return False

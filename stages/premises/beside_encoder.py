@@ -1,4 +1,4 @@
-"""Whether the encoder shows, too, that the probe was faster for a moment: then no pictures were lost."""
+"""Whether the encoder, too, shows a faster probe for a moment: then no pictures were lost there."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from pipeline.arrays import Float
 from pipeline.recording.base import Encoder
 from stages.premises.moving import usual_speed
 
-# The encoder's clock may be off by so many pictures, as it is behind losses that were not found: within them
-# it must be steady (chosen: a third of a second at 30 a second).
+# Shifts of the encoder's clock, in pictures, over which the encoder must be steady: behind losses that were
+# not found, its clock is off by as many pictures (chosen: a third of a second at 30 a second).
 _SHIFTS = np.arange(-10, 11)
-# The usual speed is that over nine steps, as for the wall, and over five changes of the count at least: more
-# than half of them must lie outside of the one that is looked at.
+# The usual speed is the median over nine steps, as for the wall, and over at least five changes of the count,
+# so that more than half of them lie outside of the step that is examined.
 _STEPS, _COUNTS = 9, 5
 
 
@@ -26,12 +26,13 @@ class Pace:
     Attributes
     ----------
     time_s, distance : (N,)
-        Midway between readings that differ, and at both ends. There a count is known to the width of a
-        reading, however coarse it is; in between only that it goes on.
+        Time and distance midway between two readings that differ, and those at both ends. At such a change
+        the distance is known to the time between two readings, however coarse the count; in between it is
+        not.
     grid_s, usual : (M,)
-        Usual advance per picture, jitter of a standing encoder included.
+        Times, and the usual advance per picture there, the jitter of a standing encoder included.
     period_s, least : float
-        From picture to picture, and the smallest advance over one that is no standing.
+        Time from picture to picture, and the smallest advance in that time of an encoder that moves.
     """
 
     time_s: Float
@@ -43,7 +44,10 @@ class Pace:
 
     @classmethod
     def of(cls, encoder: Encoder | None, pictures_s: Float, step_pictures: float) -> Pace | None:
-        """Return the pace of an encoder beside pictures (F,), s, and steps of some; None where it stands."""
+        """Return the pace of an encoder over the times of pictures (F,), s, and steps of so many pictures.
+
+        None without an encoder, or where it stands or changes too seldom.
+        """
         period_s = float(np.median(np.diff(pictures_s)))
         k = np.empty(0, np.int64) if encoder is None else np.flatnonzero(np.diff(encoder.distance_mm))
         if encoder is None or len(k) < _COUNTS:

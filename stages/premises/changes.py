@@ -16,9 +16,10 @@ from stages.premises.light import Light
 from stages.premises.pictures import Pictures
 
 _SHOWN = 8
-# A picture counts as combed when neighbouring rows differ by so many times as much as rows two apart. The
-# ratio is 1.0 ± 0.06 in noise, .3 to .4 in lit pictures of open-1 to open-3, a01 and a05, and 1.7 to 5 where
-# every second row is from two frames later. Pictures of the laser line are not combed: it moves too little.
+# A picture counts as combed if neighbouring rows differ by so many times as much as rows two apart, and a
+# recording as interlaced if so large a share of its pictures is combed. The ratio is 1.0 ± 0.06 in noise, .3
+# to .4 in lit pictures of open-1 to open-3, a01 and a05, and 1.7 to 5 where every second row is from two
+# frames later. Pictures of the laser line are never combed: it moves too little.
 _COMBED, _MANY_COMBED = 1.3, 0.25
 
 
@@ -72,7 +73,9 @@ def warn_of_frames(
             f"the video ends early: it lacks the last {left} of the {len(table.frame)} frames in frames.csv. "
             "Only what was filmed is measured. What to do: copy the video again, it may be cut off"
         )
-    warn_of(again, "left out: the one before repeated", "nothing, or repair the recorder", context)
+    warn_of(
+        again, "left out, since the one before is shown again", "nothing, or repair the recorder", context
+    )
     warn_of(frame[~pictures.seen], "that cannot be decoded", "copy the video again", context)
     dark = (light == Light.UNKNOWN) & pictures.seen & np.any(light != Light.UNKNOWN)
     warn_of(
@@ -136,13 +139,13 @@ class LeftOut:
         )  # fmt: skip
         warn_of(
             frame[self.copy],
-            "left out: the one before shown once more, as the recorder hung",
+            "left out, since the recorder hung and showed the one before again",
             "nothing, if the wall that was passed meanwhile need not be seen", context,
         )  # fmt: skip
 
 
 def warn_of(frame: Int, what: str, hint: str, context: Context) -> None:
-    """Warn of what is wrong with pictures, of which frames, and what to do; not without pictures."""
+    """Warn ``what`` is wrong with the pictures of some frames, and what to do (``hint``); not of none."""
     if frame.size:
         context.warn(f"{_pictures(len(frame))} {what}: frame {_listed(frame)}. What to do: {hint}")
 

@@ -11,15 +11,16 @@ from pipeline.machine.stage import Context
 from pipeline.recording.base import Encoder, FrameTable, Recording
 from stages.premises.losses import Steps
 
-# Frame times from which a gap in the times is looked at: lost pictures that the table knows of are fewer.
+# A gap of more frame times than this may be a jump of the clock; lost pictures that the table knows of make
+# shorter ones.
 _GAP = 4.0
-# A step of the wall over the gap is a usual one within this factor. With the gap as stated the encoder must
-# differ from the wall by more than it, and by less without: steps err by a tenth.
+# Two advances are alike within this factor, since steps err by a tenth. The clock jumped if the wall's step
+# over the gap is like a usual one, and the encoder's is like it only once the gap is taken out.
 _LIKE = 2.0
-# Frame rates that differ by more are told: recorders round 29.97 to 30 (chosen).
+# Frame rates that differ by a larger factor are reported: recorders round 29.97 to 30 (chosen).
 _OTHER_RATE = 1.2
 _FEWEST = 8
-# Times are even whose steps differ by less than this part: tables round to a thousandth of a second or finer.
+# Times count as even if their steps differ by less than this part: tables round to a millisecond or finer.
 _EVEN = 0.1
 
 
@@ -32,10 +33,10 @@ class ClockJump:
 
 
 def clock_jumps(time_s: Float, steps: Steps, encoder: Encoder | None) -> list[ClockJump]:
-    """Return the gaps in the times (F,) of pictures over which the wall went on as from picture to picture.
+    """Return the gaps in the times (F,) of pictures over which the wall moved by only a usual step.
 
-    If the encoder shows such a step too once the gap is taken out, and not as stated, the clock jumped. If it
-    shows the step as stated, the probe stood meanwhile and the times are right.
+    If the encoder, too, shows a usual step once the gap is taken out, and not with the times as stated, the
+    clock jumped. If it shows one with the times as stated, the probe stood meanwhile and the times are right.
     """
     period = float(np.median(np.diff(time_s))) if len(time_s) > 1 else 0.0
     if encoder is None or len(steps.end) < _FEWEST:
@@ -54,10 +55,11 @@ def without_jumps(time_s: Float, jumps: list[ClockJump]) -> Float:
 
 
 def without_stretch(time_s: Float, row: Int, table: FrameTable, frame_rate: float) -> Float:
-    """Return times (F,) of pictures of which some were lost, in a table that spreads the others evenly.
+    """Return times (F,) of pictures, of which some were lost, where the table spreads those left evenly.
 
-    Such a table begins and ends with the video, at the mean rate of the pictures that are left. One that only
-    counts them has the camera's own ``frame_rate``, and ends too early.
+    Such a table begins and ends with the video and has the mean rate of the pictures that are left; its times
+    are spread over the rows that were found. A table that only counts pictures has the camera's own
+    ``frame_rate`` and ends too early; its times stay as they are.
     """
     step_s, last = np.diff(table.time_s), int(row[-1])
     if last < len(table.time_s) or len(step_s) == 0 or np.ptp(step_s) > _EVEN * np.median(step_s):
@@ -88,7 +90,7 @@ def _alike(one: float, other: float) -> bool:
 
 
 def warn_of_clock(jumps: list[ClockJump], time_s: Float, recording: Recording, context: Context) -> None:
-    """Tell of jumps of the clock, and when frames do not follow each other at the stated rate."""
+    """Warn of jumps of the clock, and of a frame rate other than stated."""
     for jump in jumps:
         context.warn(
             f"the clock of frames.csv jumps by {jump.by_s:.3g} s before frame "

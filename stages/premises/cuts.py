@@ -1,4 +1,4 @@
-"""Places where the pictures do not go on from each other: recordings that were cut, joined or paused."""
+"""Finds places where a picture does not continue the one before: recordings cut, joined or paused there."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from pipeline.machine.stage import Context
 from stages.premises.light import Light
 from stages.premises.pictures import Pictures
 
-# The wall changes by so many times as much as in any step about it. Two runs joined make 3.0, 2.1 and 2.0
-# (open-1 to open-3), 8 lost pictures 1.4, all else in 90 spoilt copies of open-1 1.1: the middle. Lamps that
-# fail change it more, but texture goes on.
+# At a cut the wall's picture changes by so many times as much as in any step around it. Two joined runs make
+# 3.0, 2.1 and 2.0 (open-1 to open-3), 8 lost pictures 1.4, everything else in 90 spoilt copies of open-1 at
+# most 1.1; the bound is the middle between 1.4 and 2.0. Failing lamps change more, but texture goes on.
 _CHANGES = 1.7
-# Texture goes on where the wall moves by less than so many usual steps in the sense of the run.
+# Texture goes on if the wall's step differs from the usual one by less than so many usual steps.
 _GOES_ON = 3.0
 # Eight steps on either side, with which one is compared, and fewest of them in a recording.
 _BESIDE, _FEWEST = np.arange(-8, 9) != 0, 12

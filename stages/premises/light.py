@@ -1,4 +1,4 @@
-"""Which light each picture was taken in, and what the rhythm of the lights leads to expect."""
+"""Which light each picture was taken in, and which one the rhythm of the lights predicts."""
 
 from __future__ import annotations
 
@@ -122,9 +122,10 @@ def _otsu(value: Float) -> float:
 
 
 def _height(brightness: Float, low: float, high: float) -> Float:
-    """Return where each picture lies between dark (0) and bright (1), by its neighbours if it can be.
+    """Return where each picture (F,) lies between dark (0) and bright (1).
 
-    Where daylight or a warming lamp lifts both lights, medians of the whole run would mistake them.
+    It is measured against its neighbours where both lights are among them: daylight or a warming lamp lifts
+    both, so that medians of the whole run would misjudge them.
     """
     darkest = minimum_filter1d(brightness, 2 * _AROUND + 1, mode="nearest")
     brightest = maximum_filter1d(brightness, 2 * _AROUND + 1, mode="nearest")
@@ -134,10 +135,10 @@ def _height(brightness: Float, low: float, high: float) -> Float:
 
 
 def pattern_breaks(light: Int) -> Bool:
-    """Return (F,) true where a picture's light is not the one that the lights before it lead to expect.
+    """Return (F,) true where a picture's light is not the one predicted from the lights before it.
 
-    Expected is the light that most often follows the same preceding lights (the context) in the recording, so
-    that laser, led, ... and laser, laser, led, ... need no rules of their own. The context is the shortest
+    Predicted is the light that most often follows the same preceding lights (the context) in the recording,
+    so that laser, led, ... and laser, laser, led, ... need no rules of their own. The context is the shortest
     that predicts nearly as well as the best one: a longer one has fewer cases to learn from.
     """
     found = [_unexpected(light, memory) for memory in range(1, _LONGEST_MEMORY + 1)]

@@ -1,4 +1,4 @@
-"""Lost pictures that the rhythm of the lights does not show: the wall leaps on over them."""
+"""Finds lost pictures that the rhythm of the lights does not show: the wall moves farther over them."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from stages.premises.moving import lower_speed, usual_speed
 from stages.premises.pictures import CLOSED, Pictures
 from stages.premises.rhythm_of_steps import over_whole_periods
 
-# A step of the wall stands out when it is so many robust σ above the steps around it: by noise alone once in
-# 10^9 steps, were they normal; matching errs worse than that, and six is what outliers need everywhere here.
+# A step of the wall stands out if it is so many robust σ above the steps around it. Normal noise does that
+# once in 10^9 steps; matching has more outliers than normal noise (chosen).
 _SIGMAS = 6.0
 # Where the table has too many rows or the rhythm of the lights breaks, pictures were surely lost, and less
 # evidence is needed for where, or for how many.
@@ -41,10 +41,10 @@ _OFTEN = 0.1
 _ROUNDS = 2
 # Over a run, the wall's steps make the encoder's way within this factor: single steps err by a tenth.
 _MORE = 1.1
-# Errors of matching beyond whole periods are told from lost pictures where nine in ten are below this part of
-# a period: if they were anything, they would be spread evenly over half a period, and .45 would be the part.
-# A step that is so far from any number of lost pictures is no loss: a filter against noise holds the texture
-# back, and lets go of it.
+# Lost pictures can be told from errors of matching if nine in ten errors are below this part of a period.
+# Errors that are as large as a period would be spread evenly over half of one, and the part would be .45. A
+# single step that is farther than this from any number of lost pictures is no loss either: a noise filter
+# holds texture back and then releases it.
 _TOLD_APART = 1 / 3
 
 
@@ -155,11 +155,11 @@ def rows_by_motion(
 
 
 def _encoder_bears_out(leap: _Leap, pace: Pace | None, between_s: Float, *, in_spare_rows: bool) -> bool:
-    """Return whether a leap between two times is a loss: the encoder does not leap then.
+    """Return whether the encoder allows that a leap between two times is a loss, by not leaping itself.
 
-    A loss for which the table has rows to spare, or of rows that were skipped, needs no encoder, but none may
-    contradict it. Beside any other it must be steady, be its clock off by up to ten pictures, and known for a
-    fifth of these.
+    A loss for which the table has spare rows, or which takes back skipped rows, needs no encoder, but an
+    encoder must not contradict it. Any other loss needs an encoder that is steady at all shifts of its clock
+    by up to ten pictures, and known at a fifth of them.
     """
     known = in_spare_rows or leap.lost < 0
     if pace is None:
@@ -172,7 +172,10 @@ def _encoder_bears_out(leap: _Leap, pace: Pace | None, between_s: Float, *, in_s
 
 
 def _part(between: Float, lost: int) -> float:
-    """Return which part of a way is gone if none were ``lost`` between two times (2,), in pictures."""
+    """Return the share of a way that is left if ``lost`` pictures between two times (2,) are not counted.
+
+    Times are in pictures.
+    """
     return 1 - lost / max(float(between[1] - between[0]) + lost, 1.0)
 
 
@@ -183,7 +186,7 @@ def _knocked(leap: _Leap, steps: Steps, rhythm: int, sway: Float) -> bool:
 
 
 def _in_spare_rows(leaps: list[_Leap], left: int) -> list[_Leap]:
-    """Return which leaps, the clearest first, the rows account for that the table has ``left``."""
+    """Return the leaps, given clearest first, that are explained by the rows ``left`` over in the table."""
     out = []
     for leap in leaps:
         if 0 < leap.lost <= left:
@@ -197,12 +200,13 @@ def _leaps(
 ) -> list[_Leap]:
     """Return the steps that stand out by ``sigmas`` (K,), clearest first.
 
-    ``passed`` (K,) is how many pictures they took by their times, to which ``over`` (K,) or a number of
-    whole periods more is to be added. The error of matching is what is then left: losses do not widen it,
-    however many there are. It is a part of a picture's way or a length, whichever is more: a slow wall errs
-    by more of its way. Where the rhythm breaks, a loss has only to fit better than none. Without ``one_bore``
-    steps of one speed differ as the bores of a gauge do: what looks like losses is error, too. The table has
-    ``left`` rows more than there are pictures. Where the wall stands nothing stands out.
+    ``passed`` (K,) is how many pictures the steps took by their times; ``over`` (K,) more are to be added, or
+    whole periods beyond that. What then remains is the error of matching, which losses do not widen, however
+    many there are. It counts as a part of a picture's way or as a length, whichever is more, since a slow
+    wall errs by a larger part of its way. Where the rhythm breaks, a loss only has to fit better than none.
+    Without ``one_bore``, steps of one speed differ as the bores of a gauge do, so that apparent losses count
+    as error too. The table has ``left`` rows more than there are pictures. Where the wall stands, no step
+    stands out.
     """
     speed = steps.size / (passed + over)
     lost, usual = _counted(steps.size, passed, rhythm, over, lower_speed(speed))
@@ -237,10 +241,10 @@ def _leaps(
 def _has_neighbours(steps: Steps, passed: Float, believed: Bool) -> Bool:
     """Return which steps (K,) have four others close by, and two on either side unless ``believed`` (K,).
 
-    Where steps miss in between, as at the end of a gauge, the speed may be another meanwhile: half as many
-    again as would lie there without a gap are too far off. At the ends of a run a loss is not told from a
-    probe that is about to go faster, unless the rhythm breaks, too, the table has rows for it, or pictures
-    are lost all the time.
+    Where steps are missing, as at the end of a gauge, the speed may have changed meanwhile: steps farther off
+    than one and a half times the span of four steps are not compared. At the ends of a run a loss looks like
+    a probe that starts to go faster. It is believed there only if the rhythm breaks as well, the table has
+    rows for it, or pictures are lost all the time.
     """
     middle, own = (steps.start + steps.end) / 2, np.arange(len(steps.end))
     far = 1.5 * _AROUND_STEP * np.median(passed)  # half as many again
@@ -251,7 +255,10 @@ def _has_neighbours(steps: Steps, passed: Float, believed: Bool) -> Bool:
 
 
 def _counted(size: Float, passed: Float, rhythm: int, over: Int, usual: Float) -> tuple[Int, Float]:
-    """Return how many pictures (K,) were lost by the ``usual`` speed (K,), and that with them counted."""
+    """Return how many pictures (K,) were lost, and the usual speed (K,) once these are counted.
+
+    ``usual`` (K,) is the speed to start from.
+    """
     for _ in range(_ROUNDS):
         excess = _excess(size, usual, passed)
         lost = over + rhythm * np.rint((excess - over) / rhythm).astype(np.int64)
@@ -266,7 +273,7 @@ def _excess(size: Float, usual: Float, passed: Float) -> Float:
 
 
 def _shows_more(encoder: Encoder | None, time_s: Float, steps: Steps) -> bool:
-    """Return whether the encoder advances by more than the wall over all steps, mm: they were held back."""
+    """Return whether the encoder advances farther than the wall over all steps, mm: a codec holds it back."""
     if encoder is None:
         return False
     shown = steps.by_encoder(encoder, time_s).sum()

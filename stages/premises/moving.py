@@ -7,14 +7,14 @@ from scipy.ndimage import binary_erosion, median_filter, percentile_filter
 
 from pipeline.arrays import Bool, Float
 
-# A wall that moves by less than this part of what its fast steps make stands: what is left are errors of
-# matching, up to a tenth of a step, and one noise over another tells nothing. Chosen.
+# A wall stands if it moves by less than this part of its fast steps: that may be error of matching, up to a
+# tenth of a step, and the ratio of two errors says nothing. Chosen.
 _MOVES = 0.25
-# The fast steps are told by this quantile: a probe may stand for nine tenths of a run, and the longest tenth
-# holds whatever leaps.
+# Quantile that counts as the speed of fast steps: a probe may stand for nine tenths of a run, and leaps lie
+# in the longest tenth.
 _FAST = 0.9
-# Steps, of those around, from which a speed is told. Where pictures were lost in up to half of them, this
-# percentile is the speed without.
+# Steps around a place of which the speed is taken, and their percentile that is the speed without losses, if
+# pictures were lost in up to half of them.
 _AROUND, _LOWER = 9, 25
 
 
@@ -36,8 +36,8 @@ def usual_speed(speed: Float) -> Float:
 def lower_speed(speed: Float) -> Float:
     """Return the speed (K,) about each step as if no pictures were lost; 0 where the wall stands.
 
-    Lost pictures, however many, only make steps longer: the lower ones of those that move tell it. Steps of a
-    wall that stands are shorter for another reason, and so are those in which it stops or sets out.
+    Lost pictures, however many, only make steps longer, so the shorter ones of the moving steps are taken.
+    Steps in which the wall stands, stops or starts are shorter for another reason and are left out.
     """
     out = np.zeros(len(speed))
     moves = binary_erosion(wall_moves(speed, speed), border_value=True)

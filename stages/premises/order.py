@@ -1,4 +1,4 @@
-"""Pictures that were stored in another order than taken, and pictures from outside the pipe."""
+"""Finds pictures that were stored in another order than taken, and pictures from outside the pipe."""
 
 from __future__ import annotations
 
@@ -9,34 +9,37 @@ from stages.premises.light import Light, pattern_breaks
 from stages.premises.moving import lower_speed, usual_speed
 from stages.premises.pictures import CLOSED, Pictures
 
-# In usual steps: two pictures exchanged go on by two, back by one, on by two. The middle between these and
-# one step on, or none; half a step off its place is a picture in another's.
+# In usual steps. Over two exchanged pictures the wall goes on by two, back by one, and on by two; the bounds
+# lie half-way between these and one step, or none. A picture half a step off its place lies in that of
+# another.
 _ON, _BACK, _ASTRAY = 1.5, -0.5, 0.5
-# Neighbours in two lights that were exchanged look like two losses, of which the wall shows nothing: it goes
-# on by 1 in place of 1.5 times the usual way at least.
+# Exchanged neighbours in two lights look like two losses to the rhythm, but the wall goes on by its usual way
+# and not, as over losses, by at least 1.5 times that; the bound is half-way.
 _NO_LOSS = 1.25
-# Fewer pictures of the wall show no usual step. Those that were exchanged come back to their order within so
-# many pictures.
+# Pictures of the wall that show a usual step, and pictures within which an exchanged order must be right
+# again.
 _FEWEST, _BACK_WITHIN = 12, 9
-# Breaks that lie anywhere in a run follow each other within so many pictures n² / N times as often: there two
-# losses look like an exchange.
+# Two losses within so many pictures look like an exchange. If n breaks lie anywhere among N pictures, about
+# so many times n² / N pairs of them are so close.
 _CLOSE_BY = 3
-# The rhythm is looked at as far behind an exchange as its memory reaches.
+# Pictures behind an exchange in which the rhythm is checked: as far as its memory reaches.
 _BEHIND = 8
-# A run begins at its first closed line and ends at its last where none is seen for so many times as long as
-# is usual between two, and for a while: some rings in which nothing closes are no end.
+# Pictures before the first closed line, or behind the last, lie outside the pipe if they are more than so
+# many times the usual number between two lines, and more than "a while": a few rings that do not close are no
+# end.
 _LONG, _A_WHILE, _LEAST_LINES = 4, 8, 3
-# On neighbouring rays a line differs by less than this part of its radius: 3 px of a ring of 400, which one
-# 25 px off the centre does not reach. The share of such rays is like that of the recording's other lines:
-# sound ones have .8 of their median or more, noise that "closed" by chance half of it.
+# A line is smooth on a ray if it differs from the neighbouring ray by less than this part of its radius: 3 px
+# of a ring of 400 px, which a ring 25 px off the centre does not reach. A line is sound if its share of
+# smooth rays is at least this part of the recording's median: sound lines have .8 or more, noise that closed
+# by chance half.
 _SMOOTH, _LIKE_OTHERS = 0.01, 0.75
 
 
 def out_of_order(pictures: Pictures, light: Int) -> Bool:
     """Return (F,) true for pictures exchanged with one of the same light, or with a neighbour of the other.
 
-    Those of the laser among themselves do not show it, and where lights are not told apart nothing does. Nor
-    is it told of the first or the last picture of the wall: nothing shows where it would have lain.
+    Not found are pictures of the laser line exchanged with each other, any where the lights are not told
+    apart, and the first and last picture of the wall, whose place nothing shows.
     """
     out = np.zeros(len(light), bool)
     place = np.flatnonzero((light == Light.WALL) & (pictures.partner >= 0) & np.isfinite(pictures.step))
@@ -54,10 +57,10 @@ def _in_usual_steps(size: Float) -> Float:
 
 
 def _off_their_place(step: Float) -> Bool:
-    """Return which pictures (K,) do not lie where their neighbours' motion puts them, by steps in usual ones.
+    """Return which pictures (K,) do not lie where their neighbours' motion puts them.
 
-    The wall leaps on, goes back, and comes to where it would have been at its usual speed: no probe moves so,
-    nor do lost pictures, behind which it stays ahead.
+    ``step`` (K,) is in usual steps. Over exchanged pictures the wall leaps ahead, goes back, and ends where
+    it would have been at its usual speed. No probe moves so, and behind lost pictures the wall stays ahead.
     """
     out, ahead = np.zeros(len(step), bool), np.cumsum(step - 1)
     for first in np.flatnonzero(step > _ON):
@@ -71,10 +74,10 @@ def _off_their_place(step: Float) -> Bool:
 
 
 def _lights_exchanged(light: Int, place: Int, size: Float) -> Bool:
-    """Return (F,) true for neighbours in two lights that break the rhythm, and would not the other way round.
+    """Return (F,) true for neighbours in two lights that break the rhythm, and would keep it if exchanged.
 
-    Two pictures that are lost close by may look exchanged. None are told unless there are more of them than
-    the breaks that are left, if they lay anywhere, would make by chance.
+    Two pictures lost close to each other may look exchanged. So none are returned unless there are more pairs
+    than the remaining breaks of the rhythm would make by chance.
 
     Parameters
     ----------

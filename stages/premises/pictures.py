@@ -30,9 +30,10 @@ _NEAR_DEG, _FAR_DEG = 76.0, 35.0
 _ROWS, _COLUMNS = 128, 256
 # Rows that are enough to see motion, share of a row that a line may cover, breadth of the lamps' light.
 _LEAST_ROWS, _MOST_COVERED, _BROAD = 24, 0.1, 8.0
-# A light that comes round again within so many frames finds the picture it is to be compared with.
+# Pictures kept for comparison: a light must come round again within so many frames.
 _KEPT = 8
-# Brightness is told where this share of the surroundings is known. Not measured.
+# Least share of the surroundings of a place that counts as known when its brightness is levelled. Not
+# measured.
 _LEAST_KNOWN = 0.05
 # Share of the correlation that lies at its peak, below which the motion is not told: a lit wall that moves
 # shows .83 to .95 in open-1-field, one without texture .07 to .36.
@@ -253,8 +254,8 @@ class _AxialMotion:
 def change_between(one: Float32, other: Float32) -> float:
     """Return the mean difference of two pictures, grey levels, as if both had the mean of their exposures.
 
-    Where exposure flickers, two pictures in a row that happen to be exposed alike differed by far less than
-    is usual, and one was taken for the other once more.
+    Without that, in a recording with flickering exposure, two neighbouring pictures of equal exposure differ
+    by far less than usual, and the second was taken for a copy.
     """
     power = float(np.vdot(one, one)), float(np.vdot(other, other))
     brighter = np.float32((power[1] / power[0]) ** 0.25 if min(power) > 0 else 1.0)

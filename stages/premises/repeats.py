@@ -15,8 +15,8 @@ from stages.premises.pictures import Pictures
 _STANDS, _ONE_STEP = 0.25, 1.5
 # Steps on either side from which the usual speed is taken.
 _AROUND_STEP = 9
-# The second least of those changes that are no copy's is compared with that of a picture that may repeat one:
-# where all pictures tremble, two that happen to be moved alike change as little as in a steady recording.
+# A picture is a copy if it changes far less than the second smallest change around it that is no copy's. The
+# smallest does not serve: where all pictures tremble, two that are moved alike by chance change as little.
 _LEAST_OF_AROUND = 1
 
 
@@ -113,7 +113,7 @@ def _unchanged(pictures: Pictures, place: Int) -> Bool:
 
 
 def _leaps(step: Float, moving: Bool, behind: int) -> bool:
-    """Return whether the step (of K) at ``behind`` is longer than those around it, or of the other sign."""
+    """Return whether the step at index ``behind`` (of K) is longer than others around it, or reversed."""
     near = np.abs(np.arange(len(step)) - behind) <= _AROUND_STEP
     usual = step[near & moving & np.isfinite(step) & (np.arange(len(step)) != behind)]
     if not usual.size or not np.isfinite(step[behind]):

@@ -1,4 +1,4 @@
-"""In which rhythm the wall was shown when the pictures were taken, told by the steps between lit ones."""
+"""The rhythm of the lights when the pictures were taken, by how far the wall moves between lit pictures."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from scipy.ndimage import median_filter
 
 from pipeline.arrays import Float, Int
 
-# Steps over so many pictures count as a part of the pattern where they are one in ten of all, and six: a last
-# step that is not whole, or a loss by chance, is none. Chosen.
+# A number of pictures that steps span belongs to the pattern if at least one in ten of all steps, and six,
+# span it: an incomplete last step or a single loss does not count. Chosen.
 _SHARE, _FEWEST = 0.1, 6
 # Sizes of steps are compared with the median of so many about them that span the usual number.
 _AROUND = 9
@@ -20,13 +20,13 @@ _WHOLE, _LONGEST = 0.25, 2
 
 
 def over_whole_periods(pictures: Int, size: Float, rhythm: int) -> tuple[int, Int]:
-    """Return the rhythm, and how many lost pictures (K,) make steps over so many whole periods of it.
+    """Return the rhythm, and how many lost pictures (K,) complete each step to whole periods of it.
 
-    Steps over 1 and 3 pictures by turns, of which the latter go twice as far, were taken over 2 and 4: no
-    others fit. The evidence is the numbers of ``pictures`` (K,) that many steps span, and the median size of
-    such steps; what single steps span, at the end or elsewhere, decides nothing. Where no whole numbers fit,
-    the number that more than half of the steps span is the period. Where there is none, or steps go as far as
-    their pictures lead to expect, the ``rhythm`` of the lights stays.
+    An example: steps alternate over 1 and 3 pictures, and the latter go twice as far. Then they were taken
+    over 2 and 4 pictures, since no other numbers fit. The evidence is the numbers of ``pictures`` (K,) that
+    many steps span, and the median size of such steps; single steps decide nothing. If no whole numbers fit,
+    the period is the number that more than half of the steps span. If there is none, or if steps are as long
+    as their numbers of pictures, the ``rhythm`` of the lights is returned.
     """
     span, often = np.unique(pictures, return_counts=True)
     pattern = span[often >= max(_SHARE * len(pictures), _FEWEST)]

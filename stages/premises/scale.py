@@ -26,9 +26,10 @@ _WARNED, _ANOTHER = 1.1, 1.5
 # metres, its lamps are 6 or 250 times as wide as its pipe, also with the default radius of the lamps.
 _TOO_WIDE = 2.0
 _UNITS = (("inch", 25.4), ("m", 1000.0), ("cm", 10.0), ("ft", 304.8))
-# A ratio is taken for that of a unit within this factor; the units differ by more from each other.
+# A ratio counts as that of a unit within this factor; the units differ by more from each other.
 _NEAR_UNIT = 1.25
-# Unrolled walls show motion to about a tenth, and a gauge's bores differ from their mean: neither makes two.
+# A ratio off by this factor contradicts the tables. Unrolled walls show motion to about a tenth, and a
+# gauge's bores differ from their mean, but neither reaches a factor of two.
 _CONTRADICTS = 2.0
 _LEAST_STEPS, _ONE_SIGN = 8, 0.8
 # The pipe's radius at a picture is the median of so many rings about it: four wrong ones do not move it.
@@ -174,7 +175,7 @@ class _Ratio:
 
     @property
     def tells_nothing(self) -> bool:
-        """Whether too few steps tell it, or encoder and wall go on and back apart, or the encoder stands."""
+        """Whether the ratio is unreliable: too few steps, changing signs, or an encoder that stands."""
         return self.steps < _LEAST_STEPS or self.one_sign < _ONE_SIGN
 
 

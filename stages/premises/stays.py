@@ -20,21 +20,20 @@ from pipeline.recording.base import Illumination, Recording
 from pipeline.system.parallel import in_threads
 
 _LOOKED_AT = 40
-"""Lit pictures, spread over the run, that are looked at. Of 24, the same text was found in open-1-field."""
+"""Lit pictures, spread over the run, that are looked at. With 24, the same text was found in open-1-field."""
 _HEIGHT_PX = 600
-"""Pictures are reduced by a whole factor to about this height: finer things are noise to those who follow the
-wall."""
+"""Pictures are reduced by a whole factor to about this height: motion takes finer detail for noise."""
 _FARTHEST_DEG, _NEAREST_DEG = 35.0, 80.0
 """Polar angles between which the wall is looked at, by motion too."""
 _FINE, _CELL, _BOX, _GAP = 4 / 600, 16 / 600, 9 / 600, 15 / 600
-"""In heights of the picture: σ of the brightness about which contrast is taken, cells by which motion is
-told, box over which what stays is summed, gap between two places that count as one. A choice: a patch that
-motion tracks is some 20/600 high."""
+"""In heights of the picture: σ of the blur against which contrast is taken, size of the cells in which motion
+is detected, size of the box over which what stays is summed, and gap between two places that count as one. A
+choice: a patch that motion tracks is some 20/600 high."""
 _STILL = 0.15
 """Correlation, in the median cell, with the picture before, above which the wall did not move. It is below
 `_STAYS`, so that a noisy picture of a wall at rest is not taken for things that stay on a moving one."""
 _FEWEST = 12
-"""Pictures with a moved wall from which what stays is told: the mean of 12 keeps 1/12 of the wall's power."""
+"""Fewest pictures with a moved wall: the mean of 12 still contains 1/12 of the moving wall's power."""
 _STAYS = 0.3
 """Share of the power of contrast that stays, from which a place counts: in open-1, 2 and 3 the 999th of 1000
 places shows .02 to .13, burnt-in text .98."""
@@ -49,7 +48,7 @@ _YELLOW_NM = 575.0
 """Lasers of a shorter wavelength reach the red channel least, others the blue one."""
 _THREADS = 2
 _WORTH_A_WORD = 0.01
-"""Share of the picture of the wall that is told: no open recording has any."""
+"""Least share of the wall's picture that is reported: no open recording has any."""
 
 
 def places_that_stay(recording: Recording, probe: Probe, lit: Int, context: Context) -> Bool | None:

@@ -1,8 +1,9 @@
 """Where dirt or drops on the window, at places that a twin found, displace the line.
 
-A place is found in blocks of pixels, and reaches beyond what it does to the line: there the line is as good
-as elsewhere. What bends light moves the line at an azimuth of the image alike in all rings, or magnifies its
-way when the probe moves. Both show against the smooth ring through all azimuths that are clear.
+The twin finds places in blocks of pixels, which are larger than the dirt: in the rest of a block the line is
+as good as elsewhere. Dirt that bends light displaces the line at an azimuth of the image by the same amount
+in all rings, or magnifies its motion when the probe moves. Both show against the smooth ring that is fitted
+through all clear azimuths.
 """
 
 from __future__ import annotations
@@ -45,8 +46,8 @@ class _Azimuths:
 def set_right(rings: RingSamples, places: ImagePlaces) -> None:
     """Leave out the samples at places of the image where they do not follow their ring.
 
-    Where it lies aside alike in all rings and moves with them as it should, it is moved back by as much.
-    A groove along the whole way would look the same there: all of the departure counts to σ.
+    Samples that are displaced alike in all rings, and otherwise move with them, are moved back. A groove
+    along the whole way would look the same, so the whole displacement is added to their σ.
     """
     hidden = ~clear_of(places, np.nan_to_num(rings.pixels()))
     if not hidden.any():

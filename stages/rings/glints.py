@@ -32,8 +32,8 @@ _NEAR_SECTORS, _GAP_SECTORS = 2, 4
 # ring's own runs have 1. Glaring runs are glints even where a second ring shows one in the same place; what
 # three of five rings show is the wall and no run.
 _ODD_RUN, _GLARING_RUN = 3.0, 6.0
-# For four samples of glints that look odd, one has the profile of a line; and in a recording without any
-# odd one, one in ten lone samples is still taken to be no wall. Both are judgements, not measured.
+# For every four glint samples of odd profile, one with the profile of a line is assumed; and in a recording
+# without odd ones, one in ten lone samples still counts as no wall. Both are judgements, not measured.
 _CLUTTER_ORDINARY, _CLUTTER_PRIOR = 0.25, 0.1
 _LEAST_WIDTH_SPREAD, _LEAST_BRIGHTNESS_SPREAD = 0.03, 0.1
 

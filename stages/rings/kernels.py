@@ -8,10 +8,11 @@ import numpy as np
 # Sums may be reordered; NaN keeps its meaning.
 FAST = {"reassoc", "contract", "arcp", "nsz"}
 UNKNOWNS = 5
-# A sector that is narrower, px, has radii without a pixel: pixels are a unit apart, askew up to √2.
+# In a narrower sector, px, some radii have no pixel: pixels are one apart, up to √2 along a diagonal.
 _LEAST_ARC_PX = 1.2
-# What varies slowly around the ring is told by thirty degrees: far wider than a glint, so that it has no say;
-# a move across the pipe, one wave around the ring, is followed to 3 % (the square of half a block, over 2).
+# Blocks around the ring whose medians give its slow variation: thirty degrees, far wider than a glint, which
+# then has no influence. A move across the pipe, one wave around the ring, is followed to 3 % (the square of
+# half a block, over 2).
 _BLOCKS = 12
 
 

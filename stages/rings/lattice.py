@@ -35,13 +35,15 @@ _SLANTS_DEG = np.array([0.0, 3.0, 6.0, 10.0, 15.0, 21.0, 28.0, 36.0, 45.0])
 _OVERTONES = 3
 # Periods that are taken out of one axis: pixels enlarged by 5/2 repeat by themselves and by two of them.
 _PERIODS = 3
-# Rings that are looked at, and worked on at a time: 27,000 samples along rows tell a share of .001.
+# Rings that are examined, and corrected at a time: 27 000 samples along rows show a share of .001. Then the
+# fewest samples of which a size is fitted.
 _RINGS = 96
 _FEWEST = 200
-# Parts of a ring that must agree on what repeats, rad, so many at least, and the chance that they do: some
-# 6000 periods are looked for, of which one may do so in a recording of a hundred.
+# Length of the parts of a ring that must agree on what repeats, rad, their least number, and the largest
+# chance of their agreeing by accident: of some 6000 periods tried, one may do so in one recording of a
+# hundred.
 _PART_RAD, _FEWEST_PARTS, _BY_CHANCE = np.radians(4.0), 12, 1e-6
-# Waves of which the samples show less than this share of others' are not known: the line stood still.
+# Waves that the samples determine less than this share as well as others are left out: the line stood still.
 _KNOWN = 0.1
 
 
@@ -132,10 +134,10 @@ def _lattice(samples: RingSamples, rings: slice, off: Float, axis: int) -> Latti
 
 
 def _borne_out(waves: Float, value: Float, part: Float) -> bool:
-    """Return whether parts of the ring repeat (n, 2 K) as all others do, each beside the others.
+    """Return whether each part of the ring repeats with ``waves`` (n, 2 K) as all other parts do.
 
-    A groove along the pipe, or the wall's roughness where the probe stands, repeats as well as one likes with
-    some period, but the parts of the ring do not agree on it.
+    A groove along the pipe, or the wall's roughness where the probe stands, can be fitted with some period,
+    but the parts of the ring do not agree on it.
     """
     parts, number = np.unique(part, return_inverse=True)
     if len(parts) < _FEWEST_PARTS:
@@ -154,9 +156,9 @@ def _borne_out(waves: Float, value: Float, part: Float) -> bool:
 
 
 def _fitted(waves: Float, signed: Float, use: Bool) -> Float:
-    """Return the sizes (2 K,) of waves (F, A, 2 K) in some samples, beside what is there of a wall.
+    """Return the sizes (2 K,) of waves (F, A, 2 K) in the samples to ``use`` (F, A), beside a constant.
 
-    0 where there are too few samples.
+    0 with too few samples.
     """
     if use.sum() < _FEWEST:
         return np.zeros(waves.shape[-1])

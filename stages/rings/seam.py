@@ -11,8 +11,8 @@ from pipeline.arrays import Float
 from pipeline.artefacts.measured import RingSamples
 from pipeline.machine.stage import Context
 
-# The line on either side of an azimuth is continued straight over so many radians, from twice as many: 8 px
-# of a ring of 200 px, as broad as seams are blended. Chosen.
+# Arc over which the line on either side of an azimuth is extrapolated; the line is taken from an arc twice as
+# long. 8 px of a ring of 200 px, as broad as seams are blended. Chosen.
 _ARC_RAD = np.radians(2.25)
 # A step at one azimuth of the picture, in spreads over all azimuths: 5.3 at most in sound recordings, 10.7 at
 # one end beside burnt-in text, 100 at both where half of the picture lay 2 px aside.

@@ -71,8 +71,8 @@ def search_band(
 def _radial_profile(image, start, pixel, radius, a, aside, first, bins, total, count):  # type: ignore[no-untyped-def]
     """Mean grey level in bins of one pixel from radius ``first``; return how many bins are seen.
 
-    Of sector ``a`` and as many ``aside`` on either side: what is narrower than a pixel has none at some
-    radii. Bins without a pixel take the value of the bin before.
+    The pixels are those of sector ``a`` and of ``aside`` sectors on either side, because a sector narrower
+    than a pixel has none at some radii. Bins without a pixel take the value of the bin before.
     """
     total[:bins] = 0.0
     count[:bins] = 0
@@ -180,9 +180,9 @@ def find_ring(image: Image, sectors: Sectors, noise: float) -> tuple[Float, floa
 def _credit(score: Float) -> Float32:
     """Return the evidence of a score for the line: the score up to a limit, its logarithm beyond it.
 
-    Any light of a score at the limit is no noise. Beyond it, brighter is likelier, but slowly: a line ten
-    times as bright as its halo keeps the path over many rays, a glint ten times as bright as the line does
-    not draw it aside over a few.
+    Light with a score at the limit is certainly not noise. Beyond the limit, evidence grows slowly with
+    brightness: a line ten times as bright as its halo keeps the path over many rays, but a glint ten times as
+    bright as the line does not draw the path aside over a few.
     """
     above = np.maximum(score, _CREDIT)
     return np.asarray(np.clip(score, 0, _CREDIT) + np.log(above / _CREDIT), np.float32)

@@ -35,7 +35,7 @@ class Sectors:
     radius_px, offset_rad : (N,) float32
         Distance from the centre, and azimuth relative to the sector's centre.
     taken : Sectors, optional
-        The same without pixels that were not taken but put between others; None where all were taken.
+        The same without interpolated pixels (of interlaced pictures); None where every pixel was recorded.
     """
 
     azimuth_rad: Float
@@ -60,11 +60,11 @@ class Sectors:
 
 
 def with_even_rows_taken(sectors: Sectors) -> Sectors:
-    """Return sectors of pictures whose odd rows lie between the even ones, of which the line is then fitted.
+    """Return sectors of pictures whose odd rows are interpolated; the line is then fitted in even rows.
 
-    Below and above the centre the line runs along rows: a mean of two broadens it there, and by how much
-    depends on its place between them. Beside the centre, where it crosses the rows, all count: a sector may
-    hold odd rows alone.
+    Below and above the centre the line runs along the rows: interpolation broadens it there, by an amount
+    that depends on its place between two rows. Beside the centre, where the line crosses the rows, all rows
+    are used, since a sector may contain odd rows alone.
     """
     upright = np.abs(np.sin(sectors.azimuth_rad)) > np.sqrt(0.5)
     of_sector = np.repeat(np.arange(len(upright)), np.diff(sectors.start))

@@ -30,7 +30,8 @@ _RIVAL = 0.5
 # A ring that lost more than this share of its way round from one image to the next may have left the band, or
 # the image's noise may no longer be that of the image before. Searching anew costs time and cannot do harm.
 _LOST = 0.1
-# As many as tell an outlier (`stages.rings.validity`): five or more that leave the ring are the wall.
+# Sectors of the running median, as for outliers (`stages.rings.validity`): five or more that leave it are
+# wall.
 _EXPECTED_SECTORS = 9
 
 
@@ -84,10 +85,9 @@ def trace_ring(
 def follow_ring(image: Image, sectors: Sectors, before: RingTrace) -> RingTrace | None:
     """Fit the ring within a band about the ring seen ``before``; None when most of it is not there.
 
-    Expected is the running median of that ring: a few sectors that were on a reflection beside the line would
-    else never see the line in their band again.
-    Sectors without a line in the band are searched along their whole ray: a step of the bore moves the ring
-    from one image to the next, and for part of its way round.
+    The band lies about the running median of that ring. Otherwise a few sectors that were on a reflection
+    beside the line would never find the line in their band again. Sectors without a line in the band are
+    searched along their whole ray: a step of the bore moves part of the ring from one image to the next.
     """
     if before.coverage < _MOST:
         return None
@@ -131,8 +131,8 @@ def _fitted_about(
 ) -> tuple[Choice, ProfileFit]:
     """Search a band, px, about a ring (A,) of this image with a line of this width, and fit the likeliest.
 
-    The ring about which is searched was found in the same image and is no second witness: where another line
-    is nearly as bright, either may be the ring.
+    The ring that defines the band was found in the same image and is no independent evidence: where another
+    line is nearly as bright, either may be the ring.
     """
     peaks = search_band(image, sectors, radius_px - band, radius_px + band, width_px, response.dark_noise)
     choice = choose_line(peaks, radius_px, width_px)

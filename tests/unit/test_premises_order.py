@@ -28,7 +28,7 @@ def test_repeated_pictures_are_left_out(good, run):
     found, told = checked(spoiled.recording, run.probe)
     assert len(found.frame) == len(spoiled.recording.frames.frame) - 1
     assert np.all(np.diff(found.time_s) > 0)
-    assert any("the one before repeated" in t for t in told)
+    assert any("the one before is shown again" in t for t in told)
 
 
 @pytest.mark.parametrize("first", [21, 22], ids=["led", "laser"])
@@ -42,7 +42,7 @@ def test_pictures_of_a_recorder_that_hung_are_left_out_and_all_times_stay(first,
     np.testing.assert_allclose(found.time_s, good.frames.time_s[~hung])
     assert np.array_equal(found.illumination, good.frames.illumination[~hung])
     assert len(told) == 1
-    assert f"{count} picture{'s' * (count > 1)} left out: the one before shown once more" in told[0]
+    assert f"{count} picture{'s' * (count > 1)} left out, since the recorder hung" in told[0]
 
 
 @pytest.mark.parametrize("repeats", [slice(19, None, 20), slice(18, None, 20), slice(9, None, 7)])
@@ -55,7 +55,7 @@ def test_pictures_that_repeat_the_last_one_of_their_light_are_left_out(repeats, 
     assert found.frame.tolist() == frame[~again].tolist()
     np.testing.assert_allclose(found.time_s, good.frames.time_s[~again])
     assert len(told) == 1
-    assert f"{again.sum()} pictures left out: the one before shown" in told[0]
+    assert f"{again.sum()} pictures left out, since the recorder hung" in told[0]
 
 
 @pytest.mark.parametrize("encoder", ["goes on", "none"])
@@ -71,7 +71,7 @@ def test_pictures_of_a_recorder_that_repeats_each_light_are_left_out(count, enco
     assert found.frame.tolist() == frame[~hung].tolist()
     np.testing.assert_allclose(found.time_s, good.frames.time_s[~hung])
     assert len(told) == 1
-    assert f"{count} picture{'s' * (count > 1)} left out: the one before shown once more" in told[0]
+    assert f"{count} picture{'s' * (count > 1)} left out, since the recorder hung" in told[0]
 
 
 def test_pictures_of_a_probe_that_stops_are_no_repeats():
@@ -94,7 +94,7 @@ def test_a_repeated_picture_in_one_light_is_left_out(good, run, replaced):
     assert len(found.frame) == len(kept) - 1
     behind = time_s[13:] if replaced else time_s[12:-1]
     np.testing.assert_allclose(found.time_s[12:], behind)
-    assert any("the one before repeated" in t for t in told)
+    assert any("the one before is shown again" in t for t in told)
 
 
 def test_a_speed_that_varies_over_pictures_left_out_is_no_loss():

@@ -1,4 +1,4 @@
-"""Pieces of an earlier wall looked for on a later one: roughly anywhere, then closely where they must be."""
+"""Finds pieces of an earlier wall on a later one: first roughly and anywhere, then exactly near there."""
 
 from __future__ import annotations
 
@@ -11,15 +11,17 @@ import numpy as np
 from pipeline.arrays import Bool, Float, Float32, Int
 from stages.compare.registration.marks import CELLS_PER_RADIUS, COLUMNS, Surface
 
-# Lengths of pieces, in radii, and cells of the rough search, in cells of the close one: chosen so that a
-# 4 inch pipe is searched in a second. Pieces of 0.4 and 1.6 radii are found as well (4 pairs of a made pipe);
-# what the length of blocks costs in certainty is a debt: data/debts.md.
+# Lengths of stretches (rough search) and blocks (exact search), in radii, and size of the rough search's
+# cells in those of the exact one: chosen so that a 4 inch pipe is searched in a second. Stretches of 0.4 and
+# 1.6 radii are found as well (4 pairs of a made pipe); how certain blocks of other lengths are is a debt:
+# data/debts.md.
 _STRETCH_RADII, _BLOCK_RADII, _COARSER = 0.8, 0.5, 2
-# So many stretches are looked for everywhere, so many then near where those lie: bounds on time alone.
+# Stretches searched everywhere, stretches then searched near those, distances at which blocks are searched,
+# and rows of marks made at a time: bounds on time and memory alone.
 _ANCHORS, _MOST_STRETCHES, _MOST_STATIONS, _CHUNK_ROWS = 12, 96, 400, 1024
-# A rough match may be wrong by so many of its cells: half and twice as many change no fate of 48 made pits.
+# By how many of its cells a rough match may be wrong: half and twice as many change no fate of 48 made pits.
 _ROOM_CELLS = 3.0
-# Encoders and calibrations agree on distance at least so well: ten times the 0.2 to 0.3 % that probes state.
+# Largest relative difference of distances between two runs: ten times the 0.2 to 0.3 % that probes state.
 _LARGEST_STRAIN = 0.03
 _QUARTERS = 4
 # A block of which less was seen is left out.
@@ -32,13 +34,13 @@ AGREE = 0.2
 
 @dataclass(frozen=True)
 class Course:
-    """Roughly how the earlier run's distances move and turn; linear between stretches that agree.
+    """Rough shift and roll of the earlier run on the later one; linear between stretches that agree.
 
     Attributes
     ----------
     at_mm, shift_mm, roll_rad : (K,)
     room_mm : float
-        By how much it may be wrong along the pipe, and in arc around it.
+        By how much the shift, and the arc of the roll, may be wrong.
     """
 
     at_mm: Float
@@ -118,9 +120,10 @@ def _place(stretch: Float32, wall: Float32, first: int) -> tuple[float, float, f
 
 
 def _agreeing_stretches(starts: Int, found: Float, radius_cells: float) -> Bool:
-    """Return which stretches agree with the one that most others, and those best, agree with.
+    """Return the stretches (N,) that agree with the best supported one.
 
-    All in cells; ``found`` (N, 3) are the rows at which they lie, columns by which they turn, correlations.
+    That is the stretch with which others of the largest sum of correlations agree. ``found`` (N, 3) holds the
+    row at which each stretch lies, the columns by which it is turned, both in cells, and its correlation.
     """
     strain = _LARGEST_STRAIN * np.abs(starts[:, None] - starts[None])
     moved, turn = found[:, 0] - starts, found[:, 1] * 2 * np.pi / (COLUMNS // _COARSER)
@@ -150,9 +153,9 @@ class Matches:
         Middle of the block, distance of the earlier run.
     shift_mm, roll_rad, correlation : (N,)
     agree : (N,) bool
-        Whether it lies where its neighbours say.
+        Whether the block lies where its neighbours put it.
     overlapping : float
-        Blocks that share a piece of wall: so many count for one.
+        Number of blocks that share a piece of wall and therefore count as one.
     """
 
     at_mm: Float
