@@ -132,7 +132,10 @@ def _measured(
                 continue
             depth = _depth_of(region, here, surface, wall, clean, parameters, context)
             while (frame := _contradicted(depth, here, surface)) is not None:
-                surface, _ = wall.surface_about(region, every_point, (*surface.left_out, frame))
+                without, _ = wall.surface_about(region, every_point, (*surface.left_out, frame))
+                if not _is_measured(without, here):
+                    break
+                surface = without
                 depth = _depth_of(region, here, surface, wall, clean, parameters, context)
             depth = depth if region.all_round else allowed_by_neighbours(depth, here, surface)
             if region.sign * depth.depth_mm >= parameters.min_depth_mm:
@@ -246,5 +249,5 @@ def _defects_of_run(
 
 
 DEFECTS = Stage(
-    "defects", "38", DefectParameters, _defects_of_run, "defects as instances with depth, clock and kind"
+    "defects", "39", DefectParameters, _defects_of_run, "defects as instances with depth, clock and kind"
 )

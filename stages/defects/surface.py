@@ -158,7 +158,9 @@ class MeasuredWall:
         used = _chosen(used, ~np.isin(used.frame, without)) if without else used
         points = deviation_points(relief, used, self.spacing_mm)
         coarse = millimetre_mean(relief.all_mm, relief.cell_mm)
-        everything = fine_surface(relief, points, wanted, coarse)
+        # The map's own mean holds the frames that are left out.
+        stands_in = np.where(wanted, np.nan, coarse) if without else coarse
+        everything = fine_surface(relief, points, wanted, stands_in)
         local = everything + relief.local_mm - relief.all_mm
         return Surface(relief, local, everything, coarse, near, points, without)
 

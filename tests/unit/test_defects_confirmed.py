@@ -7,6 +7,7 @@ import pytest
 from scipy.ndimage import maximum_filter
 
 from pipeline.adjustment.shared_light import NOTHING_HELD, HeldOver
+from pipeline.artefacts.cloud_along import cloud_along
 from pipeline.artefacts.measured import RingSamples, RingValidity
 from stages.defects import DefectParameters, find_defects
 from stages.defects.corroborate import Evidence, photo_stands_out
@@ -16,6 +17,7 @@ from stages.defects.noise_tail import Law, NoiseTail, noise_tail
 from stages.defects.noise_tail import tail_of as tail_of_peaks
 from stages.defects.relief import smooth_shape_removed
 from stages.defects.segment import Region
+from stages.defects.surface import MeasuredWall
 from tests.quiet import quiet_context
 from tests.synthetic_wall import bare_recording, grey_texture, smooth_noise, wall_of
 
@@ -68,6 +70,23 @@ def test_a_glint_on_one_ring_of_a_finding_does_not_make_its_depth(depth_mm):
     (finding,) = told.items
     assert abs(finding.depth_mm - depth_mm) < 1.96 * finding.depth_sigma_mm
     assert finding.depth_sigma_mm < 0.3 * abs(depth_mm)
+
+
+def test_what_is_left_out_of_a_surface_comes_not_back_by_the_map():
+    """Between rings far apart the mean of the map stood in, which holds the glint that was left out."""
+    place, rows = np.arange(0, 60, 0.5), 120
+    radius = np.full((rows, len(AZIMUTH)), RADIUS)
+    radius[40:80, 95:125] += 0.6
+    radius[59:62, 100:116] += 3.0
+    wall = wall_of(place, AZIMUTH, radius, SIGMA)
+    rings = wall.cloud.frame % 2 == 0
+    cloud = replace(wall.cloud, **{f.name: getattr(wall.cloud, f.name)[rings] for f in fields(wall.cloud)})
+    shape = smooth_shape_removed(wall.radius_map, DefectParameters())
+    region = Region(40, 95, np.ones((40, 30), bool), 1.0)
+    surface, here = MeasuredWall(shape, cloud_along(cloud), 1.0).surface_about(region, False, (60,))
+    shown = here.cut(surface.all_mm)
+    assert np.isfinite(shown).mean() > 0.9
+    assert np.nanmax(shown) < 0.9
 
 
 def test_rings_that_are_not_sure_of_themselves_do_not_speak_for_a_finding():
