@@ -249,5 +249,5 @@ def _defects_of_run(
 
 
 DEFECTS = Stage(
-    "defects", "39", DefectParameters, _defects_of_run, "defects as instances with depth, clock and kind"
+    "defects", "40", DefectParameters, _defects_of_run, "defects as instances with depth, clock and kind"
 )

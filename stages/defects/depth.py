@@ -106,7 +106,7 @@ def allowed_by_neighbours(depth: Depth, region: Region, surface: Surface) -> Dep
 
     A wall seen along a line of sight falls off from ring to ring by no more than their distance (45°, the
     mean flank of a hemisphere): what one ring shows beyond that is no part of the wall that the next one
-    shows. Where one beside shows a defect itself, it is between what that one shows and what it allows.
+    shows.
     """
     tops, spacing = _tops_of_rings(depth, region, surface), surface.points.spacing_mm
     if not len(tops.top_mm):
@@ -114,10 +114,8 @@ def allowed_by_neighbours(depth: Depth, region: Region, surface: Surface) -> Dep
     shown = max(float(tops.beside_mm.max(initial=0.0)), 0.0)
     if abs(depth.depth_mm) <= shown + spacing:
         return depth
-    at_mm, sigma = shown + spacing, np.hypot(depth.sigma_mm, (shown + spacing) / 2)
-    if shown >= _SHOWN_SIGMAS * surface.relief.typical.sigma_mm:
-        at_mm, sigma = shown + spacing / 2, np.hypot(surface.relief.typical.sigma_mm, spacing / 2)
-    return replace(depth, depth_mm=float(np.sign(depth.depth_mm)) * at_mm, sigma_mm=float(sigma))
+    sigma = float(np.hypot(depth.sigma_mm, (shown + spacing) / 2))
+    return replace(depth, depth_mm=float(np.sign(depth.depth_mm)) * (shown + spacing), sigma_mm=sigma)
 
 
 def contradicted_frame(depth: Depth, region: Region, surface: Surface) -> int | None:
