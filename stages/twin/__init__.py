@@ -37,6 +37,7 @@ from stages.twin.on_wall import ring_step_mm, unnamed
 from stages.twin.pixels import defective_pixels
 from stages.twin.render import Region, Renderer
 from stages.twin.scene import Scene, scene_of
+from stages.twin.seen_in_photo import parted_from_photo
 from stages.twin.state import (
     PhotometricState,
     Sampled,
@@ -211,10 +212,11 @@ def compared_with(
     over_time = (*over_time, *flicker_of_measured(photometry.state, over_time, scene.ring))
     failed = any("led_dead" in m.name for m in over_time)
     whole, withdrawn = sums.named(samples, recording, failed)
-    on_window, unsure = beside_blur(sums.on_window(samples), whole)
+    on_window, of_photo = parted_from_photo(sums.on_window(samples), scene.ring)
+    on_window, unsure = beside_blur(on_window, whole)
     bent = on_line(fixed, rings, scene.ring, on_window)
     on_window, glints = told_apart((*on_window, *bent), sums.glints(whole, bent))
-    apart_mm, clear = ring_step_mm(rings, scene.trajectory), (*on_window, *glints)
+    apart_mm, clear = ring_step_mm(rings, scene.trajectory), (*on_window, *glints, *of_photo)
     line_rad = float(np.arctan2(scene.ring.radius_mm, scene.ring.ahead_mm))
     found: tuple[Mismatch, ...] = (
         *through_window(over_time, on_window, scene.ring), *on_window, *photometry.pixels,
@@ -231,7 +233,7 @@ def compared_with(
         comparison.regions(), found,
         comparison.psnr_db(False), comparison.psnr_db(True), comparison.chi2_camera, comparison.stray_share,
         comparison.seen / max(comparison.view, 1.0), cannot_tell(state), tuple(comparison.views),
-        maps_of(samples), comparison.levels(), worst_places(samples), (*withdrawn, *unsure),
+        maps_of(samples), comparison.levels(), worst_places(samples), (*withdrawn, *unsure, *of_photo),
     )  # fmt: skip
 
 
@@ -284,7 +286,7 @@ PHOTOMETRY = Stage(
 )
 TWIN = Stage(
     "twin",
-    "36",
+    "37",
     TwinParameters,
     compare_with_twin,
     "recorded frames beside the same frames, re-rendered from what the run has measured",

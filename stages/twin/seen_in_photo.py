@@ -1,0 +1,48 @@
+"""What the wall's photo holds of dirt on the window shows elsewhere in frames, as the opposite of itself.
+
+The photo was made through the same window. Wall that was seen through dirt is darker in it, and brighter than
+it where frames show that wall beside the dirt: nearer or farther, at the same azimuth of the image.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from pipeline.artefacts.twin import Mismatch
+from stages.twin.cells import half_turn
+from stages.twin.scene import Ring
+
+_DIMS = ("window_dirt", "window_scatter", "droplet")
+
+
+def parted_from_photo(
+    found: Sequence[Mismatch], ring: Ring
+) -> tuple[tuple[Mismatch, ...], tuple[Mismatch, ...]]:
+    """Return what is on the window, and places without a name that what is dim there may leave in the photo.
+
+    The latter are brighter, by less than what is dim, and at its azimuth.
+    """
+    dim = [m for m in found if set(m.names) & set(_DIMS)]
+    left = [m for m in found if not m.name and any(_may_be_left_by(m, d, ring) for d in dim)]
+    said = "{} But the photo may be darker there, since it was made through what lies at the same azimuth."
+    withdrawn = tuple(replace(m, statement=said.format(m.statement)) for m in left)
+    return tuple(m for m in found if m not in left), withdrawn
+
+
+def _may_be_left_by(bright: Mismatch, dim: Mismatch, ring: Ring) -> bool:
+    sizes = [next((p.value for p in m.parameters if p.name == "share"), 0.0) for m in (bright, dim)]
+    if not 0 < -sizes[0] < sizes[1]:
+        return False
+    (one, wide), (other, more) = (_around(m, ring) for m in (bright, dim))
+    return abs(half_turn(one - other)) < wide + more
+
+
+def _around(mismatch: Mismatch, ring: Ring) -> tuple[float, float]:
+    """Return image azimuth and half the width around of a place, degrees."""
+    at = {p.name: p.value for p in mismatch.place}
+    u, v = at["u_px"] - ring.centre_px[0], at["v_px"] - ring.centre_px[1]
+    wide = np.arctan2(at["radius_px"], max(float(np.hypot(u, v)), 1.0))
+    return float(np.degrees(np.arctan2(v, u))), float(np.degrees(wide))
