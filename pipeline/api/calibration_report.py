@@ -13,6 +13,7 @@ from scipy.stats import binned_statistic_2d
 
 from pipeline.adjustment.robust import robust_spread
 from pipeline.arrays import Float, Int
+from pipeline.files.json_yaml import json_number
 from pipeline.files.provenance import MadeBy
 from pipeline.instrument.laser import LaserSheet
 from pipeline.instrument.probe import Probe
@@ -132,7 +133,7 @@ def _laser(probe: Probe) -> dict[str, dict[str, float | str | None]]:
     sigma = np.sqrt(np.einsum("ij,jk,ik->i", jacobian, covariance, jacobian))
     sigma[1] = sigma[1] if values[0] > sigma[0] else np.nan
     return {
-        name: {"value": float(v), "sigma": float(s) if np.isfinite(s) else None, "unit": unit}
+        name: {"value": float(v), "sigma": json_number(s), "unit": unit}
         for (name, unit), v, s in zip(_TERMS, values, sigma, strict=True)
     }
 

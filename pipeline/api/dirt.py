@@ -41,7 +41,7 @@ def dirt_of(twin: Path | str | None) -> tuple[str, ...]:
         more = [_WIDER_DROP if "aside" in m["parameters"] else _WIDER for m in on_image]
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise InputError(
-            file, "is not what a twin found", expected="twin.json of boresight twin", hint="name its folder"
+            file, "is not a result of boresight twin", expected="its twin.json", hint="name its folder"
         ) from error
     wider = [[u, v, by * r] for by, (u, v, r) in zip(more, places, strict=True)]
     of_line = [p for p, m in zip(wider, moved, strict=True) if m]

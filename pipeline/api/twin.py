@@ -15,6 +15,7 @@ from pipeline.artefacts.twin import GaugeTwin, Mismatch, NamedFigure, Twin, Twin
 from pipeline.errors import InputError
 from pipeline.export.report.pictures import jpeg_uri
 from pipeline.export.run_record import check_inputs_unchanged, read_run_record
+from pipeline.files.json_yaml import json_number
 from pipeline.files.provenance import MadeBy
 from pipeline.machine.configuration import resolve
 from pipeline.machine.display import Display, SilentDisplay
@@ -134,8 +135,8 @@ def twin_document(found: Twin, tried: DiagnosisTried, of: TwinOf) -> dict[str, A
         "regions": {
             r.name: {
                 "pixels": r.pixels,
-                "chi2_before": _known(r.chi2_before),
-                "chi2_after": _known(r.chi2_after),
+                "chi2_before": json_number(r.chi2_before),
+                "chi2_after": json_number(r.chi2_after),
             }
             for r in found.regions
         },
@@ -143,9 +144,9 @@ def twin_document(found: Twin, tried: DiagnosisTried, of: TwinOf) -> dict[str, A
         "worst": [_mismatch(m) for m in found.worst],
         "withdrawn": [_mismatch(m) for m in (*tried.withdrawn, *found.withdrawn)],
         "gauge": gauge,
-        "psnr_db": _known(found.psnr_db),
-        "psnr_noise_free_db": _known(found.psnr_noise_free_db),
-        "chi2_wall_camera_noise_alone": _known(found.chi2_camera),
+        "psnr_db": json_number(found.psnr_db),
+        "psnr_noise_free_db": json_number(found.psnr_noise_free_db),
+        "chi2_wall_camera_noise_alone": json_number(found.chi2_camera),
         "stray_light_in_dark": found.stray,
         "seen": found.seen,
         "chi2_by_brightness": _figures(found.by_level),
@@ -154,23 +155,19 @@ def twin_document(found: Twin, tried: DiagnosisTried, of: TwinOf) -> dict[str, A
 
 
 def _gauge(gauge: GaugeTwin) -> dict[str, Any]:
-    plain = {k: _known(v) if isinstance(v, float) else v for k, v in vars(gauge).items() if k != "frame"}
+    plain = {k: json_number(v) if isinstance(v, float) else v for k, v in vars(gauge).items() if k != "frame"}
     return {"frames": [int(f) for f in gauge.frame], **plain}
 
 
 def _mismatch(mismatch: Mismatch) -> dict[str, Any]:
     plain = asdict(mismatch)
     figures = {"place": _figures(mismatch.place), "parameters": _figures(mismatch.parameters)}
-    chi2 = {name: _known(plain[name]) for name in ("chi2_before", "chi2_after", "probability")}
+    chi2 = {name: json_number(plain[name]) for name in ("chi2_before", "chi2_after", "probability")}
     return plain | figures | chi2 | {"name": mismatch.name or None}
 
 
 def _figures(figures: Sequence[NamedFigure]) -> dict[str, Any]:
-    return {f.name: {"value": _known(f.value), "sd": _known(f.sd), "unit": f.unit} for f in figures}
-
-
-def _known(value: float) -> float | None:
-    return float(value) if math.isfinite(value) else None
+    return {f.name: {"value": json_number(f.value), "sd": json_number(f.sd), "unit": f.unit} for f in figures}
 
 
 def psnr_without_noise(found: Twin) -> str:

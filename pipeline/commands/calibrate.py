@@ -49,7 +49,9 @@ def _show(result: GaugeCalibration, output: Path, console: Console) -> None:
             table.add_row(name, value, f"{sigma[k]:.2g}", f"{change[k]:+.3g}", moved)
     console.print(table)
     if len(result.wrong_fiducials):
-        console.print(f"outvoted fiducials: {', '.join(map(str, result.wrong_fiducials))}")
+        console.print(
+            f"left out, not where the recording says: fiducials {', '.join(map(str, result.wrong_fiducials))}"
+        )
     if len(result.wrong_rings):
-        console.print(f"outvoted rings, frames: {', '.join(map(str, result.wrong_rings))}")
+        console.print(f"left out, not on the bore: rings of frames {', '.join(map(str, result.wrong_rings))}")
     console.print(f"Probe: {output / 'probe.yaml'}   Report: {output / 'calibration.html'}")

@@ -11,6 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from pipeline.arrays import Float
+from pipeline.files.json_yaml import json_number
 from pipeline.files.provenance import MadeBy
 from pipeline.instrument.camera.calibration import CalibrationReport, ModelScore
 from pipeline.instrument.camera.mapping import camera_to_mapping
@@ -162,8 +163,8 @@ def _score(score: ModelScore) -> dict[str, Any]:
     return {
         "model": score.model,
         "parameters": score.parameters,
-        "rms_px": _number(score.rms_px),
-        "held_out_rms_px": _number(score.held_out_rms_px),
+        "rms_px": json_number(score.rms_px),
+        "held_out_rms_px": json_number(score.held_out_rms_px),
         "refusal": score.refusal,
     }
 
@@ -190,8 +191,4 @@ def _comparison(report: CalibrationReport, compared_file: str) -> dict[str, Any]
 
 
 def _rounded(values: Float) -> list[list[float | None]]:
-    return [[_number(round(float(v), 4)) for v in row] for row in values]
-
-
-def _number(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None
+    return [[json_number(round(float(v), 4)) for v in row] for row in values]

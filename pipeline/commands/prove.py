@@ -63,7 +63,7 @@ def rows_of(done: Sequence[Worked]) -> tuple[Figure, ...]:
         for case in done
         if case.wall is not None and case.trials[0].concealed
     ]
-    words = "Median wall error after correction, over the oracle's"
+    words = "Median wall error after correction, relative to that by the true instrument"
     value = median(ratios) if ratios else None
     wall = Figure("wall_error", words, "≤ 1.1", value, len(ratios), None)
     return (*figures([trial for case in done for trial in case.trials]), wall)
@@ -108,7 +108,9 @@ def prove(
     ] = False,
     shuffle: Annotated[
         bool,
-        typer.Option("--shuffle", help="score every case by another case's answer: all scores must collapse"),
+        typer.Option(
+            "--shuffle", help="score every case by another case's answer: scores must drop to chance"
+        ),
     ] = False,
     workers: Annotated[int, typer.Option(min=1, help="number of cases worked on at a time")] = 1,
 ) -> None:

@@ -43,6 +43,11 @@ def parse_json(text: str | bytes) -> Any:
         raise ValueError("it is nested too deeply") from error
 
 
+def json_number(value: float) -> float | None:
+    """Return a finite number, None for NaN and infinity, which JSON does not have."""
+    return float(value) if math.isfinite(value) else None
+
+
 # A file of settings has some kB; a larger one than this is not one, and is refused unread.
 LARGEST_YAML_BYTES = 1_000_000
 # Likeness of two keys, of 1, from which one is taken for the other misspelt; frames and frame_rate have 0.63.

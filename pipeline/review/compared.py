@@ -282,5 +282,5 @@ def _statement(found: tuple[Change, ...]) -> str:
     words = ", ".join(f"{n} {fate}" for fate, n in count.items())
     return (
         f"{tested} findings compared on both walls: {words}. Where nothing has changed, the chance that any "
-        f"of these is declared is {FAMILY_ERROR:.0%}."
+        f"of these is declared a change is {FAMILY_ERROR:.0%}."
     )

@@ -39,7 +39,9 @@ class LightScene(Parameters):
     traced: ``even`` stands for it.
     """
 
-    level: float = Field(0.6, gt=0, le=50, description="brightest wall on the axis' side over full scale")
+    level: float = Field(
+        0.6, gt=0, le=50, description="light of the mean wall where it is brightest, over full scale"
+    )
     lobe: float = Field(1.0, ge=0, le=20, description="exponent of the emission cos^m; 1: bare LED")
     even: float = Field(0.15, ge=0, le=1, description="share emitted evenly forward, for bounced light")
     colour_bgr: Bgr = Field((1.0, 1.0, 1.0), description="share of each channel")
@@ -128,13 +130,15 @@ class Scene(Parameters):
     summary: str = Field("", description="what it is for, one sentence")
     kind: Literal["inspection", "gauge"] = Field("inspection", description="kind of run")
     seed: int = Field(0, ge=0, description="of everything random")
-    probe_seed: int | None = Field(None, ge=0, description="of the true instrument's draw; absent: seed")
+    probe_seed: int | None = Field(
+        None, ge=0, description="seed of the true instrument's draw; absent: as seed"
+    )
     frames: int = Field(gt=0, le=1_000_000, description="number of frames")
     frame_rate: float = Field(30.0, gt=0, le=10_000, description="1/s")
     pattern: tuple[Pattern, ...] = Field(("laser", "led"), min_length=1, description="illumination, repeated")
     probe: dict[str, Any] = Field(description="what is stated of the instrument, as in probe.yaml")
     truth: Literal["stated", "drawn"] = Field(
-        "drawn", description="is the true instrument as stated, or drawn"
+        "drawn", description="true instrument: as stated, or drawn from its stated uncertainty"
     )
     laser: LaserScene = Field(default_factory=lambda: LaserScene.model_validate({}))
     light: LightScene = Field(default_factory=lambda: LightScene.model_validate({}))

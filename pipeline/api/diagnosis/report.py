@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 from pipeline.api.diagnosis.apply import GeometryChange, consequence
 from pipeline.arrays import Float
 from pipeline.files.disk import replace_text
+from pipeline.files.json_yaml import json_number
 from pipeline.pages import page_template, rendered, tidy
 from pipeline.pages.notation import measured
 from pipeline.physics.catalogue import ALL_EFFECTS
@@ -31,13 +32,13 @@ from stages.diagnose.result import (
 # What the diagnosis measures of events beyond the numbers of their laws: meaning and unit.
 _OF_EVENTS = {
     "duration_s": ("how long it lasts", "s"),
-    "late_s": ("by how much the encoder shows pictures to be late", "s"),
+    "late_s": ("time by which pictures are late against the encoder", "s"),
 }  # fmt: skip
 _HEADLINES = {
     Verdict.CONSISTENT: "The recording agrees with the stated instrument",
     Verdict.CLASS: "Something was left out; its kind is known, its name is not",
     Verdict.UNEXPLAINED: "Something was left out that no known effect explains",
-    Verdict.NOT_IDENTIFIABLE: "This recording cannot tell",
+    Verdict.NOT_IDENTIFIABLE: "This recording cannot tell whether anything was left out",
 }
 
 
@@ -113,7 +114,7 @@ def size_of_mismatch(found: Diagnosis) -> str:
 def _by_hour(change: GeometryChange) -> list[tuple[int, float | None, float | None]]:
     """Return each clock position with mean and largest change, None where nothing was seen."""
     return [
-        (k or 12, float(mean) if np.isfinite(mean) else None, float(most) if np.isfinite(most) else None)
+        (k or 12, json_number(mean), json_number(most))
         for k, (mean, most) in enumerate(zip(change.mean_mm, change.max_mm, strict=True))
     ]
 
