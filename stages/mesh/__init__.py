@@ -47,19 +47,19 @@ class MeshParameters(Parameters):
         0.02,
         gt=0,
         le=5,
-        description="mm; how far off the wall the surface may lie beyond the wall's own noise",
+        description="mm; how far the surface may lie off the wall, beyond the wall's own noise",
     )
     noise_factor: float = Field(
         4.0,
         ge=0,
         le=6,
-        description="random 1 σ of a cell that may be smoothed on top; 0: the bound is strict",
+        description="how many random 1 σ of a cell are added to error_mm; 0: the bound is strict",
     )
     # C. Mallows' criterion for the least error of prediction asks 2 of every vertex, 1 of a triangle, and of
     # noise that two to three rows of a radius map share as many times more. Against truth, open-1 errs by
     # 14.3 µm with 3 (bias left out), 14.3 with 10, 15.4 with 20.
     triangle_cost: float = Field(
-        3.0, ge=0, le=1e6, description="χ² that a triangle must take away; higher: fewer triangles"
+        3.0, ge=0, le=1e6, description="least drop of χ² for each further triangle; higher: fewer triangles"
     )
     triangles_per_mm2: float = Field(
         2.0, gt=0, le=200, description="1/mm²; decimation of a Poisson surface stops at this density"

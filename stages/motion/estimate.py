@@ -1,9 +1,9 @@
 """The motion stage: one robust estimate of camera, pipe axis and encoder from texture, rings and encoder.
 
 Texture tracks are landmarks on the wall; rings lie on the wall; the encoder has a scale and slips; the motion
-is smooth; the axis bends as little as it may; the instrument is as stated within its uncertainty. All of it
-is one least-squares problem with robust weights. A long run is a chain of them, whose loops are closed where
-the probe passes a wall again.
+is smooth; the axis bends as little as possible; the instrument is as stated, within its uncertainty. All of
+it forms one least-squares problem with robust weights. A long run is a chain of such problems, with loops
+closed where the probe passes a wall again.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from stages.motion.bundle_adjustment.equations import Equations, Measurements
 from stages.motion.bundle_adjustment.solver import Estimate, estimate_state
 from stages.motion.bundle_adjustment.unknowns import State
 from stages.motion.events import find_events, warn_of_slips
-from stages.motion.loops.loop_closure import close_loops
+from stages.motion.loops.loop_closure import LoopReport, close_loops
 from stages.motion.loops.revisits import Passage, WallFeatures, bands_in_rings, texture_at
 from stages.motion.measuring import measure_run, places_of
 from stages.motion.parameters import MotionParameters
@@ -40,7 +40,9 @@ from stages.motion.trajectory import (
     report_steps,
     trajectory_of,
 )
+from stages.motion.windows.measured_run import MeasuredRun
 from stages.motion.windows.sliding_window import adjust_run, joined_at_once
+from stages.motion.windows.submap_joining import JoinedRun
 
 _LARGEST_CHANGE = 0.1
 """Share by which the radius may differ from the rings' before the adjustment counts as diverged: the rings'
@@ -71,18 +73,7 @@ def estimate_motion(
     run = measure_run(recording, probe, rings, points, parameters, context)
     check = partial(_require_convergence, run.texture.grid.radius_mm)
     estimate = adjust_run(run, parameters, check, context.progress)
-    distance = distance_along(estimate.joined.axis, estimate.joined.T_pc)
-    grid, lit, circles = run.texture.grid, run.texture.poses.frames, run.circles
-    passage = Passage.of(lit, distance[lit], grid.near_mm, grid.far_mm)
-    at_rings = distance[places_of(recording, points.frame)] + probe.laser.baseline_mm
-
-    def features(passage: Passage) -> WallFeatures:
-        bands_mm = bands_in_rings(at_rings, circles.radius_mm)
-        observations = run.texture.store.spool.parts(_OBSERVATIONS_AT_ONCE)
-        return WallFeatures(texture_at(passage.frame, observations), bands_mm)
-
-    view = WallView(recording, probe, grid)
-    joined, loops = close_loops(estimate.joined, passage, features, view, parameters, context.scratch)
+    joined, loops = _with_loops_closed(estimate.joined, run, recording, probe, parameters, context)
     wider = 2 * joined.radius_mm / recording.pipe.nominal_diameter_mm - 1
     doubt, has_encoder = estimate.encoder.doubt_of_probe(wider), run.encoder is not None
     joined = joined.with_scale_sigma(doubt)
@@ -91,7 +82,7 @@ def estimate_motion(
     events = find_events(recording.frames, trajectory, run.texture.poses, joined.slip, has_encoder)
     if run.encoder is not None:
         warn_of_slips(events, trajectory, probe.encoder_scale_sigma, run.encoder.sigma_mm, context)
-    seen = SeenCentres(circles.centre_c, probe.laser.baseline_mm)
+    seen = SeenCentres(run.circles.centre_c, probe.laser.baseline_mm)
     shakes = camera_trembles(trajectory, run.texture.poses, seen)
     doubted = shakes or run.texture.poses.much_lost
     steady, believed = estimate.steady, doubting_instrument(trajectory, probe, estimate.lasting, doubted)
@@ -104,6 +95,29 @@ def estimate_motion(
         radius_doubt=doubt,
         knock=steady.run.knock,
     )  # fmt: skip
+
+
+def _with_loops_closed(
+    joined: JoinedRun,
+    run: MeasuredRun,
+    recording: Recording,
+    probe: Probe,
+    parameters: MotionParameters,
+    context: Context,
+) -> tuple[JoinedRun, LoopReport]:
+    """Return a joined run with its loops closed, and what the report says of them."""
+    distance = distance_along(joined.axis, joined.T_pc)
+    grid, lit, circles = run.texture.grid, run.texture.poses.frames, run.circles
+    passage = Passage.of(lit, distance[lit], grid.near_mm, grid.far_mm)
+    at_rings = distance[places_of(recording, circles.frame)] + probe.laser.baseline_mm
+
+    def features(passage: Passage) -> WallFeatures:
+        bands_mm = bands_in_rings(at_rings, circles.radius_mm)
+        observations = run.texture.store.spool.parts(_OBSERVATIONS_AT_ONCE)
+        return WallFeatures(texture_at(passage.frame, observations), bands_mm)
+
+    view = WallView(recording, probe, grid)
+    return close_loops(joined, passage, features, view, parameters, context.scratch)
 
 
 @dataclass(frozen=True)
@@ -196,7 +210,7 @@ def require_along_pipe(trajectory: Trajectory) -> None:
     Raises
     ------
     UnusableError
-        When the optical axis leaves the pipe's by more than a ring that is seen all round allows.
+        When the angle between the optical axis and the pipe's exceeds 45°.
     """
     T_pc, limit_deg = trajectory.T_pc, np.degrees(_MOST_TURNED)
     _, R_pa = frames_at(trajectory.axis, distance_along(trajectory.axis, T_pc))

@@ -11,12 +11,12 @@ from pipeline.recording.base import Recording
 from stages.motion.tracking.landmarks import TrackedPoses
 
 _SCATTER = 0.01
-"""Scatter of stamps, in frame times, below which it does not matter: at 20 mm/s and 30 frames/s 7 µm."""
+"""Smaller scatter of stamps, in frame times, does not matter: at 20 mm/s and 30 frames/s it makes 7 µm."""
 _FARTHEST = 0.5
 """Stamps farther from an even rhythm, in frame times, are no scatter: frames are missing, or it changes."""
 _BETTER = 0.7
-"""The even rhythm is believed where encoder and wall differ by so much less with it: where stamps are right,
-they differ more. Not measured."""
+"""Equal intervals are believed if the difference of encoder and wall falls to this share with them: if the
+stamps are right, it rises. Not measured."""
 _FEWEST = 10
 
 

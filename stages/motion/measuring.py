@@ -57,23 +57,10 @@ def measure_run(
         When the rings do not place the pipe, or neither texture nor encoder determines the distance.
     """
     circles, rings = circles_in_rings(points), rings.placed_in(points)
-    grid = strip_grid(circles.usual_radius_mm, parameters)
-    view, encoder = WallView(recording, probe, grid), None
-    if use_encoder:
-        encoder = encoder_at_frames(recording, parameters.encoder_sigma_mm, grid.far_mm, context)
-    texture, predictor = _track(view, circles, encoder, parameters, context)
-    times = believed_times(recording, texture.poses, context)
-    if encoder is not None and times is not recording.frames.time_s:
-        recording = replace(recording, frames=replace(recording.frames, time_s=times))
-        encoder = encoder_at_frames(recording, parameters.encoder_sigma_mm, grid.far_mm, context)
-    if encoder is not None and contradicted(encoder, texture.poses, context):
-        encoder = None
-        texture, predictor = _track(view, circles, None, parameters, context)
-    if encoder is not None:
-        warn_of_unread(encoder, texture.poses, recording.frames.frame, context)
-    _require_distance(texture.poses, encoder)
-    place = places_of(recording, rings.frame)
-    followed = _in_bore(circles, texture, predictor, view, encoder)
+    view = WallView(recording, probe, strip_grid(circles.usual_radius_mm, parameters))
+    tracked = _tracked(view, circles, parameters, context, use_encoder)
+    encoder = tracked.encoder
+    followed = _in_bore(circles, tracked.texture, tracked.predictor, view, encoder)
     if followed.bore.reduces:
         followed = _in_reducer(followed, circles, view, encoder, parameters, context)
         _warn_of_reducer(followed.bore, encoder, context)
@@ -83,10 +70,41 @@ def measure_run(
     jump = find_jump(circles, followed.at_mm, points, probe)
     if jump is not None and texture_breaks(jump, rings.frame, followed.texture.poses):
         jump = None
-    time_s = recording.frames.time_s
     return MeasuredRun(
-        followed.texture, rings, place, time_s, followed.T_pc, encoder, probe, bore, circles, jump=jump
+        followed.texture, rings, places_of(recording, rings.frame), tracked.time_s, followed.T_pc, encoder,
+        probe, bore, circles, jump=jump,
     )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class _Tracked:
+    """Texture tracked on a cylinder, its predictor of poses, the encoder if believed, and times (N,), s."""
+
+    texture: TrackedTexture
+    predictor: PosePredictor
+    encoder: EncoderReadings | None
+    time_s: Float
+
+
+def _tracked(
+    view: WallView, circles: RingCircles, parameters: MotionParameters, context: Context, use_encoder: bool
+) -> _Tracked:
+    """Track texture with the encoder; without it, if the texture contradicts it."""
+    recording, far_mm, encoder = view.recording, view.grid.far_mm, None
+    if use_encoder:
+        encoder = encoder_at_frames(recording, parameters.encoder_sigma_mm, far_mm, context)
+    texture, predictor = _track(view, circles, encoder, parameters, context)
+    times = believed_times(recording, texture.poses, context)
+    if encoder is not None and times is not recording.frames.time_s:
+        recording = replace(recording, frames=replace(recording.frames, time_s=times))
+        encoder = encoder_at_frames(recording, parameters.encoder_sigma_mm, far_mm, context)
+    if encoder is not None and contradicted(encoder, texture.poses, context):
+        encoder = None
+        texture, predictor = _track(view, circles, None, parameters, context)
+    if encoder is not None:
+        warn_of_unread(encoder, texture.poses, recording.frames.frame, context)
+    _require_distance(texture.poses, encoder)
+    return _Tracked(texture, predictor, encoder, recording.frames.time_s)
 
 
 def strip_grid(radius_mm: float, parameters: MotionParameters) -> StripGrid:

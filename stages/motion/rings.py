@@ -24,8 +24,8 @@ _MOST_NOT_ON_WALL = 0.5
 """Share of the rings that show no wall in a sector, from which its texture is not followed. A choice:
 half is most of the way."""
 _FARTHEST_PX = 20.0
-"""A ring farther than this from where it is expected is a hole or an outlier, of little weight. Up to there
-derivatives change evenly: with relief of 5 px rms nothing is left of their pull. A choice."""
+"""A ring farther than this from where it is expected is a hole or an outlier, of little weight. Up to this
+distance derivatives change linearly: with relief of 5 px rms no bias remains. A choice."""
 
 
 @dataclass(frozen=True)
@@ -60,11 +60,12 @@ class RingBins:
         return RingBins(*(np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(RingBins)))
 
     def instrument_where_expected(self, residual_mm: Float, normal_c: Float) -> Float:
-        """Return ``by_instrument`` where the pipe puts the ring, which is off it by (M,) along (M, 3) in C.
+        """Return ``by_instrument`` at the places where the pipe's model expects the rings.
 
-        Derivatives where it was found follow the wall's relief there, and their product with the residual has
-        a mean: in open-1-field it moved radius and distance by 0.15 σ (W. A. Fuller, "Measurement Error
-        Models", 1987, ch. 3).
+        ``residual_mm`` (M,) is how far each ring was found off there, along ``normal_c`` (M, 3). Derivatives
+        at the places found would follow the wall's relief, and their product with the residual has a mean
+        that is not zero: in open-1-field it moved radius and distance by 0.15 σ (W. A. Fuller, "Measurement
+        Error Models", 1987, ch. 3).
         """
         away = residual_mm / np.einsum("mi,mi->m", normal_c, self.by_pixel)
         away = np.clip(away, -_FARTHEST_PX, _FARTHEST_PX)
@@ -123,9 +124,9 @@ def circles_in_rings(points: RingPoints) -> RingCircles:
 
 
 def looking_at_wall(recording: Recording, rings: RingSamples, points: RingPoints) -> Recording:
-    """Return the recording without the sectors of the picture in which most rings' line is not on the wall.
+    """Return the recording without those sectors of the picture in which most rings have no line on the wall.
 
-    In standing water the wall above is mirrored: its texture there lies elsewhere, too.
+    Standing water mirrors the wall above it, so that texture seen there lies elsewhere, too.
     """
     lost = (rings.valid & np.isnan(points.xyz_c[..., 0])).mean(0) > _MOST_NOT_ON_WALL
     if not lost.any():

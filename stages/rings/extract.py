@@ -57,8 +57,8 @@ class RingParameters(Parameters):
     )
     left_out: ImagePlaces = Field(
         (),
-        description="dirty places of the image: u, v and radius, px, of each; the line is left out there "
-        "but where it moves as its ring does; boresight run --twin takes them from a twin",
+        description="dirty places of the image, each as u, v and radius, px; the line is left out there "
+        "unless it moves as its ring does; boresight run --twin takes them from a twin",
     )
 
 

@@ -49,7 +49,7 @@ class TextureParameters(Parameters):
         0.5, ge=0.02, le=1.0, description="wall used on either side of the laser sheet, in pipe radii"
     )
     most_views: int = Field(
-        48, ge=3, le=64, description="most frames blended into one place; as many as their noise asks for"
+        48, ge=3, le=64, description="most frames blended into one place; fewer if pictures have little noise"
     )
     tile_mm: float = Field(10.0, ge=1.0, le=200.0, description="length of the tiles worked on, mm")
     smoothing_mm: float = Field(0.2, ge=0.0, le=10.0, description="1 σ of the radius map's smoothing, mm")
@@ -61,18 +61,18 @@ class TextureParameters(Parameters):
         1500,
         ge=20,
         le=100000,
-        description="frames whose light is worked out together; a longer pipe is cut in stretches of so many",
+        description="frames whose light is estimated together; a run of more frames is divided in stretches",
     )
     left_out: tuple[tuple[float, float, float], ...] = Field(
         (),
-        description="dirty places of the image that are not used: u, v and radius, px, of each; "
+        description="dirty places of the image that are not used, each as u, v and radius, px; "
         "boresight run --twin takes them from a twin",
     )
     white_quantile: float = Field(
         0.9995,
         ge=0.5,
         le=1.0,
-        description="quantile of the wall's brightest colour that stays below 250 of 255",
+        description="share of the wall whose brightest colour channel stays below 250 of 255",
     )
 
 

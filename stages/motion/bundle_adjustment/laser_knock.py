@@ -36,13 +36,13 @@ _LARGEST_JUMP = 0.1
 """Share of the radius beyond which a jump is another bore: in gauges and reducers they differ by a fifth
 (a01) or more, and no laser moves so far. A choice."""
 _SURE = float(np.log(1000))
-"""Logarithm of the odds for a knock from which it is told, and of those against it from which it is refused.
-Drawn runs without one, or with a joint, come to -9 and less; a09, knocked by .35°, to 9."""
+"""Least log odds for a knock with which it is certain, and against one with which it is ruled out. Drawn runs
+without a knock, or with a joint, have -9 and less; a09, knocked by .35°, has 9."""
 _WELD = 0.3
-"""Share of a jump by which the radius may change otherwise over a length: more is the edge of a weld."""
+"""By what share of the jump the lasting change of radius may differ from it: more is the edge of a weld."""
 _USUAL_MM = 1.0
-"""Jump, 1 σ of each part, that a knock and a joint are expected to make: it weighs what each may explain by
-its freedom, the same for both. A choice."""
+"""1 σ of each part of the jump that a knock or a joint is expected to make. It sets how much the freedom of
+either costs, equally for both. A choice."""
 _LARGEST = 0.2
 """1 σ of any change beforehand, as a share of the radius or as a slope: it keeps the equations regular."""
 _LASER = 3
@@ -167,7 +167,7 @@ class KnockTest:
 
     @property
     def ambiguous(self) -> bool:
-        """Whether it may have been, and something else as well."""
+        """Whether the laser may have been knocked, but something else may have made the jump."""
         return not self.told and self.better > -_SURE
 
     def warn(self, context: Context) -> None:
@@ -231,8 +231,8 @@ def _jump_of_lines(frame: Int) -> tuple[Float, Float]:
     weight : (N, 2 n)
         Of each 2 n rings in a row, by least squares.
     sway : (N,)
-        How many times as much of a swaying way is left where rings are missing between: of its third power
-        of time, the first that lines on both sides do not share.
+        How many times more of the probe's sway remains where rings are missing in between. Compared is the
+        third power of time, the lowest that lines on both sides do not follow.
     """
     at = sliding_window_view(frame / np.median(np.diff(frame)), 2 * _SIDE)
     at = np.vstack([np.arange(2 * _SIDE), at - at[:, :1]])

@@ -53,10 +53,11 @@ def observe(  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
 def _share_of_biases(x, y, z, share):  # type: ignore[no-untyped-def]
-    """Write by how much a match at a point in C errs by each knot's error, which is the same all round.
+    """Write by how much a match at a point in C errs for a unit error at each knot of the polar angle.
 
-    Errors are radial and piecewise linear in the polar angle: light that falls off across a patch, blur that
-    grows with distance and compression shift matches along the radius, which must not be taken for the lens.
+    Errors are radial, equal all round, and piecewise linear in the polar angle. Light that falls off across a
+    patch, blur that grows with distance, and compression shift matches along the radius, and that must not be
+    taken for the lens.
     """
     theta = np.arctan2(np.hypot(x, y), z)
     place = min(max((theta - _FIRST_RAD) / _KNOT_RAD, 0.0), len(share) - 1.0)

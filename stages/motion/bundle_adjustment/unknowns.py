@@ -41,9 +41,10 @@ class State:
     instrument : (Q,)
         Corrections of the instrument along its principal uncertainties, then of texture matching, in σ.
     bore : Bore
-        Not unknown: where the rings show another bore.
+        Widths of the pipe as read from the rings; not an unknown.
     guess_mm : (N,)
-        Distances of the camera with which the rings' places in the bore were worked out; empty: those of now.
+        Camera distances with which the places of the rings in the bore were computed; empty: the current
+        ones.
     """
 
     T_pc: Float
@@ -96,7 +97,7 @@ class State:
         return frames_at(self.axis, distance_mm)[1]
 
     def with_bore_in_place(self, ahead_mm: float) -> State:
-        """Return the state with a reducer placed where its rings, ``ahead_mm`` of the camera, lie by now."""
+        """Return the state with a reducer moved to where its rings, ``ahead_mm`` of the camera, lie now."""
         if not self.bore.reduces or not len(self.guess_mm):
             return self
         now = to_pipe(self.axis, self.T_pc[:, :3, 3])[0]

@@ -34,9 +34,9 @@ _BLURS = 4
 def without_illumination(grey: Float32, usable: Bool) -> Float32:
     """Return grey (H, W) over the mean brightness of its rows, minus 1; 0 where unusable.
 
-    The predicted light has been divided out before; removed here is what the prediction left along the pipe,
-    the same all round. A local mean would follow the light as well, but at the border of the usable part it
-    sees one side only and shifts the texture there.
+    The predicted light has been divided out before. What the prediction left along the pipe, equal all round,
+    is removed here. A local mean would follow the light as well, but at the border of the usable part it sees
+    one side only and shifts the texture there.
     """
     mean, count = _row_means(grey, usable)
     row = np.arange(len(mean))
@@ -94,7 +94,7 @@ def noise_of_rows(contrast: Float32, usable: Bool) -> Float32:
 
 
 def _blurred(contrast: Float32, part: slice, sigma_along: float, sigma_around: float) -> Float32:
-    """Return some rows of the blurred strip; blurred are just as many more as the blur reaches."""
+    """Return some rows of the blurred strip; only these, and the rows that the blur reaches, are computed."""
     more = int(np.ceil(5 * sigma_along)) + 1
     first = max(part.start - more, 0)
     wide = cv2.GaussianBlur(contrast[first : part.stop + more], (0, 0), sigma_around, None, sigma_along)

@@ -30,9 +30,9 @@ from stages.premises.stays import darkest_channel, in_full
 from stages.texture.light import irradiance
 
 _COARSE = (8, 4)
-"""The camera model is computed for every eighth row and fourth column and interpolated between: around the
-pipe pixels lie on a curve. `Strip.pixel` uses the same interpolation, so that no error of a position comes
-of it."""
+"""The camera model is computed for every eighth row and fourth column, more densely around the pipe because
+pixels lie on a curve there, and interpolated between. `Strip.pixel` uses the same interpolation, so that
+positions have no error from it."""
 _LEAST_LIGHT = 0.05
 """Predicted light is not believed below this share of the largest: the division would amplify noise."""
 _DARKEST, _BRIGHTEST = 5.0, 250.0
@@ -56,8 +56,8 @@ class StripGrid:
     near_mm, far_mm : float
         Wall ahead of the camera that is sampled.
     bore : Bore
-        How much wider the pipe is than the cylinder. In a reducer what lies on a cylinder is stretched while
-        the camera comes near, and patches of it are matched wrongly.
+        How much wider the pipe is than the cylinder. On a plain cylinder the texture of a reducer would be
+        stretched more and more as the camera comes near, and its patches matched wrongly.
     """
 
     radius_mm: float

@@ -1,4 +1,4 @@
-"""A run whose laser was knocked: the change is estimated, and later rings are corrected."""
+"""Estimates by how much a laser was knocked in mid-run, and corrects the rings after the knock."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ from stages.motion.windows.measured_run import MeasuredRun
 from stages.motion.windows.submaps import Window
 
 _ROUNDS = 2
-"""Times that a cause's size is estimated, each with what was found before taken out: of 0.8° of tilt a third
-would change a fifth of its σ."""
+"""Times that the size of a cause is estimated, each time with the size found before corrected. With 0.8° of
+tilt, a third time would change it by a fifth of its σ."""
 _STEPS = 20
 """Most steps of an adjustment: a right cause takes 5 to 10 (open-1-field, its line moved), a wrong one may
 never settle, and is refused all the same."""
@@ -77,8 +77,8 @@ def with_steady_laser(
 ) -> tuple[MeasuredRun, KnockTest | None]:
     """Return the run with the change of its laser, and the test for a knock; None where no rings jump.
 
-    A knock, a joint of the pipe and neither are each adjusted with the rings' jump and compared by their
-    marginal likelihoods. Both at once are not tried: at a weld (open-2) their freedom explains it best.
+    Three causes of the rings' jump are adjusted and compared by their marginal likelihoods: a knock, a joint
+    of the pipe, and neither. Both at once are not tried: at a weld (open-2) their freedom would fit best.
 
     Raises
     ------
