@@ -293,5 +293,5 @@ GAUGE_EVIDENCE = Stage(
     "evidence", "37", DiagnosisParameters, examine_gauge, "what a gauge run shows of effects", "diagnosis"
 )
 FIELD_EVIDENCE = Stage(
-    "evidence", "21", DiagnosisParameters, examine_field, "what an inspection shows of effects", "diagnosis"
+    "evidence", "22", DiagnosisParameters, examine_field, "what an inspection shows of effects", "diagnosis"
 )

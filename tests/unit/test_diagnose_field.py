@@ -2,15 +2,19 @@
 
 from dataclasses import replace
 from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
 
+from pipeline.artefacts.measured import RingSamples, RingValidity
 from stages.diagnose.effects.library import LIBRARY
+from stages.diagnose.field import left
 from stages.diagnose.field.against_gauge import not_refuted
 from stages.diagnose.field.answer import _alone, _knowing_encoder, _met, field_answer
 from stages.diagnose.field.evidence import FieldEvidence, scale_by_line
 from stages.diagnose.gauge.fit import fit
+from stages.diagnose.gauge.points import runs_across
 from stages.diagnose.gauge.scan import Scored
 from stages.diagnose.gauge.search import prepare
 from stages.diagnose.inference import INSTRUMENT, Column, Evidence, Score, Stated, stated_belief
@@ -159,6 +163,37 @@ def test_the_gauge_has_no_say_in_what_acts_in_a_pipe_or_is_too_small_for_it(soun
     assert not_refuted(shown, sound_gauge, stated) == shown
 
 
+@pytest.mark.parametrize(
+    ("before_px", "after_px", "unexplained"),
+    [
+        (0.39, 0.38, True),
+        (0.39, 0.12, False),
+        (0.39, 0.2, False),
+        (0.2, 0.19, False),
+        (0.39, np.nan, False),
+    ],
+)
+def test_what_the_likeliest_cause_leaves_most_of_is_not_explained(
+    before_px, after_px, unexplained, monkeypatch
+):
+    """Rows of the sensor that waver were called a wavy sheet, a square pixel or an oval pipe."""
+    residual = {0: before_px, 1: after_px}
+    monkeypatch.setattr(
+        left,
+        "rings_against_texture",
+        lambda run, terms=(): SimpleNamespace(rms_px=residual[len(terms)], floor_px=0.12),
+    )
+    likeliest = seen_in_the_field("laser_cone", 0.1)
+    doubt = left.why_unexplained(cast(Any, None), likeliest)
+    assert bool(doubt) is unexplained
+    field = field_with(2.0 * WAVE @ [0.3, 0.4])
+    answer = field_answer(field, LIBRARY, NOTHING_STATED)
+    shown = replace(answer, shown=() if doubt else answer.shown)
+    found = _alone(Diagnosis("field", "gauge", Verdict.CONSISTENT, 1.0), answer, shown, field, True, doubt)
+    assert found.verdict is (Verdict.UNEXPLAINED if unexplained else Verdict.CLASS)
+    assert ("no effect of the library" in found.identifiable) is unexplained
+
+
 def test_what_the_gauge_refutes_is_unexplained_and_says_what_it_looks_like():
     noise = SIGMA * np.random.default_rng(1).standard_normal(400)
     field = field_with(2.0 * WAVE @ [0.3, 0.4] + noise)
@@ -170,3 +205,17 @@ def test_what_the_gauge_refutes_is_unexplained_and_says_what_it_looks_like():
     assert "looks like this: The laser sheet is tilted" in found.identifiable
     assert "tell" not in found.record_next
     assert not any("came or went" in note for note in found.notes)
+
+
+def test_a_bin_of_a_ring_off_the_centre_runs_across_pixels():
+    """A wave in the fraction of a pixel is the smaller the farther a bin runs; gauge and inspection alike."""
+    bins, azimuth = 72, -np.pi + 2 * np.pi * np.arange(1440) / 1440
+    radius = (300 + 20 * np.cos(azimuth))[None].astype(np.float32)
+    validity = np.full(radius.shape, RingValidity.VALID, np.uint8)
+    validity[0, :100] = RingValidity.OUTLIER
+    rings = RingSamples(np.array([7]), azimuth, np.zeros(2), radius, radius, radius, radius, validity)
+    at = np.radians([-175.0, 0.0, 40.0, 90.0])
+    outward = np.stack([np.cos(at), np.sin(at)], -1)
+    across = runs_across(rings, np.array([7]), np.full(4, 7), outward, bins)
+    expected = [0.0, *(-20 * np.sin(at[1:]) * 2 * np.pi / bins)]
+    assert across == pytest.approx(expected, abs=0.02)

@@ -11,6 +11,7 @@ from stages.diagnose.channels import Seen
 from stages.diagnose.effects.base import EffectModel
 from stages.diagnose.field.against_gauge import met_in_field, not_refuted
 from stages.diagnose.field.evidence import FieldEvidence, travels
+from stages.diagnose.field.left import why_unexplained
 from stages.diagnose.gauge.scan import Scored
 from stages.diagnose.inference import INSTRUMENT, Evidence, Stated, places_of, score, stated_belief
 from stages.diagnose.result import (
@@ -140,7 +141,9 @@ def with_field(
         return _met(found, dict(zip(names, met, strict=True)))
     if alone.shown:
         possible = alone.shown if examined is None else not_refuted(alone.shown, examined, stated)
-        return _alone(found, alone, replace(alone, shown=possible), seen, gauge is not None)
+        doubt = why_unexplained(field.field.run, possible[0]) if possible else ""
+        left = replace(alone, shown=() if doubt else possible)
+        return _alone(found, alone, left, seen, gauge is not None, doubt)
     if found.verdict is Verdict.NOT_IDENTIFIABLE and gauge is None and travels(field.field.run):
         return replace(found, verdict=Verdict.CONSISTENT)
     return found
@@ -200,13 +203,16 @@ def _confirmed(effect: EffectFound, met: Confirmation | None) -> EffectFound:
 
 
 def _alone(
-    found: Diagnosis, alone: FieldAnswer, possible: FieldAnswer, field: FieldEvidence, with_gauge: bool
-) -> Diagnosis:
+    found: Diagnosis, alone: FieldAnswer, possible: FieldAnswer, field: FieldEvidence, with_gauge: bool,
+    doubt: str = "",
+) -> Diagnosis:  # fmt: skip
     """Return the class that the field alone shows, beside whatever other channels say.
 
-    Where the gauge run refutes every one of them, what the field shows is unexplained.
+    Where none of it is ``possible``, what the field shows is unexplained: ``doubt`` says why, or the gauge
+    run refutes every one of them.
     """
-    told = _BY_FIELD + possible.identifiable if possible.shown else _LOOKS_LIKE.format(alone.identifiable)
+    refuted = doubt or _LOOKS_LIKE.format(alone.identifiable)
+    told = _BY_FIELD + possible.identifiable if possible.shown else refuted
     notes = (_NOT_IN_GAUGE if with_gauge else _ONE_PIPE,) if possible.shown else ()
     said = [text for text in (found.identifiable, told) if text]
     certain = found.effects if found.verdict in (Verdict.NAMED, Verdict.PARTLY) else ()

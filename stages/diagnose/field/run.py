@@ -15,7 +15,7 @@ from pipeline.instrument.probe import Probe
 from pipeline.machine.stage import Context
 from pipeline.recording.base import Recording
 from stages.diagnose.effects.base import ImagePoints
-from stages.diagnose.gauge.points import SHARP, Moving, rates, widths_at
+from stages.diagnose.gauge.points import SHARP, Moving, rates, runs_across, widths_at
 from stages.motion import (
     MATCH_BIASES,
     EncoderReadings,
@@ -152,10 +152,11 @@ def ring_points(run: FieldRun) -> ImagePoints:
     normal_c, along_c, azimuth, distance = _wall_at(run, frame, xyz_c)
     passing = _passing(run, frame, xyz_c)
     rate = np.einsum("mi,mi->m", normal_c, passing) / np.einsum("mi,mi->m", normal_c, along_ray)
-    width_px = widths_at(run.rings, run.ring_frames, frame, uv - run.rings.centre_px)
+    at = run.rings, run.ring_frames, frame, uv - run.rings.centre_px
     return ImagePoints(
         run.probe, frame, run.measured.time_s[frame], uv, xyz_c, normal_c, along_c, rate[:, None] * outward,
-        speed_mm_s(run)[frame], True, width_px, azimuth, distance,
+        speed_mm_s(run)[frame], True, widths_at(*at), azimuth, distance,
+        across_px=runs_across(*at, run.parameters.ring_bins),
     )  # fmt: skip
 
 

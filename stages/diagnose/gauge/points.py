@@ -147,12 +147,28 @@ def widths_at(source: RingSamples, index: Int, frame: Int, outward: Float) -> Fl
     frame : (M,) int
         Place of each point's frame.
     """
-    step = 2 * np.pi / len(source.azimuth_rad)
-    turn = (np.arctan2(outward[:, 1], outward[:, 0]) - source.azimuth_rad[0]) / step
-    column = np.round(turn).astype(np.int64) % len(source.azimuth_rad)
-    width = source.width_px[np.searchsorted(index, frame), column].astype(float)
+    width = source.width_px[np.searchsorted(index, frame), _column(source, outward)].astype(float)
     seen = np.isfinite(width)
     return np.where(seen, width, np.median(width[seen]) if seen.any() else 1.0)
+
+
+def runs_across(source: RingSamples, index: Int, frame: Int, outward: Float, bins: int) -> Float:
+    """Return by how much the image radius changes (M,) over one of so many ``bins``; 0 where none is seen.
+
+    The other parameters are those of `widths_at`; a bin lies about each direction.
+    """
+    half, row = len(source.azimuth_rad) / (2 * bins), np.searchsorted(index, frame)
+    ends = [_column(source, outward, turned) for turned in (-half, half)]
+    valid = source.valid
+    first, last = (np.where(valid[row, c], source.radius_px[row, c], np.nan) for c in ends)
+    return np.asarray(np.nan_to_num(last - first), np.float64)
+
+
+def _column(source: RingSamples, outward: Float, turned: float = 0.0) -> Int:
+    """Return the column (M,) of samples nearest to directions, or so many ``turned`` from these."""
+    step = 2 * np.pi / len(source.azimuth_rad)
+    turn = (np.arctan2(outward[:, 1], outward[:, 0]) - source.azimuth_rad[0]) / step
+    return np.asarray(np.round(turn + turned).astype(np.int64) % len(source.azimuth_rad))
 
 
 def _wall_directions(xyz_p: Float, T_pc: Float) -> tuple[Float, Float]:

@@ -1,0 +1,38 @@
+"""Whether what an inspection shows is explained by the likeliest effect, or mostly left by it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from stages.diagnose.field.run import FieldRun
+from stages.diagnose.gauge.scan import Scored
+from stages.diagnose.residual import rings_against_texture
+
+# The most of the 1 σ with which texture alone has the middle of a ring, in four sound inspections; found were
+# .05 to .08 px (`RingResidual.floor_px`).
+_MIDDLE_PX = 0.11
+_LEFT = (
+    "The inspection alone shows what no effect of the library explains. The likeliest, {}, leaves {:.2f} px "
+    "of {:.2f} px between rings and texture, most of it alike at one place of the image, where noise makes "
+    "{:.2f} px"
+)
+
+
+def why_unexplained(run: FieldRun, likeliest: Scored) -> str:
+    """Return why what rings show is not the likeliest effect; empty where that may be right, or nobody knows.
+
+    What repeats at one azimuth of the image on other wall is no noise, but for where texture alone has the
+    middle of a ring. An effect that explains the rest takes most of it: it does not where it leaves more than
+    half, and more than noise and middle make besides.
+    """
+    taken = [(likeliest.model, likeliest.shape, likeliest.score.amplitude)]
+    try:
+        before, after = rings_against_texture(run), rings_against_texture(run, taken)
+    except np.linalg.LinAlgError:
+        return ""
+    sound = before.floor_px**2 + _MIDDLE_PX**2
+    repeated, left = before.rms_px**2 - sound, after.rms_px**2 - sound
+    if not (left > sound and left > repeated / 2):
+        return ""
+    what = likeliest.model.law.replace("_", " ")
+    return _LEFT.format(what, after.rms_px, before.rms_px, before.floor_px)
