@@ -3,18 +3,20 @@
 The twin finds places in blocks of pixels, which are larger than the dirt: in the rest of a block the line is
 as good as elsewhere. Dirt that bends light displaces the line at an azimuth of the image by the same amount
 in all rings, or magnifies its motion when the probe moves. Both show against the smooth ring that is fitted
-through all clear azimuths.
+through all clear azimuths. Only rings that pass a place tell what it does, and only for radii at which they
+pass it.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.ndimage import maximum_filter1d
 
 from pipeline.adjustment.robust import basis_of, ring_harmonics, spread_about_median
-from pipeline.arrays import Bool, Float
+from pipeline.arrays import Bool, Float, Int
 from pipeline.artefacts.measured import RingSamples, RingValidity
 from pipeline.geometry.image_places import ImagePlaces, clear_of
 
@@ -23,12 +25,18 @@ _HARMONICS, _MOST = 4, 3.0
 Usual departures by which a dent that passes by counts at most."""
 _FEWEST_RINGS, _ENOUGH_RINGS, _BESIDE = 16, 128, 9
 """Rings that must show an azimuth for its median to be known to a third of their spread, and as many as are
-looked at; azimuths about one that must follow the ring as well, as many as tell an outlier."""
+looked at, or up to twice as many; azimuths about one that must follow the ring as well, as many as tell an
+outlier."""
 _SURE, _ROUGH = 3.0, 2.0
 """Spreads of the clear azimuths from which one departs steadily, and times their usual scatter that it may
 scatter, as a line beside glints does. Chosen; of sixteen rings noise changes it by a fifth."""
 _OF_DEPTH, _KNOWN = 0.1, 0.05
 """By how much of its way a line may be magnified, and so a depth; 1 σ to which that must be known. Chosen."""
+_ENDS, _BEYOND = 0.1, 0.5
+"""Share of the rings beyond each end of the radii at which a place counts as looked at, and share of the way
+between these ends by which radii may lie beyond them. Chosen: a way with a normal spread keeps 99 %."""
+_AT_ONCE = 128
+"""Rings worked on at a time, for memory's sake."""
 
 
 @dataclass(frozen=True)
@@ -36,49 +44,102 @@ class _Azimuths:
     """What the line does behind dirt at azimuths (A,).
 
     ``measured`` tells where it is as good as elsewhere but for a steady departure ``aside_px`` (0 where that
-    is no larger than elsewhere).
+    is no larger than elsewhere), at radii from ``from_px`` to ``to_px``.
     """
 
     measured: Bool
     aside_px: Float
+    from_px: Float
+    to_px: Float
+
+    def shown_by(self, rings: RingSamples) -> Bool:
+        """Return whether the line of rings (F, A) is as good as elsewhere behind dirt."""
+        return self.measured & (rings.radius_px >= self.from_px) & (rings.radius_px <= self.to_px)
 
 
-def set_right(rings: RingSamples, places: ImagePlaces) -> None:
-    """Leave out the samples at places of the image where they do not follow their ring.
+def set_right(rings: RingSamples, places: ImagePlaces) -> int:
+    """Leave out the samples at places of the image where they do not follow their ring; return how many.
 
     Samples that are displaced alike in all rings, and otherwise move with them, are moved back. A groove
     along the whole way would look the same, so the whole displacement is added to their σ.
     """
-    hidden = ~clear_of(places, np.nan_to_num(rings.pixels()))
-    if not hidden.any():
-        return
-    some = slice(None, None, max(len(rings.frame) // _ENOUGH_RINGS, 1))
-    told = replace(rings, radius_px=rings.radius_px[some], validity=rings.validity[some])
-    behind = _behind(told, hidden[some])
-    rings.validity[hidden & ~behind.measured] = RingValidity.OUT_OF_VIEW
-    aside = np.where(hidden & behind.measured, behind.aside_px, 0.0)
+    hides = np.sum([_hidden(some, places).sum(0) for some in _some_at_a_time(rings)], 0)
+    if not hides.any():
+        return 0
+    behind = _behind(*_looked_at(rings, places, hides), hides == 0)
+    return sum(_apply(behind, some, places) for some in _some_at_a_time(rings))
+
+
+def _apply(behind: _Azimuths, rings: RingSamples, places: ImagePlaces) -> int:
+    hidden, shown = _hidden(rings, places), behind.shown_by(rings)
+    rings.validity[hidden & ~shown] = RingValidity.OUT_OF_VIEW
+    aside = np.where(hidden & shown, behind.aside_px, 0.0)
     rings.radius_px[:] -= aside
     np.hypot(rings.sigma_px, aside, out=rings.sigma_px, casting="same_kind")
+    return int((hidden & ~shown).sum())
 
 
-def _behind(rings: RingSamples, hidden: Bool) -> _Azimuths:
-    """Return what azimuths of rings (F, A) are like where they are ``hidden``, beside clear azimuths."""
-    clear = np.asarray(~hidden.any(0))
-    radius = np.where(rings.validity == RingValidity.VALID, rings.radius_px, np.nan).astype(float)
+def _some_at_a_time(rings: RingSamples) -> Iterator[RingSamples]:
+    for first in range(0, len(rings.frame), _AT_ONCE):
+        yield rings.some(slice(first, first + _AT_ONCE))
+
+
+def _hidden(rings: RingSamples, places: ImagePlaces) -> Bool:
+    """Return which valid samples (F, A) lie at the places."""
+    return rings.valid & ~clear_of(places, np.nan_to_num(rings.pixels()))
+
+
+def _looked_at(rings: RingSamples, places: ImagePlaces, hides: Int) -> tuple[Float, Float]:
+    """Return departures from the smooth ring, and its radius (N, A), of rings spread evenly over the run.
+
+    They are taken at each azimuth from the ``hides`` (A,) rings in which it is hidden, where that is none
+    from all; so the rings in a row are not the same at all azimuths. NaN where there are fewer.
+    """
+    clear = hides == 0
+    every = np.maximum(np.where(clear, len(rings.frame), hides) // _ENOUGH_RINGS, 1)
+    departure, smooth = np.full((2, 2 * _ENOUGH_RINGS, len(hides)), np.nan)
+    passed = np.zeros(len(hides), np.int64)
+    for some in _some_at_a_time(rings):
+        hidden = _hidden(some, places)
+        wanted = hidden | (clear & some.valid)
+        number = passed + np.cumsum(wanted, 0) - 1
+        passed += wanted.sum(0)
+        taken = wanted & (number % every == 0)
+        of_ring = taken.any(1)
+        radius, ring = _with_smooth(some, hidden, of_ring)
+        row, azimuth = np.nonzero(taken[of_ring])
+        place = (number[of_ring] // every)[row, azimuth], azimuth
+        departure[place], smooth[place] = (radius - ring)[row, azimuth], ring[row, azimuth]
+    return departure, smooth
+
+
+def _with_smooth(rings: RingSamples, hidden: Bool, which: Bool) -> tuple[Float, Float]:
+    """Return the radius of some of the rings, and of the smooth ring through what is not hidden, (n, A)."""
+    radius = np.where(rings.valid[which], rings.radius_px[which], np.nan).astype(float)
     basis = basis_of(rings.azimuth_rad, _HARMONICS)
-    smooth = ring_harmonics(np.where(hidden, np.nan, radius), basis) @ basis.T
-    departure = np.where(hidden | clear, radius - smooth, np.nan)
+    return radius, ring_harmonics(np.where(hidden[which], np.nan, radius), basis) @ basis.T
+
+
+def _behind(departure: Float, smooth: Float, clear: Bool) -> _Azimuths:
+    """Return what azimuths are like behind dirt, beside those (A,) that are clear in all rings."""
     enough = np.isfinite(departure).sum(0) >= _FEWEST_RINGS
     of_clear = clear & enough
+    steady, gain, scatter, first, last = np.full((5, len(clear)), np.nan)
     if not of_clear.any():
-        return _Azimuths(clear, np.zeros(len(clear)))
-    steady, gain, scatter = (np.full(len(clear), np.nan) for _ in range(3))
+        return _Azimuths(clear, np.zeros(len(clear)), first, last)
     steady[enough], gain[enough], scatter[enough] = _of_azimuths(departure[:, enough], smooth[:, enough])
+    first[enough], last[enough] = _looked_between((departure + smooth)[:, enough])
     follows = (np.abs(gain) < _OF_DEPTH) & (spread_about_median(gain[of_clear]) < _KNOWN)
     follows &= scatter < _ROUGH * np.median(scatter[of_clear])
     lost = maximum_filter1d(enough & ~follows & ~clear, _BESIDE, mode="wrap")
     usual = np.abs(steady) < _SURE * spread_about_median(steady[of_clear])
-    return _Azimuths(clear | (follows & ~lost), np.where(enough & ~usual, steady, 0.0))
+    return _Azimuths(follows & ~lost, np.where(enough & ~usual, steady, 0.0), first, last)
+
+
+def _looked_between(radius: Float) -> tuple[Float, Float]:
+    """Return the least and the largest radius (A,) that the rings (N, A) looked at stand for."""
+    first, last = np.nanquantile(radius, (_ENDS, 1 - _ENDS), axis=0)
+    return first - _BEYOND * (last - first), last + _BEYOND * (last - first)
 
 
 def _of_azimuths(departure: Float, smooth: Float) -> tuple[Float, Float, Float]:

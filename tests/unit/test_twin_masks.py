@@ -1,6 +1,7 @@
 """What a twin found on the window is kept out of the next run's photo and rings."""
 
 import json
+import tracemalloc
 
 import numpy as np
 import pytest
@@ -119,6 +120,34 @@ def test_a_line_that_the_rim_of_a_drop_moves_alike_in_all_rings_is_moved_back():
 
 def test_a_line_whose_way_nothing_tells_is_left_out():
     assert _lost(_rings(60, way_px=0.0), (300.0, 200.0, 12.0)).any(0).sum() >= 13
+
+
+@pytest.mark.parametrize("usually_at_px", [100, 108])
+def test_a_drop_that_few_rings_of_a_long_run_pass_is_looked_at_in_those_rings(usually_at_px):
+    """Every twentieth ring was looked at: what others showed through a drop, in a wider chamber, stayed."""
+    rings, few, through = _rings(2560), slice(1001, 1020), slice(174, 187)
+    rings.radius_px[:] += usually_at_px - 100
+    rings.radius_px[few] += 15
+    clean = rings.radius_px.copy()
+    rings.radius_px[few, through] += 6
+    _lost(rings, (330.0, 200.0, 25.0))
+    assert np.abs(rings.radius_px - clean)[rings.valid].max() < 3
+
+
+def test_dirt_of_a_long_run_is_looked_for_in_little_memory():
+    rings, size = _rings(2000), 2000 * 360 * 2 * 8
+    tracemalloc.start()
+    try:
+        set_right(rings, ((300.0, 200.0, 12.0),))
+        most = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert most < size
+
+
+def test_samples_left_out_behind_dirt_are_counted():
+    rings = _rings(60, drop=(300.0, 200.0, 14.0, 0.6))
+    assert set_right(rings, ((300.0, 200.0, 36.0),)) == (~rings.valid).sum() > 0
 
 
 def test_a_folder_without_a_twin_is_refused(tmp_path):
