@@ -55,7 +55,8 @@ def _repeated(artefact: Any, times: int, step: float, rows: int, coarser: int) -
             shown = {f.name: getattr(artefact, f.name) for f in fields(artefact)}
             shown = {k: v[:, few] if np.ndim(v) == 2 else v for k, v in shown.items()}
             shown["azimuth_rad"] = artefact.azimuth_rad[few]
-            return RingSamples(**{k: _tiled(v, times) if k != "azimuth_rad" and k != "centre_px" else v
+            of_all = ("azimuth_rad", "centre_px")
+            return RingSamples(**{k: v if v is None or k in of_all else _tiled(v, times)
                                   for k, v in shown.items()})  # fmt: skip
         case Trajectory():
             T_pc = np.tile(artefact.T_pc, (times, 1, 1))

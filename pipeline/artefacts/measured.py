@@ -51,6 +51,9 @@ class RingSamples:
         above the background in grey levels. NaN where no line was found.
     validity : (F, A) uint8
         `RingValidity`; a saturated but usable sample stays VALID with a larger ``sigma_px``.
+    moved_px : (F, A) float32 or None
+        By how much samples were moved inward because dirt on the window displaces the line there alike in
+        all rings, 0 elsewhere; None where nothing was. Only a probe that rolls tells this from a groove.
     """
 
     frame: Int
@@ -61,6 +64,7 @@ class RingSamples:
     width_px: Float32
     amplitude: Float32
     validity: Byte
+    moved_px: Float32 | None = None
 
     @property
     def valid(self) -> Bool:
@@ -75,7 +79,8 @@ class RingSamples:
     def some(self, rows: slice) -> RingSamples:
         """Return some of the rings: those of a slice of the F frames."""
         per_frame = ("frame", "radius_px", "sigma_px", "width_px", "amplitude", "validity")
-        return replace(self, **{name: getattr(self, name)[rows] for name in per_frame})
+        moved_px = None if self.moved_px is None else self.moved_px[rows]
+        return replace(self, moved_px=moved_px, **{name: getattr(self, name)[rows] for name in per_frame})
 
     def reduced(self, times: Float) -> RingSamples:
         """Return the rings with each picture's radii divided by ``times`` (F,), its excess in size."""

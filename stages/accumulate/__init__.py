@@ -23,6 +23,7 @@ from pipeline.machine.stage import Context, Parameters, Stage
 from pipeline.pages import notation
 from stages.accumulate.fixed import fixed_to_probe
 from stages.accumulate.grid import MapGrid, map_grid
+from stages.accumulate.moved_back import shared_on_wall, told_by_roll
 from stages.accumulate.stretch import cut_stretches, empty_wall, fill, map_of
 from stages.accumulate.survey import RingsOnWall, RingSurvey, in_steady_pictures, survey_of
 from stages.accumulate.unmeasured import warn_of_unmeasured
@@ -157,7 +158,12 @@ def accumulate_wall(
         hint = "see the rejected samples of stage rings"
         raise UnusableError("accumulate", "no valid ring sample", hint=hint)
     grid = map_grid(survey, parameters.distance_step_mm, parameters.azimuth_samples)
+    told = told_by_roll(rings, survey.roll_rad, context)
+    if told is not rings:
+        rings, on_wall = told, RingsOnWall(found, told, points, trajectory)
+        survey = survey_of(on_wall)
     spread = calibration_spread(found, rings, trajectory, survey)
+    shared = shared_on_wall(on_wall, grid, parameters.largest_gap_mm, context.scratch)
     fixed = fixed_to_probe(survey, rings.frame, trajectory.radius_mm, grid, context.scratch)
     held = _held_in(rings, survey, trajectory.radius_mm)
     wall = replace(empty_wall(grid, survey, trajectory.axis, fixed, context.scratch), held=held)
@@ -165,8 +171,9 @@ def accumulate_wall(
     stretches = cut_stretches(grid, survey, smoothing_mm, gap_mm)
     for done, stretch in enumerate(stretches, 1):
         systematic = spread.on(grid.rows(stretch.from_row, stretch.to_row))
-        if fixed is not None:
-            systematic = np.hypot(systematic, fixed.departure_mm[stretch.from_row : stretch.to_row])
+        for departure in (None if fixed is None else fixed.departure_mm, shared):
+            if departure is not None:
+                systematic = np.hypot(systematic, departure[stretch.from_row : stretch.to_row])
         radius_map = map_of(stretch, on_wall, survey, grid, systematic, smoothing_mm, gap_mm, held)
         fill(wall, stretch, radius_map, on_wall, survey)
         context.progress(done, len(stretches))
@@ -268,7 +275,7 @@ def _report(context: Context, wall: Wall, spread: CalibrationSpread) -> None:
 
 ACCUMULATE = Stage(
     "accumulate",
-    "13",
+    "14",
     AccumulateParameters,
     accumulate_wall,
     "point cloud and radius map about the pipe's own axis, with σ",

@@ -10,15 +10,16 @@ pass it.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.ndimage import maximum_filter1d
+from scipy.ndimage import binary_propagation, maximum_filter1d
 
 from pipeline.adjustment.robust import basis_of, ring_harmonics, spread_about_median
 from pipeline.arrays import Bool, Float, Int
 from pipeline.artefacts.measured import RingSamples, RingValidity
 from pipeline.geometry.image_places import ImagePlaces, clear_of
+from pipeline.machine.stage import Context
 
 _HARMONICS, _MOST = 4, 3.0
 """A round pipe seen askew, an oval one and an instrument that errs give a ring up to the fourth harmonic.
@@ -57,26 +58,34 @@ class _Azimuths:
         return self.measured & (rings.radius_px >= self.from_px) & (rings.radius_px <= self.to_px)
 
 
-def set_right(rings: RingSamples, places: ImagePlaces) -> int:
-    """Leave out the samples at places of the image where they do not follow their ring; return how many.
+def set_right(rings: RingSamples, places: ImagePlaces, context: Context) -> RingSamples:
+    """Leave out, in place, the samples at places of the image where they do not follow their ring.
 
-    Samples that are displaced alike in all rings, and otherwise move with them, are moved back. A groove
-    along the whole way would look the same, so the whole displacement is added to their σ.
+    Samples that are displaced alike in all rings, and otherwise move with them, are moved back. The whole
+    displacement is added to their σ and kept in ``moved_px`` of the rings returned. Unless the probe rolls,
+    a groove along the whole way would look the same; `stages.accumulate.moved_back` leaves it out.
     """
     hides = np.sum([_hidden(some, places).sum(0) for some in _some_at_a_time(rings)], 0)
     if not hides.any():
-        return 0
+        return rings
     behind = _behind(*_looked_at(rings, places, hides), hides == 0)
-    return sum(_apply(behind, some, places) for some in _some_at_a_time(rings))
+    rings = replace(rings, moved_px=context.scratch.zeros(rings.radius_px.shape, np.float32))
+    lost, moved = np.sum([_apply(behind, some, places) for some in _some_at_a_time(rings)], 0).tolist()
+    context.report("ring samples left out behind dirt", lost, "samples")
+    context.report("ring samples moved back behind dirt", moved, "samples")
+    return rings if moved else replace(rings, moved_px=None)
 
 
-def _apply(behind: _Azimuths, rings: RingSamples, places: ImagePlaces) -> int:
+def _apply(behind: _Azimuths, rings: RingSamples, places: ImagePlaces) -> tuple[int, int]:
+    """Put rings right in place; return how many samples were left out and moved back."""
     hidden, shown = _hidden(rings, places), behind.shown_by(rings)
     rings.validity[hidden & ~shown] = RingValidity.OUT_OF_VIEW
     aside = np.where(hidden & shown, behind.aside_px, 0.0)
     rings.radius_px[:] -= aside
     np.hypot(rings.sigma_px, aside, out=rings.sigma_px, casting="same_kind")
-    return int((hidden & ~shown).sum())
+    if rings.moved_px is not None:
+        rings.moved_px[:] = aside
+    return int((hidden & ~shown).sum()), int(np.count_nonzero(aside))
 
 
 def _some_at_a_time(rings: RingSamples) -> Iterator[RingSamples]:
@@ -132,8 +141,19 @@ def _behind(departure: Float, smooth: Float, clear: Bool) -> _Azimuths:
     follows = (np.abs(gain) < _OF_DEPTH) & (spread_about_median(gain[of_clear]) < _KNOWN)
     follows &= scatter < _ROUGH * np.median(scatter[of_clear])
     lost = maximum_filter1d(enough & ~follows & ~clear, _BESIDE, mode="wrap")
-    usual = np.abs(steady) < _SURE * spread_about_median(steady[of_clear])
-    return _Azimuths(follows & ~lost, np.where(enough & ~usual, steady, 0.0), first, last)
+    departs = enough & (np.abs(steady) >= _SURE * spread_about_median(steady[of_clear]))
+    ends_clear = ~_reaches(departs, clear)
+    return _Azimuths(follows & ~lost & ends_clear, np.where(departs, steady, 0.0), first, last)
+
+
+def _reaches(departs: Bool, clear: Bool) -> Bool:
+    """Return of azimuths (A,) around the circle whether they lie in a stretch that departs where it is clear.
+
+    What goes on beside dirt is on the wall, or at least not told from it.
+    """
+    twice, wall = np.tile(departs, 2), np.tile(departs & clear, 2)
+    whole = binary_propagation(wall, mask=twice)
+    return np.asarray(whole[: len(clear)] | whole[len(clear) :])
 
 
 def _looked_between(radius: Float) -> tuple[Float, Float]:

@@ -94,8 +94,7 @@ def extract_rings(
             hint="is the laser on, the probe inside the pipe, and the exposure long enough?",
         )  # fmt: skip
     if parameters.left_out:
-        lost = set_right(samples, parameters.left_out)
-        context.report("ring samples left out behind dirt", lost, "samples")
+        samples = set_right(samples, parameters.left_out, context)
     _compare_rings(samples)
     lattices = lattices_of(samples)
     take_out(lattices, samples)

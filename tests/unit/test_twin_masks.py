@@ -2,6 +2,7 @@
 
 import json
 import tracemalloc
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from pipeline.artefacts.measured import RingSamples, RingValidity
 from pipeline.errors import InputError
 from pipeline.geometry.image_places import clear_of
 from stages.rings.behind_dirt import set_right
+from tests.quiet import quiet_context
 
 
 def _dirty(tmp_path, fixed_to="image", name="droplet", **parameters):
@@ -77,7 +79,7 @@ def _rings(count, drop=None, way_px=1.0, noise_px=0.05):
 
 def _lost(rings, *places):
     """Return which samples a place takes, the rings set right."""
-    set_right(rings, places)
+    set_right(rings, places, quiet_context())
     return rings.validity == RingValidity.OUT_OF_VIEW
 
 
@@ -138,7 +140,7 @@ def test_dirt_of_a_long_run_is_looked_for_in_little_memory():
     rings, size = _rings(2000), 2000 * 360 * 2 * 8
     tracemalloc.start()
     try:
-        set_right(rings, ((300.0, 200.0, 12.0),))
+        set_right(rings, ((300.0, 200.0, 12.0),), quiet_context())
         most = tracemalloc.get_traced_memory()[1]
     finally:
         tracemalloc.stop()
@@ -146,8 +148,19 @@ def test_dirt_of_a_long_run_is_looked_for_in_little_memory():
 
 
 def test_samples_left_out_behind_dirt_are_counted():
-    rings = _rings(60, drop=(300.0, 200.0, 14.0, 0.6))
-    assert set_right(rings, ((300.0, 200.0, 36.0),)) == (~rings.valid).sum() > 0
+    rings, told = _rings(60, drop=(300.0, 200.0, 14.0, 0.6)), {}
+    context = replace(quiet_context(), report=lambda name, value, unit="": told.update({name: value}))
+    set_right(rings, ((300.0, 200.0, 36.0),), context)
+    assert told["ring samples left out behind dirt"] == (~rings.valid).sum() > 0
+
+
+def test_a_groove_that_goes_on_beside_dirt_is_left_out_behind_it():
+    """It was levelled behind the dirt alone, and said to be measured."""
+    rings = _rings(60)
+    rings.radius_px[:, 165:196] += np.float32(0.8)
+    kept = ~_lost(rings, (300.0, 200.0, 8.0))
+    assert kept[:, 165:175].all()
+    assert not kept[:, 176:185].any()
 
 
 def test_a_folder_without_a_twin_is_refused(tmp_path):
