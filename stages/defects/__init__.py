@@ -37,11 +37,12 @@ from stages.defects.along import stretches
 from stages.defects.clean import CleanWall, clean_wall
 from stages.defects.corroborate import Witnesses, evidence_for
 from stages.defects.dark_lines import dark_lines, lies_beside
-from stages.defects.depth import Depth, allowed_by_neighbours, contradicted_frame, measure_depth
+from stages.defects.depth import Depth, measure_depth
 from stages.defects.describe import Scene, describe, describe_line
 from stages.defects.detect import Detection, detect
 from stages.defects.grow import footprint, grown
 from stages.defects.judge import Found, credibility_on, judged
+from stages.defects.neighbours import allowed_by_neighbours, contradicted_frame, reaching
 from stages.defects.noise_tail import noise_tail
 from stages.defects.parallax import LitPictures
 from stages.defects.parameters import DefectParameters
@@ -130,7 +131,8 @@ def _measured(
             surface, here = wall.surface_about(region, every_point)
             if not _is_measured(surface, here):
                 continue
-            depth = _depth_of(region, here, surface, wall, clean, parameters, context)
+            whole, uncut = surface, _depth_of(region, here, surface, wall, clean, parameters, context)
+            depth = uncut
             while (frame := _contradicted(depth, here, surface)) is not None:
                 without, _ = wall.surface_about(region, every_point, (*surface.left_out, frame))
                 if not _is_measured(without, here):
@@ -143,8 +145,12 @@ def _measured(
                 evidence = evidence_for(here, depth, surface, scene.seen_by, _fixed_in(region, fixed), top)
                 bead = _chance_of_bead(region, wall, parameters)
                 widened = flattened(depth, here, surface, scene.seen_by.held, wall.ways_mm)
+                lone_mm = uncut.depth_mm if abs(uncut.depth_mm) > abs(depth.depth_mm) else None
+                if lone_mm is not None:
+                    widened = reaching(widened, uncut, here, whole)
                 told = describe(here, widened, surface, scene)
-                yield Found(region, told, replace(told, depth_sigma_mm=depth.sigma_mm), evidence, bead)
+                by_noise = replace(told, depth_sigma_mm=depth.sigma_mm)
+                yield Found(region, told, by_noise, evidence, bead, lone_mm)
                 break
         context.progress(len(regions) + done, 2 * len(regions))
 
@@ -249,5 +255,5 @@ def _defects_of_run(
 
 
 DEFECTS = Stage(
-    "defects", "40", DefectParameters, _defects_of_run, "defects as instances with depth, clock and kind"
+    "defects", "41", DefectParameters, _defects_of_run, "defects as instances with depth, clock and kind"
 )

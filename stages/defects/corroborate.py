@@ -18,6 +18,7 @@ from pipeline.adjustment.shared_light import NOTHING_HELD, HeldOver
 from pipeline.arrays import Bool, Float, Int
 from pipeline.artefacts.measured import PointCloud, RingSamples, RingValidity, WallTexture
 from stages.defects.depth import Depth
+from stages.defects.neighbours import frames_at_peak
 from stages.defects.parallax import LitPictures
 from stages.defects.relief import Relief
 from stages.defects.segment import Region
@@ -145,8 +146,12 @@ def evidence_for(
     relief = surface.relief
     size = min(n * c for n, c in zip(region.mask.shape, relief.cell_mm, strict=True))
     shifted = abs(depth.depth_mm) > size
+    # A pit in a wider patch makes up less than a fifth of any ring in it.
+    showing = np.union1d(
+        frames_behind(region, depth.depth_mm, surface), frames_at_peak(depth, region, surface)
+    )
     return Evidence(
-        seen_by.held.independent(len(frames_behind(region, depth.depth_mm, surface))),
+        seen_by.held.independent(len(showing)),
         None if shifted else photo_stands_out(seen_by.texture, relief, region),
         score,
         _is_fixed(region, surface, fixed_mm),

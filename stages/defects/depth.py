@@ -13,11 +13,11 @@ import numpy as np
 from scipy.ndimage import gaussian_filter
 from scipy.optimize import OptimizeResult, least_squares
 
-from pipeline.arrays import Float, Int
+from pipeline.arrays import Float
 from stages.defects.clean import CleanWall
 from stages.defects.relief import Relief
 from stages.defects.segment import Region
-from stages.defects.surface import DeviationPoints, Surface, cells_of
+from stages.defects.surface import DeviationPoints, Surface
 
 _FEW_RINGS = 5.0
 _BELL_CLEAR_MM = 5.0
@@ -25,10 +25,6 @@ _BELL_MISFIT = 0.12
 # A bell whose height the points leave open by more than this share of it tells nothing: what the rings
 # themselves show is the depth then, and its σ that of a peak between them.
 _BELL_UNKNOWN = 0.5
-# Rings beside each other are no further apart than this many of their distances; a ring's departure is that
-# of the fifth of its samples that depart most, as for what confirms a finding.
-_BESIDE, _TOP_QUANTILE, _LEAST_OF_RING = 1.6, 0.8, 3
-_SHOWN_SIGMAS = 2.0  # of the wall's own unevenness, as for what confirms a finding
 _SHARPENING = 0.3  # 1 σ of a peak's curvature correction, relative
 # Of its depth: without it 85 and 90 % of the depths of 88 defects painted into two open recordings were in
 # their 95 % interval, with it 92 and 91 % of 82 (`python -m tests.benchmarks.bench_painted_findings`).
@@ -99,75 +95,6 @@ def noise_gain(region: Region, relief: Relief) -> Float:
     The line is dim on rust and at the bottom of a pit, and a codec keeps less of it: rings scatter more.
     """
     return np.asarray(np.fmax(region.cut(relief.noise_mm) / relief.typical.sigma_mm, 1.0))
-
-
-def allowed_by_neighbours(depth: Depth, region: Region, surface: Surface) -> Depth:
-    """Return the depth, limited by what the rings beside the deepest one allow, with a larger σ if it is.
-
-    A wall seen along a line of sight falls off from ring to ring by no more than their distance (45°, the
-    mean flank of a hemisphere): what one ring shows beyond that is no part of the wall that the next one
-    shows.
-    """
-    tops, spacing = _tops_of_rings(depth, region, surface), surface.points.spacing_mm
-    if not len(tops.top_mm):
-        return depth
-    shown = max(float(tops.beside_mm.max(initial=0.0)), 0.0)
-    if abs(depth.depth_mm) <= shown + spacing:
-        return depth
-    sigma = float(np.hypot(depth.sigma_mm, (shown + spacing) / 2))
-    return replace(depth, depth_mm=float(np.sign(depth.depth_mm)) * (shown + spacing), sigma_mm=sigma)
-
-
-def contradicted_frame(depth: Depth, region: Region, surface: Surface) -> int | None:
-    """Return the frame whose ring alone makes a depth that those beside do not allow, None where none does.
-
-    The rings on both sides of it show the finding themselves: its depth is theirs without that one.
-    """
-    tops = _tops_of_rings(depth, region, surface)
-    shown = tops.beside_mm >= _SHOWN_SIGMAS * surface.relief.typical.sigma_mm
-    if len(shown) < 2 or not shown.all():
-        return None
-    most = float(tops.beside_mm.max()) + surface.points.spacing_mm
-    return tops.deepest_frame if abs(depth.depth_mm) > most else None
-
-
-@dataclass(frozen=True)
-class _Tops:
-    """How far each ring (n,) of a ``frame`` departs to a finding's side, at which place along the pipe."""
-
-    frame: Int
-    top_mm: Float
-    at_mm: Float
-    spacing_mm: float
-
-    @property
-    def beside_mm(self) -> Float:
-        """Those (m,) of the rings beside the one that departs most; none where there is no ring."""
-        deepest = self.top_mm.argmax() if len(self.top_mm) else 0
-        near = np.abs(self.at_mm - self.at_mm[deepest : deepest + 1]) < _BESIDE * self.spacing_mm
-        return np.asarray(self.top_mm[near & (np.arange(len(near)) != deepest)])
-
-    @property
-    def deepest_frame(self) -> int:
-        """The frame of the ring that departs most."""
-        return int(self.frame[self.top_mm.argmax()])
-
-
-def _tops_of_rings(depth: Depth, region: Region, surface: Surface) -> _Tops:
-    """Return how far each ring by which the surface goes departs to the finding's side."""
-    relief, points = surface.relief, surface.near
-    margin = int(np.ceil(2 * surface.points.spacing_mm / relief.cell_mm[0]))
-    columns = np.broadcast_to(region.mask.any(0), (len(region.mask) + 2 * margin, region.mask.shape[1]))
-    wide = Region(region.row - margin, region.column, columns, region.sign)
-    row, column, inside = cells_of(points, relief, wide)
-    inside &= ~np.isin(points.frame, surface.left_out)
-    deviation = np.sign(depth.depth_mm) * (points.radius_mm - relief.shape_at(row, column))
-    frame = np.unique(points.frame[inside])
-    rings = [(k, inside & (points.frame == k)) for k in frame]
-    rings = [(k, r) for k, r in rings if r.sum() >= _LEAST_OF_RING]
-    top = np.array([np.quantile(deviation[r], _TOP_QUANTILE) for _, r in rings])
-    at = np.array([float(np.mean(points.distance_mm[r])) for _, r in rings])
-    return _Tops(np.array([k for k, _ in rings], np.int64), top, at, surface.points.spacing_mm)
 
 
 def _is_small(relief: Relief, region: Region, points: DeviationPoints) -> bool:

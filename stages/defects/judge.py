@@ -29,6 +29,10 @@ _AT_LEAST = (
     "It is at least so deep, to ± {:.2f} mm by noise, which does not make it: the rest of σ is what pictures "
     "that hold some of those before them may have taken off."
 )
+_LONE = (
+    "It is at least so deep: one ring alone shows {:.2f} mm, which may be a glint, or a pit so narrow that "
+    "no other ring crosses it."
+)
 
 
 @dataclass(frozen=True)
@@ -36,7 +40,7 @@ class Found:
     """A region that is deep enough to be reported, described as if it were surely there.
 
     ``by_noise`` is the same with the σ that noise alone makes, ``bead`` the probability that it is no step of
-    the bore.
+    the bore, ``lone_mm`` the depth that one ring alone shows, which those beside it do not allow.
     """
 
     region: Region
@@ -44,6 +48,7 @@ class Found:
     by_noise: Defect
     evidence: Evidence
     bead: float
+    lone_mm: float | None = None
 
     @property
     def step(self) -> bool:
@@ -57,10 +62,15 @@ class Found:
 
     def told(self, probability: float, counts: bool) -> Defect:
         """Return it with its probability, and if it counts in words whether its depth is a lower bound."""
-        words = _AT_LEAST.format(self.by_noise.depth_sigma_mm)
-        told = f"{self.defect.statement} {words}" if counts and self.flattened else self.defect.statement
+        words = self._at_least() if counts else ""
+        told = f"{self.defect.statement} {words}".rstrip()
         sure = self.defect.confidence * probability
         return replace(self.defect, probability=probability, confidence=sure, statement=told)
+
+    def _at_least(self) -> str:
+        if self.lone_mm is not None:
+            return _LONE.format(self.lone_mm)
+        return _AT_LEAST.format(self.by_noise.depth_sigma_mm) if self.flattened else ""
 
 
 def credibility_on(found: Sequence[Found], tail: NoiseTail, wall: MeasuredWall) -> Credibility:

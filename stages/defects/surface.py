@@ -154,8 +154,8 @@ class MeasuredWall:
         relief = self.relief.rows(rows)
         half = relief.cell_mm[0] / 2
         near = self.cloud.between(relief.distance_mm[0] - half, relief.distance_mm[-1] + half)
-        used = near if every_point else _chosen(near, sure_of_themselves(near))
-        used = _chosen(used, ~np.isin(used.frame, without)) if without else used
+        used = near if every_point else chosen(near, sure_of_themselves(near))
+        used = chosen(used, ~np.isin(used.frame, without)) if without else used
         points = deviation_points(relief, used, self.spacing_mm)
         coarse = millimetre_mean(relief.all_mm, relief.cell_mm)
         # The map's own mean holds the frames that are left out.
@@ -187,7 +187,7 @@ def sure_of_themselves(points: PointCloud) -> Bool:
     )
 
 
-def _chosen(points: PointCloud, which: Bool) -> PointCloud:
+def chosen(points: PointCloud, which: Bool) -> PointCloud:
     """Return some of the points."""
     return replace(points, **{f.name: getattr(points, f.name)[which] for f in fields(points)})
 

@@ -1,0 +1,48 @@
+"""A pit in a wider patch keeps its depth, and what one ring alone shows is told as a lower bound."""
+
+import numpy as np
+import pytest
+
+from stages.defects import DefectParameters, find_defects
+from stages.defects.grow import millimetre_mean
+from tests.quiet import quiet_context
+from tests.synthetic_wall import bare_recording, grey_texture, smooth_noise, wall_of
+
+RADIUS, NOISE_MM, MIDDLE = 38.0, 0.03, 60.0
+AZIMUTH = -np.pi + np.arange(360) * np.pi / 180
+
+
+def patch_with_pit(step_mm, patch_mm, pit_mm, wide_mm, seed, shift=(0.0, 0.0)):
+    """Return the one finding of a patch 30 mm wide with a half ellipsoid in it, and its true 1 mm mean."""
+    distance = np.arange(MIDDLE - 30, MIDDLE + 30, step_mm)
+    along = (distance - MIDDLE)[:, None]
+    around = (AZIMUTH * RADIUS)[None]
+    out = np.hypot(along / 15, around / 15)
+    into = np.hypot(along - shift[0], around - shift[1]) / (wide_mm / 2)
+    height = patch_mm * np.where(out < 1, 1 - out**4, 0) + pit_mm * np.sqrt(np.maximum(1 - into**2, 0))
+    noise = smooth_noise(np.random.default_rng(seed), height.shape, NOISE_MM, 1.5)
+    wall = wall_of(distance, AZIMUTH, RADIUS + height + noise, NOISE_MM)
+    told = find_defects(
+        bare_recording(2 * RADIUS), wall, grey_texture(wall), DefectParameters(draws=20), quiet_context()
+    )
+    (finding,) = told.items
+    return finding, float(np.nanmax(millimetre_mean(height, (step_mm, RADIUS * np.pi / 180))))
+
+
+@pytest.mark.parametrize(
+    ("step_mm", "patch_mm", "pit_mm", "wide_mm"),
+    [(0.5, 0.5, 1.5, 4.0), (0.5, 0.8, 2.0, 4.0), (1.0, 0.6, 1.8, 3.0), (0.5, 0.47, 2.0, 3.45)],
+)
+def test_a_pit_that_many_rings_show_in_a_wider_patch_has_its_depth(step_mm, patch_mm, pit_mm, wide_mm):
+    """1.95 mm was told as 0.78 ± 0.25: a pit narrower than a fifth of the patch was in no ring's top."""
+    finding, true = patch_with_pit(step_mm, patch_mm, pit_mm, wide_mm, seed=5)
+    assert abs(finding.depth_mm - true) < 1.96 * finding.depth_sigma_mm
+    assert finding.depth_sigma_mm < 0.2 * true
+    assert "at least" not in finding.statement
+
+
+@pytest.mark.parametrize(("step_mm", "wide_mm"), [(1.0, 1.8), (0.5, 1.2)])
+def test_a_pit_that_one_ring_shows_is_within_the_depth_told(step_mm, wide_mm):
+    """2.2 mm was told as 0.63 ± 0.03: it may as well be a glint, and the corrosion stays confirmed."""
+    finding, true = patch_with_pit(step_mm, 0.6, 1.7, wide_mm, seed=5)
+    assert abs(finding.depth_mm - true) < 1.96 * finding.depth_sigma_mm
