@@ -166,7 +166,9 @@ def _depth_of(
 ) -> Depth:
     """Return the depth of a region, of which ``here`` counts its rows from the surface's first."""
     if region.all_round:
-        return measure_all_round(here, surface, clean, bore_beside(region, wall.relief.radius_map))
+        return measure_all_round(
+            here, surface, clean, bore_beside(region, wall.relief.radius_map, wall.rings_mm)
+        )
     return measure_depth(here, surface, clean, parameters.draws, context.random)
 
 
@@ -182,7 +184,7 @@ def _chance_of_bead(region: Region, wall: MeasuredWall, parameters: DefectParame
     radius_map = wall.relief.radius_map
     if not goes_round(region, radius_map):
         return 1.0
-    return bore_beside(region, radius_map).chance_of_bead(parameters.min_depth_mm)
+    return bore_beside(region, radius_map, wall.rings_mm).chance_of_bead(parameters.min_depth_mm)
 
 
 def _lines(
@@ -255,5 +257,5 @@ def _defects_of_run(
 
 
 DEFECTS = Stage(
-    "defects", "41", DefectParameters, _defects_of_run, "defects as instances with depth, clock and kind"
+    "defects", "42", DefectParameters, _defects_of_run, "defects as instances with depth, clock and kind"
 )

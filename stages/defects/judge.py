@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipeline.artefacts.findings import Defect
-from stages.defects.all_round import IS_STEP
+from stages.defects.all_round import IS_STEP, MAY_BE_STEP
 from stages.defects.corroborate import Evidence
 from stages.defects.credibility import (
     COUNTED,
@@ -92,13 +92,14 @@ def judged(
         deep = chance_of_depth(f.by_noise, min_depth_mm)
         real = deep if f.region.all_round else deep * credibility.chance_against_clutter(f.evidence)
         real = min(real, MOST_SURE) * (1.0 if f.evidence.on_wall else _WALL_OR_NOT)
-        real *= f.bead
+        unsure, real = real >= COUNTED > real * f.bead, real * f.bead
         counts = f.evidence.corroborated and real >= COUNTED and is_depth_known(f.by_noise)
         defect = f.told(real, counts)
         if counts:
             confirmed.append(defect)
         else:
             doubt = f.evidence.doubt if is_depth_known(f.by_noise) or not f.evidence.corroborated else _UNSURE
+            doubt = MAY_BE_STEP if unsure else doubt
             doubt = f"{IS_STEP}, with a probability of {min(1 - f.bead, MOST_SURE):.2f}" if f.step else doubt
             words = f"{defect.statement} Not confirmed. {doubt}."
             unconfirmed.append(replace(defect, statement=words))

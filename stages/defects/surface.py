@@ -11,6 +11,7 @@ from functools import cached_property
 import numba
 import numpy as np
 
+from pipeline.adjustment.robust import robust_spread
 from pipeline.arrays import Bool, Float, Int
 from pipeline.artefacts.cloud_along import CloudAlong
 from pipeline.artefacts.measured import PointCloud
@@ -139,6 +140,14 @@ class MeasuredWall:
         """How far the probe went to each frame's ring (F,) since the ring before."""
         return self.cloud.ways_mm()
 
+    @cached_property
+    def rings_mm(self) -> float:
+        """1 σ by which median radii of rings scatter on sampled rows, by second differences; 0 if unknown."""
+        s = self.relief.radius_map.distance_mm
+        parts = [_bends(self.cloud.between(float(s[r][0]), float(s[r][-1]))) for r in self.relief.sampled]
+        bends = np.concatenate(parts) if parts else np.empty(0)
+        return float(robust_spread(bends) / np.sqrt(6)) if bends.size else 0.0
+
     def with_margin(self, rows: slice) -> Stretch:
         """Return rows with those about them that have a say in their surface."""
         margin = self.relief.rows_in(max(_MARGIN_MM, _MARGIN_IN_RINGS * self.spacing_mm))
@@ -178,6 +187,16 @@ class MeasuredWall:
         i, j = np.nonzero(region.mask)
         wanted[here.row + i, (region.column + j) % columns] = True
         return self.surface(part.wide, wanted, every_point, without), here
+
+
+def _bends(points: PointCloud) -> Float:
+    """Return second differences (n,) of the median radius of rings along the pipe, mm."""
+    order = np.argsort(points.frame, kind="stable")
+    first = np.unique(points.frame[order], return_index=True)[1][1:]
+    at, radius = (np.split(x[order], first) for x in (points.distance_mm, points.radius_mm))
+    rings = np.array([float(np.median(r)) for r in radius if len(r)])
+    along = np.argsort([float(np.median(s)) for s in at if len(s)])
+    return np.diff(rings[along], 2) if len(rings) > 2 else np.empty(0)
 
 
 def sure_of_themselves(points: PointCloud) -> Bool:
