@@ -29,7 +29,7 @@ from stages.diagnose.compared import OnImage, compared, image_of, with_pictures,
 from stages.diagnose.compose import composed
 from stages.diagnose.correct import CORRECTED_MOTION, CORRECTION, Corrected, CorrectedMotion, Correction
 from stages.diagnose.effects.library import without as library_without
-from stages.diagnose.field.answer import with_field
+from stages.diagnose.field.answer import borne_out, met_by_field, with_field
 from stages.diagnose.field.evidence import travel_of_run
 from stages.diagnose.field.run import FieldRun
 from stages.diagnose.gauge.answer import verdict_of
@@ -104,8 +104,9 @@ def diagnose(
     without = parameters.without
     of_field, of_gauge = _by_correction(of_field, of_gauge, run_corrected, correction, probe, without)
     context.progress(0, _STEPS)
-    found = composed(of_field, of_gauge, probe, without)
-    found = with_field(found, of_field, of_gauge, probe, library_without(without))
+    met = met_by_field(composed(of_field, of_gauge, probe, without), of_field, of_gauge, probe)
+    found = composed(of_field, borne_out(of_gauge, met), probe, without)
+    found = with_field(found, of_field, of_gauge, met, probe, library_without(without))
     found = found.not_knowing(without)
     context.progress(1, _STEPS)
     examined = of_gauge.geometry if of_gauge is not None else None

@@ -141,7 +141,7 @@ def test_quantities_are_those_of_the_catalogue_within_its_range_and_in_the_words
     assert all(quantity in model.equation(shape, size) for quantity in found)
 
 
-def test_a_negative_size_is_told_by_the_other_word_and_never_with_a_sign():
+def test_a_negative_size_is_told_by_the_other_word():
     short = LIBRARY["encoder_scale"].statement((), np.array([-0.0125]))
     assert short == "The encoder reads 1.250% too little of every distance."
     assert "too much" in LIBRARY["encoder_scale"].statement((), np.array([0.0125]))

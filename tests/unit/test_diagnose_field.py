@@ -1,6 +1,6 @@
 """A field alone gives a class, never a name; against the gauge it bears out or contradicts."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -8,13 +8,17 @@ import numpy as np
 import pytest
 
 from pipeline.artefacts.measured import RingSamples, RingValidity
+from pipeline.physics.effect import CourseKind
+from stages.diagnose.channels import Seen
+from stages.diagnose.effects.courses import Coursed
 from stages.diagnose.effects.library import LIBRARY
 from stages.diagnose.field import left
-from stages.diagnose.field.against_gauge import not_refuted
-from stages.diagnose.field.answer import _alone, _knowing_encoder, _met, field_answer
+from stages.diagnose.field.against_gauge import _same_step, not_refuted
+from stages.diagnose.field.answer import _alone, _knowing_encoder, _met, _scale_named, borne_out, field_answer
 from stages.diagnose.field.evidence import FieldEvidence, scale_by_line
 from stages.diagnose.gauge.fit import fit
 from stages.diagnose.gauge.points import runs_across
+from stages.diagnose.gauge.run import Term
 from stages.diagnose.gauge.scan import Scored
 from stages.diagnose.gauge.search import prepare
 from stages.diagnose.inference import INSTRUMENT, Column, Evidence, Score, Stated, stated_belief
@@ -95,24 +99,37 @@ def field_with_way(tilt, read_short):
     return FieldEvidence(None, Evidence(tuple(columns), information, right, information, misfit, degrees))
 
 
-def _in_order(known):
-    field, stated = known
-    return field, LIBRARY, stated
+def seen_with_way(tilt, read_short):
+    """An inspection whose own way says so much of the encoder, by a sheet where it is stated to be."""
+    own = SimpleNamespace(value=read_short, size_sigma=0.001)
+    travel = SimpleNamespace(estimate=lambda name: own if name == "encoder_scale" else None)
+    return SimpleNamespace(field=field_with_way(tilt, read_short), travel=travel)
+
+
+def shown_by(seen, known):
+    stated = Stated(("encoder_scale",), np.array([[0.002**-2]]))
+    field, believed = _knowing_encoder(seen, known, stated)
+    return field_answer(field, LIBRARY, believed).shown
 
 
 def test_an_encoder_that_is_known_to_count_short_is_not_taken_for_a_baseline():
-    stated = Stated(("encoder_scale",), np.array([[0.002**-2]]))
-    unaware = field_answer(field_with_way(0.0, -0.012), LIBRARY, stated)
-    assert [s.model.name for s in unaware.shown] == ["baseline"]
-    short = EffectFound("encoder_scale", 0.99, {"relative": Value(-0.012, 0.0007)}, "It counts short.", "")
-    for verdict in (Verdict.NAMED, Verdict.CLASS):
-        found = Diagnosis("field", "gauge", verdict, 1e-9, effects=(short,))
-        answer = field_answer(*_in_order(_knowing_encoder(found, field_with_way(0.0, -0.012), stated)))
-        assert bool(answer.shown) is (verdict is Verdict.CLASS)
-    found = replace(found, verdict=Verdict.NAMED)
-    tilted = field_answer(*_in_order(_knowing_encoder(found, field_with_way(0.5, -0.012), stated)))
-    assert [s.model.name for s in tilted.shown] == ["laser_tilt"]
-    assert np.linalg.norm(tilted.shown[0].score.amplitude) == pytest.approx(0.5, rel=0.05)
+    short = Value(-0.012, 0.0007)
+    assert [s.model.name for s in shown_by(seen_with_way(0.0, -0.012), None)] == ["baseline"]
+    assert shown_by(seen_with_way(0.0, -0.012), short) == ()
+    (tilted,) = shown_by(seen_with_way(0.5, -0.012), short)
+    assert tilted.model.name == "laser_tilt"
+    assert np.linalg.norm(tilted.score.amplitude) == pytest.approx(0.5, rel=0.05)
+
+
+def test_an_encoder_that_counted_short_in_the_gauge_run_alone_says_nothing_of_the_inspection():
+    assert shown_by(seen_with_way(0.0, 0.0), Value(-0.012, 0.0007)) == ()
+
+
+def test_only_a_name_that_is_sure_makes_an_encoder_known():
+    effect = EffectFound("encoder_scale", 0.99, {"relative": Value(-0.012, 0.0007)}, "It counts short.", "")
+    sure = Diagnosis("field", "gauge", Verdict.NAMED, 1e-9, effects=(effect,))
+    assert _scale_named(sure) == effect.parameters["relative"]
+    assert _scale_named(replace(sure, verdict=Verdict.CLASS)) is None
 
 
 def met(agrees):
@@ -219,3 +236,44 @@ def test_a_bin_of_a_ring_off_the_centre_runs_across_pixels():
     across = runs_across(rings, np.array([7]), np.full(4, 7), outward, bins)
     expected = [0.0, *(-20 * np.sin(at[1:]) * 2 * np.pi / bins)]
     assert across == pytest.approx(expected, abs=0.02)
+
+
+def field_with_step(at_s, size):
+    """An inspection of 12 s whose sheet tilts at a time, looked at in 40 places of each picture."""
+    time, azimuth = np.repeat(np.linspace(0.0, 12.0, 120), 40), np.tile(AZIMUTH[::10], 120)
+    wave = 2.0 * np.stack([np.cos(azimuth), np.sin(azimuth)], 1)
+    noise = SIGMA * np.random.default_rng(3).standard_normal(len(time))
+    signal = size * wave[:, 0] * (time > at_s) + noise
+
+    def about(asked):
+        patterns = np.concatenate([wave * (time > shape[0])[:, None] for _, shape in asked], 1)
+        columns = tuple(Column(m.name, a.name, shape) for m, shape in asked for a in m.amplitudes)
+        information, right = patterns.T @ patterns / SIGMA**2, patterns.T @ signal / SIGMA**2
+        return Evidence(columns, information, right, information, 0.0, np.full(len(right), np.inf))
+
+    run = SimpleNamespace(measured=SimpleNamespace(time_s=time), recording=SimpleNamespace(frame_rate=30.0))
+    return SimpleNamespace(run=run, about=about)
+
+
+@pytest.mark.parametrize(("size", "told"), [(0.3, True), (0.0, False), (-0.3, False), (0.6, False)])
+def test_a_step_of_the_gauge_run_is_borne_out_by_the_same_step_at_another_time_and_by_no_other(size, told):
+    tilt = Coursed(LIBRARY["laser_tilt"], (), CourseKind.STEP)
+    term = Term(tilt, (2.6,), np.array([0.3, 0.0]))
+    found = _same_step(term, 0.01**2 * np.eye(2), field_with_step(7.1, size), NOTHING_STATED)
+    assert (found is not None and found.agrees) is told
+    if found is not None:
+        assert "at 7." in found.measured
+
+
+@dataclass(frozen=True)
+class Judged:
+    """What of a gauge run's examination counts here."""
+
+    confirmed: tuple[tuple[Confirmation, ...], ...]
+
+
+def test_what_the_field_bears_out_counts_for_the_gauge_and_what_it_contradicts_does_not():
+    gauge = Seen("gauge", Judged(((), (met(True),))), None, None, ())
+    assert borne_out(gauge, (met(True), met(False))).geometry.confirmed == ((met(True),), (met(True),))
+    assert borne_out(gauge, (None, None)).geometry == gauge.geometry
+    assert borne_out(None, ()) is None

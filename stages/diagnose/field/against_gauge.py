@@ -8,6 +8,7 @@ import numpy as np
 
 from pipeline.arrays import Float
 from pipeline.physics.catalogue import EFFECTS
+from pipeline.physics.effect import CourseKind
 from stages.diagnose.agreement import same, sized
 from stages.diagnose.effects.base import EffectModel, Shape
 from stages.diagnose.effects.courses import OWN_CLOCK, Coursed
@@ -15,6 +16,7 @@ from stages.diagnose.field.evidence import FieldEvidence
 from stages.diagnose.gauge.confirm import partial_of
 from stages.diagnose.gauge.examine import Examined
 from stages.diagnose.gauge.fit import evidence
+from stages.diagnose.gauge.run import Term
 from stages.diagnose.gauge.scan import Scored
 from stages.diagnose.inference import Evidence, Score, Stated, places_of, score
 from stages.diagnose.result import Confirmation
@@ -22,6 +24,8 @@ from stages.diagnose.result import Confirmation
 # Inspection and gauge confirm or refute each other only where the 1 σ of what is asked is below this share of
 # the other's size: it is then three such σ away from nothing. Debt: data/debts.md.
 TELLING = 0.33
+# The same where the time of a step was searched for: six σ away from nothing.
+_SEARCHED = 0.5 * TELLING
 _PARTS_OF_THE_PROBE = ("laser", "camera", "window")
 # The medium is that of the pipe or of the gauge, not of the probe.
 _OF_THE_MEDIUM = ("outside_index",)
@@ -89,20 +93,49 @@ def met_in_field(
     best = examined.best
     if best is None:
         return ()
-    out: list[Confirmation | None] = []
+    out = []
     for term in best.fit.terms:
-        if isinstance(term.model, Coursed) and term.model.kind in OWN_CLOCK:
-            # What happens at a time of the gauge run need not happen in another recording.
-            out.append(None)
-            continue
         own = partial_of("all", best.evidence, best, term, stated)
         known = own is not None and np.isfinite(own.covariance).all()
         covariance = own.covariance if own is not None and known else np.zeros((len(term.amplitude),) * 2)
         try:
-            out.append(confirm_in_field(term.model, term.shape, term.amplitude, covariance, found, stated))
+            out.append(_met(term, covariance, found, stated))
         except np.linalg.LinAlgError:
             out.append(None)
     return tuple(out)
+
+
+def _met(term: Term, covariance: Float, found: FieldEvidence, stated: Stated) -> Confirmation | None:
+    if not isinstance(term.model, Coursed) or term.model.kind not in OWN_CLOCK:
+        return confirm_in_field(term.model, term.shape, term.amplitude, covariance, found, stated)
+    return _same_step(term, covariance, found, stated) if term.model.kind is CourseKind.STEP else None
+
+
+def _same_step(term: Term, covariance: Float, found: FieldEvidence, stated: Stated) -> Confirmation | None:
+    """Return that the inspection shows the same step at a time of its own; None where it does not.
+
+    What happens once in a gauge run need not happen in another recording: nothing contradicts it.
+    """
+    if found.run is None:
+        return None
+    duration = float(np.ptp(found.run.measured.time_s))
+    shapes = term.model.shapes(duration, found.run.recording.frame_rate)
+    whole = found.about([(term.model, shape) for shape in shapes])
+    if whole is None:
+        return None
+    scores = [(shape, score(whole, stated, places_of(whole, term.model, shape))) for shape in shapes]
+    seen = [(shape, own) for shape, own in scores if own is not None]
+    shape, own = max(seen, key=lambda pair: pair[1].statistic, default=((), None))
+    size = float(np.linalg.norm(term.amplitude))
+    if own is None or np.sqrt(np.trace(own.covariance)) > _SEARCHED * size:
+        return None
+    if not same(term.amplitude, own.amplitude, own.covariance + covariance, size):
+        return None
+    return Confirmation(
+        f"in the inspection, by the gauge run: {sized(term.model, term.shape, term.amplitude, covariance)}",
+        f"inspection alone, at {shape[0]:.1f} s: {sized(term.model, shape, own.amplitude, own.covariance)}",
+        True,
+    )  # fmt: skip
 
 
 def _own_score(model: EffectModel, shape: Shape, found: FieldEvidence, stated: Stated) -> Score | None:

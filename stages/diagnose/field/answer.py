@@ -5,8 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from pipeline.instrument.probe import Probe
 from pipeline.physics.catalogue import EFFECTS
+from stages.diagnose.agreement import same
 from stages.diagnose.channels import Seen
 from stages.diagnose.effects.base import EffectModel
 from stages.diagnose.field.against_gauge import met_in_field, not_refuted
@@ -20,6 +23,7 @@ from stages.diagnose.result import (
     EffectFound,
     Location,
     Remainder,
+    Value,
     Verdict,
     classes_of,
     record_next,
@@ -32,6 +36,7 @@ DETECTED = 1e-4
 # recording's own unknowns absorb nearly the same of each. Debt: data/debts.md.
 _ALMOST, _APART = 0.1, 20.0
 _SHOWN = 4
+_SCALE = "encoder_scale"
 _BY_FIELD = "The inspection alone shows: "
 _NOT_IN_GAUGE = (
     "The gauge run shows none of it: it came or went between the recordings, or does not act in a gauge."
@@ -124,19 +129,46 @@ def _about_as_good(scores: Sequence[Scored]) -> tuple[Scored, ...]:
     return tuple(s for s in scores if s.score.statistic > top - max(_APART, _ALMOST * top))
 
 
+def met_by_field(
+    found: Diagnosis, field: Seen | None, gauge: Seen | None, probe: Probe
+) -> tuple[Confirmation | None, ...]:
+    """Return, for each effect of the gauge's likeliest hypothesis, whether the field says the same.
+
+    Of the encoder's scale counts what the gauge's markers say: from the field's own way it would follow that
+    the field agrees with any place of the sheet.
+    """
+    examined = gauge.geometry if gauge is not None else None
+    if gauge is None or examined is None or field is None or field.field is None or field.field.run is None:
+        return ()
+    of_gauge = gauge.travel.estimate(_SCALE) if gauge.travel is not None else None
+    scale = (
+        Value(of_gauge.value, of_gauge.size_sigma) if of_gauge is not None and _scale_named(found) else None
+    )
+    return met_in_field(examined, *_knowing_encoder(field, scale, stated_belief(probe)))
+
+
+def borne_out(gauge: Seen | None, met: Sequence[Confirmation | None]) -> Seen | None:
+    """Return a gauge run with what the field bears out of it, ``met`` as of `met_by_field`."""
+    if gauge is None or gauge.geometry is None or not met:
+        return gauge
+    each = zip(gauge.geometry.confirmed, met, strict=False)
+    confirmed = tuple((*own, other) if other is not None and other.agrees else own for own, other in each)
+    return replace(gauge, geometry=replace(gauge.geometry, confirmed=confirmed))
+
+
 def with_field(
-    found: Diagnosis, field: Seen | None, gauge: Seen | None, probe: Probe, library: Mapping[str, EffectModel]
-) -> Diagnosis:
-    """Return the answer with what the field's rings and texture say put in."""
+    found: Diagnosis, field: Seen | None, gauge: Seen | None, met: Sequence[Confirmation | None],
+    probe: Probe, library: Mapping[str, EffectModel],
+) -> Diagnosis:  # fmt: skip
+    """Return the answer with what the field's rings and texture say put in; ``met`` as of `met_by_field`."""
     if field is None or field.field is None or field.field.run is None:
         return found
     stated = stated_belief(probe)
-    seen, stated = _knowing_encoder(found, field.field, stated)
+    seen, stated = _knowing_encoder(field, _scale_named(found), stated)
     alone = field_answer(seen, library, stated)
     examined = gauge.geometry if gauge is not None else None
     found = replace(found, global_p=_both(found.global_p, alone.global_p))
     if examined is not None and examined.best is not None and examined.best.fit.terms:
-        met = met_in_field(examined, seen, stated)
         names = [t.model.law for t in examined.best.fit.terms]
         return _met(found, dict(zip(names, met, strict=True)))
     if alone.shown:
@@ -149,17 +181,28 @@ def with_field(
     return found
 
 
-def _knowing_encoder(found: Diagnosis, field: FieldEvidence, stated: Stated) -> tuple[FieldEvidence, Stated]:
-    """Return what the field says, and is believed, where an error of the encoder's scale is sure.
-
-    Taken for right, an encoder that counts short makes the wall seem nearer than it is.
-    """
+def _scale_named(found: Diagnosis) -> Value | None:
+    """Return by what share of the way the encoder surely reads too much, where that is named."""
     certain = found.effects if found.verdict in (Verdict.NAMED, Verdict.PARTLY) else ()
-    for scale in (e.parameters["relative"] for e in certain if e.name == "encoder_scale"):
-        information, own = stated.information.copy(), stated.names.index("encoder_scale")
-        information[own, own] = scale.sd**-2.0
-        return field.with_encoder(scale.value), replace(stated, information=information)
-    return field, stated
+    return next((e.parameters["relative"] for e in certain if e.name == _SCALE), None)
+
+
+def _knowing_encoder(field: Seen, scale: Value | None, stated: Stated) -> tuple[FieldEvidence, Stated]:
+    """Return what the field says, and is believed, when an error of the encoder's scale is known.
+
+    Taken for right, an encoder that counts short makes the wall seem nearer than it is. An error that the
+    field's own way contradicts is that of another recording.
+    """
+    assert field.field is not None
+    own = field.travel.estimate(_SCALE) if field.travel is not None else None
+    if scale is None or own is None or not np.isfinite([scale.sd, own.size_sigma]).all():
+        return field.field, stated
+    gap = np.array([[scale.sd**2 + own.size_sigma**2]])
+    if not same(np.array([scale.value]), np.array([own.value]), gap, abs(scale.value)):
+        return field.field, stated
+    information, at = stated.information.copy(), stated.names.index(_SCALE)
+    information[at, at] = scale.sd**-2.0
+    return field.field.with_encoder(scale.value), replace(stated, information=information)
 
 
 def _met(found: Diagnosis, met: Mapping[str, Confirmation | None]) -> Diagnosis:
@@ -197,7 +240,7 @@ def _beside(found: Diagnosis, certain: Sequence[EffectFound], members: Sequence[
 
 
 def _confirmed(effect: EffectFound, met: Confirmation | None) -> EffectFound:
-    if met is None:
+    if met is None or met in effect.confirmed_by:
         return effect
     return replace(effect, confirmed_by=(*effect.confirmed_by, met))
 
