@@ -70,8 +70,9 @@ def confirm_in_field(
 ) -> Confirmation | None:
     """Return whether the field by itself says the same of an effect as the gauge; None when it cannot tell.
 
-    The field's estimate owes nothing to the gauge: poses from texture, a pipe of unknown size, the stated
-    instrument within its uncertainty. ``amplitude`` (Q,) and ``covariance`` (Q, Q) are the gauge's.
+    The field's estimate owes nothing to the gauge but the encoder's scale, where that is named: poses from
+    texture, a pipe of unknown size, the stated instrument within its uncertainty. ``amplitude`` (Q,) and
+    ``covariance`` (Q, Q) are the gauge's.
     """
     if found.run is None:
         return None

@@ -35,6 +35,10 @@ DETECTED = 1e-4
 # Effects that explain almost as much as the best belong to its class: laws err by a few per cent, and the
 # recording's own unknowns absorb nearly the same of each. Debt: data/debts.md.
 _ALMOST, _APART = 0.1, 20.0
+_OTHER_ENCODER = (
+    "The inspection's own readings and pictures do not show the encoder off by so much: it counted otherwise "
+    "in the gauge run, or the inspection cannot tell."
+)
 _SHOWN = 4
 _SCALE = "encoder_scale"
 _BY_FIELD = "The inspection alone shows: "
@@ -164,7 +168,10 @@ def with_field(
     if field is None or field.field is None or field.field.run is None:
         return found
     stated = stated_belief(probe)
-    seen, stated = _knowing_encoder(field, _scale_named(found), stated)
+    scale = _scale_named(found)
+    seen, stated = _knowing_encoder(field, scale, stated)
+    if scale is not None and seen is field.field and field.travel is not None:
+        found = replace(found, notes=(*found.notes, _OTHER_ENCODER))
     alone = field_answer(seen, library, stated)
     examined = gauge.geometry if gauge is not None else None
     found = replace(found, global_p=_both(found.global_p, alone.global_p))
