@@ -1,5 +1,7 @@
 """Beads with glints on them, and steps of the bore, by the median round the pipe."""
 
+from dataclasses import fields, replace
+
 import numpy as np
 import pytest
 
@@ -54,8 +56,10 @@ def measured(radius_mm):
     wall = wall_of(DISTANCE, AZIMUTH, radius_mm, NOISE_MM)
     shape = smooth_shape_removed(wall.radius_map, DefectParameters())
     all_mm = shape.rows(shape.welds[0]).all_mm
-    region = Region(shape.welds[0].start, 0, np.isfinite(all_mm), float(np.sign(np.median(all_mm))), True)
-    whole = MeasuredWall(shape, cloud_along(wall.cloud), 0.5)
+    region = Region(shape.welds[0].start, 0, np.isfinite(all_mm), float(np.sign(np.nanmedian(all_mm))), True)
+    seen = np.isfinite(wall.cloud.radius_mm)
+    cloud = replace(wall.cloud, **{f.name: getattr(wall.cloud, f.name)[seen] for f in fields(wall.cloud)})
+    whole = MeasuredWall(shape, cloud_along(cloud), 0.5)
     surface, here = whole.surface_about(region, every_point=False)
     return measure_all_round(
         here, surface, clean_wall(whole, (region,)), bore_beside(region, wall.radius_map, whole.rings_mm)
@@ -184,3 +188,14 @@ def test_a_helical_groove_between_bores_of_one_width_is_no_step():
     found = searched(RADIUS + 0.8 * np.exp(-((off / 2) ** 2)) + smooth_noise(rng, SHAPE, NOISE_MM, 1.5))
     assert found.items
     assert not any("step" in d.statement for d in found.unconfirmed)
+
+
+def test_a_circle_of_a_bead_that_is_hardly_seen_does_not_make_its_depth():
+    """The circle with the largest median counted, even one of which a glint was all that was seen."""
+    rng = np.random.default_rng(7)
+    drawn = DrawnDefect("weld", MIDDLE, 0.0, 6.0, 0.0, -0.9)
+    radius = RADIUS + relief(drawn, DISTANCE, AZIMUTH, RADIUS, rng) + smooth_noise(rng, SHAPE, NOISE_MM, 1.5)
+    radius[CENTRE : CENTRE + 2, 100:120] -= 1.5
+    radius[CENTRE : CENTRE + 2, :100] = radius[CENTRE : CENTRE + 2, 120:] = np.nan
+    told = measured(radius)
+    assert abs(told.depth_mm + 0.9) < 1.96 * told.sigma_mm
