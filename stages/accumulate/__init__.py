@@ -15,6 +15,7 @@ from pipeline.adjustment.shared_light import HeldOver
 from pipeline.arrays import Float, Int
 from pipeline.artefacts.findings import clock_of_azimuth
 from pipeline.artefacts.measured import RingPoints, RingSamples, RingValidity, Trajectory, Wall
+from pipeline.artefacts.moved_back import told_by_roll
 from pipeline.artefacts.wall_map import FixedPlace, FixedToProbe
 from pipeline.errors import UnusableError
 from pipeline.geometry.axis import frames_at
@@ -23,7 +24,7 @@ from pipeline.machine.stage import Context, Parameters, Stage
 from pipeline.pages import notation
 from stages.accumulate.fixed import fixed_to_probe
 from stages.accumulate.grid import MapGrid, map_grid
-from stages.accumulate.moved_back import shared_on_wall, told_by_roll
+from stages.accumulate.moved_back import shared_on_wall, warn_of_left_out
 from stages.accumulate.stretch import cut_stretches, empty_wall, fill, map_of
 from stages.accumulate.survey import RingsOnWall, RingSurvey, in_steady_pictures, survey_of
 from stages.accumulate.unmeasured import warn_of_unmeasured
@@ -151,17 +152,15 @@ def accumulate_wall(
         When no ring sample lies on the wall, or most of the wall is nowhere near the pipe's radius.
     """
     found = probe.as_found_in(trajectory)
-    rings = in_steady_pictures(rings, trajectory)
+    told = told_by_roll(rings, trajectory)
+    warn_of_left_out(rings, told, context)
+    rings = in_steady_pictures(told, trajectory)
     on_wall = RingsOnWall(found, rings, points, trajectory)
     survey = survey_of(on_wall)
     if not survey.count.any():
         hint = "see the rejected samples of stage rings"
         raise UnusableError("accumulate", "no valid ring sample", hint=hint)
     grid = map_grid(survey, parameters.distance_step_mm, parameters.azimuth_samples)
-    told = told_by_roll(rings, survey.roll_rad, context)
-    if told is not rings:
-        rings, on_wall = told, RingsOnWall(found, told, points, trajectory)
-        survey = survey_of(on_wall)
     spread = calibration_spread(found, rings, trajectory, survey)
     shared = shared_on_wall(on_wall, grid, parameters.largest_gap_mm, context.scratch)
     fixed = fixed_to_probe(survey, rings.frame, trajectory.radius_mm, grid, context.scratch)

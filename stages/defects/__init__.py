@@ -26,6 +26,7 @@ from pipeline.arrays import Float, Float32
 from pipeline.artefacts.cloud_along import cloud_along
 from pipeline.artefacts.findings import Defect, Defects
 from pipeline.artefacts.measured import RingSamples, Trajectory, Wall, WallTexture
+from pipeline.artefacts.moved_back import told_by_roll
 from pipeline.artefacts.wall_map import FixedToProbe
 from pipeline.errors import UnusableError
 from pipeline.instrument.probe import Probe
@@ -253,9 +254,10 @@ def _defects_of_run(
 ) -> Defects:
     """Find the defects of a run, with all that its rings and lit pictures say of them."""
     pictures = LitPictures(frames.applied_to(recording), probe.as_found_in(trajectory), trajectory)
-    return find_defects(recording, wall, texture, parameters, context, rings, pictures)
+    on_wall = told_by_roll(rings, trajectory)
+    return find_defects(recording, wall, texture, parameters, context, on_wall, pictures)
 
 
 DEFECTS = Stage(
-    "defects", "42", DefectParameters, _defects_of_run, "defects as instances with depth, clock and kind"
+    "defects", "43", DefectParameters, _defects_of_run, "defects as instances with depth, clock and kind"
 )

@@ -63,7 +63,7 @@ def set_right(rings: RingSamples, places: ImagePlaces, context: Context) -> Ring
 
     Samples that are displaced alike in all rings, and otherwise move with them, are moved back. The whole
     displacement is added to their σ and kept in ``moved_px`` of the rings returned. Unless the probe rolls,
-    a groove along the whole way would look the same; `stages.accumulate.moved_back` leaves it out.
+    a groove along the whole way would look the same; `pipeline.artefacts.moved_back` leaves it out.
     """
     hides = np.sum([_hidden(some, places).sum(0) for some in _some_at_a_time(rings)], 0)
     if not hides.any():

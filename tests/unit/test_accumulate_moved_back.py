@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from pipeline.arrays import Float
-from pipeline.artefacts.measured import Trajectory, Wall
+from pipeline.artefacts.measured import RingSamples, Trajectory, Wall
+from pipeline.artefacts.moved_back import told_by_roll
 from pipeline.geometry.axis import straight_axis
 from pipeline.geometry.rigid import from_parts, rotation_from_vector
 from stages.accumulate import AccumulateParameters, accumulate_wall
@@ -43,13 +44,19 @@ def seam(s: Float, psi: Float) -> Float:
     return RADIUS - 0.5 * near(psi)
 
 
-def measured(roll_rad: float, wall=round_wall, rim_px: float = 0.0) -> Wall:
-    run, probe = motion(roll_rad), replace(small_probe(), covariance=np.zeros((20, 20)))
+def put_right(run: Trajectory, wall=round_wall, rim_px: float = 0.0) -> RingSamples:
+    """Return rings whose line a rim moves, set right as the rings stage does."""
+    probe = small_probe()
     rings = rings_on_wall(probe, run.T_pc, run.frame, np.random.default_rng(0), wall, 0.05, AZIMUTHS)
     rings.radius_px[:] += rim_px * near(rings.azimuth_rad)
     radius_px = float(np.median(rings.radius_px))
     place = (rings.centre_px[0] + radius_px, rings.centre_px[1], 0.08 * radius_px)
-    rings = set_right(rings, (place,), quiet_context())
+    return set_right(rings, (place,), quiet_context())
+
+
+def measured(roll_rad: float, wall=round_wall, rim_px: float = 0.0) -> Wall:
+    run, probe = motion(roll_rad), replace(small_probe(), covariance=np.zeros((20, 20)))
+    rings = put_right(run, wall, rim_px)
     points = triangulate_rings(rings, probe, TriangulateParameters(), quiet_context())
     chosen = AccumulateParameters(azimuth_samples=AZIMUTHS)
     return accumulate_wall(probe, rings, points, run, chosen, quiet_context())
@@ -82,3 +89,12 @@ def test_with_roll_the_wall_behind_the_rim_of_a_drop_is_known_with_the_whole_mov
     assert sigma.min() > RIM_MM
     clean = measured(ROLL).radius_map.sigma_mm
     assert np.nanmedian(moved.radius_map.sigma_mm) < 1.1 * np.nanmedian(clean)
+
+
+@pytest.mark.parametrize("roll_rad", [0.0, ROLL])
+def test_points_of_the_wall_are_those_of_the_rings_told_by_roll(roll_rad: float) -> None:
+    """Where they are not as many, the defects stage cannot tell how bright the line was at a finding."""
+    run = motion(roll_rad)
+    told = told_by_roll(put_right(run, rim_px=RIM_PX), run)
+    points = np.bincount(measured(roll_rad, rim_px=RIM_PX).cloud.frame, minlength=RINGS)
+    np.testing.assert_array_equal(points, told.valid.sum(1))

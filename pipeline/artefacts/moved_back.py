@@ -1,0 +1,59 @@
+"""Whether ring samples that were moved back behind dirt on the window were displaced by dirt.
+
+Dirt displaces the line at one azimuth of the image in all rings. A groove or seam along the pipe does the
+same unless the probe rolls: then the wall behind the dirt changes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.ndimage import label
+
+from pipeline.arrays import Bool, Float, Int
+from pipeline.artefacts.measured import RingSamples, RingValidity, Trajectory
+from pipeline.geometry.axis import frames_at, to_pipe
+
+
+def told_by_roll(rings: RingSamples, trajectory: Trajectory) -> RingSamples:
+    """Return the rings without samples that were moved back where the probe's roll does not bear that out.
+
+    They were moved by the median of what their rings depart by. What is on the wall, and as wide as the
+    stretch of azimuths that was moved, is seen there while the probe rolls by that width: it makes the median
+    only if half of the rings have rolls within as much.
+    """
+    if rings.moved_px is None:
+        return rings
+    moved, roll_rad = (rings.moved_px != 0) & rings.valid, _roll_of(rings, trajectory)
+    width = _widths(moved.any(0)) * 2 * np.pi / moved.shape[1]
+    unsure = [a for a in np.flatnonzero(width) if _half_within(roll_rad[moved[:, a]]) <= width[a]]
+    lost = np.zeros_like(moved)
+    lost[:, unsure] = moved[:, unsure]
+    return replace(rings, validity=np.where(lost, np.uint8(RingValidity.OUT_OF_VIEW), rings.validity))
+
+
+def _roll_of(rings: RingSamples, trajectory: Trajectory) -> Float:
+    """Return azimuth in P less azimuth in the image (F,)."""
+    last = len(trajectory.frame) - 1
+    T_pc = trajectory.T_pc[np.minimum(np.searchsorted(trajectory.frame, rings.frame), last)]
+    section = frames_at(trajectory.axis, to_pipe(trajectory.axis, T_pc[:, :3, 3])[0])[1]
+    turn = np.swapaxes(section, 1, 2) @ T_pc[:, :3, :3]
+    return np.asarray(np.arctan2(turn[:, 1, 0], turn[:, 0, 0]))
+
+
+def _widths(moved: Bool) -> Int:
+    """Return of azimuths (A,) around the circle how many are in the same stretch of those moved, else 0."""
+    start = int(np.argmin(moved))
+    stretch = label(np.roll(moved, -start))[0]
+    count = np.bincount(stretch)
+    count[0] = 0
+    return np.asarray(np.roll(count[stretch], start))
+
+
+def _half_within(angle: Float) -> float:
+    """Return the width, rad, of the shortest arc in which at least half of the angles (n,) lie."""
+    ordered = np.sort(angle % (2 * np.pi))
+    further = -(-len(ordered) // 2) - 1
+    ends = np.concatenate([ordered, ordered + 2 * np.pi])[further : further + len(ordered)]
+    return float((ends - ordered).min())
