@@ -4,17 +4,19 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import StrEnum
+from functools import cache
 from pathlib import Path
 
 import numpy as np
 
+from pipeline.errors import InputError
 from pipeline.physics.catalogue import effect
-from pipeline.physics.effect import Course, CourseKind
+from pipeline.physics.effect import COURSES, Course, CourseKind
+from pipeline.simulator.effects import switch_on
 from pipeline.simulator.effects.switch import Switch, switches_from_mapping
+from pipeline.simulator.laws import bench_truth
 from pipeline.simulator.prior import Concealable, Prior, draw_pair, read_prior
 from pipeline.simulator.scene import Scene
-from stages.diagnose.effects.courses import Coursed, with_courses
-from stages.diagnose.effects.library import LIBRARY
 from tests.benchmarks.ring_level import Noise
 
 PRIOR = Path(__file__).with_name("ring_level.yaml")
@@ -22,6 +24,13 @@ PRIOR = Path(__file__).with_name("ring_level.yaml")
 _FRAMES = 1 / 3
 _TEXEL_MM = 1.0
 _REPEATED = "sheet_waviness"
+_BORE_MM = 50.8
+# Courses that are drawn; a swing is drawn as `laser_rocking` and the like.
+_COURSES = (
+    CourseKind.STEP, CourseKind.RAMP, CourseKind.EXPONENTIAL, CourseKind.SPEED, CourseKind.REVERSAL,
+    CourseKind.DISTANCE,
+)  # fmt: skip
+_OF_THEIR_OWN = {(law, CourseKind.EXPONENTIAL) for law in ("baseline", "focal_scale", "principal_point")}
 
 
 class Mode(StrEnum):
@@ -71,24 +80,44 @@ def drawn(mode: Mode, seed: int) -> Drawn:
     return Drawn(scene, pair.folder / "scene.yaml", switches, noise)
 
 
+@cache
+def with_a_course() -> tuple[tuple[str, CourseKind], ...]:
+    """Return steady effects of the prior with each course that the simulator can give them.
+
+    Whether the diagnosis searches them makes no difference. What the catalogue has as an effect of its own
+    comes under that name among the single effects.
+    """
+    scene, out = bench_truth(_BORE_MM), []
+    for one in read_prior(PRIOR).effects:
+        for kind in _COURSES if effect(one.name).time == "static" else ():
+            numbers = tuple(q.typical for q in COURSES[kind])
+            values = tuple(q.typical for q in effect(one.name).quantities)
+            try:
+                switch_on(scene, [Switch(one.name, values, Course(kind, numbers))])
+            except InputError:
+                continue
+            out += [(one.name, kind)] if (one.name, kind) not in _OF_THEIR_OWN else []
+    return tuple(out)
+
+
 def _with_course(prior: Prior, seed: int, duration_s: float) -> Switch:
     """Return a law with a course, both drawn; they take their turns."""
     random = np.random.default_rng([seed, 13])
-    models = [m for m in with_courses(LIBRARY).values() if isinstance(m, Coursed)]
-    model = models[random.permutation(len(models))[0]]
-    size = next(e.size for e in prior.effects if e.name == model.law)
-    values = {q.name: q.typical for q in effect(model.law).quantities}
-    first = effect(model.law).quantities[0]
+    pairs = with_a_course()
+    name, kind = pairs[int(random.integers(len(pairs)))]
+    size = next(e.size for e in prior.effects if e.name == name)
+    values = {q.name: q.typical for q in effect(name).quantities}
+    first = effect(name).quantities[0]
     sign = random.choice([-1.0, 1.0]) if first.low < 0 else 1.0
     values[first.name] *= float(sign * np.exp(random.uniform(*np.log(size))))
     values |= {"direction_deg": float(random.uniform(-180, 180))} if "direction_deg" in values else {}
-    values |= {"order": model.own[0]} if "order" in values else {}
+    values |= {"order": float(random.integers(2, 4))} if "order" in values else {}
     numbers = {
         CourseKind.STEP: (random.uniform(0.15, 0.85) * duration_s,), CourseKind.RAMP: (duration_s,),
         CourseKind.EXPONENTIAL: (random.uniform(0.15, 0.6) * duration_s,), CourseKind.SPEED: (20.0,),
         CourseKind.DISTANCE: (100.0,),
-    }.get(model.kind, ())  # fmt: skip
-    return Switch(model.law, tuple(values.values()), Course(model.kind, tuple(map(float, numbers))))
+    }.get(kind, ())  # fmt: skip
+    return Switch(name, tuple(values.values()), Course(kind, tuple(map(float, numbers))))
 
 
 def _several(prior: Prior, seed: int) -> tuple[Switch, ...]:

@@ -11,7 +11,7 @@ from pipeline.simulator.effects import switch_on
 from pipeline.simulator.effects.switch import parse_switch, parse_switches, switches_from_mapping
 from pipeline.simulator.laws import bench_truth
 from pipeline.simulator.prior import Concealable, draw_pair, read_prior
-from stages.diagnose.effects.courses import SEARCHED, Coursed, with_courses
+from stages.diagnose.effects.courses import SEARCHED, Coursed, shape_alike, with_courses
 from stages.diagnose.effects.library import LIBRARY, columns, ring_shift_px, texture_shift_px, without
 from tests.shared_data import PROJECT_ROOT
 from tests.unit.wall_points import Bore, plain_probe, ring_points, texture_points
@@ -73,17 +73,31 @@ def test_the_simulated_sheet_is_knocked_at_its_time_and_keeps_other_changes():
 
 
 @pytest.mark.parametrize("drift", ["baseline_drift", "focal_drift", "centre_drift"])
-def test_a_ramp_is_the_drift_that_the_catalogue_has_under_a_name_of_its_own(drift):
-    """Two names of one curve would share its chance, or one be given where the library lacks the other."""
+def test_a_ramp_and_a_slow_drift_are_one_curve_and_both_are_searched(drift):
+    """Where one of them alone was, the other got a wrong name, or none where its size was out of range."""
     points = ring_points(plain_probe(), BORE, 90, 1.3)
     run_s = 8.0
     points = replace(points, time_s=np.linspace(0, run_s, len(points.uv)))
     model = LIBRARY[drift]
-    slowest = columns(model, points, model.shapes(run_s, 15.0)[-1])
-    ramp = columns(Coursed(model.static, (), CourseKind.RAMP), points, (run_s,))
-    left = slowest - ramp @ np.linalg.lstsq(ramp, slowest)[0]
-    assert np.linalg.norm(left) < 0.02 * np.linalg.norm(slowest)
-    assert f"{model.static.name}, ramp" not in with_courses(LIBRARY)
+    ramp = with_courses(LIBRARY)[f"{model.static.name}, ramp"]
+    size = np.array([a.plausible for a in ramp.amplitudes]) / 2
+    slow = shape_alike(model, ramp, (run_s,), size, run_s)
+    assert slow == model.shapes(run_s, 15.0)[-1]
+    assert shape_alike(ramp, model, slow, size, run_s) == (run_s,)
+    drifting, even = columns(model, points, slow), columns(ramp, points, (run_s,))
+    left = drifting - even @ np.linalg.lstsq(even, drifting)[0]
+    assert np.linalg.norm(left) < 0.02 * np.linalg.norm(drifting)
+    assert shape_alike(model, coursed("laser_tilt", CourseKind.RAMP), (run_s,), np.ones(2), run_s) is None
+    assert shape_alike(model, coursed(model.static.name, CourseKind.STEP), (4.0,), size, run_s) is None
+
+
+def test_beside_a_large_ramp_there_is_no_drift_that_would_come_to_what_is_impossible():
+    """A baseline that has grown by .3 mm in a run is no drift of 6.4 runs: that would come to 2.1 mm."""
+    ramp = coursed("baseline", CourseKind.RAMP)
+    (quick,) = shape_alike(LIBRARY["baseline_drift"], ramp, (4.0,), np.array([0.15]), 8.0) or (np.inf,)
+    assert quick < 6.4 * 8.0
+    assert 0.3 / -np.expm1(-8.0 / quick) <= 1.0
+    assert shape_alike(LIBRARY["baseline_drift"], ramp, (8.0,), np.array([1.2]), 8.0) is None
 
 
 @pytest.mark.parametrize("text", ["ovality~step=0.1", "encoder_scale~ramp=0.01"])

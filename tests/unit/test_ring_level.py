@@ -10,10 +10,11 @@ from pipeline.simulator.effects import switch_on
 from pipeline.simulator.effects.switch import parse_switch
 from pipeline.simulator.prior import read_prior
 from stages.calibrate.gauge.geometry import gauge_of
-from stages.diagnose.effects.library import without
+from stages.diagnose.effects.courses import Coursed, with_courses
+from stages.diagnose.effects.library import LIBRARY, without
 from tests.benchmarks.bench_diagnosis import of_positions, trial_from
 from tests.benchmarks.ring_level import Eye, Noise, ring_level_run, seen_at, traced_ring
-from tests.benchmarks.ring_level_cases import PRIOR, Mode, drawn
+from tests.benchmarks.ring_level_cases import PRIOR, Mode, drawn, with_a_course
 from tests.benchmarks.ring_level_figures import more_figures
 from tests.exact_rings import exact_rings
 
@@ -130,3 +131,11 @@ def test_what_rings_cannot_tell_of_is_no_truth_that_was_ruled_out():
     assert "told with 0 to 0.001 (mean 0.000): there in 1 of 1" in told("baseline")
     assert "told with 0 to 0.001" not in told("encoder_slip")
     assert "no probability is told of: 1" in told("encoder_slip")
+
+
+@pytest.mark.parametrize(("seed", "key"), [(41, "baseline~ramp"), (66, "focal_scale~ramp")])
+def test_courses_are_drawn_of_all_that_the_simulator_can_give_a_course(seed, key):
+    """What the diagnosis ceased to search was no longer concealed, so that no figure showed the loss."""
+    assert drawn(Mode.COURSES, seed).switches[0].key == key
+    searched = {(m.law, m.kind) for m in with_courses(LIBRARY).values() if isinstance(m, Coursed)}
+    assert searched < set(with_a_course())

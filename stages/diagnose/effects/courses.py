@@ -15,6 +15,7 @@ from pipeline.arrays import Bool, Float
 from pipeline.physics.catalogue import effect
 from pipeline.physics.effect import Course, CourseKind
 from stages.diagnose.effects.base import Amplitude, EffectModel, Factored, ImagePoints, Product, Shape
+from stages.diagnose.effects.kinds import Drifting
 
 # Laws of parts that a knock, heat or play can move during a recording, each with its shapes.
 _MOVABLE: Mapping[str, tuple[Shape, ...]] = {
@@ -22,13 +23,11 @@ _MOVABLE: Mapping[str, tuple[Shape, ...]] = {
     "sheet_waviness": ((2.0,), (3.0,)), "principal_point": ((),), "focal_scale": ((),),
     "radial_distortion": ((),), "sensor_tilt": ((),), "pixel_aspect": ((),),
 }  # fmt: skip
-# What the catalogue has under names of its own. A ramp is a drift so slow that the run sees its start alone:
-# with a time constant of 6.4 runs it is off a straight line by 1.6 % of its size.
-_DRIFTS = ("baseline", "focal_scale", "principal_point")
+# What the catalogue has under names of its own.
 _NAMED = {
-    ("laser_tilt", CourseKind.SINUSOID),
-    *((law, kind) for law in _DRIFTS for kind in (CourseKind.EXPONENTIAL, CourseKind.RAMP)),
-}
+    ("laser_tilt", CourseKind.SINUSOID), ("baseline", CourseKind.EXPONENTIAL),
+    ("focal_scale", CourseKind.EXPONENTIAL), ("principal_point", CourseKind.EXPONENTIAL),
+}  # fmt: skip
 # Courses that are searched for every law.
 SEARCHED = (
     CourseKind.STEP, CourseKind.RAMP, CourseKind.EXPONENTIAL, CourseKind.SPEED, CourseKind.REVERSAL,
@@ -171,6 +170,30 @@ def with_courses(
         if (name, kind) not in _NAMED
     ]
     return {**library, **{model.name: model for model in more}}
+
+
+def shape_alike(
+    model: EffectModel, other: EffectModel, shape: Shape, amplitude: Float, duration_s: float
+) -> Shape | None:
+    """Return the shape at which a model grows as another does in a run, if one drifts as the other's ramp.
+
+    A ramp and a slow drift are one curve under two names: with a time constant of 6.4 runs the drift is off
+    a straight line by 1.6 % of its size. What it comes to in the end must be possible, so that only a quicker
+    one, which is bent more, may be in a large ramp's place.
+
+    Parameters
+    ----------
+    other, shape, amplitude
+        The effect that was found, its shape and its amplitudes (Q,).
+    """
+    if isinstance(other, Drifting) and isinstance(model, Coursed):
+        ramps = model.kind is CourseKind.RAMP and model.law == other.static.law
+        return (duration_s,) if ramps else None
+    if not (isinstance(model, Drifting) and isinstance(other, Coursed) and other.kind is CourseKind.RAMP):
+        return None
+    reached, end = amplitude * duration_s / shape[0], np.array(duration_s)
+    slowest_first = reversed(model.shapes(duration_s, 0.0) if model.static.law == other.law else ())
+    return next((s for s in slowest_first if model.possible(s, reached / model.reached(end, s))), None)
 
 
 def _stands(time_s: Float, speed: Float) -> Bool:

@@ -14,7 +14,7 @@ from pipeline.arrays import Float, Int
 from pipeline.physics.catalogue import effect
 from pipeline.physics.effect import CourseKind
 from stages.diagnose.effects.base import EffectModel, Shape
-from stages.diagnose.effects.courses import Coursed
+from stages.diagnose.effects.courses import Coursed, shape_alike
 from stages.diagnose.gauge.fit import Fit, evidence
 from stages.diagnose.gauge.formula import APART
 from stages.diagnose.gauge.run import GaugeRun, Term
@@ -57,7 +57,7 @@ def not_told_apart(
         (model, shape)
         for model in library.values()
         if model.law not in laws
-        for shape in _shapes_beside(model, terms, _middle(model.shapes(*span(run))))
+        for shape in _shapes_beside(model, terms, run)
     ]
     asked = [*((t.model, t.shape) for t in terms), *rivals]
     about = evidence(run, nothing, asked, with_spread=False)[0].deflated(alike)
@@ -72,13 +72,17 @@ def not_told_apart(
     )  # fmt: skip
 
 
-def _shapes_beside(model: EffectModel, terms: Sequence[Term], middle: Shape | None) -> set[Shape]:
+def _shapes_beside(model: EffectModel, terms: Sequence[Term], run: GaugeRun) -> set[Shape]:
     """Return the shapes at which a model is a rival of terms: their own course's, else the middle one.
 
-    A law with a course rivals only terms with the same course.
+    A law with a course rivals only terms with the same course, and a drift or ramp that is alike in this run.
     """
     beside = {t.shape for t in terms if t.model.kind is model.kind and model.kind is not CourseKind.CONSTANT}
-    return beside or ({middle} if middle is not None and not isinstance(model, Coursed) else set())
+    middle, duration_s = _middle(model.shapes(*span(run))), span(run)[0]
+    if not beside and middle is not None and not isinstance(model, Coursed):
+        beside = {middle}
+    alike = (shape_alike(model, t.model, *t.at(t.amplitude), duration_s) for t in terms)
+    return beside | {shape for shape in alike if shape is not None}
 
 
 def expected_gain(about: Evidence, stated: Stated, block: Int, amplitude: Float, rival: Int) -> float:
