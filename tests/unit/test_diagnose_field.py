@@ -13,7 +13,7 @@ from stages.diagnose.channels import Seen
 from stages.diagnose.effects.courses import Coursed
 from stages.diagnose.effects.library import LIBRARY
 from stages.diagnose.field import left
-from stages.diagnose.field.against_gauge import _same_step, not_refuted
+from stages.diagnose.field.against_gauge import _same_step, met_in_field, not_refuted
 from stages.diagnose.field.answer import _alone, _knowing_encoder, _met, _scale_named, borne_out, field_answer
 from stages.diagnose.field.evidence import FieldEvidence, scale_by_line
 from stages.diagnose.gauge.fit import fit
@@ -152,6 +152,26 @@ def test_a_field_that_cannot_tell_says_so_and_changes_no_verdict():
     found = _met(named, {"outside_index": None})
     assert found.verdict is Verdict.NAMED
     assert "too little of outside_index" in found.shortcomings[0]
+
+
+def evidence_of(model, shape, size):
+    """Evidence of one effect whose 1 σ is a hundredth of its plausible size."""
+    (amplitude,) = model.amplitudes
+    column, own = Column(model.name, amplitude.name, shape), np.array([[(100 / amplitude.plausible) ** 2]])
+    return Evidence((column,), own, own @ [size], own, float(size**2 * own[0, 0]), np.array([np.inf]))
+
+
+@pytest.mark.parametrize(
+    ("name", "shape", "told"), [("baseline", (), True), ("baseline_drift", (4.0,), False)]
+)
+def test_an_inspection_contradicts_what_stays_and_no_drift_of_the_gauge_run(name, shape, told):
+    """A probe that is warm from the gauge run does not drift again in the inspection that follows."""
+    model, size = LIBRARY[name], 0.2
+    fitted = SimpleNamespace(terms=(Term(model, shape, np.array([size])),))
+    best = SimpleNamespace(fit=fitted, evidence=evidence_of(model, shape, size))
+    field = FieldEvidence(None, evidence_of(model, shape, 0.02), run=SimpleNamespace())
+    (found,) = met_in_field(SimpleNamespace(best=best), field, NOTHING_STATED)
+    assert [c.agrees for c in (found,) if c is not None] == [False] * told
 
 
 @pytest.fixture(scope="module")
