@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tracemalloc
 from dataclasses import replace
 from typing import Any
 
@@ -10,7 +11,7 @@ import pytest
 from scipy.interpolate import PchipInterpolator
 
 from pipeline.recording.base import Encoder
-from stages.diagnose.travel.events import with_events
+from stages.diagnose.travel.events import _strongest, with_events
 from stages.diagnose.travel.evidence import TravelEstimate, _estimates, _goes_otherwise
 from stages.diagnose.travel.left_over import left_over, strongest_stretch
 from stages.diagnose.travel.model import EventKind, fitted
@@ -341,3 +342,25 @@ def test_the_strongest_stretch_is_the_best_of_all() -> None:
     assert found.size_mm == pytest.approx(value[np.argmax(gain)])
     assert abs(found.first - 120) < 5
     assert abs(found.end - 190) < 5
+
+
+def test_neither_the_search_of_events_nor_what_is_left_out_takes_the_square_of_the_run() -> None:
+    """For 3000 pictures all steps, and all stray pictures, together were matrices of 72 MB and more."""
+    count = 2400
+    fit = fitted(seen(np.random.default_rng(4)), read(scale=0.01), (), None)
+    way = np.linspace(0, 2000.0, count)
+    sight = replace(fit.sight, frame=np.arange(count), time_s=way / 20, distance_mm=way, path_mm=way)
+    noise, columns = np.random.default_rng(5).standard_normal(count), np.stack([np.ones(count), way], 1)
+    long = replace(
+        fit, sight=sight, difference_mm=noise,
+        whitened=whitened_fit(noise, columns, fit.noise.precision(way)),
+    )  # fmt: skip
+    tracemalloc.start()
+    event, score, tried = _strongest(long)
+    missed, _ = long.left_out_mm
+    most = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert (tried, len(missed)) == (2 * count, count)
+    assert score > 0
+    assert event.place > 0
+    assert most < 8 * count**2

@@ -130,7 +130,7 @@ def _strongest(fit: TravelFit) -> tuple[Event, float, int]:
     best, score, count = Event(EventKind.STEP, 0), 0.0, 0
     known = (EventKind.STEP,) if SLIP not in fit.without else ()
     for kind in (*known, EventKind.OUTLIER):
-        gain = fit.whitened.gain(candidate_columns(sight, kind, speed))[1]
+        gain = fit.whitened.gain_in_parts(candidate_columns(sight, kind, speed))[1]
         if kind is EventKind.STEP:
             gain[:SIDE], gain[len(gain) - SIDE + 1 :] = 0.0, 0.0
         count += len(gain)

@@ -6,6 +6,7 @@ increments, and what it adds between two pictures belongs to one part.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -18,6 +19,7 @@ from pipeline.recording.base import Encoder
 from stages.diagnose.agreement import Agreement, Part, agreement
 from stages.diagnose.travel.sight import Sight, quantum_mm, readings_at
 from stages.diagnose.travel.solve import (
+    AT_ONCE,
     DELAY,
     PLAY,
     SCALE,
@@ -113,7 +115,8 @@ class TravelFit:
 
         Pictures that an event leaves free are none of them.
         """
-        own = self.whitened.information(np.eye(len(self.difference_mm)))
+        parts = candidate_columns(self.sight, EventKind.OUTLIER, np.zeros(0))
+        own = np.concatenate([self.whitened.information(part) for part in parts])
         told = own > _TOLD * np.max(own)
         return self.whitened.weighted[told] / own[told], own[told] ** -0.5
 
@@ -212,17 +215,24 @@ def event_columns(sight: Sight, events: tuple[Event, ...], speed: Float) -> Floa
     """Return (N, E + D): what each event adds, then each picture taken during one."""
     if not events:
         return np.zeros((len(sight.time_s), 0))
-    each = [candidate_columns(sight, e.kind, speed)[:, e.place] for e in events]
-    free = [k for e in events for k in range(e.place - e.during, e.place)]
-    return np.concatenate([np.stack(each, 1), np.eye(len(sight.time_s))[:, free]], axis=1)
+    each = [_columns_at(sight, e.kind, speed, np.array([e.place])) for e in events]
+    free = np.concatenate([np.arange(e.place - e.during, e.place) for e in events])
+    return np.concatenate([*each, _columns_at(sight, EventKind.OUTLIER, speed, free)], axis=1)
 
 
-def candidate_columns(sight: Sight, kind: EventKind, speed: Float) -> Float:
-    """Return (N, N): the column of an event of that kind at every place."""
+def candidate_columns(sight: Sight, kind: EventKind, speed: Float) -> Iterator[Float]:
+    """Yield the columns (N, M) of an event of that kind at every place, `AT_ONCE` places at a time."""
     count = len(sight.time_s)
+    for places in np.array_split(np.arange(count), max(count // AT_ONCE, 1)):
+        yield _columns_at(sight, kind, speed, places)
+
+
+def _columns_at(sight: Sight, kind: EventKind, speed: Float, places: Int) -> Float:
+    """Return (N, M): the columns of events of that kind at places (M,)."""
+    frame = np.arange(len(sight.time_s))[:, None]
     if kind is EventKind.OUTLIER:
-        return np.eye(count)
-    after = np.tril(np.ones((count, count)))
+        return np.asarray(frame == places, np.float64)
+    after = np.asarray(frame >= places, np.float64)
     # Frames missing after a moment: pictures are later than their times say, by what the probe then moves.
     return after if kind is EventKind.STEP else -after * speed[:, None]
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -292,13 +292,16 @@ class Whitened:
 
     def information(self, candidates: Float) -> Float:
         """Return (M,) that of candidate columns (N, M), each alone beside the columns."""
-        parts = np.array_split(candidates, max(candidates.shape[1] // AT_ONCE, 1), axis=1)
-        return np.concatenate([np.einsum("nm,nm->m", p, self.beyond(p)) for p in parts])
+        return np.asarray(np.einsum("nm,nm->m", candidates, self.beyond(candidates)))
 
     def gain(self, candidates: Float) -> tuple[Float, Float]:
         """Return estimates (M,) and scores z² (M,) that each candidate column (N, M) alone would add."""
-        information = self.information(candidates)
-        score = candidates.T @ self.weighted
+        return self.gain_in_parts([candidates])
+
+    def gain_in_parts(self, parts: Iterable[Float]) -> tuple[Float, Float]:
+        """Return what `gain` does of all candidate columns, some (N, M) of them at a time."""
+        each = [(self.information(part), part.T @ self.weighted) for part in parts]
+        information, score = (np.concatenate(one) for one in zip(*each, strict=True))
         seen = information > 1e-9 * np.max(information, initial=1e-30)
         safe = np.where(seen, information, 1.0)
         return np.where(seen, score / safe, 0.0), np.where(seen, score**2 / safe, 0.0)

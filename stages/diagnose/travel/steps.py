@@ -258,7 +258,7 @@ def _rivals(fit: TravelFit, place_in_list: int, encoder: Encoder) -> tuple[Event
     speed = median_filter(np.gradient(sight.distance_mm, sight.time_s), 5)
     score, size = {}, {}
     for kind in EventKind:
-        value, gain = rest.whitened.gain(candidate_columns(sight, kind, speed))
+        value, gain = rest.whitened.gain_in_parts(candidate_columns(sight, kind, speed))
         near = slice(max(event.place - 2, 0), event.place + 3)
         size[kind], score[kind] = float(value[near][np.argmax(gain[near])]), float(gain[near].max())
     sigma = float(fit.sigma[4 + place_in_list])
