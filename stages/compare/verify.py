@@ -112,10 +112,10 @@ def wall_coverage(wall: WallMap) -> float:
 
 
 def bore_differences(wall: WallMap, diameter_mm: float, tolerance_mm: float) -> Differences:
-    """Return the differences of a wall's radius from a known bore's, which is uniform within ± tolerance."""
+    """Return the differences of a wall's radius from a bore's, its diameter uniform within ± tolerance."""
     known = np.isfinite(wall.radius_mm)
     station, azimuth = np.nonzero(known)
-    bore = tolerance_mm**2 / 3
+    bore = (tolerance_mm / 2) ** 2 / 3
     return Differences(
         wall.distance_mm[station],
         wall.azimuth_rad[azimuth],
@@ -250,6 +250,6 @@ def _verification(
 
 _SUMMARY = "Compare a run's wall with what is known of it."
 VERIFY_BORE, VERIFY_MAP, VERIFY_SURFACE = (
-    Stage("verify", "1", VerifyParameters, function, _SUMMARY)
+    Stage("verify", "2", VerifyParameters, function, _SUMMARY)
     for function in (verify_bore, verify_map, verify_surface)
 )

@@ -41,6 +41,15 @@ def test_the_radius_change_lies_at_its_clock_and_the_deepest_change_is_told(tmp_
     assert consequence(change).startswith("Wall loss at 3 o'clock, 22 mm, was understated by 0.21 mm")
 
 
+def test_rows_of_two_runs_are_compared_with_the_nearest_one(tmp_path):
+    rising = np.repeat(50.0 + DISTANCE[:, None], len(AZIMUTH), 1)
+    before, after = run(tmp_path / "a", rising, []), run(tmp_path / "b", rising, [])
+    map_of_after = dict(np.load(after / "radius_map.npz"))
+    map_of_after["distance_mm"] = map_of_after["distance_mm"] + 0.3 * (DISTANCE[1] - DISTANCE[0])
+    np.savez(after / "radius_map.npz", **map_of_after)
+    assert np.nanmean(geometry_change(before, after).mean_mm) == pytest.approx(0.0, abs=1e-3)
+
+
 def test_without_defects_the_radius_is_told_and_nothing_is_told_of_nothing():
     at_four = np.where(np.arange(12) == 4, -0.12, 0.0)
     assert "radius was overstated by 0.12 mm at 4 o'clock" in consequence(

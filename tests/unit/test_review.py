@@ -64,6 +64,8 @@ def test_an_author_who_has_not_seen_the_last_action_is_refused(ledger):
     ledger.append(do.Accept(finding="1"), "ann", "b", 0)
     with pytest.raises(StaleError, match="1 changes"):
         ledger.append(do.Reject(finding="1"), "bo", "b", 0)
+    with pytest.raises(StaleError, match="older than what is shown"):
+        ledger.append(do.Reject(finding="1"), "bo", "b", 7)
     assert after(ledger)["1"].decided_by == "ann"
 
 

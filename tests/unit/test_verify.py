@@ -226,6 +226,13 @@ def test_certificate_is_one_page_and_data_that_agree(tmp_path):
     assert f"{document['accuracy']['rms_mm']:.3f} mm RMS against bore of 101.6 mm" in page
 
 
+def test_a_bore_known_to_so_much_of_its_diameter_is_known_to_half_of_that_in_radius():
+    shape, none = (3, 4), np.zeros((3, 4))
+    wall = WallMap(np.arange(3.0), np.arange(4.0), np.full(shape, 50.8), none, none)
+    radius = 50.8 + np.random.default_rng(0).uniform(-0.2, 0.2, 100_000) / 2
+    assert bore_differences(wall, 101.6, 0.2).sigma_mm == pytest.approx(radius.std(), rel=0.01)
+
+
 def test_another_bore_gives_another_certificate_and_the_same_one_is_kept(tmp_path):
     run, out = run_folder(tmp_path / "run"), tmp_path / "out"
     for diameter, tolerance in ((101.6, 0.0), (101.6, 0.0), (102.6, 0.0)):

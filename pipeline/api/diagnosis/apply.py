@@ -181,7 +181,8 @@ def _of_defect(d: DefectChange) -> str:
 def _radius_change(before: Path, after: Path) -> tuple[Float, Float]:
     """Return (S, A) and azimuth (A,), on the corrected run's grid; NaN where either saw nothing."""
     old, new = (np.load(folder / "radius_map.npz") for folder in (before, after))
-    row = np.clip(np.searchsorted(old["distance_mm"], new["distance_mm"]), 0, len(old["distance_mm"]) - 1)
+    between = (old["distance_mm"][1:] + old["distance_mm"][:-1]) / 2
+    row = np.searchsorted(between, new["distance_mm"])
     change = new["radius_mm"].astype(float) - old["radius_mm"].astype(float)[row]
     outside = (new["distance_mm"] < old["distance_mm"][0]) | (new["distance_mm"] > old["distance_mm"][-1])
     change[outside] = np.nan

@@ -98,8 +98,10 @@ class Ledger:
         with self._open() as connection:
             connection.execute("BEGIN IMMEDIATE")
             last = _revision(connection)
-            if last != revision:
+            if last > revision:
                 raise StaleError(f"{last - revision} changes have been made elsewhere since; look again")
+            if last < revision:
+                raise StaleError("the record of decisions is older than what is shown; look again")
             at = _now()
             row = (basis, who, at, action.model_dump_json())
             written = connection.execute(
