@@ -25,7 +25,7 @@ _BELL_MISFIT = 0.12
 # A bell whose height the points leave open by more than this share of it tells nothing: what the rings
 # themselves show is the depth then, and its σ that of a peak between them.
 _BELL_UNKNOWN = 0.5
-_SHARPENING = 0.3  # 1 σ of a peak's curvature correction, relative
+SHARPENING = 0.3  # 1 σ of a peak's curvature correction, relative
 # Of its depth: without it 85 and 90 % of the depths of 88 defects painted into two open recordings were in
 # their 95 % interval, with it 92 and 91 % of 82 (`python -m tests.benchmarks.bench_painted_findings`).
 _TOP_SHAPE = 0.04
@@ -77,7 +77,7 @@ def measure_depth(
     depth = float(height[peak]) - bias
     sharpened = float((region.cut(surface.all_mm) - region.cut(surface.coarse_mm))[peak])
     scatter = float(np.hypot(drawn.std(), sharpening_sigma(sharpened)))
-    if _is_small(relief, region, surface.points):
+    if is_small(relief, region, surface.points):
         noise = Noise(clean, float(gain[near].mean()), relief.cell_mm, draws, random)
         depth, scatter = _between_rings(relief, region, surface.points, noise, depth, scatter)
     sigma = float(np.hypot(scatter, shape_sigma(relief, region, depth, surface.points.spacing_mm)))
@@ -86,7 +86,7 @@ def measure_depth(
 
 def sharpening_sigma(sharpened_mm: float) -> float:
     """Return 1 σ of a peak of which the map's smoothing had taken so much off, mm."""
-    return _SHARPENING * abs(float(np.nan_to_num(sharpened_mm)))
+    return SHARPENING * abs(float(np.nan_to_num(sharpened_mm)))
 
 
 def noise_gain(region: Region, relief: Relief) -> Float:
@@ -97,7 +97,7 @@ def noise_gain(region: Region, relief: Relief) -> Float:
     return np.asarray(np.fmax(region.cut(relief.noise_mm) / relief.typical.sigma_mm, 1.0))
 
 
-def _is_small(relief: Relief, region: Region, points: DeviationPoints) -> bool:
+def is_small(relief: Relief, region: Region, points: DeviationPoints) -> bool:
     """Return whether so few rings cross a defect that its deepest place may lie between them.
 
     Beside a weld the points' deviation is the weld's too, so that no bell is fitted there.
@@ -136,8 +136,8 @@ def _between_rings(
     if bell is None or bell.residual_mm > _BELL_MISFIT * bell.height_mm:
         return depth_mm, sigma_mm
     if bell.sigma_mm > _BELL_UNKNOWN * bell.height_mm:
-        return depth_mm, float(np.hypot(sigma_mm, _SHARPENING * depth_mm))
-    return bell.height_mm, float(np.hypot(bell.sigma_mm, _SHARPENING * (bell.height_mm - depth_mm)))
+        return depth_mm, float(np.hypot(sigma_mm, SHARPENING * depth_mm))
+    return bell.height_mm, float(np.hypot(bell.sigma_mm, SHARPENING * (bell.height_mm - depth_mm)))
 
 
 def shape_sigma(relief: Relief, region: Region, depth_mm: float, spacing_mm: float) -> float:

@@ -12,7 +12,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from pipeline.arrays import Bool, Float, Int
-from stages.defects.depth import Depth
+from stages.defects.depth import SHARPENING, Depth, is_small
 from stages.defects.segment import Region
 from stages.defects.surface import Surface, cells_of, chosen, sure_of_themselves
 
@@ -27,10 +27,17 @@ _NARROW, _HALF = 2.0, 0.5
 
 
 def allowed_by_neighbours(depth: Depth, region: Region, surface: Surface) -> Depth:
-    """Return the depth, limited by what the rings beside the deepest one allow, with a larger σ if it is."""
+    """Return the depth, limited by what the rings beside the deepest one allow, with a larger σ if it is.
+
+    Where no bell tells what lies between rings, as in a wide patch, σ also grows by how far it falls off to
+    those beside: the deepest place of a narrow pit lies between them.
+    """
     rings = _rings(depth, region, surface)
-    if not len(rings.frame) or abs(depth.depth_mm) <= rings.allowed_mm:
+    if not len(rings.frame):
         return depth
+    if abs(depth.depth_mm) <= rings.allowed_mm:
+        falls = 0.0 if is_small(surface.relief, region, surface.points) else rings.falls_mm
+        return replace(depth, sigma_mm=float(np.hypot(depth.sigma_mm, SHARPENING * falls)))
     sigma = float(np.hypot(depth.sigma_mm, rings.allowed_mm / 2))
     return replace(depth, depth_mm=float(np.sign(depth.depth_mm)) * rings.allowed_mm, sigma_mm=sigma)
 
@@ -95,6 +102,12 @@ class _Rings:
         """Which (m,) are beside the deepest."""
         near = np.abs(self.at_mm - self.at_mm[self.deepest]) < _BESIDE * self.spacing_mm
         return np.flatnonzero(near & (np.arange(len(near)) != self.deepest))
+
+    @property
+    def falls_mm(self) -> float:
+        """How far it falls off at most from the deepest to one beside."""
+        deepest = float(self.peak_mm[self.deepest])
+        return deepest - float(self.peak_mm[self.beside].min(initial=deepest))
 
     @property
     def allowed_mm(self) -> float:

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.ndimage import uniform_filter
 
 from stages.defects import DefectParameters, find_defects
 from stages.defects.grow import millimetre_mean
@@ -46,3 +47,23 @@ def test_a_pit_that_one_ring_shows_is_within_the_depth_told(step_mm, wide_mm):
     """2.2 mm was told as 0.63 ± 0.03: it may as well be a glint, and the corrosion stays confirmed."""
     finding, true = patch_with_pit(step_mm, 0.6, 1.7, wide_mm, seed=5)
     assert abs(finding.depth_mm - true) < 1.96 * finding.depth_sigma_mm
+
+
+def fine_mean(patch_mm, pit_mm, wide_mm):
+    """Return the largest mean over a millimetre of a pit in a patch, which lies anywhere between rings."""
+    x = np.arange(-4, 4, 0.05)
+    off = np.hypot(x[:, None], x[None]) / (wide_mm / 2)
+    return float(uniform_filter(patch_mm + pit_mm * np.sqrt(np.maximum(1 - off**2, 0)), 20).max())
+
+
+@pytest.mark.parametrize(
+    ("step_mm", "pit_mm", "wide_mm", "shift"),
+    [(1.0, 1.9, 2.1, (0.5, 0.0)), (1.0, 1.6, 2.0, (0.5, 1.0)), (0.5, 1.6, 1.3, (0.25, 0.0))],
+)
+def test_a_pit_that_two_rings_show_has_a_depth_as_sure_as_what_lies_between_them(
+    step_mm, pit_mm, wide_mm, shift
+):
+    """2.43 mm was told as 2.11 ± 0.08: no bell is fitted in a wide patch, and its top lies between rings."""
+    finding, _ = patch_with_pit(step_mm, 0.6, pit_mm, wide_mm, 5, shift)
+    assert abs(finding.depth_mm - fine_mean(0.6, pit_mm, wide_mm)) < 1.96 * finding.depth_sigma_mm
+    assert finding.depth_sigma_mm < 0.35 * finding.depth_mm
