@@ -180,3 +180,11 @@ def test_a_prior_draws_an_effect_with_its_course():
     assert 1.0 <= values["time_s"] <= 6.0
     with pytest.raises(ValueError, match="has no quantity 'period_s'"):
         Concealable.model_validate(knocked | {"others": {"period_s": (1.0, 6.0)}})
+
+
+@pytest.mark.parametrize(("name", "per_s"), [("baseline_drift", "0.0128 mm"), ("focal_drift", "1.2766%")])
+def test_a_drift_slower_than_its_run_is_told_by_its_growth_at_first(name, per_s):
+    """Its size in the end, .66 ± 1.06 mm after a growth of .1, stood alone in the sentence."""
+    told = LIBRARY[name].statement((51.2,), np.array([-0.66]))
+    assert f"shorter, by {per_s} in the first second" in told
+    assert "-" not in told

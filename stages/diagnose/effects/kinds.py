@@ -28,12 +28,16 @@ class Worded(EffectModel):
 
     def statement(self, shape: Shape, amplitude: Float) -> str:
         """Return the effect in a plain sentence with its size."""
-        quantities, signed = self.quantities(shape, amplitude), effect(self.name).quantities[0].name
+        quantities, signed = self.told(shape, amplitude), effect(self.name).quantities[0].name
         if "[" in self.words:
             word = 2 if quantities[signed] < 0 else 1
             sizes = {**quantities, signed: abs(quantities[signed])}
             return _EITHER.sub(lambda either: either[word], self.words).format(**sizes)
         return self.words.format(**quantities)
+
+    def told(self, shape: Shape, amplitude: Float) -> dict[str, float]:
+        """Return what the sentence tells, by name."""
+        return self.quantities(shape, amplitude)
 
 
 class Scalar(Worded):
@@ -83,6 +87,15 @@ class Drifting(Worded, Product):
     def factored(self, points: ImagePoints, shape: Shape) -> Factored:
         """Return the share of its final size that is reached, and the static law."""
         return (self.reached(points.time_s, shape),), self.static, ()
+
+    def told(self, shape: Shape, amplitude: Float) -> dict[str, float]:
+        """Return the quantities and the growth in the first second.
+
+        Of a drift slower than its recording that is known, and the final size, a continuation, is not.
+        """
+        quantities = self.quantities(shape, amplitude)
+        final = abs(quantities[effect(self.name).quantities[0].name])
+        return quantities | {"at_first": final * float(self.reached(np.ones(1), shape)[0])}
 
     def quantities(self, shape: Shape, amplitude: Float) -> dict[str, float]:
         """Return the final size and the time constant."""
