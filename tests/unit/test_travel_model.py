@@ -15,8 +15,9 @@ from stages.diagnose.travel.events import _strongest, with_events
 from stages.diagnose.travel.evidence import TravelEstimate, _estimates, _goes_otherwise
 from stages.diagnose.travel.left_over import left_over, strongest_stretch
 from stages.diagnose.travel.model import EventKind, fitted
+from stages.diagnose.travel.noise import DriftNoise, whitened_fit
 from stages.diagnose.travel.sight import Sight, quantum_mm, readings_at
-from stages.diagnose.travel.solve import DELAY, PLAY, SCALE, DriftNoise, whitened_fit
+from stages.diagnose.travel.solve import DELAY, PLAY, SCALE
 from stages.diagnose.travel.steps import steps_found
 from tests.travel_cases import read, seen
 

@@ -7,8 +7,9 @@ from scipy.stats import t as student
 
 from pipeline.recording.base import Encoder
 from stages.diagnose.travel.model import Event, EventKind, TravelFit, candidate_columns, fitted
+from stages.diagnose.travel.noise import DriftNoise
 from stages.diagnose.travel.sight import Sight
-from stages.diagnose.travel.solve import DELAY, FAR_BETTER, PLAY, SMOOTH, DriftNoise
+from stages.diagnose.travel.solve import DELAY, FAR_BETTER, PLAY, SMOOTH
 
 # So many steps and stray pictures are taken up, one after the other.
 _MOST = 16

@@ -11,18 +11,9 @@ from scipy.stats import norm
 from pipeline.arrays import Float, Int
 from stages.diagnose.travel.events import SLIP, chance, is_found
 from stages.diagnose.travel.model import EventKind, TravelFit
+from stages.diagnose.travel.noise import AT_ONCE, DriftNoise, Whitened, chance_of_noise
 from stages.diagnose.travel.sight import PLACED_SIGMA_MM
-from stages.diagnose.travel.solve import (
-    AT_ONCE,
-    DELAY,
-    FAR_BETTER,
-    OFFSET,
-    PLAY,
-    SMOOTH,
-    DriftNoise,
-    Whitened,
-    chance_of_noise,
-)
+from stages.diagnose.travel.solve import DELAY, FAR_BETTER, OFFSET, PLAY, SMOOTH
 from stages.diagnose.travel.steps import StepFound, or_else
 
 # What is left of the reading is noise unless its chance is below this. Debt: data/debts.md.

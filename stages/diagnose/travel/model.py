@@ -17,23 +17,19 @@ from pipeline.pages import notation
 from pipeline.physics.catalogue import effect
 from pipeline.recording.base import Encoder
 from stages.diagnose.agreement import Agreement, Part, agreement
+from stages.diagnose.travel.noise import AT_ONCE, DriftNoise, Whitened, chance_of_noise, whitened_fit
 from stages.diagnose.travel.sight import Sight, quantum_mm, readings_at
 from stages.diagnose.travel.solve import (
-    AT_ONCE,
     DELAY,
     PLAY,
     SCALE,
     SMOOTH,
     Asked,
-    DriftNoise,
-    Whitened,
-    chance_of_noise,
     estimated_noise,
     nearest_start,
     refined,
     simplest,
     starts,
-    whitened_fit,
 )
 
 _AROUND = 10

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import cho_solve_banded, cholesky_banded
 from scipy.linalg.lapack import dgelsy
-from scipy.stats import f as fisher
 
 from pipeline.adjustment.robust import spread_about_median
 from pipeline.arrays import Float, Int
 from pipeline.recording.base import Encoder
+from stages.diagnose.travel.noise import SOLID, DriftNoise, Precision, whitened_fit
 from stages.diagnose.travel.sight import Sight, Turns, lag_mm, readings_at, turns_between
 
 OFFSET, SCALE, DELAY, PLAY = range(4)
@@ -30,10 +29,6 @@ _LAGS = (2, 4, 8, 16, 32)
 # Increments a lag needs at least: one or two steps among twelve do not move their median by much.
 _PER_LAG = 12
 _REWEIGHTINGS = 30
-# So many columns as long as the run are looked at together: all of them would take its square.
-AT_ONCE = 256
-# Columns of length 1 are told apart to this share: a root of what doubles resolve.
-_SOLID = 1e-8
 
 
 @dataclass(frozen=True)
@@ -167,42 +162,6 @@ def _smooth_columns(asked: Asked, turns: Turns, play_mm: float) -> tuple[Float, 
     return columns, columns[:, PLAY] * play_mm - here
 
 
-@dataclass(frozen=True)
-class DriftNoise:
-    """White noise of ``white_mm`` in each difference, and a random walk of ``drift_mm`` per √mm of way."""
-
-    white_mm: float
-    drift_mm: float
-
-    def precision(self, path_mm: Float) -> Precision:
-        """Return it at ways (N,), which never go back."""
-        step = np.diff(path_mm, prepend=path_mm[0])
-        band = np.zeros((2, len(path_mm)))
-        band[0] = 2 * self.white_mm**2 + self.drift_mm**2 * step
-        band[0, 0] = self.white_mm**2
-        band[1, :-1] = -(self.white_mm**2)
-        return Precision(cholesky_banded(band, lower=True))
-
-
-@dataclass(frozen=True)
-class Precision:
-    """Inverse K⁻¹ of the covariance of N differences, whose steps hang together with their neighbours alone.
-
-    Attributes
-    ----------
-    factor : (2, N)
-        Cholesky factor of the covariance of the first difference and of the steps: its diagonal, and below.
-    """
-
-    factor: Float
-
-    def times(self, values: Float) -> Float:
-        """Return K⁻¹ times values (N, ...)."""
-        steps = np.diff(values, axis=0, prepend=0 * values[:1])
-        solved = cho_solve_banded((self.factor, True), steps)
-        return np.asarray(-np.diff(solved, axis=0, append=0 * solved[:1]))
-
-
 def estimated_noise(difference_mm: Float, columns: Float, path_mm: Float, least_mm: float) -> DriftNoise:
     """Return the noise of differences (N,), what columns (N, C) explain taken out, whatever events are in it.
 
@@ -239,7 +198,7 @@ def robust_coefficients(values: Float, columns: Float, rounds: int = _REWEIGHTIN
 
 
 def _least_squares(columns: Float, values: Float) -> Float:
-    """Return the shortest (C,) that fits values (N,) best; directions below `_SOLID` of the largest get 0.
+    """Return the shortest (C,) that fits values (N,) best; directions below `SOLID` of the largest get 0.
 
     By an orthogonal factorisation with pivots, called without NumPy's and SciPy's wrappers: those, and the
     singular values by which they tell the rank, take ten times as long, and searches ask this 20,000 times.
@@ -250,84 +209,7 @@ def _least_squares(columns: Float, values: Float) -> Float:
     right = np.zeros(max(n, count))
     right[:n] = values
     pivots, work = np.zeros(count, np.int32), 4 * count + n + 32 * (count + 1)
-    found = np.asarray(dgelsy(columns, right, pivots, _SOLID, work)[1][:count])
+    found = np.asarray(dgelsy(columns, right, pivots, SOLID, work)[1][:count])
     if not np.isfinite(found).all():
         raise np.linalg.LinAlgError("readings or columns are not finite")
     return found
-
-
-@dataclass(frozen=True)
-class Whitened:
-    """Generalised least squares of differences (N,) on columns (N, C).
-
-    Attributes
-    ----------
-    estimate : (C,)
-    covariance : (C, C)
-    residual : (N,)
-        Of the differences.
-    weighted : (N,)
-        K⁻¹ residual.
-    precision : Precision
-        K⁻¹.
-    weighted_columns : (N, C)
-        K⁻¹ columns.
-    inverse : (C, C)
-        Inverse of the columns' information, 0 in directions that say nothing.
-    """
-
-    estimate: Float
-    covariance: Float
-    residual: Float
-    weighted: Float
-    precision: Precision
-    weighted_columns: Float
-    inverse: Float
-
-    def beyond(self, values: Float) -> Float:
-        """Return K⁻¹ times values (N, M), less what the columns take."""
-        return self.precision.times(values) - self.weighted_columns @ self.inverse @ (
-            self.weighted_columns.T @ values
-        )
-
-    def information(self, candidates: Float) -> Float:
-        """Return (M,) that of candidate columns (N, M), each alone beside the columns."""
-        return np.asarray(np.einsum("nm,nm->m", candidates, self.beyond(candidates)))
-
-    def gain(self, candidates: Float) -> tuple[Float, Float]:
-        """Return estimates (M,) and scores z² (M,) that each candidate column (N, M) alone would add."""
-        return self.gain_in_parts([candidates])
-
-    def gain_in_parts(self, parts: Iterable[Float]) -> tuple[Float, Float]:
-        """Return what `gain` does of all candidate columns, some (N, M) of them at a time."""
-        each = [(self.information(part), part.T @ self.weighted) for part in parts]
-        information, score = (np.concatenate(one) for one in zip(*each, strict=True))
-        seen = information > 1e-9 * np.max(information, initial=1e-30)
-        safe = np.where(seen, information, 1.0)
-        return np.where(seen, score / safe, 0.0), np.where(seen, score**2 / safe, 0.0)
-
-
-def whitened_fit(difference_mm: Float, columns: Float, precision: Precision) -> Whitened:
-    """Return the generalised least-squares fit; columns that say nothing get no estimate (σ infinite)."""
-    weighted_columns = precision.times(columns)
-    information = columns.T @ weighted_columns
-    scale = 1 / np.sqrt(np.maximum(np.diag(information), 1e-30))
-    value, vector = np.linalg.eigh(information * np.outer(scale, scale))
-    solid = value > _SOLID
-    inverse = (vector[:, solid] / value[solid]) @ vector[:, solid].T
-    inverse = inverse * np.outer(scale, scale)
-    hidden = (vector[:, ~solid] ** 2).sum(1) > 1e-6
-    estimate = inverse @ (weighted_columns.T @ difference_mm)
-    residual = difference_mm - columns @ estimate
-    spread = inverse.copy()
-    spread[hidden, hidden] = np.inf
-    weighted = precision.times(residual)
-    return Whitened(estimate, spread, residual, weighted, precision, weighted_columns, inverse)
-
-
-def chance_of_noise(left_over: float, free: int, pictures: int) -> float:
-    """Return the chance that noise leaves so much χ² for each of its ``free`` degrees of freedom (F test).
-
-    The noise itself is measured by medians, which tell it as well as a third of the pictures would.
-    """
-    return float(fisher.sf(left_over, max(free, 1), max(pictures / 3, 1.0)))
