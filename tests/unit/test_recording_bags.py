@@ -121,7 +121,8 @@ def test_refusals_say_what_was_tried(tmp_path: Path) -> None:
     file.write_text("nothing")
     with pytest.raises(InputError) as caught:
         open_recording(file)
-    for tried in ("recording folder: it is not a folder", "ROS 1 bag: it does not", "MCAP file: it does not"):
+    refused = "its first bytes are not those of one"
+    for tried in ("recording folder: it is not a folder", f"ROS 1 bag: {refused}", f"MCAP file: {refused}"):
         assert tried in str(caught.value)
     with pytest.raises(InputError, match="does not exist"):
         open_recording(tmp_path / "nowhere")
