@@ -1,11 +1,15 @@
 """A pit in a wider patch keeps its depth, and what one ring alone shows is told as a lower bound."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from scipy.ndimage import uniform_filter
 
 from stages.defects import DefectParameters, find_defects
+from stages.defects.depth import Depth
 from stages.defects.grow import millimetre_mean
+from stages.defects.neighbours import frames_at_peak
 from tests.quiet import quiet_context
 from tests.synthetic_wall import bare_recording, grey_texture, smooth_noise, wall_of
 
@@ -47,6 +51,13 @@ def test_a_pit_that_one_ring_shows_is_within_the_depth_told(step_mm, wide_mm):
     """2.2 mm was told as 0.63 ± 0.03: it may as well be a glint, and the corrosion stays confirmed."""
     finding, true = patch_with_pit(step_mm, 0.6, 1.7, wide_mm, seed=5)
     assert abs(finding.depth_mm - true) < 1.96 * finding.depth_sigma_mm
+
+
+def test_of_a_narrow_finding_single_rings_about_its_peak_are_no_witnesses():
+    """Glints 0.9 mm wide counted as witnessed by rings whose noise departs by half as much within 1 mm."""
+    cells = SimpleNamespace(relief=SimpleNamespace(cell_mm=(0.5, 0.45)))
+    narrow = SimpleNamespace(mask=np.ones((4, 2), bool))
+    assert not frames_at_peak(Depth(-0.22, 0.07, 0.0, (1, 1)), narrow, cells).size
 
 
 def fine_mean(patch_mm, pit_mm, wide_mm):
