@@ -213,8 +213,10 @@ def read_run_record(run: Path) -> RunRecord:
         )  # fmt: skip
         state = tree["state"]
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+        missing = isinstance(error, FileNotFoundError)
+        problem = "does not exist" if missing else "is not the record of a run"
         raise InputError(
-            file, "is not the record of a run", expected="run.json of boresight run", hint="name a run folder"
+            file, problem, expected="run.json of boresight run", hint="name a run folder"
         ) from error
     if state != "completed":
         raise InputError(file, f"the run is {state}", expected="a completed run", hint="complete it first")

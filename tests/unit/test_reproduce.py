@@ -77,6 +77,11 @@ def test_no_record_is_told(tmp_path: Path, text: str) -> None:
         read_run_record(tmp_path)
 
 
+def test_a_folder_that_is_not_there_is_told_as_missing(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="does not exist"):
+        read_run_record(tmp_path / "nowhere")
+
+
 def test_an_unfinished_run_is_told(tmp_path: Path) -> None:
     (tmp_path / "run.json").write_text(json.dumps(RECORD | {"state": "failed"}))
     with pytest.raises(InputError, match="the run is failed"):
