@@ -180,7 +180,8 @@ def line_is_bright(region: Region, depth_mm: float, surface: Surface, rings: Rin
     if len(showing) < MANY_RINGS:
         return True
     told = [_is_bright(height, inside, points, rings, int(k)) for k in showing]
-    return float(np.mean([bright for bright in told if bright is not None])) >= _MOST
+    known = [bright for bright in told if bright is not None]
+    return not known or float(np.mean(known)) >= _MOST
 
 
 def _is_bright(

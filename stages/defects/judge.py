@@ -30,8 +30,8 @@ _AT_LEAST = (
     "that hold some of those before them may have taken off."
 )
 _LONE = (
-    "It is at least so deep: one ring alone shows {:.2f} mm, which may be a glint, or a pit so narrow that "
-    "no other ring crosses it."
+    "It is at least so deep: single rings show up to {:.2f} mm and those beside them do not, which may be a "
+    "glint, or a pit so narrow that no other ring crosses it."
 )
 
 
@@ -39,8 +39,8 @@ _LONE = (
 class Found:
     """A region that is deep enough to be reported, described as if it were surely there.
 
-    ``by_noise`` is the same with the σ that noise alone makes, ``bead`` the probability that it is no step of
-    the bore, ``lone_mm`` the depth that one ring alone shows, which those beside it do not allow.
+    ``by_noise`` is the same with σ before codec or lone rings widen it, ``bead`` the probability that it is
+    no step of the bore, ``lone_mm`` the depth with rings that those beside them do not allow.
     """
 
     region: Region
@@ -58,6 +58,8 @@ class Found:
     @property
     def flattened(self) -> bool:
         """Whether it is deeper than noise makes it, and may have been flattened by about its depth."""
+        if self.lone_mm is not None:
+            return False
         return is_depth_known(self.by_noise) and not is_depth_known(self.defect)
 
     def told(self, probability: float, counts: bool) -> Defect:
@@ -69,7 +71,7 @@ class Found:
 
     def _at_least(self) -> str:
         if self.lone_mm is not None:
-            return _LONE.format(self.lone_mm)
+            return _LONE.format(abs(self.lone_mm))
         return _AT_LEAST.format(self.by_noise.depth_sigma_mm) if self.flattened else ""
 
 

@@ -51,7 +51,9 @@ def contradicted_frame(depth: Depth, region: Region, surface: Surface) -> int | 
     if not len(rings.frame) or abs(depth.depth_mm) <= rings.allowed_mm:
         return None
     shown = rings.top_mm[rings.beside] >= _SHOWN_SIGMAS * surface.relief.typical.sigma_mm
-    return int(rings.frame[rings.deepest]) if len(shown) > 1 and shown.all() else None
+    side = np.sign(rings.at_mm[rings.beside] - rings.at_mm[rings.deepest])
+    both = bool((side < 0).any() and (side > 0).any())
+    return int(rings.frame[rings.deepest]) if both and shown.all() else None
 
 
 def frames_at_peak(depth: Depth, region: Region, surface: Surface) -> Int:

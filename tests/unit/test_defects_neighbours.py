@@ -9,6 +9,7 @@ from scipy.ndimage import uniform_filter
 from stages.defects import DefectParameters, find_defects
 from stages.defects.depth import Depth
 from stages.defects.grow import millimetre_mean
+from stages.defects.judge import Found
 from stages.defects.neighbours import frames_at_peak
 from tests.quiet import quiet_context
 from tests.synthetic_wall import bare_recording, grey_texture, smooth_noise, wall_of
@@ -58,6 +59,13 @@ def test_of_a_narrow_finding_single_rings_about_its_peak_are_no_witnesses():
     cells = SimpleNamespace(relief=SimpleNamespace(cell_mm=(0.5, 0.45)))
     narrow = SimpleNamespace(mask=np.ones((4, 2), bool))
     assert not frames_at_peak(Depth(-0.22, 0.07, 0.0, (1, 1)), narrow, cells).size
+
+
+def test_what_single_rings_show_is_told_without_a_sign():
+    """A deposit's depth is negative: "single rings show up to -2.30 mm" was the sentence."""
+    deposit = Found(None, None, None, None, 1.0, lone_mm=-2.3)
+    assert "show up to 2.30 mm" in deposit._at_least()
+    assert not deposit.flattened
 
 
 def fine_mean(patch_mm, pit_mm, wide_mm):
