@@ -13,6 +13,7 @@ from stages.diagnose.claims import Claim, claims_of, stretch
 from stages.diagnose.gauge import answer as of_gauge
 from stages.diagnose.gauge.examine import Examined
 from stages.diagnose.result import (
+    AGAIN,
     Diagnosis,
     EffectFound,
     Location,
@@ -27,10 +28,6 @@ _SAME_FREQUENCY_HZ = 0.15
 _IN_PROFILE = Location(str(Channel.PROFILE), None, None)
 _UNKNOWN = "a cause that the library does not have, such as {}"
 _OF_ENCODER = "an error of the encoder that depends on distance or speed in another way"
-_AGAIN = (
-    "To see what the pattern depends on, record the gauge run again: with probe or gauge rolled by 90°, at "
-    "another speed, and after warming up."
-)
 
 
 def composed(
@@ -155,7 +152,7 @@ def verdict_of_rings(examined: Examined | None, claimed: bool) -> Verdict:
 def _next(said: _Said, asked: Sequence[str]) -> str:
     """Return what to record so that the answer becomes a name."""
     if said.verdict is Verdict.UNEXPLAINED or (said.verdict is Verdict.PARTLY and not said.members):
-        return _AGAIN
+        return AGAIN
     return record_next(asked) if said.verdict in (Verdict.CLASS, Verdict.PARTLY) and asked else ""
 
 

@@ -53,6 +53,12 @@ def _words(names: Sequence[str]) -> str:
     return f"{', '.join(leading)} and {last}" if leading else last
 
 
+AGAIN = (
+    "To see what the pattern depends on, record the gauge run again: with probe or gauge rolled by 90°, at "
+    "another speed, and after warming up."
+)
+
+
 class Verdict(StrEnum):
     """What a diagnosis comes to."""
 

@@ -241,6 +241,7 @@ def test_what_the_gauge_refutes_is_unexplained_and_says_what_it_looks_like():
     assert found.members == ()
     assert "looks like this: The laser sheet is tilted" in found.identifiable
     assert "tell" not in found.record_next
+    assert "A gauge run with this probe" not in found.record_next
     assert not any("came or went" in note for note in found.notes)
 
 

@@ -18,6 +18,7 @@ from stages.diagnose.field.left import why_unexplained
 from stages.diagnose.gauge.scan import Scored
 from stages.diagnose.inference import INSTRUMENT, Evidence, Stated, places_of, score, stated_belief
 from stages.diagnose.result import (
+    AGAIN,
     Confirmation,
     Diagnosis,
     EffectFound,
@@ -81,7 +82,9 @@ class FieldAnswer:
     def next(self) -> str:
         """Return what to record: a gauge run, and what tells the members apart."""
         more = record_next([s.model.name for s in self.shown]) if self.shown else ""
-        return f"A gauge run with this probe, off the axis of known bores, rolled, to and fro. {more}"
+        return (
+            f"A gauge run with this probe, off the axis of known bores, rolled, to and fro. {more}".rstrip()
+        )
 
 
 def field_answer(found: FieldEvidence, library: Mapping[str, EffectModel], stated: Stated) -> FieldAnswer:
@@ -180,7 +183,7 @@ def with_field(
         return _met(found, dict(zip(names, met, strict=True)))
     if alone.shown:
         possible = alone.shown if examined is None else not_refuted(alone.shown, examined, stated)
-        doubt = why_unexplained(field.field.run, possible[0]) if possible else ""
+        doubt = why_unexplained(field.field.run, possible[0]) if possible and seen is field.field else ""
         left = replace(alone, shown=() if doubt else possible)
         return _alone(found, alone, left, seen, gauge is not None, doubt)
     if found.verdict is Verdict.NOT_IDENTIFIABLE and gauge is None and travels(field.field.run):
@@ -272,9 +275,8 @@ def _alone(
         # What the refuted causes are fixed to was not measured.
         where = replace(where, fixed_to=None, time=None)
     found = _beside(found, certain, _union(possible.members, names)) if possible.shown else _nameless(found)
-    found = replace(
-        found, identifiable="; ".join(said), record_next=possible.next, notes=(*found.notes, *notes)
-    )
+    following = possible.next if possible.shown or not with_gauge else AGAIN
+    found = replace(found, identifiable="; ".join(said), record_next=following, notes=(*found.notes, *notes))
     if found.remainder is None:
         return replace(found, location=where)
     return replace(found, remainder=replace(found.remainder, location=where))

@@ -8,8 +8,8 @@ from stages.diagnose.field.run import FieldRun
 from stages.diagnose.gauge.scan import Scored
 from stages.diagnose.residual import rings_against_texture
 
-# The most of the 1 σ with which texture alone has the middle of a ring, in four sound inspections; found were
-# .05 to .08 px (`RingResidual.floor_px`).
+# Texture alone places the middle of a ring with a 1 σ of .09 to .11 px in four sound inspections, of which
+# the largest is taken; its error there was .05 to .08 px (`RingResidual.floor_px`).
 _MIDDLE_PX = 0.11
 _LEFT = (
     "The inspection alone shows what no effect of the library explains. The likeliest, {}, leaves {:.2f} px "

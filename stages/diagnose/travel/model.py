@@ -219,7 +219,7 @@ def event_columns(sight: Sight, events: tuple[Event, ...], speed: Float) -> Floa
 def candidate_columns(sight: Sight, kind: EventKind, speed: Float) -> Iterator[Float]:
     """Yield the columns (N, M) of an event of that kind at every place, `AT_ONCE` places at a time."""
     count = len(sight.time_s)
-    for places in np.array_split(np.arange(count), max(count // AT_ONCE, 1)):
+    for places in np.array_split(np.arange(count), count // AT_ONCE + 1):
         yield _columns_at(sight, kind, speed, places)
 
 
