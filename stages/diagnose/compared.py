@@ -13,7 +13,7 @@ from pipeline.recording.base import Recording
 from stages.diagnose.channels import Seen
 from stages.diagnose.correct import ENCODER_EFFECTS, Correction
 from stages.diagnose.effects.base import EffectModel, Shape
-from stages.diagnose.effects.courses import OWN_CLOCK, Coursed
+from stages.diagnose.effects.courses import of_own_clock
 from stages.diagnose.field.run import FieldRun
 from stages.diagnose.gauge.examine import Examined
 from stages.diagnose.residual import (
@@ -71,7 +71,8 @@ def compared(
         linear = _beyond_probe(examined, correction)
         if field is None:
             return _gauge_alone(of_gauge, examined) if of_gauge is not None else None
-        if of_gauge is not None and _of_own_clock(examined):
+        terms = examined.best.fit.terms if examined is not None and examined.best is not None else ()
+        if of_gauge is not None and any(of_own_clock(t.model) for t in terms):
             # What happens at a time of the gauge run need not happen in the field: the gauge's own held-out
             # rings tell.
             return _gauge_alone(of_gauge, examined)
@@ -133,13 +134,6 @@ def _in_field(field: FieldRun, corrected: FieldRun, linear: Linear, of: GaugeRes
     after = rings_against_texture(corrected, linear)
     every = (of.before.rms_px, of.after.rms_px) if of is not None else (before.rms_px, after.rms_px)
     return Compared(before, after, FitQuality("px", *every, before.rms_px, after.rms_px, after.floor_px))
-
-
-def _of_own_clock(examined: Examined | None) -> bool:
-    """Return whether an effect was found that comes at times of its own recording alone."""
-    best = examined.best if examined is not None else None
-    terms = best.fit.terms if best is not None else ()
-    return any(isinstance(t.model, Coursed) and t.model.kind in OWN_CLOCK for t in terms)
 
 
 def _beyond_probe(examined: Examined | None, correction: Correction | None) -> Linear:

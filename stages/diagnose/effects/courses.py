@@ -34,7 +34,7 @@ SEARCHED = (
     CourseKind.DISTANCE,
 )  # fmt: skip
 # Courses that tell of times of their own recording alone.
-OWN_CLOCK = frozenset({CourseKind.STEP, CourseKind.RAMP, CourseKind.EXPONENTIAL, CourseKind.SINUSOID})
+_OWN_CLOCK = frozenset({CourseKind.STEP, CourseKind.RAMP, CourseKind.EXPONENTIAL, CourseKind.SINUSOID})
 # Times of a step on the first grid: a step half a cell off (a 64th of the recording) still keeps 97 % of
 # its information in the middle of the recording, n (T − n) / T² of what is before and after.
 _TIMES = 32
@@ -155,6 +155,11 @@ class Coursed(Product):
         known = self.quantities(shape, amplitude) | self.course(shape, amplitude)
         numbers = ", ".join(f"{name} = {value:.5g}" for name, value in known.items())
         return f"({effect(self.law).law}) × ({_FORMULAS[self.kind]}), {numbers}"
+
+
+def of_own_clock(model: EffectModel) -> bool:
+    """Return whether an effect comes at times of its own recording, which no other has to share."""
+    return model.kind in _OWN_CLOCK
 
 
 def with_courses(

@@ -11,8 +11,7 @@ from pipeline.physics.catalogue import EFFECTS
 from pipeline.physics.effect import CourseKind
 from stages.diagnose.agreement import same, sized
 from stages.diagnose.effects.base import EffectModel, Shape
-from stages.diagnose.effects.courses import OWN_CLOCK, Coursed
-from stages.diagnose.effects.kinds import Drifting
+from stages.diagnose.effects.courses import of_own_clock
 from stages.diagnose.field.evidence import FieldEvidence
 from stages.diagnose.gauge.confirm import partial_of
 from stages.diagnose.gauge.examine import Examined
@@ -108,7 +107,7 @@ def met_in_field(
 
 
 def _met(term: Term, covariance: Float, found: FieldEvidence, stated: Stated) -> Confirmation | None:
-    if not isinstance(term.model, (Coursed, Drifting)) or term.model.kind not in OWN_CLOCK:
+    if not of_own_clock(term.model):
         return confirm_in_field(term.model, term.shape, term.amplitude, covariance, found, stated)
     return _same_step(term, covariance, found, stated) if term.model.kind is CourseKind.STEP else None
 

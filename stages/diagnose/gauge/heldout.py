@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 
 from pipeline.arrays import Bool, Float, Int
 from stages.calibrate.gauge.edges import Edges
-from stages.diagnose.effects.courses import OWN_CLOCK, Coursed
+from stages.diagnose.effects.courses import of_own_clock
 from stages.diagnose.gauge.elimination import EDGE, RING, Equations, Part, eliminate_globals, eliminate_poses
 from stages.diagnose.gauge.fit import Fit, evidence, kept_columns, own_unknowns
 from stages.diagnose.gauge.hypotheses import Judged, Regime
@@ -65,7 +65,7 @@ def fit_quality(
     if len(parts) < 2:
         return FitQuality("px", before, after, np.nan, np.nan, floor)
     by_part: Sequence[Evidence] = best.by_regime
-    if any(isinstance(t.model, Coursed) and t.model.kind in OWN_CLOCK for t in best.fit.terms):
+    if any(of_own_clock(t.model) for t in best.fit.terms):
         parts = [Part(frames, _SEEN_KINDS) for frames in _by_turns(len(run.time_s))]
         every = [Part(p.frames) for p in parts]
         by_part = evidence(run, best.fit, (), every, with_spread=False)[1:]
