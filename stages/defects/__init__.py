@@ -1,17 +1,22 @@
-"""Wall to defects: what stands off the pipe's own smooth shape, told from noise, measured, named.
+"""Find the defects of a measured wall: detect deviations from the pipe's own shape, measure, classify.
 
-1. Take the pipe's own slowly varying shape out (`relief`), and the motion of single rings; once more when it
-   is known where the defects are.
-2. Matched filters over scales, threshold from a wished number of false alarms (`detect`).
-3. Hysteresis (`grow`) to instances with outlines; all-round beads are welds (`segment`).
-4. Depth as the extreme of a 1 mm mean (`surface`), without what noise adds, ± 1 σ (`depth`, `smear`).
-5. What neither a second ring nor the photo confirms, stays at one place of the image, lies where the line
-ends, or is rather false than real by what the same recording shows where nothing is, is set apart with the
-reason (`corroborate`, `credibility`).
-6. Kind from named features as a probability, with codes and words (`describe`).
-7. Dark lines that the photo alone shows, as cracks are, are set apart, too (`dark_lines`).
+1. Subtract the pipe's own slowly varying shape and the motion error of single rings (`relief`). Repeat this
+   with the defects left out, once it is known where they are.
+2. Run matched filters of several sizes; the threshold follows from the wanted number of false alarms
+   (`detect`).
+3. Grow what exceeds the threshold by hysteresis (`grow`) and split it into instances with outlines; beads
+   that go all round the pipe are welds (`segment`).
+4. Measure each depth as the extreme of the wall averaged over 1 mm (`surface`), corrected for what noise adds
+   to an extreme, with 1 σ (`depth`, `smear`).
+5. Set unconfirmed findings apart, with the reason: neither a second ring nor the photo shows it, it stays at
+   one place of the image, it lies where the line ends, or the recording itself shows that findings like it
+   are more often false than real (`corroborate`, `credibility`).
+6. Give a probability to each kind of defect by named features, and write codes and a description
+   (`describe`).
+7. List dark lines that only the photo shows, as cracks are, among the unconfirmed findings (`dark_lines`).
 
-A long wall is gone through in stretches with overlap; what is found does not depend on where they are cut.
+A long wall is processed in overlapping stretches along the pipe; the result does not depend on where they are
+cut.
 """
 
 from __future__ import annotations
@@ -48,15 +53,17 @@ from stages.defects.noise_tail import noise_tail
 from stages.defects.parallax import LitPictures
 from stages.defects.parameters import DefectParameters
 from stages.defects.relief import smooth_shape_removed
+from stages.defects.report import report_found, report_unconfirmed, warn_of_missed, warn_of_short_ones
 from stages.defects.segment import Region, regions_of
 from stages.defects.smear import flattened
 from stages.defects.surface import MeasuredWall, Surface
-from stages.defects.told import report_found, report_unconfirmed, warn_of_missed, warn_of_short_ones
 
 __all__ = ["DEFECTS", "DefectParameters", "find_defects"]
 
+# Least wall for a search: 1000 cells, and 8 circles of the map of which half of the cells were measured
+# (chosen).
 _MIN_CELLS, _MIN_CIRCLES, _HALF = 1000, 8, 0.5
-# A finding is measured without at most so many rings on which a glint lies (chosen).
+# At most so many rings with a glint on them are left out when a finding is measured (chosen).
 _MOST_LEFT_OUT = 4
 
 
@@ -69,14 +76,15 @@ def find_defects(
     rings: RingSamples | None = None,
     pictures: LitPictures | None = None,
 ) -> Defects:
-    """Find, outline, measure and name the defects of a wall.
+    """Find, outline, measure and classify the defects of a wall.
 
-    Its ``rings`` tell how bright the line was, ``pictures`` whether the wall looks as it was measured.
+    ``rings`` give the brightness of the laser line, ``pictures`` the LED-lit frames in which a finding is
+    looked for; what needs them is skipped where they are None. Depths are mm, positive into the wall.
 
     Raises
     ------
     UnusableError
-        When too little of the wall was measured to know its own shape.
+        When too little of the wall was measured to determine the pipe's own shape.
     """
     _refuse_unseen(wall)
     relief = smooth_shape_removed(wall.radius_map, parameters)
@@ -125,9 +133,9 @@ def _measured(
     parameters: DefectParameters,
     context: Context,
 ) -> Iterator[Found]:
-    """Yield the regions that were measured and are as deep as is worth reporting."""
+    """Yield the regions that were measured and reach the smallest depth to be reported."""
     for done, region in enumerate(regions, 1):
-        # A region that the sure points do not show is measured once more with all points.
+        # A region without points of usual σ is measured once more with all points.
         for every_point in (False, True):
             surface, here = wall.surface_about(region, every_point)
             if not _is_measured(surface, here):
@@ -165,7 +173,7 @@ def _depth_of(
     parameters: DefectParameters,
     context: Context,
 ) -> Depth:
-    """Return the depth of a region, of which ``here`` counts its rows from the surface's first."""
+    """Return the depth of a region; ``here`` is that region with rows counted from the surface's first."""
     if region.all_round:
         return measure_all_round(
             here, surface, clean, bore_beside(region, wall.relief.radius_map, wall.rings_mm)
@@ -174,14 +182,14 @@ def _depth_of(
 
 
 def _contradicted(depth: Depth, here: Region, surface: Surface) -> int | None:
-    """Return the frame that a region is to be measured without, None where there is none."""
+    """Return the next frame to be left out when a region is measured, None where there is none."""
     if here.all_round or len(surface.left_out) >= _MOST_LEFT_OUT:
         return None
     return contradicted_frame(depth, here, surface)
 
 
 def _chance_of_bead(region: Region, wall: MeasuredWall, parameters: DefectParameters) -> float:
-    """Return the probability that a region is no step of the bore."""
+    """Return the probability that a region is not a step of the bore's diameter."""
     radius_map = wall.relief.radius_map
     if not goes_round(region, radius_map):
         return 1.0
@@ -196,7 +204,7 @@ def _lines(
     parameters: DefectParameters,
     context: Context,
 ) -> Iterator[Defect]:
-    """Yield the dark lines that the photo alone shows; one beside what rings show is a part of it."""
+    """Yield dark lines that only the photo shows; one beside a finding of the rings belongs to it."""
     for region in dark_lines(scene.seen_by.texture, wall.relief, context.scratch):
         beside = any(lies_beside(region, f.region, wall.relief) for f in found)
         surface, here = wall.surface_about(region, every_point=True)
@@ -206,7 +214,7 @@ def _lines(
 
 
 def _fixed_in(region: Region, fixed: FixedToProbe | None) -> Float:
-    """Return by how much the line departs in a region (H, W) at one place of the image, mm."""
+    """Return the displacement of the line that stays at one place of the image, over a region (H, W), mm."""
     if fixed is None:
         return np.zeros(region.mask.shape)
     rows = fixed.departure_mm[region.row : region.row + len(region.mask)].astype(float)
@@ -214,13 +222,13 @@ def _fixed_in(region: Region, fixed: FixedToProbe | None) -> Float:
 
 
 def _is_measured(surface: Surface, region: Region) -> bool:
-    """Whether any cell of a region has a surface: between rings far apart some have none."""
+    """Whether any cell of a region has a measured surface: some regions between distant rings have none."""
     shown = region.cut(surface.all_mm if region.all_round else surface.local_mm)
     return bool(np.isfinite(shown[region.mask]).any())
 
 
 def _refuse_unseen(wall: Wall) -> None:
-    """Refuse a wall of which too little was seen to know the shape that defects depart from."""
+    """Raise UnusableError when too little of the wall was measured to determine its smooth shape."""
     radius, cells, circles = wall.radius_map.radius_mm, 0, 0
     for part in stretches(len(radius)):
         seen = np.isfinite(radius[part.own])
@@ -235,7 +243,7 @@ def _refuse_unseen(wall: Wall) -> None:
 
 
 def _smallest_depth(detection: Detection, parameters: DefectParameters) -> float:
-    """Return the depth at which nine of ten defects of 3 mm × 3 mm pass both the threshold and the limit."""
+    """Return the depth, mm, at which 9 of 10 defects of 3 mm × 3 mm pass threshold and smallest depth."""
     chance = float(ndtri(0.9))
     found = (detection.threshold + chance) * detection.small_sigma_mm
     return max(found, parameters.min_depth_mm + chance * detection.small_sigma_mm)
@@ -252,7 +260,7 @@ def _defects_of_run(
     parameters: DefectParameters,
     context: Context,
 ) -> Defects:
-    """Find the defects of a run, with all that its rings and lit pictures say of them."""
+    """Find the defects of a run, with the evidence of its rings and lit pictures."""
     pictures = LitPictures(frames.applied_to(recording), probe.as_found_in(trajectory), trajectory)
     on_wall = told_by_roll(rings, trajectory)
     return find_defects(recording, wall, texture, parameters, context, on_wall, pictures)

@@ -1,7 +1,7 @@
-"""What goes all round the pipe: a bead or groove, or a step of the bore, told by its median round the pipe.
+"""Beads, grooves and steps of the bore that go all round the pipe, measured by medians round the pipe.
 
-A glint or a pit on a bead stands out farther than the bead, but it lies on less than half of any circle of
-it, so that medians round the pipe do not see it. It is found on the bead as a finding of its own.
+A glint or a pit on a bead stands out farther than the bead, but it covers less than half of any circle of it,
+so that it does not move the median round the pipe. It is found as a separate finding on the bead.
 """
 
 from __future__ import annotations
@@ -19,45 +19,55 @@ from stages.defects.depth import Depth, noise_gain, shape_sigma, sharpening_sigm
 from stages.defects.segment import Region
 from stages.defects.surface import Surface
 
-IS_STEP = "The bore is of one width before it and of another behind it: it is a step, no bead or groove"
-MAY_BE_STEP = "It may as well be a step: too little of the bore was seen before it or behind it"
-# The bore beside a finding is looked at over a tenth of the diameter: a step is smeared over as much.
+IS_STEP = (
+    "The bore has one diameter before it and another behind it: it is a step of the bore, no bead or groove"
+)
+MAY_BE_STEP = "It may also be a step of the bore: too little of the bore was seen before it or behind it"
+# The bore beside a finding is its first 0.2 radii on either side: a step is smeared over about that length. A
+# region goes all round if it has cells in nine of ten columns of the map.
 _BESIDE, _ALL_ROUND = 0.2, 0.9
-# A bead stands out of the bore on both sides by all of its height, a step out of one of them by nothing: half
-# is the middle between the two.
+# A bead stands out of the bore on both sides by its full height, a step does so on one side only: the limit
+# is half-way between the two.
 _BETWEEN = 0.5
-_BEAD_OR_STEP = 0.5  # where nothing tells
-# A bead's crest lies beyond the height below which nine tenths of it stay; above are the few per cent that
-# are glints, too. By how much follows from how far that height is above the one of three quarters, both over
-# its distance from the median: so for two heights by halves, a sine, and 80 normal values. ± 1 σ (chosen) for
-# what is like none of them.
+_BEAD_OR_STEP = 0.5  # prior probability of a bead, where the bore beside it was not seen
+# The crest of a bead is higher than the 90 % quantile of its heights round the pipe; the few per cent above
+# that quantile may be glints. How much higher follows from the 75 % quantile: the ratio (90 % − 75 %) / (90 %
+# − 50 %) is _TAILS, and (crest − 50 %) / (90 % − 50 %) is _CRESTS, for a bead that is high on one half and
+# low on the other, for a sine, and for 80 normal values. Other shapes err by 1 σ of _CREST_SIGMA (chosen). A
+# normal value's 90 % quantile is 1.28 σ.
 _HIGH, _LOWER, _HIGH_SIGMAS = 0.9, 0.75, 1.28
 _TAILS, _CRESTS, _CREST_SIGMA = (0.0, 0.257, 0.474), (1.0, 1.05, 1.87), 0.25
-# So many places of 2 mm are independent: the width of a ring's samples and a depth's 1 mm mean leave so much
-# alike. A row counts where half of it was seen.
+# Heights 2 mm apart round the pipe count as independent: the width of a ring's sample and the 1 mm mean of a
+# depth correlate closer ones. A row of the map is used where at least half of it was seen.
 _PLACE_MM, _SEEN = 2.0, 0.5
-# 1 σ of n normal values' median times √n, and of their 90 % quantile over its distance from the median.
+# For n normal values: 1 σ of their median times √n, and the relative 1 σ of their 90 % quantile's distance
+# from the median times √n.
 _MEDIAN_ERRS, _HIGH_ERRS = 1.25, 1.33
-_EXACT_MM = 1e-6
+_EXACT_MM = 1e-6  # keeps divisions defined where nothing scatters
 
 
 @dataclass(frozen=True)
 class Bore:
-    """How far a finding's median round the pipe stands out of the bore before and behind it (2,), mm.
+    """By how much a finding's median round the pipe stands out of the bore beside it, mm.
 
-    ``sigma_mm`` is by how much such medians scatter from row to row of the bore where they do less, as the
-    foot of a step adds to it on the other; by at least what those of rings do all over the wall. NaN where
-    nothing was seen.
+    Attributes
+    ----------
+    out_mm : (2,)
+        Height over the bore before and behind it; NaN where that side was not seen.
+    sigma_mm : float
+        1 σ of such medians: their scatter from row to row on the steadier side, since the foot of a step adds
+        scatter on the other; at least the scatter of the rings' medians over the whole wall.
     """
 
     out_mm: Float
     sigma_mm: float
 
     def chance_of_bead(self, min_depth_mm: float) -> float:
-        """Return the probability that it stands out of both sides, as a bead does and no step.
+        """Return the probability that it stands out of the bore on both sides: a bead does, a step does not.
 
-        Out of one that was not seen it does so or not, as a bead or a step that the view ends in. What lies
-        between bores of one width is no step, though its median stand out of neither: a helical groove.
+        A side that was not seen is as likely that of a bead as that of a step. What lies between bores of
+        equal diameter is no step, even if its median stands out on neither side: a helical groove is an
+        example.
         """
         seen = self.out_mm[np.isfinite(self.out_mm)]
         if not len(seen):
@@ -72,14 +82,15 @@ class Bore:
 
 
 def goes_round(region: Region, radius_map: RadiusMap) -> bool:
-    """Return whether a region goes round so much of the pipe that it may be a step of the bore."""
+    """Return whether a region covers enough of the circumference to be a possible step of the bore."""
     return bool(region.mask.any(0).sum() >= _ALL_ROUND * radius_map.radius_mm.shape[1])
 
 
 def bore_beside(region: Region, radius_map: RadiusMap, rings_mm: float) -> Bore:
-    """Return how a region that goes round the pipe stands out of the bore beside it.
+    """Return by how much a region that goes round the pipe stands out of the bore on either side.
 
-    ``rings_mm`` is by how much rings' medians scatter: between rings, rows of the map scatter less.
+    ``rings_mm`` is the scatter of the medians of single rings, 1 σ: rows of the map, interpolated between
+    rings, scatter less.
     """
     radius_mm, s = radius_map.radius_mm, radius_map.distance_mm
     first, end = region.row, region.row + len(region.mask)
@@ -96,9 +107,9 @@ def _level(profile_mm: Float) -> float:
 
 
 def _scatter(profile_mm: Float) -> float:
-    """Return by how much a profile (n,) scatters about a straight line, NaN where at most two are seen.
+    """Return by how much a profile (n,) scatters about a straight line; NaN with fewer than three values.
 
-    The line is that of the median slope (Theil 1950, Sen 1968), which the foot of a step does not turn.
+    The line has the median of all slopes (Theil 1950, Sen 1968), which the foot of a step does not tilt.
     """
     at = np.flatnonzero(np.isfinite(profile_mm))
     if len(at) < 3:
@@ -109,10 +120,10 @@ def _scatter(profile_mm: Float) -> float:
 
 
 def measure_all_round(region: Region, surface: Surface, clean: CleanWall, bore: Bore) -> Depth:
-    """Return the depth of what goes all round: its largest median round the pipe, and its crest beyond.
+    """Return the depth of a region that goes all round: largest median round the pipe plus crest above it.
 
-    The crest follows from by how much more the height varies round the pipe than noise makes it. ``region``
-    counts its rows from the first of the surface.
+    The crest follows from how much the height varies round the pipe beyond noise. The rows of ``region``
+    count from the first row of the surface.
     """
     relief = surface.relief
     height = np.where(region.mask, region.sign * region.cut(surface.all_mm), np.nan)
@@ -135,19 +146,19 @@ def measure_all_round(region: Region, surface: Surface, clean: CleanWall, bore: 
 
 
 def _highest_row(height: Float) -> int:
-    """Return the row of a height (H, A) of which nine tenths stay below the most, of those well seen."""
+    """Return the row of heights (H, A) with the largest 90 % quantile, among rows that were seen well."""
     share = np.isfinite(height).mean(1)
     rows = np.flatnonzero(share >= min(_SEEN, float(share.max())))
     return int(rows[np.argmax(np.nanquantile(height[rows], _HIGH, 1))])
 
 
 def _crest(height: Float, noise_mm: float, places: float) -> tuple[float, float, float]:
-    """Return a height's (n,) median round the pipe, by how much its crest exceeds it, and its 1 σ, mm."""
+    """Return the median of heights (n,) round the pipe, by how much the crest exceeds it, and its 1 σ, mm."""
     level, lower, high = np.quantile(height, (0.5, _LOWER, _HIGH))
     out2, noise2 = (high - level) ** 2, (_HIGH_SIGMAS * noise_mm) ** 2
     varies2 = max(out2 - noise2, 0.0)
     varies = np.sqrt(varies2)
-    # Both squares err by twice the relative error of a quantile.
+    # The relative error of a square is twice that of its quantile.
     unsure = np.sqrt(varies2 + 2 * _HIGH_ERRS / np.sqrt(places) * np.hypot(out2, noise2)) - varies
     beyond = float(np.interp((high - lower) / max(high - level, _EXACT_MM), _TAILS, _CRESTS))
     sigma = float(np.hypot(_CREST_SIGMA * varies, beyond * unsure))

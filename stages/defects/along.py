@@ -1,4 +1,4 @@
-"""A long map in stretches along the pipe, a sample of it, and its smooth course along the pipe."""
+"""Process a long map in stretches along the pipe: cut it, take sample rows, fit smooth splines along it."""
 
 from __future__ import annotations
 
@@ -17,29 +17,29 @@ _SAMPLED_ROWS, _BLOCKS = 2048, 16
 
 @dataclass(frozen=True)
 class Stretch:
-    """Some rows of a map: its ``own``, and the ``wide`` rows that influence them."""
+    """Rows of a map to be computed (``own``), and these with the neighbours they depend on (``wide``)."""
 
     own: slice
     wide: slice
 
     @property
     def inner(self) -> slice:
-        """Its own rows, counted from the first of the wide ones."""
+        """The own rows, counted from the first of the wide ones."""
         return slice(self.own.start - self.wide.start, self.own.stop - self.wide.start)
 
 
 def stretches(rows: int, overlap: int = 0) -> list[Stretch]:
-    """Return stretches that cover a map of so many rows, each seeing ``overlap`` rows of its neighbours."""
+    """Return stretches that cover a map of ``rows`` rows, each with ``overlap`` rows of its neighbours."""
     return [widened(slice(k, min(k + _ROWS, rows)), rows, overlap) for k in range(0, rows, _ROWS)]
 
 
 def widened(own: slice, rows: int, overlap: int) -> Stretch:
-    """Return some of a map's ``rows`` with so many of their neighbours."""
+    """Return the rows ``own`` of a map of ``rows`` rows, with ``overlap`` neighbours on either side."""
     return Stretch(own, slice(max(0, own.start - overlap), min(rows, own.stop + overlap)))
 
 
 def sample(usable: Bool) -> tuple[slice, ...]:
-    """Return the rows for medians: all of a short map, or blocks spread over its ``usable`` rows (S,)."""
+    """Return rows for robust statistics: all of a short map, else blocks spread over ``usable`` rows (S,)."""
     rows, at = len(usable), np.flatnonzero(usable)
     size = _SAMPLED_ROWS // _BLOCKS
     if rows <= _SAMPLED_ROWS or not at.size:
@@ -50,7 +50,10 @@ def sample(usable: Bool) -> tuple[slice, ...]:
 
 
 def slow_along(distance_mm: Float, coefficients: Float, smooth_mm: float) -> Float:
-    """Return (S, 5) coefficients as robust cubic splines with knots ``smooth_mm`` apart."""
+    """Return harmonics (S, 5), mm, smoothed by robust cubic splines with knots ``smooth_mm`` apart.
+
+    Rows without a finite value are interpolated; fewer than 8 finite rows give their median everywhere.
+    """
     good = np.isfinite(coefficients[:, 0])
     if good.sum() < 8:
         return np.tile(np.nanmedian(coefficients, 0), (len(coefficients), 1))

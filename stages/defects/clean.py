@@ -1,4 +1,4 @@
-"""The wall away from all defects: a sample of noise alone."""
+"""The wall away from all defects, as a sample of its noise."""
 
 from __future__ import annotations
 
@@ -19,15 +19,16 @@ _CLEAR_MM = 3.0
 
 @dataclass(frozen=True)
 class CleanWall:
-    """A sample of the wall's 1 mm mean.
+    """Sampled rows of the wall, averaged over 1 mm.
 
     Attributes
     ----------
     local_mm : (S, A)
+        Deviation from the smooth shape, as in `Surface`.
     clean : (S, A) bool
-        Away from all defects.
+        True at least 3 mm away from all defects.
     scale : float
-        Share of noise in the scatter of the clean wall; the rest is its natural roughness.
+        Noise over total scatter of the clean wall (1 σ each); the rest is its natural roughness.
     """
 
     local_mm: Float
@@ -36,11 +37,11 @@ class CleanWall:
 
     @cached_property
     def noise_mm(self) -> float:
-        """1 σ of the clean wall's noise, 0 where none of it is clean."""
+        """1 σ of the clean wall's noise, mm; 0 where no cell is clean."""
         return self.scale * robust_spread(self.local_mm[self.clean]) if self.clean.any() else 0.0
 
     def draw(self, shape: tuple[int, int], random: np.random.Generator) -> Float:
-        """Return a patch (H, W) of the clean wall, cleanest of some tries; its sign is drawn too."""
+        """Return a patch (H, W) of noise, mm: the cleanest of up to 40 random patches, with a random sign."""
         rows, columns = self.local_mm.shape
         best, share = np.zeros(shape), -1.0
         for _ in range(_TRIES):
@@ -62,7 +63,7 @@ def _reflected(i: Int, count: int) -> Int:
 
 
 def clean_wall(wall: MeasuredWall, regions: tuple[Region, ...]) -> CleanWall:
-    """Return the wall's sampled rows, regions with a margin marked in them."""
+    """Return the wall's sampled rows, with all regions and a margin of 3 mm marked as not clean."""
     parts = [_sampled(wall, rows, regions) for rows in wall.relief.sampled]
     local, clean = (np.concatenate(p) for p in zip(*parts, strict=True))
     return CleanWall(local, clean, _noise_share(wall.relief.typical, local[clean]))
@@ -85,7 +86,7 @@ def _sampled(wall: MeasuredWall, rows: slice, regions: tuple[Region, ...]) -> tu
 
 
 def _noise_share(typical: Typical, clean_mm: Float) -> float:
-    """Return noise over scatter of the clean wall: what exceeds the roughness that the map shows."""
+    """Return noise over scatter of the clean wall, 1 σ each: the map's roughness is taken off the scatter."""
     roughness = typical.sigma_mm**2 - typical.noise_mm**2
     scatter = robust_spread(clean_mm) ** 2 if clean_mm.size else 0.0
     return float(np.sqrt(np.clip(1 - roughness / scatter, 0.1, 1.0))) if scatter > 0 else 1.0

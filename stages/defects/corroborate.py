@@ -1,10 +1,10 @@
-"""Evidence for a defect besides the ring that shows it: a second ring, or the photo of the wall.
+"""Evidence for a defect beyond the one ring that shows it: a second ring, or the photo of the wall.
 
-A glint, a splash or a piece of texture taken for the line shows in one ring. A place of the wall shows in
-every ring that crosses it, whichever pass of the probe that ring is of, and often in the photo, which is
-taken under another light. What stays at one place of the image while the wall goes by
-(`stages.accumulate.fixed`) shows in every ring and is no wall. Where a cable or water hides the wall the line
-ends, and what lies at its end is as much the end's as the wall's, in every ring.
+A glint, a splash or a patch of texture that is taken for the line appears in one ring. A real defect appears
+in every ring that crosses it, on every pass of the probe, and often in the photo, which is taken under other
+light. What stays at one place of the image while the wall goes by (`stages.accumulate.fixed`) appears in
+every ring and is not on the wall. Where a cable or water hides the wall, the line ends; what lies at its end
+may in every ring be an effect of that end.
 """
 
 from __future__ import annotations
@@ -22,26 +22,27 @@ from stages.defects.neighbours import frames_at_peak
 from stages.defects.parallax import LitPictures
 from stages.defects.relief import Relief
 from stages.defects.segment import Region
-from stages.defects.surface import Surface, cells_of, sure_of_themselves
+from stages.defects.surface import Surface, cells_of, of_usual_sigma
 
 LEAST_RINGS = 2
-# A ring speaks for a defect where a fifth of its samples there are off the wall by a quarter of the depth, as
-# beside the deepest place of a bell, and by two σ of the wall's own unevenness.
+# A ring shows a defect if a fifth of its samples there deviate by a quarter of the depth, as they do beside
+# the deepest place of a bell, and by two σ of the wall's own unevenness.
 _TOP_SHARE, _DEPTH_SHARE, _NOISE_SIGMAS = 0.2, 0.25, 2.0
 _LEAST_SAMPLES = 3
-# Of any ten places of a ring one is as bright as this.
+# Bright means brighter than nine of ten places of the ring.
 _BRIGHT = 0.9
-# Most are half of the rings. A codec hands a glint on to a picture or two after it and before it: up to four
-# or five rings show it.
+# Half of the asked rings must be bright there. A codec repeats a glint in one or two pictures before and
+# after it, so that up to five rings show it; six or more rings are asked one by one.
 _MOST, MANY_RINGS = 0.5, 6
-# The photo speaks for it where it is darker or brighter there than at all of so many places beside it: by
-# chance once in 41 times for either.
+# The photo confirms a finding if it is darker or brighter there than at all of 40 places around the pipe: for
+# each of the two this happens by chance once in 41 times.
 _PLACES = 40
-# A finding is what is fixed to the image where that makes up half of its depth in half of its cells. Chosen:
-# a droplet's own finding has it in nine of ten cells, a defect beside one in none.
+# A finding counts as fixed to the image if what is fixed makes up half of its depth in half of its cells.
+# Chosen: for a droplet's own finding it does in nine of ten cells, for a defect beside a droplet in none.
 _FIXED_SHARE = 0.5
-# A row of a finding lies at the edge of what was seen where it is deepest within the millimetre of a depth's
-# mean. Of a finding beside hidden wall all rows do, of one that merely touches it few: more than half counts.
+# A row of a finding is at the edge of the seen wall if it is deepest within 1 mm of it, the length over which
+# a depth is averaged. All rows of a finding that the edge causes are, few of one that only touches it: more
+# than half of the rows decides.
 _EDGE_MM, _EDGE_SHARE = 1.0, 0.5
 
 
@@ -52,22 +53,22 @@ class Evidence:
     Attributes
     ----------
     rings : int
-        How many show it; rings that share light of a codec count together.
+        Number of independent rings that show it; rings to which a codec gave the same light count as one.
     photo : bool, optional
-        Whether the photo does; None where it cannot tell.
+        Whether the photo shows it; None where the photo cannot decide.
     score : float
-        How far the search for it stands out, σ.
+        Largest matched-filter response, σ.
     fixed : bool
         Whether it stays at one place of the image while the wall goes by.
     edge : bool
         Whether it is deepest beside hidden wall.
     bright : bool
-        Whether the line is brighter there than at nine of ten places of the ring that shows it deepest, and
-        where many show it of most.
+        Whether the line is brighter there than at nine of ten places of the ring that shows it deepest; where
+        six or more rings show it, of most of them.
     contradicted : bool
         Whether lit pictures, taken when the line was elsewhere, show the wall without it.
     in_the_way : bool
-        Whether the probe would have driven through it.
+        Whether the probe would have collided with it.
     """
 
     rings: int
@@ -81,7 +82,7 @@ class Evidence:
 
     @property
     def on_wall(self) -> bool:
-        """Whether it is the wall's, and not as likely of the probe or of where the line ends."""
+        """Whether it belongs to the wall, and is not explained by the probe or by the end of the line."""
         return not (self.fixed or self.edge or self.contradicted or self.in_the_way)
 
     @property
@@ -91,7 +92,7 @@ class Evidence:
 
     @property
     def doubt(self) -> str:
-        """Why it is not counted, in words."""
+        """Why it is not counted, as a sentence without its full stop."""
         if self.fixed:
             return (
                 "It stays at one place of the image while the wall goes by, as something on the window or on "
@@ -113,20 +114,20 @@ class Evidence:
                 "wall may have drawn it aside"
             )
         if not self.corroborated:
-            return "No second ring shows it by light of its own, nor do one ring and the photo"
+            return "No second ring shows it with light of its own, nor do one ring and the photo together"
         if self.bright:
             return (
                 "The line is brighter there than at nine of ten places of its ring, as of a glint or a "
-                "reflection, and more findings are so than defects are by chance"
+                "reflection, and more findings of this recording are so bright than chance explains"
             )
-        return "Of findings like it, more are false than real in such footage"
+        return "In this recording, more findings of this strength are expected to be false than real"
 
 
 @dataclass(frozen=True)
 class Witnesses:
     """What findings are compared with: the wall's photo, and rings and lit pictures where they are known.
 
-    Rings that a codec ``held`` alike are no witnesses of their own.
+    Rings to which a codec gave the same light (``held``) do not count as independent.
     """
 
     texture: WallTexture
@@ -138,15 +139,17 @@ class Witnesses:
 def evidence_for(
     region: Region, depth: Depth, surface: Surface, seen_by: Witnesses, fixed_mm: Float, score: float
 ) -> Evidence:
-    """Return the evidence of rings and photo, and whether a finding is ``fixed_mm`` (H, W) to the image.
+    """Return the evidence for and against a finding.
 
-    The photo is laid on the wall as it was measured: where the depth itself shifts the picture by more than
-    the finding's size, the picture differs there because of the depth and is no second witness.
+    ``fixed_mm`` (H, W) is the displacement that stays at one place of the image, ``score`` the largest
+    matched-filter response, σ. The photo is projected onto the measured wall: where the depth shifts the
+    photo by more than the finding's size, the photo differs there because of the depth and is no independent
+    evidence.
     """
     relief = surface.relief
     size = min(n * c for n, c in zip(region.mask.shape, relief.cell_mm, strict=True))
     shifted = abs(depth.depth_mm) > size
-    # A pit in a wider patch makes up less than a fifth of any ring in it.
+    # A pit inside a wide patch covers less than a fifth of any ring's samples: its peak is examined, too.
     showing = np.union1d(
         frames_behind(region, depth.depth_mm, surface), frames_at_peak(depth, region, surface)
     )
@@ -165,8 +168,9 @@ def evidence_for(
 def line_is_bright(region: Region, depth_mm: float, surface: Surface, rings: RingSamples) -> bool:
     """Whether the line is brighter in the region than at nine of ten places of the deepest ring there.
 
-    A glint or a reflection that was taken for the line is; a defect is one time in ten. Where more rings show
-    it than a codec hands a glint on to, most of them are asked: a glint on a defect makes it none.
+    A glint or a reflection that is taken for the line is; of defects one in ten is, by chance. Where more
+    rings show the finding than a codec spreads a glint over, most of them must be bright: a single glint on a
+    defect does not make it one.
     """
     points = surface.near
     i, j, inside = cells_of(points, surface.relief, region)
@@ -187,25 +191,25 @@ def line_is_bright(region: Region, depth_mm: float, surface: Surface, rings: Rin
 def _is_bright(
     height: Float, inside: Bool, points: PointCloud, rings: RingSamples, frame: int
 ) -> bool | None:
-    """Whether a frame's line is bright where it stands highest ``inside``; None where that is not known."""
+    """Whether a frame's line is bright where it deviates most ``inside``; None where that is not known."""
     its = points.frame == frame
     ring = np.flatnonzero(rings.frame == frame)
     used = np.flatnonzero(rings.validity[ring[0]] == RingValidity.VALID) if len(ring) else ring
     if len(used) != its.sum():  # a part of the ring lies beyond these rows
         return None
-    # points lie in the order of their ring's samples
+    # points are in the order of their ring's samples
     line, there = rings.amplitude[ring[0], used], inside[its]
     highest = float(height[its][there].max())
-    if highest <= 0:  # the ring lies to the other side of the wall
+    if highest <= 0:  # the ring deviates to the other side there
         return None
     top = there & (height[its] >= highest / 2)
     return float(np.mean(line < np.median(line[top]))) > _BRIGHT
 
 
 def lies_at_edge(region: Region, relief: Relief) -> bool:
-    """Whether most of a finding's rows are deepest at the edge of hidden wall that is wider than they are.
+    """Whether most rows of a finding are deepest beside hidden wall that is wider than they are.
 
-    Narrower gaps are the finding's own: a steep flank hides a part of what is behind it.
+    Narrower gaps belong to the finding itself: a steep flank hides a part of what lies behind it.
     """
     columns, reach = region.mask.shape[1], int(np.ceil(_EDGE_MM / relief.cell_mm[1]))
     margin = columns + reach
@@ -218,7 +222,7 @@ def lies_at_edge(region: Region, relief: Relief) -> bool:
 
 
 def _ends(height: Float, inside: Bool, reach: int) -> bool:
-    """Whether a row (n,) is deepest within reach of unseen cells, more of them than it has inside."""
+    """Whether a row (n,) is deepest within ``reach`` cells of an unseen gap that is wider than its inside."""
     shown = inside & np.isfinite(height)
     deepest = int(np.argmax(np.where(shown, height, -1.0)))
     runs, _ = label(np.isnan(height))
@@ -227,17 +231,17 @@ def _ends(height: Float, inside: Bool, reach: int) -> bool:
 
 
 def _is_fixed(region: Region, surface: Surface, fixed_mm: Float) -> bool:
-    """Whether what stays at one place of the image makes up a finding."""
+    """Whether what stays at one place of the image explains a finding."""
     height = np.abs(region.cut(surface.local_mm))[region.mask]
     explained = fixed_mm[region.mask] > np.maximum(_FIXED_SHARE * np.nan_to_num(height), 0.0)
     return bool(explained.mean() > _FIXED_SHARE)
 
 
 def frames_behind(region: Region, depth_mm: float, surface: Surface) -> Int:
-    """Return the frames (n,) whose rings show a defect of this depth by samples that are sure."""
+    """Return the frames (n,) whose rings show a defect of this depth, mm, with samples of usual σ."""
     relief, points = surface.relief, surface.near
     i, j, inside = cells_of(points, relief, region)
-    inside &= sure_of_themselves(points)
+    inside &= of_usual_sigma(points)
     deviation = points.radius_mm[inside] - relief.shape_at(i[inside], j[inside])
     limit = max(_DEPTH_SHARE * abs(depth_mm), _NOISE_SIGMAS * relief.typical.sigma_mm)
     frame, ring, count = np.unique(points.frame[inside], return_inverse=True, return_counts=True)
@@ -246,9 +250,9 @@ def frames_behind(region: Region, depth_mm: float, surface: Surface) -> Int:
 
 
 def photo_stands_out(texture: WallTexture, relief: Relief, region: Region) -> bool | None:
-    """Whether the photo differs in the region more from what is around than at all places beside it.
+    """Whether the photo differs from its surroundings more in the region than at all places beside it.
 
-    It cannot tell, None, of what goes all round, and where it is not known.
+    None, undecided, for what goes all round the pipe and where there is no photo.
     """
     if region.all_round:
         return None
@@ -259,7 +263,7 @@ def photo_stands_out(texture: WallTexture, relief: Relief, region: Region) -> bo
 
 
 def darkness(texture: WallTexture, relief: Relief, region: Region) -> float:
-    """Return by which fraction the photo is darker inside than in a frame around; NaN where unknown."""
+    """Return by which fraction the photo is darker inside than in a frame around it; NaN without a photo."""
     margin = max(4, min(region.mask.shape) // 2)
     rows = np.arange(region.row - margin, region.row + region.mask.shape[0] + margin)
     columns = np.arange(region.column - margin, region.column + region.mask.shape[1] + margin)

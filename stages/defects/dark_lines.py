@@ -1,11 +1,11 @@
-"""Dark lines in the wall's photo, as cracks are: narrower than the rings can measure, plain to the eye.
+"""Find dark lines in the wall's photo, such as cracks: narrower than rings can measure, but visible.
 
-1. Strength of a valley of brightness at every pixel, by the second derivatives across it, over what is usual
-   around (after Frangi et al., Multiscale vessel enhancement filtering, MICCAI 1998).
-2. Thinned to lines of one pixel; what is connected is one line. Its weight is the sum of its strengths: an
-   area, as a seam of the photo, weighs no more than a line.
-3. Bright and dark lines of the same photo tell how heavy lines of the wall's own pattern get. Only what this
-   does not explain is told: a wall full of streaks may hide a crack, but none is invented there.
+1. Compute at every pixel how strong a valley of brightness is, from second derivatives across it, relative to
+   what is usual around (after Frangi et al., Multiscale vessel enhancement filtering, MICCAI 1998).
+2. Thin the result to lines one pixel wide; connected pixels are one line. Its weight is the sum of the
+   strengths along it, so that an area, such as a seam of the photo, weighs no more than a line.
+3. Bright and dark lines of the same photo show how heavy lines of the wall's own pattern get. Only dark lines
+   heavier than that are reported: on a wall full of streaks a crack may be missed, but no streak becomes one.
 """
 
 from __future__ import annotations
@@ -23,33 +23,34 @@ from stages.defects.along import stretches
 from stages.defects.relief import WallRelief
 from stages.defects.segment import Region, instances
 
-# Half a millimetre is a wide crack and two pixels of a usual photo; mm and pixels, 1 σ of the smoothing.
+# 1 σ of the smoothing, the larger of mm and pixels: a wide crack is 0.5 mm or two pixels of a usual photo.
 _LINE_MM, _LINE_PX = 0.25, 1.0
-# The usual strength is that of a square of wall around, which no single line fills, mm. Chosen.
+# The usual strength is the RMS over a square of wall of this size, mm, which no single line fills. Chosen.
 _AROUND_MM = 25.0
-# A line goes on where it is so many times as strong as usual; more than the second says no more. Chosen.
+# A line continues where it has 1.5 times the usual strength; strengths above 6 count as 6. Chosen.
 _GOES_ON, _MOST = 1.5, 6.0
-# So much of the photo's edge, and of that of places without a photo, is left out, mm.
+# Width left out along the edge of the photo and around places without a photo, mm.
 _EDGE_MM = 2.0
-# Lines over the seam of the picture and over cuts along the pipe are whole up to this length, mm.
+# Lines across the photo's seam and across cuts along the pipe are found whole up to this length, mm.
 _OVERLAP_MM = 30.0
-# So many of the heaviest lines tell how the weights of a pattern fall off; a photo has a line by chance in so
-# many cases; shorter ones are specks, mm. Chosen.
+# The 40 heaviest lines show how the weights of a pattern fall off; the limit is set so that a photo without
+# cracks exceeds it in 5 % of cases; lines shorter than 5 mm are specks. Chosen.
 _HEAVIEST, _BY_CHANCE, _SHORTEST_MM = 40, 0.05, 5.0
-_MAY_BE_CRACKS = 5  # of the heaviest
-_LOOKED_AT = 400  # of dark and of bright ones: flanks and what lies beyond the seam are left out of them
-_GAP_MM = 1.0  # parts of a line so near to each other are one
-# A bright line is dark on both sides, at 1.7 times the smoothing, and a dark one bright: a heavier line of
-# the other kind is looked for so far away, mm.
+_MAY_BE_CRACKS = 5  # of the heaviest: these may be cracks and not part of the pattern
+_LOOKED_AT = 400  # heaviest dark and bright lines; flanks and lines beyond the seam are then left out
+_GAP_MM = 1.0  # parts of a line with a smaller gap are one line
+# A bright line has dark flanks and a dark line bright ones, at 1.7 times the smoothing: lines within this
+# distance of a heavier line of the other kind are left out, mm.
 _FLANK_MM = 1.0
-# The rim of a finding is dark as well, so far from it, mm: of its lines more than half lies there. Chosen.
+# The rim of a finding is dark, too: a line belongs to a finding if more than half of it lies this close, mm.
+# Chosen.
 _BESIDE_MM, _MOSTLY = 2.0, 0.5
-_DARKEST = 4.0  # grey levels: below it a ratio of brightness is noise of the darkness
+_DARKEST = 4.0  # grey levels, added before the logarithm: below it a ratio of brightness is noise
 
 
 @dataclass(frozen=True)
 class _Line:
-    """Rows and columns (N,) of a line in the picture, and its weight."""
+    """Rows and columns (N,) of the pixels of a line in the picture, and its weight, the sum of strengths."""
 
     row: Int
     column: Int
@@ -57,7 +58,7 @@ class _Line:
 
 
 def dark_lines(texture: WallTexture, relief: WallRelief, scratch: Scratch) -> list[Region]:
-    """Return the dark lines of a photo that its own pattern does not explain, as cells of the map."""
+    """Return the dark lines of a photo that its own pattern does not explain, as regions of the map."""
     overlap = round(_OVERLAP_MM / texture.mm_per_px)
     parts = stretches(len(texture.bgra), overlap)
     cells = scratch.zeros(relief.shape, np.bool_)
@@ -70,7 +71,7 @@ def dark_lines(texture: WallTexture, relief: WallRelief, scratch: Scratch) -> li
 
 
 class _Strip:
-    """Some rows of a photo, with a part of it repeated beyond its seam."""
+    """Some rows of a photo, continued on both sides by what lies beyond its seam."""
 
     def __init__(self, texture: WallTexture, rows: slice, radius_mm: float) -> None:
         self._texture, self._first = texture, rows.start
@@ -82,7 +83,7 @@ class _Strip:
         self._picture = np.pad(picture, ((0, 0), (self._beyond, self._beyond), (0, 0)), "wrap")
 
     def unexplained(self, by_chance: float) -> Iterator[_Line]:
-        """Yield the dark lines that are heavier than the photo's pattern makes lines, but by this chance."""
+        """Yield dark lines heavier than the photo's own pattern makes with probability ``by_chance``."""
         valley, ridge = self._strengths()
         dark, bright = self._lines_but_flanks(valley, ridge), self._lines_but_flanks(ridge, valley)
         limit = limit_of_weight(np.sort([line.weight for line in dark + bright])[::-1], by_chance)
@@ -92,7 +93,7 @@ class _Strip:
                 yield line
 
     def _lines_but_flanks(self, strength: Float32, other: Float32) -> list[_Line]:
-        """Return lines, but none along a heavier one of the other kind, and none beyond the seam."""
+        """Return lines, except those along a heavier line of the other kind and those beyond the seam."""
         reach = tuple(2 * round(_FLANK_MM / c) + 1 for c in self._cell)
         beside = cv2.dilate(other, np.ones(reach, np.uint8))
         own = (
@@ -103,7 +104,7 @@ class _Strip:
         return [k for k in own if self._beyond <= k.column.mean() < self._beyond + self._around]
 
     def _strengths(self) -> tuple[Float32, Float32]:
-        """Return how strong dark and bright lines are (h, w), over what is usual; 0 without a photo."""
+        """Return the strength of dark and bright lines (h, w) relative to the usual; 0 without a photo."""
         grey = cv2.cvtColor(self._picture[..., :3], cv2.COLOR_BGR2GRAY).astype(np.float32)
         smooth = self._blurred(np.log(grey + _DARKEST), max(_LINE_MM, _LINE_PX * max(self._cell)))
         along, around = (1 / c**2 for c in self._cell)
@@ -123,13 +124,13 @@ class _Strip:
         return np.asarray(cv2.GaussianBlur(image, (0, 0), around, sigmaY=along), np.float32)
 
     def _seen(self) -> Bool:
-        """Return where there is a photo (h, w), its edges left out."""
+        """Return where there is a photo (h, w), without a margin along its edges."""
         known = np.pad((self._picture[..., 3] > 0).astype(np.uint8), 1)
         height, width = (2 * round(_EDGE_MM / c) + 1 for c in self._cell)
         return np.asarray(cv2.erode(known, np.ones((height, width), np.uint8))[1:-1, 1:-1] > 0)
 
     def _lines(self, strength: Float32) -> list[_Line]:
-        """Return the heaviest of what is connected, thinned to one pixel."""
+        """Return the heaviest lines: connected pixels above the limit, thinned to a width of one pixel."""
         thin = cv2.ximgproc.thinning(np.where(strength > _GOES_ON, 255, 0).astype(np.uint8))
         _, label = cv2.connectedComponents(thin)
         row, column = np.nonzero(thin)
@@ -144,7 +145,7 @@ class _Strip:
         return [_Line(row[k], column[k], float(weight[number[k[0]]])) for k in np.split(kept, cuts) if len(k)]
 
     def cells_of(self, line: _Line, relief: WallRelief) -> tuple[Int, Int]:
-        """Return rows and columns of the map's cells through which a line goes."""
+        """Return rows and columns of the map's cells that a line passes through."""
         texture, radius_map = self._texture, relief.radius_map
         s = texture.distance_from_mm + (self._first + line.row) * texture.mm_per_px
         psi = texture.azimuth_from_rad + (line.column - self._beyond) * texture.rad_per_px
@@ -156,7 +157,7 @@ class _Strip:
 
 
 def lies_beside(line: Region, found: Region, relief: WallRelief) -> bool:
-    """Return whether most of a line lies in the window of a finding or within some millimetres of it."""
+    """Return whether more than half of a line's cells lie in the window of a finding or within 2 mm of it."""
     columns = relief.shape[1]
     along, around = (round(_BESIDE_MM / c) for c in relief.cell_mm)
     i, j = np.nonzero(line.mask)
@@ -168,12 +169,13 @@ def lies_beside(line: Region, found: Region, relief: WallRelief) -> bool:
 
 
 def limit_of_weight(weight: Float, by_chance: float) -> float:
-    """Return the weight above which a pattern whose lines weigh so much (N,), falling, has one by chance.
+    """Return the weight that the lines of a photo's own pattern exceed with a given probability.
 
-    Above some weight they fall off as a power (Pareto): their logarithms exponentially. The heaviest may be
-    cracks and are only known to be heavier than the rest; the limit holds how unsure the rest leave the power
-    (predictive distribution of an exponential law with censored data: Lawless, Statistical Models and Methods
-    for Lifetime Data, 2003, ch. 4). Of too few lines nothing is known, and the limit is endless.
+    ``weight`` (N,) are the weights of all lines, falling. Above some weight their number falls off as a power
+    (Pareto), so that the logarithms are exponential. The heaviest few may be cracks and enter only as
+    "heavier than the rest"; the limit includes the uncertainty of the fitted power (predictive distribution
+    of an exponential law with censored data: Lawless, Statistical Models and Methods for Lifetime Data, 2003,
+    ch. 4). With fewer than 40 lines nothing is known and the limit is infinite.
     """
     if len(weight) < _HEAVIEST or weight[_HEAVIEST - 1] <= 0:
         return np.inf

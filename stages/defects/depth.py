@@ -1,8 +1,9 @@
-"""Depth of a defect: the extreme of its 1 mm mean, freed from what noise adds to an extreme.
+"""Measure the depth of a defect: the extreme of its 1 mm mean, corrected for what noise adds to an extreme.
 
 Where only a few rings cross a defect, its deepest place lies between them. Around the pipe it is sampled
-densely: that profile tells the shape of a bell fitted to the points, which is taken to be the same along the
-pipe up to its own length, and to move on around the pipe from ring to ring where the defect lies askew.
+densely: that profile gives the shape of a bell, which is fitted to the points. The bell has the same shape
+along the pipe, with a length of its own, and may shift around the pipe from ring to ring where the defect
+lies askew.
 """
 
 from __future__ import annotations
@@ -19,28 +20,31 @@ from stages.defects.relief import Relief
 from stages.defects.segment import Region
 from stages.defects.surface import DeviationPoints, Surface
 
+# A bell is fitted where fewer than 5 rings cross a defect, no weld within 5 mm, and is used if the points
+# scatter about it by at most 0.12 of its height, RMS.
 _FEW_RINGS = 5.0
 _BELL_CLEAR_MM = 5.0
 _BELL_MISFIT = 0.12
-# A bell whose height the points leave open by more than this share of it tells nothing: what the rings
-# themselves show is the depth then, and its σ that of a peak between them.
+# If the height of the bell has a σ of more than this share of it, the bell is not used: the depth is what the
+# rings themselves show, and its σ includes that the peak may lie between them.
 _BELL_UNKNOWN = 0.5
-SHARPENING = 0.3  # 1 σ of a peak's curvature correction, relative
-# Of its depth: without it 85 and 90 % of the depths of 88 defects painted into two open recordings were in
-# their 95 % interval, with it 92 and 91 % of 82 (`python -m tests.benchmarks.bench_painted_findings`).
+SHARPENING = 0.3  # 1 σ of a correction for a peak's curvature, relative to the correction
+# 1 σ by which the top departs from a bell, as a share of the depth. Without it, 85 and 90 % of the depths of
+# 88 defects painted into two open recordings were in their 95 % interval, with it 92 and 91 % of 82 (`python
+# -m tests.benchmarks.bench_painted_findings`).
 _TOP_SHAPE = 0.04
 _MARGIN_MM = 2.5
 _LEAST = 24
 _SHAPE_PRIOR_MM = 0.35  # 0.07 mm, the noise of independent samples, over 0.2, the prior 1 σ of ln p
-_SKEW_PRIOR_MM = 0.07  # the same over 1, the prior 1 σ of the way around per way along
-_SKEWS = (0.0, 0.7, -0.7)  # fits start askew to either side by 35°, too: from 0 they end in a broad bell
+_SKEW_PRIOR_MM = 0.07  # the same over 1, the prior 1 σ of the shift around per mm along
+_SKEWS = (0.0, 0.7, -0.7)  # fits also start askew by ±35°: from 0 alone they may end in a broad bell
 
 
 @dataclass(frozen=True)
 class Depth:
-    """Depth (positive into the wall), its 1 σ, and the bias that was taken out, mm.
+    """Depth (positive into the wall), its 1 σ, and the bias from noise that was subtracted, mm.
 
-    ``peak`` is the cell of the region's window (row, column) whose deviation is extreme.
+    ``peak`` is the cell (row, column) of the region's window with the extreme deviation.
     """
 
     depth_mm: float
@@ -49,7 +53,7 @@ class Depth:
     peak: tuple[int, int]
 
     def as_written(self) -> Depth:
-        """Return the depth rounded as in defects.json, lest report and table differ in their last digit."""
+        """Return the depth rounded as in defects.json, so that report and table agree in their last digit."""
         return replace(self, depth_mm=round(self.depth_mm, 4), sigma_mm=round(self.sigma_mm, 4))
 
 
@@ -58,9 +62,10 @@ def measure_depth(
 ) -> Depth:
     """Measure the depth of one region.
 
-    The extreme of a noisy surface exceeds the surface's extreme. By how much, and how it scatters, is found
-    by adding noise as the clean wall shows it to the smoothed surface (parametric bootstrap: Efron &
-    Tibshirani, An Introduction to the Bootstrap, 1993, ch. 10), larger where the map's own noise is.
+    The extreme of a noisy surface exceeds the extreme of the true surface. By how much, and with which
+    scatter, is found by adding noise drawn from the clean wall to the smoothed surface, ``draws`` times
+    (parametric bootstrap: Efron & Tibshirani, An Introduction to the Bootstrap, 1993, ch. 10); the noise is
+    scaled up where the map's own noise is larger.
     """
     relief = surface.relief
     height = region.sign * region.cut(surface.local_mm)
@@ -69,7 +74,7 @@ def measure_depth(
     peak = np.unravel_index(int(np.argmax(height)), height.shape)
     smooth = gaussian_filter(height, [1.0 / c for c in relief.cell_mm])
     top = float(smooth[inside].max())
-    # where points show nothing of what the map shows, the top of a defect may lie below zero
+    # a top below zero is possible where the points do not show what the map shows
     near = inside & (smooth >= top - 0.5 * abs(top))
     gain = noise_gain(region, relief)
     drawn = np.array([(smooth + gain * clean.draw(height.shape, random))[near].max() for _ in range(draws)])
@@ -85,14 +90,15 @@ def measure_depth(
 
 
 def sharpening_sigma(sharpened_mm: float) -> float:
-    """Return 1 σ of a peak of which the map's smoothing had taken so much off, mm."""
+    """Return 1 σ of a peak's depth, mm, from which the map's smoothing had taken off ``sharpened_mm``."""
     return SHARPENING * abs(float(np.nan_to_num(sharpened_mm)))
 
 
 def noise_gain(region: Region, relief: Relief) -> Float:
-    """Return how many times the wall's usual noise the cells of a region (H, W) have, at least 1.
+    """Return the noise of a region's cells (H, W) as a multiple of the wall's usual noise, at least 1.
 
-    The line is dim on rust and at the bottom of a pit, and a codec keeps less of it: rings scatter more.
+    The line is dim on rust and at the bottom of a pit, and a codec keeps less of it there: rings scatter
+    more.
     """
     return np.asarray(np.fmax(region.cut(relief.noise_mm) / relief.typical.sigma_mm, 1.0))
 
@@ -100,7 +106,7 @@ def noise_gain(region: Region, relief: Relief) -> Float:
 def is_small(relief: Relief, region: Region, points: DeviationPoints) -> bool:
     """Return whether so few rings cross a defect that its deepest place may lie between them.
 
-    Beside a weld the points' deviation is the weld's too, so that no bell is fitted there.
+    Always False beside a weld: there the points deviate by the weld, too, and no bell can be fitted.
     """
     margin = round(_BELL_CLEAR_MM / relief.cell_mm[0])
     first, last = region.row - margin, region.row + region.mask.shape[0] + margin
@@ -111,7 +117,7 @@ def is_small(relief: Relief, region: Region, points: DeviationPoints) -> bool:
 
 @dataclass(frozen=True)
 class Noise:
-    """What the clean wall shows, ``gain`` times as large, drawn so often on cells of a size."""
+    """Noise of the clean wall, multiplied by ``gain`` and drawn ``draws`` times on cells of ``cell_mm``."""
 
     clean: CleanWall
     gain: float
@@ -120,7 +126,7 @@ class Noise:
     random: np.random.Generator
 
     def in_sum(self, weight: Float, x_mm: Float, y_mm: Float) -> float:
-        """Return 1 σ of a weighted sum over places (N,) along and around."""
+        """Return 1 σ of the sum of noise times ``weight`` over places (N,), mm along and around the pipe."""
         i, j = (np.rint(at / c).astype(int) for at, c in zip((x_mm, y_mm), self.cell_mm, strict=True))
         i, j = i - i.min(), j - j.min()
         shape = (int(i.max()) + 1, int(j.max()) + 1)
@@ -131,7 +137,7 @@ class Noise:
 def _between_rings(
     relief: Relief, region: Region, points: DeviationPoints, noise: Noise, depth_mm: float, sigma_mm: float
 ) -> tuple[float, float]:
-    """Return depth and 1 σ by a bell if a bell describes the defect; else those given."""
+    """Return depth and 1 σ, mm, of the fitted bell if a bell describes the defect; else those given."""
     bell = fit_bell(relief, region, points, noise)
     if bell is None or bell.residual_mm > _BELL_MISFIT * bell.height_mm:
         return depth_mm, sigma_mm
@@ -141,10 +147,10 @@ def _between_rings(
 
 
 def shape_sigma(relief: Relief, region: Region, depth_mm: float, spacing_mm: float) -> float:
-    """Return 1 σ of the pipe's own shape below the defect: a ring's five harmonics, given its roughness.
+    """Return 1 σ, mm, of the smooth shape below a defect: five harmonics fitted to rough rings.
 
-    What the defect's own foot takes from them is at most a few per cent of its depth. Where few rings cross
-    it, its top departs from a bell or a local quadratic, too.
+    What the defect's own foot takes from the harmonics is at most a few per cent of its depth. Where few
+    rings cross it, the departure of its top from a bell or a local quadratic is included.
     """
     around = 2 * np.pi * relief.radius_mm
     independent = max(1.0, around / 8.0)
@@ -156,7 +162,7 @@ def shape_sigma(relief: Relief, region: Region, depth_mm: float, spacing_mm: flo
 
 @dataclass(frozen=True)
 class Bell:
-    """Height of the bell's 1 mm mean, its 1 σ from noise, and RMS of the points about the bell, mm."""
+    """Height of the fitted bell's 1 mm mean, its 1 σ from noise, and RMS of the points about the bell, mm."""
 
     height_mm: float
     sigma_mm: float
@@ -164,7 +170,10 @@ class Bell:
 
 
 def fit_bell(relief: Relief, region: Region, points: DeviationPoints, noise: Noise) -> Bell | None:
-    """Fit height · exp(−(x²/a² + (y − k x)²/b²)^p) to a region's points; None where none stands out."""
+    """Fit height · exp(−(x²/a² + (y − k x)²/b²)^p) to a region's points; None if none of them stands out.
+
+    x is mm along the pipe and y mm around it, both from the bell's middle; k is the skew.
+    """
     x, y, value = _near(relief, region, points)
     value = region.sign * value
     if len(value) < _LEAST or value.max() <= 0:
@@ -182,7 +191,7 @@ def fit_bell(relief: Relief, region: Region, points: DeviationPoints, noise: Noi
         unit = [1, 1, 1, 0.3, 0.3, 0.5, 0.5]
         return least_squares(misfit, [*start[:6], skew], bounds=(low, high), x_scale=unit)
 
-    skews = _SKEWS if size[0] > points.spacing_mm else _SKEWS[:1]  # one ring tells no skew
+    skews = _SKEWS if size[0] > points.spacing_mm else _SKEWS[:1]  # one ring alone cannot show a skew
     found = min(map(fitted, skews), key=lambda fit: float(fit.cost))
     jacobian = np.asarray(found.jac, float)
     height, slope = _millimetre_mean(found.x)
@@ -194,7 +203,7 @@ def fit_bell(relief: Relief, region: Region, points: DeviationPoints, noise: Noi
 
 
 def _near(relief: Relief, region: Region, points: DeviationPoints) -> tuple[Float, Float, Float]:
-    """Return place (mm along and around from the window's middle) and deviation of a window's points."""
+    """Return a window's points: mm along and around from its middle, and deviation, mm."""
     size = np.array(region.mask.shape)
     reach = size / 2 + _MARGIN_MM / np.array(relief.cell_mm)
     along = points.row - (region.row + (size[0] - 1) / 2)
@@ -212,7 +221,7 @@ def _bell(t: Float, x: Float, y: Float) -> Float:
 
 
 def _millimetre_mean(t: Float) -> tuple[float, Float]:
-    """Return the mean of the bell over 1 mm × 1 mm at its top, and the gradient by its parameters (7,)."""
+    """Return the bell's mean over 1 mm × 1 mm at its top, and its gradient (7,) by the parameters."""
     offset = (np.arange(9) - 4) / 9
     x, y = (g.ravel() for g in np.meshgrid(offset, offset))
 

@@ -1,4 +1,4 @@
-"""From a measured region to a `Defect`: kind by a few named features, place and description."""
+"""Describe a measured region as a `Defect`: its kind by a few named features, its place and a description."""
 
 from __future__ import annotations
 
@@ -26,30 +26,30 @@ from stages.defects.relief import Relief
 from stages.defects.segment import Region
 from stages.defects.surface import Surface, cells_of
 
-# Elongation up to which the description calls a defect nearly round (chosen).
+# A defect with a smaller elongation is described as nearly round (chosen).
 _NEARLY_ROUND = 1.25
-# Least probability of another kind that the description mentions (chosen).
+# Another kind is mentioned in the description from this probability on (chosen).
 _WORTH_TELLING = 0.05
-_SMALL_MM2 = 60.0  # below this a quartic surface follows everything
-_UNKNOWN_ROUGHNESS = 0.08, 0.08
+_SMALL_MM2 = 60.0  # on a smaller area a quartic surface follows every roughness
+_UNKNOWN_ROUGHNESS = 0.08, 0.08  # roughness over depth and its 1 σ, where it cannot be measured
 # Coefficients of a quartic surface.
 _QUARTIC = 15
-# A line so long that scatters no more about a straight one, r.m.s., may be a joint or a seam. Chosen.
-# Short cracks are as straight, but no joint is as short.
+# A line longer than 30 mm that departs from a straight one by less than 0.4 mm RMS may be a joint or a seam.
+# Chosen: short cracks are as straight, but joints are longer.
 _STRAIGHT_MM, _LONG_MM = 0.4, 30.0
 _CRACK_OR = "a crack, or a scratch, the edge of a stain or a shadow"
 _ROUND = " It goes all round: it may be the gap of a joint or the hollow root of a weld."
 
 
 def features_of(relief: Relief, region: Region, depth: Depth) -> Features:
-    """Measure the shape of a region."""
+    """Return the features of a region's shape by which its kind is judged."""
     cell = relief.cell_mm
     length, width = region.mask.shape[0] * cell[0], region.mask.shape[1] * cell[1]
     i, j = np.nonzero(region.mask)
     place = np.stack([i * cell[0], j * cell[1]], -1)
     spread = np.cov(place.T) + np.diag(np.square(cell) / 12) if len(i) > 1 else np.diag(np.square(cell))
     values, vectors = np.linalg.eigh(spread)
-    # what the 1 mm mean adds to a width
+    # the variance that averaging over 1 mm adds to a width is subtracted
     slim = float(np.sqrt(max(16 * values[0] - 1.0, cell[1] ** 2)))
     elongation = float(np.sqrt(values[1] / max(values[0] - 1.0 / 16, values[0] / 4)))
     direction = float(np.arccos(min(1.0, abs(vectors[0, 1]))))
@@ -57,7 +57,7 @@ def features_of(relief: Relief, region: Region, depth: Depth) -> Features:
 
 
 def _roughness(relief: Relief, region: Region, depth: Depth) -> tuple[float, float]:
-    """Return the roughness and its 1 σ: how far the noise of the place may scatter about its mean square."""
+    """Return roughness over depth, and its 1 σ from the scatter of the noise's mean square on this area."""
     surface = region.cut(millimetre_mean(relief.local_mm, relief.cell_mm))
     i, j = np.nonzero(region.mask & np.isfinite(surface))
     area_mm2 = len(i) * relief.cell_mm[0] * relief.cell_mm[1]
@@ -76,7 +76,7 @@ def _roughness(relief: Relief, region: Region, depth: Depth) -> tuple[float, flo
 
 @dataclass(frozen=True)
 class Scene:
-    """What all defects of a run are described with."""
+    """What all defects of a run are described with: evidence, wall thickness and smallest depth, mm."""
 
     seen_by: Witnesses
     wall_thickness_mm: float | None
@@ -84,7 +84,7 @@ class Scene:
 
 
 def describe(region: Region, depth: Depth, surface: Surface, scene: Scene) -> Defect:
-    """Return the defect of a region with probability 1 and without a number; both are set later."""
+    """Return the defect of a region; the caller sets its number and its probability, here 0 and 1."""
     relief = surface.relief
     depth = depth.as_written()
     features = features_of(relief, region, depth)
@@ -125,9 +125,9 @@ def describe(region: Region, depth: Depth, surface: Surface, scene: Scene) -> De
 
 
 def describe_line(region: Region, depth: Depth, surface: Surface, scene: Scene) -> Defect:
-    """Return a dark line that the photo alone shows as a defect, with what the rings measure there.
+    """Return a dark line that only the photo shows as an unconfirmed crack, with the depth from the rings.
 
-    Nothing tells how probable it is that it is a crack.
+    Its probability is NaN: nothing tells how probable it is that the line is a crack.
     """
     shown = describe(region, depth, surface, scene)
     direction = features_of(surface.relief, region, depth).direction_rad
@@ -145,19 +145,19 @@ def describe_line(region: Region, depth: Depth, surface: Surface, scene: Scene) 
         pacp_suggestion="" if straight else pacp_suggestion(DefectKind.CRACK, direction),
         en13508_suggestion="" if straight else en13508_suggestion(DefectKind.CRACK),
         statement=f"{'Straight dark' if straight else 'Dark'} line in the photo, about {length:.0f} mm long. "
-        f"It may be {causes}. Rings, which measure no width below 1 mm, show {rings}. Not confirmed. The "
-        "photo alone shows it.",
+        f"It may be {causes}. Rings, which resolve no width below 1 mm, show {rings}. Not confirmed. Only "
+        "the photo shows it.",
     )
 
 
 def _across_mm(relief: Relief, region: Region) -> float:
-    """Return by how much the cells of a line scatter to either side of a straight one, r.m.s."""
+    """Return by how much the cells of a line scatter about a straight line, RMS, mm."""
     place = np.argwhere(region.mask) * relief.cell_mm
     return float(np.sqrt(max(np.linalg.eigvalsh(np.cov(place.T))[0], 0.0))) if len(place) > 1 else 0.0
 
 
 def _goes_round(relief: Relief, region: Region) -> bool:
-    """Return whether a region reaches over every azimuth."""
+    """Return whether a region covers every azimuth."""
     return region.all_round or region.mask.shape[1] >= len(relief.azimuth_rad)
 
 
@@ -193,7 +193,7 @@ def _outline(relief: Relief, region: Region) -> Float:
     bottom = top + region.mask.shape[0] * relief.cell_mm[0]
     if region.all_round:
         return np.array([[top, first], [top, last], [bottom, last], [bottom, first]])
-    # parts of one joined defect are bridged, so that one polygon holds them all
+    # gaps between the parts of one defect are bridged, so that one polygon encloses all of them
     mask, bridge = np.pad(region.mask.astype(np.uint8), 1), 3
     while cv2.connectedComponents(mask)[0] > 2:
         closed = cv2.morphologyEx(mask, cv2.MORPH_CLOSE, np.ones((bridge, bridge), np.uint8))
@@ -208,7 +208,7 @@ def _polygon(mask: Byte) -> Float:
     polygon = cv2.approxPolyDP(_contour(mask), 0.7, True)
     if cv2.contourArea(polygon) > 0:
         return np.asarray(polygon[:, 0], float)
-    # The contour through the centres of cells in one line has no area: it goes through their quarters.
+    # The contour through the centres of cells in one row has no area: take it through a grid twice as fine.
     return (_contour(np.repeat(np.repeat(mask, 2, 0), 2, 1))[:, 0] - 0.5) / 2
 
 
@@ -218,17 +218,17 @@ def _contour(mask: Byte) -> Int:
 
 
 def _form(elongation: float) -> str:
-    """Return how long a defect is for its width, in words."""
+    """Return the elongation in words."""
     return "nearly round" if elongation < _NEARLY_ROUND else f"{elongation:.1f} times as long as wide"
 
 
 def _a(kind: DefectKind) -> str:
-    """Return a kind with its article; corrosion has none."""
+    """Return a kind with its article; corrosion takes none."""
     return kind.value if kind is DefectKind.CORROSION else f"a {kind}"
 
 
 def _statement(features: Features, likely: dict[DefectKind, float], depth: Depth, darkness: float) -> str:
-    """Say what it is and why it is classed so."""
+    """Return the description: what it is, how large, and why it was classed so."""
     kinds = list(likely)
     words = f"{kinds[0].capitalize()}, {notation.depth(depth.depth_mm, depth.sigma_mm)}"
     if kinds[0] is DefectKind.WELD:

@@ -1,4 +1,4 @@
-"""Matched filters over scales and directions, with a threshold from a wished number of false alarms."""
+"""Detect with matched filters of several sizes, at a threshold set by the number of false alarms."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _ROUND_MM = (0.7, 1.4, 2.8, 5.6, 11.2)
 _LONG_MM = ((4.0, 0.6), (8.0, 0.8))
 _DIRECTIONS = 8
 _THREADS = 2
-_SMALL = 1  # the template for a bump of 3 mm × 3 mm
+_SMALL = 1  # index of the template for a bump of 3 mm × 3 mm: round, 1.4 mm
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ class Template:
     direction_rad: float = 0.0
 
     def kernel(self, cell_mm: tuple[float, float]) -> Float:
-        """Return the template on the grid (odd, odd), peak 1."""
+        """Return the template on the map's grid (odd, odd), 1 at its peak."""
         reach = [int(np.ceil(2.5 * max(self.long_mm, 0.5 * c) / c)) for c in cell_mm]
         s, q = np.meshgrid(
             *(c * np.arange(-n, n + 1) for c, n in zip(cell_mm, reach, strict=True)), indexing="ij"
@@ -47,9 +47,16 @@ class Template:
 
 @dataclass(frozen=True)
 class Weighed:
-    """Relief over its variance (S, A), one over its variance, and where the wall was measured.
+    """A relief prepared for the filters.
 
-    ``reach`` is the largest half length of a template, rows.
+    Attributes
+    ----------
+    signal, weight : (S, A)
+        Relief over its variance, mm⁻¹, and one over its variance, mm⁻²; 0 where nothing was measured.
+    seen : (S, A) bool
+        Where the wall was measured.
+    reach : int
+        Largest half length of a template, rows.
     """
 
     signal: Float
@@ -59,23 +66,23 @@ class Weighed:
 
     @cached_property
     def signal_spectrum(self) -> Complex64:
-        """The Fourier transform of ``signal``, zero beyond its ends."""
+        """The Fourier transform of ``signal``, padded with zeros beyond the ends of the pipe."""
         return self._spectrum(self.signal)
 
     @cached_property
     def weight_spectrum(self) -> Complex64:
-        """The Fourier transform of ``weight``, zero beyond its ends."""
+        """The Fourier transform of ``weight``, padded with zeros beyond the ends of the pipe."""
         return self._spectrum(self.weight)
 
     def filtered(self, spectrum: Complex64, kernel: Float) -> Float:
-        """Return the correlation (S, A) with a template's kernel: periodic in azimuth, zero beyond the ends.
+        """Return the correlation (S, A) with a kernel: periodic in azimuth, zero beyond the pipe's ends.
 
-        Templates look alike upside down, so that correlation is convolution.
+        Templates are symmetric about their centre, so that correlation equals convolution.
         """
         rows, columns = self._shape
         padded = np.zeros((rows, columns), np.float32)
         i, j = (np.arange(n) - n // 2 for n in kernel.shape)
-        # A template that is longer than the circle is wound round it.
+        # A template longer than the circumference is wrapped round it.
         np.add.at(padded, np.ix_(i % rows, j % columns), kernel.astype(np.float32))
         found = irfft2(spectrum * rfft2(padded), (rows, columns))
         return np.asarray(found[: len(self.seen)], float)
@@ -92,15 +99,15 @@ class Weighed:
 
 @dataclass(frozen=True)
 class Filter:
-    """A template as it is used on a wall.
+    """A template scaled to a wall's noise.
 
     Attributes
     ----------
     kernel : (odd, odd)
     scale : float
-        1 σ of its response to this wall's noise and roughness; to white noise it would be 1.
+        1 σ of its response to this wall's noise and roughness; it would be 1 for white noise.
     least_power : float
-        Where less of the wall than this was seen, nothing is found.
+        Where the power (sum of weight times squared kernel) is less, too little was seen: the score is 0.
     height_sigma_mm : float
         Typical 1 σ of the height that it measures.
     """
@@ -121,7 +128,7 @@ class Filter:
 
 @dataclass(frozen=True)
 class Detection:
-    """Where something is there.
+    """Cells in which the matched filters exceed the threshold.
 
     Attributes
     ----------
@@ -132,7 +139,7 @@ class Detection:
     small_sigma_mm : float
         Typical 1 σ of the height of a bump of 3 mm × 3 mm.
     score : (S, A)
-        Largest response of all templates, whatever its sign, in σ.
+        Largest absolute response of all templates, σ.
     filters : tuple of Filter
     """
 
@@ -145,7 +152,7 @@ class Detection:
 
 
 def templates() -> tuple[Template, ...]:
-    """Return round bumps over scales and thin ones over directions."""
+    """Return round bumps of several sizes and elongated ones in several directions."""
     turns = [np.pi * k / _DIRECTIONS for k in range(_DIRECTIONS)]
     return (
         *(Template(m, m) for m in _ROUND_MM),
@@ -154,7 +161,7 @@ def templates() -> tuple[Template, ...]:
 
 
 def detect(relief: WallRelief, false_alarms: float, scratch: Scratch, progress: Progress) -> Detection:
-    """Find cells that stand out of noise and roughness, some rows after the others."""
+    """Find cells that exceed noise and roughness; ``false_alarms`` are expected on the whole wall."""
     bank = templates()
     threshold = _threshold(seen_mm2(relief), bank, false_alarms)
     into, inward = (scratch.zeros(relief.shape, bool) for _ in range(2))
@@ -188,17 +195,17 @@ def scores(filters: Sequence[Filter], wall: Weighed) -> Iterator[Float]:
 
 
 def seen_mm2(relief: WallRelief) -> float:
-    """Return how much of the wall was measured."""
+    """Return the measured area of the wall, mm²."""
     cells = sum(int(relief.rows(s.own).seen.sum()) for s in stretches(relief.shape[0]))
     return cells * relief.cell_mm[0] * relief.cell_mm[1]
 
 
 def _threshold(area_mm2: float, bank: tuple[Template, ...], false_alarms: float) -> float:
-    """Return the level that Gaussian fields exceed ``false_alarms`` times in all.
+    """Return the level, σ, that Gaussian noise exceeds ``false_alarms`` times on the whole wall.
 
     Expected Euler characteristic of the excursion set of a smooth Gaussian field (Adler & Taylor, Random
-    Fields and Geometry, 2007, § 11.7); a field filtered with a Gaussian of 1 σ b has gradient variance
-    1 / (2 b²).
+    Fields and Geometry, 2007, § 11.7); a field filtered with a Gaussian of 1 σ b has gradient variance 1 / (2
+    b²).
     """
     density = sum(0.5 / (t.long_mm * t.short_mm) for t in bank)
 
@@ -210,16 +217,16 @@ def _threshold(area_mm2: float, bank: tuple[Template, ...], false_alarms: float)
 
 
 def weighed(relief: Relief, reach: int) -> Weighed:
-    """Return the relief as the filters take it, with room for templates that reach so many rows."""
+    """Return the relief as the filters need it; ``reach`` is the largest half length of a template, rows."""
     weight = np.where(relief.seen, 1 / relief.sigma_mm**2, 0.0)
     return Weighed(weight * np.nan_to_num(relief.local_mm), weight, relief.seen, reach)
 
 
 def _fitted(relief: WallRelief, kernels: list[Float], overlap: int) -> Iterator[tuple[Filter, Float]]:
-    """Yield the filters for this wall, each with its response to the sampled rows, in σ.
+    """Yield the filters for this wall, each with its response to the sampled rows, σ.
 
-    The response to white noise is known; noise and roughness are correlated, so that the field's own robust
-    scatter sets the unit.
+    A filter's response to white noise is known. This wall's noise and roughness are correlated, so that the
+    robust scatter of the response itself is its unit.
     """
     parts = [widened(rows, relief.shape[0], overlap) for rows in relief.sampled]
     walls = [weighed(relief.rows(part.wide), overlap) for part in parts]
@@ -239,6 +246,6 @@ def _fitted(relief: WallRelief, kernels: list[Float], overlap: int) -> Iterator[
 
 
 def _response(wall: Weighed, kernel: Float) -> tuple[Float, Float]:
-    """Return the response (S, A) of unit variance in white noise, and how much was seen of each template."""
+    """Return the response (S, A), of unit variance in white noise, and its power: how much was seen."""
     power = wall.filtered(wall.weight_spectrum, kernel**2)
     return wall.filtered(wall.signal_spectrum, kernel) / np.sqrt(np.maximum(power, 1e-30)), power

@@ -1,4 +1,4 @@
-"""Regions grown from cells that stand out, by hysteresis over a long map."""
+"""Grow regions from the detected cells by hysteresis, over a map of any length."""
 
 from __future__ import annotations
 
@@ -17,24 +17,24 @@ from stages.defects.parameters import DefectParameters
 from stages.defects.relief import WallRelief
 
 _EIGHT = np.ones((3, 3), int)
-_REACH_MM = 80.0
-_FOOT_MM = 10.0
-_BLOCK = 64
+_REACH_MM = 80.0  # a defect is followed over at most this distance from its top in one step
+_FOOT_MM = 10.0  # width of the margin that is taken to hold the foot of a defect
+_BLOCK = 64  # rows per block in the search for the highest cell
 
 
 @dataclass(frozen=True)
 class Grown:
-    """Cells (S, A) of all defects into the wall, and of all inward ones."""
+    """Cells (S, A) of all defects that go into the wall, and of all that stand inward."""
 
     into: Bool
     inward: Bool
 
 
 def grown(relief: WallRelief, seeds: Detection, parameters: DefectParameters, scratch: Scratch) -> Grown:
-    """Return all cells of all defects: each reaches down to a fraction of its own height.
+    """Return all cells of all defects: each one extends down to a fraction of its own height.
 
-    The highest cell goes first, wherever on the wall it is, so that it does not matter in which stretches a
-    long map is gone through.
+    The highest cell of the whole wall is grown first, so that the result does not depend on how a long map is
+    cut into stretches.
     """
     smooth = scratch.zeros(relief.shape, np.float32)
     for part in stretches(relief.shape[0], relief.rows_in(1.0)):
@@ -51,7 +51,7 @@ def grown(relief: WallRelief, seeds: Detection, parameters: DefectParameters, sc
 
 
 def footprint(relief: WallRelief, cells: Grown, scratch: Scratch) -> Bool:
-    """Return the cells (S, A) of all local defects with a margin for their feet."""
+    """Return the cells (S, A) of all defects with a margin of 10 mm for their feet."""
     out = scratch.zeros(relief.shape, bool)
     for part in stretches(relief.shape[0], relief.rows_in(_FOOT_MM)):
         either = cells.into[part.wide] | cells.inward[part.wide]
@@ -60,7 +60,7 @@ def footprint(relief: WallRelief, cells: Grown, scratch: Scratch) -> Bool:
 
 
 def joined(mask: Bool, cell_mm: tuple[float, float], gap_mm: float) -> Bool:
-    """Return the mask closed over gaps of ``gap_mm``, by which cells are told to be of one defect."""
+    """Return the mask (rows, A) dilated by half of ``gap_mm``: cells of one defect then touch each other."""
     reach = [max(0, round(gap_mm / 2 / c)) for c in cell_mm]
     kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * reach[1] + 1, 2 * reach[0] + 1))
     pad = reach[1] + 1
@@ -70,7 +70,7 @@ def joined(mask: Bool, cell_mm: tuple[float, float], gap_mm: float) -> Bool:
 
 @dataclass(frozen=True)
 class Hills:
-    """What rises from the wall on one side of it.
+    """What deviates from the wall to one side.
 
     Attributes
     ----------
@@ -81,7 +81,7 @@ class Hills:
     foot_mm : float
         Height below which nothing belongs to a defect.
     reach : int
-        Rows over which a defect is followed from its top at once.
+        Rows over which a defect is followed from its top in one step.
     """
 
     sign: float
@@ -90,11 +90,11 @@ class Hills:
     reach: int
 
     def height(self, rows: slice) -> Float:
-        """Return the height of some rows (rows, A); −1 where nothing was measured."""
+        """Return the height of some rows (rows, A), mm; −1 where nothing was measured."""
         return np.nan_to_num(self.sign * self.smooth_mm[rows].astype(float), nan=-1.0)
 
     def grown(self, seeds: Bool, parameters: DefectParameters, scratch: Scratch) -> Bool:
-        """Return all cells (S, A) of the hills on which some of ``seeds`` stand, from the highest down."""
+        """Return the cells (S, A) of all hills that hold one of ``seeds``, grown from the highest down."""
         out, left = (scratch.zeros(seeds.shape, bool) for _ in range(2))
         least = max(self.foot_mm, 0.75 * parameters.min_depth_mm)
         for part in stretches(len(seeds)):
@@ -107,18 +107,18 @@ class Hills:
         return out
 
     def _top(self, left: Bool, block: int) -> float:
-        """Return the greatest height of a block's cells that are left, 0 when none is."""
+        """Return the greatest height, mm, of a block's remaining cells; 0 when none remains."""
         rows = slice(block * _BLOCK, min((block + 1) * _BLOCK, len(left)))
         return float(np.where(left[rows], self.height(rows), 0.0).max()) if left[rows].any() else 0.0
 
     def _place(self, left: Bool, block: int) -> tuple[int, int]:
-        """Return where in a block the highest cell is that is left."""
+        """Return row and column of the highest remaining cell of a block."""
         rows = slice(block * _BLOCK, min((block + 1) * _BLOCK, len(left)))
         i, j = divmod(int(np.argmax(np.where(left[rows], self.height(rows), 0.0))), left.shape[1])
         return rows.start + i, j
 
     def _grow(self, top: tuple[int, int], out: Bool, left: Bool, parameters: DefectParameters) -> slice:
-        """Add the hill below a top to ``out``, take it and its skirt from ``left``; return the rows seen."""
+        """Add the hill below a top to ``out``, remove it and its skirt from ``left``; return the rows."""
         i, j = top
         window = widened(slice(i, i + 1), len(left), self.reach).wide
         turn = left.shape[1] // 2 - j

@@ -1,4 +1,4 @@
-"""Which findings are confirmed, with which probability, and why the others are not."""
+"""Decide which findings are confirmed, with which probability, and say why the others are not."""
 
 from __future__ import annotations
 
@@ -22,25 +22,34 @@ from stages.defects.noise_tail import NoiseTail
 from stages.defects.segment import Region
 from stages.defects.surface import MeasuredWall
 
-# Nothing says that what stays at one place of the image, or lies where the line ends, is rather the wall.
+# A finding fixed to the image, or where the line ends, is as likely as not on the wall: nothing tells.
 _WALL_OR_NOT = 0.5
-_UNSURE = "Its depth is not known to twice its σ"
+_UNSURE = "Its depth is less than twice its σ, so that it may be zero"
 _AT_LEAST = (
-    "It is at least so deep, to ± {:.2f} mm by noise, which does not make it: the rest of σ is what pictures "
-    "that hold some of those before them may have taken off."
+    "This depth is a lower bound, with ± {:.2f} mm from noise. The rest of σ is what pictures that repeat "
+    "parts of earlier ones may have taken off the depth."
 )
 _LONE = (
-    "It is at least so deep: single rings show up to {:.2f} mm and those beside them do not, which may be a "
-    "glint, or a pit so narrow that no other ring crosses it."
+    "This depth is a lower bound: single rings show up to {:.2f} mm, but the rings beside them do not. That "
+    "may be a glint, or a pit so narrow that no other ring crosses it."
 )
 
 
 @dataclass(frozen=True)
 class Found:
-    """A region that is deep enough to be reported, described as if it were surely there.
+    """A region deep enough to be reported, described as if it were certainly real.
 
-    ``by_noise`` is the same with σ before codec or lone rings widen it, ``bead`` the probability that it is
-    no step of the bore, ``lone_mm`` the depth with rings that those beside them do not allow.
+    Attributes
+    ----------
+    region : Region
+    defect : Defect
+    by_noise : Defect
+        The same with σ from noise alone, before codec or single deep rings widen it.
+    evidence : Evidence
+    bead : float
+        Probability that it is not a step of the bore.
+    lone_mm : float, optional
+        The larger depth shown by rings that their neighbours contradict; None where there are none.
     """
 
     region: Region
@@ -52,18 +61,18 @@ class Found:
 
     @property
     def step(self) -> bool:
-        """Whether it is rather a step of the bore."""
+        """Whether it is more likely a step of the bore."""
         return self.bead < COUNTED
 
     @property
     def flattened(self) -> bool:
-        """Whether it is deeper than noise makes it, and may have been flattened by about its depth."""
+        """Whether its depth is significant against noise, but not with what flattening may have taken off."""
         if self.lone_mm is not None:
             return False
         return is_depth_known(self.by_noise) and not is_depth_known(self.defect)
 
-    def told(self, probability: float, counts: bool) -> Defect:
-        """Return it with its probability, and if it counts in words whether its depth is a lower bound."""
+    def with_probability(self, probability: float, counts: bool) -> Defect:
+        """Return it with its probability and, if it counts, a sentence where its depth is a lower bound."""
         words = self._at_least() if counts else ""
         told = f"{self.defect.statement} {words}".rstrip()
         sure = self.defect.confidence * probability
@@ -76,7 +85,7 @@ class Found:
 
 
 def credibility_on(found: Sequence[Found], tail: NoiseTail, wall: MeasuredWall) -> Credibility:
-    """Return what is to be expected by the findings on the wall; welds and steps are left out."""
+    """Return what the findings show about real and false ones on this wall; welds and steps are left out."""
     used = [f for f in found if f.evidence.on_wall and not (f.region.all_round or f.step)]
     column = 2 * np.pi / wall.relief.shape[1]
     widths = [f.region.mask.shape[1] * column for f in used]
@@ -87,7 +96,7 @@ def credibility_on(found: Sequence[Found], tail: NoiseTail, wall: MeasuredWall) 
 def judged(
     found: Sequence[Found], credibility: Credibility, min_depth_mm: float
 ) -> tuple[list[Defect], list[Defect]]:
-    """Return what is confirmed, and what is not, with the reason."""
+    """Return the confirmed findings, and the unconfirmed ones with the reason in their statement."""
     confirmed: list[Defect] = []
     unconfirmed: list[Defect] = []
     for f in found:
@@ -96,7 +105,7 @@ def judged(
         real = min(real, MOST_SURE) * (1.0 if f.evidence.on_wall else _WALL_OR_NOT)
         unsure, real = real >= COUNTED > real * f.bead, real * f.bead
         counts = f.evidence.corroborated and real >= COUNTED and is_depth_known(f.by_noise)
-        defect = f.told(real, counts)
+        defect = f.with_probability(real, counts)
         if counts:
             confirmed.append(defect)
         else:

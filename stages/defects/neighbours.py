@@ -1,8 +1,9 @@
-"""What the rings beside the deepest one allow a finding's depth to be: a glint on one ring is no depth.
+"""Limit a finding's depth to what the rings beside the deepest one allow: a glint on one ring is no depth.
 
-A wall seen along a line of sight falls off from ring to ring by no more than their distance (45°, the mean
-flank of a hemisphere), or by half of what it stands out of the finding about it, where it is steeper. What
-one ring shows beyond that, no other does: it may be a glint, or a pit so narrow that no other crosses it.
+From ring to ring, a wall seen along a line of sight gets shallower by at most the distance of the rings (45°,
+the mean flank of a hemisphere); where the finding is steeper, by at most half of what it stands out of its
+own surroundings. What one ring shows beyond that, no other ring shows: it may be a glint, or a pit so narrow
+that no other ring crosses it.
 """
 
 from __future__ import annotations
@@ -14,23 +15,23 @@ import numpy as np
 from pipeline.arrays import Bool, Float, Int
 from stages.defects.depth import SHARPENING, Depth, is_small
 from stages.defects.segment import Region
-from stages.defects.surface import Surface, cells_of, chosen, sure_of_themselves
+from stages.defects.surface import Surface, cells_of, chosen, of_usual_sigma
 
-# Rings beside each other are no further apart than this many of their distances; a ring's departure is that
-# of the fifth of its samples that depart most, as for what confirms a finding.
+# Rings at most 1.6 median spacings apart are neighbours. A ring's departure is the 80 % quantile of its
+# samples, as for the evidence that confirms a finding, and needs at least 3 samples.
 _BESIDE, _TOP_QUANTILE, _LEAST_OF_RING = 1.6, 0.8, 3
-_SHOWN_SIGMAS = 2.0  # of the wall's own unevenness, as for what confirms a finding
-# A depth is a mean over a millimetre: so much of a ring about a finding's peak tells what it shows of it.
+_SHOWN_SIGMAS = 2.0  # of the wall's own unevenness, as for the evidence that confirms a finding
+# A depth is a mean over 1 mm: that much of a ring, around a finding's peak, is compared with it.
 _MEAN_MM = 1.0
-# A round pit that the rings on both sides of one miss is narrower than so many of their distances.
+# If both neighbours of a ring miss a round pit, the pit is narrower than two ring spacings.
 _NARROW, _HALF = 2.0, 0.5
 
 
 def allowed_by_neighbours(depth: Depth, region: Region, surface: Surface) -> Depth:
-    """Return the depth, limited by what the rings beside the deepest one allow, with a larger σ if it is.
+    """Return the depth, limited by what the rings beside the deepest one allow, and then with a larger σ.
 
-    Where no bell tells what lies between rings, as in a wide patch, σ also grows by how far it falls off to
-    those beside: the deepest place of a narrow pit lies between them.
+    Where no bell is fitted between rings, as in a wide patch, σ also grows by how much the depth falls off to
+    the neighbouring rings: the deepest place of a narrow pit may lie between them.
     """
     rings = _rings(depth, region, surface)
     if not len(rings.frame):
@@ -43,9 +44,9 @@ def allowed_by_neighbours(depth: Depth, region: Region, surface: Surface) -> Dep
 
 
 def contradicted_frame(depth: Depth, region: Region, surface: Surface) -> int | None:
-    """Return the frame whose ring alone makes a depth that those beside do not allow, None where none does.
+    """Return the frame whose ring alone shows more depth than its neighbours allow; None where there is none.
 
-    The rings on both sides of it show the finding themselves: its depth is theirs without that one.
+    Only where rings on both sides show the finding, too, so that it has a depth without that frame.
     """
     rings = _rings(depth, region, surface)
     if not len(rings.frame) or abs(depth.depth_mm) <= rings.allowed_mm:
@@ -57,22 +58,23 @@ def contradicted_frame(depth: Depth, region: Region, surface: Surface) -> int | 
 
 
 def frames_at_peak(depth: Depth, region: Region, surface: Surface) -> Int:
-    """Return the frames (n,) whose rings show half of a depth about its peak, by samples that are sure.
+    """Return the frames (n,) whose rings show half of a depth at its peak, with samples of usual σ.
 
-    Only of a wide patch, of which what a depth is the mean of is less than the fifth that departs most: of a
-    narrower finding that fifth tells the same, and this would take noise of single rings for the finding.
+    Only for a wide patch, where the 1 mm that a depth is averaged over is less than a fifth of a ring's
+    samples. In a narrower finding the deepest fifth shows the same, and this test would mistake noise of
+    single rings for it.
     """
     width = region.mask.any(0).sum() * surface.relief.cell_mm[1]
     if (1 - _TOP_QUANTILE) * width <= _MEAN_MM:
         return np.zeros(0, np.int64)
-    sure = replace(surface, near=chosen(surface.near, sure_of_themselves(surface.near)))
+    sure = replace(surface, near=chosen(surface.near, of_usual_sigma(surface.near)))
     rings = _rings(depth, region, sure)
     limit = max(_HALF * abs(depth.depth_mm), _SHOWN_SIGMAS * surface.relief.typical.sigma_mm)
     return rings.frame[rings.peak_mm > limit]
 
 
 def reaching(depth: Depth, uncut: Depth, region: Region, surface: Surface) -> Depth:
-    """Return a depth with a σ that reaches the one of which a lone ring was cut, where that may be a pit."""
+    """Return a depth whose σ includes what a lone deep ring showed beyond it, if that may be a pit."""
     cut = max(abs(uncut.depth_mm) - abs(depth.depth_mm), 0.0)
     if not _may_be_a_pit(uncut, region, surface):
         return depth
@@ -80,17 +82,17 @@ def reaching(depth: Depth, uncut: Depth, region: Region, surface: Surface) -> De
 
 
 def _may_be_a_pit(depth: Depth, region: Region, surface: Surface) -> bool:
-    """Return whether what the deepest ring shows is so narrow that a round pit may lie between the others."""
+    """Return whether the deepest ring's departure is so narrow that a round pit fits between the others."""
     rings = _rings(depth, region, surface)
     return not len(rings.frame) or rings.width_mm[rings.deepest] < _NARROW * surface.points.spacing_mm
 
 
 @dataclass(frozen=True)
 class _Rings:
-    """What each ring (n,) of a ``frame`` shows to a finding's side, at which place along the pipe.
+    """How far each ring (n,) departs to a finding's side, and where along the pipe, mm.
 
-    ``top_mm`` is how far it departs over all of the finding's columns, ``foot_mm`` the median there,
-    ``peak_mm`` how far about the finding's peak, and ``width_mm`` how wide it stands out there.
+    ``top_mm`` is the 80 % quantile over the finding's columns and ``foot_mm`` the median there; ``peak_mm``
+    is the departure about the finding's peak and ``width_mm`` its width there.
     """
 
     frame: Int
@@ -103,24 +105,24 @@ class _Rings:
 
     @property
     def deepest(self) -> int:
-        """Which shows the most about the finding's peak."""
+        """Index of the ring that departs most about the finding's peak."""
         return int(self.peak_mm.argmax())
 
     @property
     def beside(self) -> Int:
-        """Which (m,) are beside the deepest."""
+        """Indices (m,) of the rings beside the deepest one."""
         near = np.abs(self.at_mm - self.at_mm[self.deepest]) < _BESIDE * self.spacing_mm
         return np.flatnonzero(near & (np.arange(len(near)) != self.deepest))
 
     @property
     def falls_mm(self) -> float:
-        """How far it falls off at most from the deepest to one beside."""
+        """The largest fall from the deepest ring to one beside it, mm."""
         deepest = float(self.peak_mm[self.deepest])
         return deepest - float(self.peak_mm[self.beside].min(initial=deepest))
 
     @property
     def allowed_mm(self) -> float:
-        """How deep the rings beside the deepest allow the finding to be."""
+        """The depth that the rings beside the deepest one allow, mm."""
         shown = np.maximum(self.peak_mm, self.top_mm)[self.beside]
         steep = 2 * shown - np.maximum(self.foot_mm[self.beside], 0.0)
         gentle = max(float(shown.max(initial=0.0)), 0.0) + self.spacing_mm
@@ -128,22 +130,22 @@ class _Rings:
 
 
 def _rings(depth: Depth, region: Region, surface: Surface) -> _Rings:
-    """Return what each ring about a finding's peak, by which the surface goes, shows of it."""
+    """Return each ring's departure about a finding's peak, without frames that the surface left out."""
     samples = _samples(depth, region, surface)
     spacing = surface.points.spacing_mm
     near = ~np.isin(samples.frame, surface.left_out) & (np.abs(samples.along_mm) <= 2 * spacing)
     rings = [(k, samples.of(near & (samples.frame == k))) for k in np.unique(samples.frame[near])]
     rings = [(k, ring) for k, ring in rings if ring.about.sum() >= _LEAST_OF_RING]
-    at, top, foot, peak, width = np.array([ring.told(spacing) for _, ring in rings]).reshape(-1, 5).T
+    at, top, foot, peak, width = np.array([ring.summary(spacing) for _, ring in rings]).reshape(-1, 5).T
     frame = np.array([k for k, _ in rings], np.int64)
     return _Rings(frame, at, top, foot, peak, width, spacing)
 
 
 @dataclass(frozen=True)
 class _Samples:
-    """Samples (m,) of rings: their frame, how far they depart to a finding's side, and where from its peak.
+    """Samples (m,) of rings: frame, departure to a finding's side, and place relative to its peak, mm.
 
-    ``inside`` are those in the columns of the finding.
+    ``inside`` marks those in the columns of the finding.
     """
 
     frame: Int
@@ -153,16 +155,16 @@ class _Samples:
     inside: Bool
 
     def of(self, which: Bool) -> _Samples:
-        """Return some of the samples."""
+        """Return the samples that ``which`` (m,) marks."""
         return _Samples(*(getattr(self, f.name)[which] for f in fields(self)))
 
     @property
     def about(self) -> Bool:
-        """Which are about the peak; what lies askew by up to 45° moves on around from ring to ring."""
+        """Which samples are near the peak; a finding may lie askew by up to 45° to the pipe's axis."""
         return np.abs(self.around_mm) <= _MEAN_MM + np.abs(self.along_mm)
 
-    def told(self, spacing_mm: float) -> tuple[float, ...]:
-        """Return what the samples, all of one ring, give to `_Rings`."""
+    def summary(self, spacing_mm: float) -> tuple[float, ...]:
+        """Return at, top, foot, peak and width of `_Rings` for samples that are all of one ring, mm."""
         about = np.sort(self.out_mm[self.about])
         pitch = float(np.ptp(self.around_mm[self.about])) / (len(about) - 1)
         peak = float(about[-max(round(_MEAN_MM / max(pitch, 1e-9)), 1) :].mean())
@@ -174,7 +176,7 @@ class _Samples:
 
 
 def _samples(depth: Depth, region: Region, surface: Surface) -> _Samples:
-    """Return the samples on a surface as a finding sees them."""
+    """Return the samples of all rings near a surface, relative to a finding."""
     relief, points = surface.relief, surface.near
     columns = Region(
         0,

@@ -1,4 +1,4 @@
-"""How many peaks of noise the search finds: counted below its threshold, and carried on above it."""
+"""Estimate how many peaks of noise the search finds: counted below its threshold, extrapolated above it."""
 
 from __future__ import annotations
 
@@ -14,47 +14,48 @@ from stages.defects.along import widened
 from stages.defects.detect import Detection, scores, seen_mm2, weighed
 from stages.defects.relief import WallRelief
 
-# Cells beside a peak within which another is the same one: 2 mm, the reach of the smaller templates.
+# Two peaks closer than 4 cells, 2 mm, the reach of the smaller templates, count as one.
 _BESIDE = 4
-# Peaks of Gaussian noise that are added to those of the wall: so few move a tail of fifty by a tenth.
+# As many peaks of Gaussian noise are added to those of the wall as a weak prior: they change a tail of fifty
+# peaks by a tenth.
 _AS_GAUSSIAN = 5
-# ln of a law's scale: from half of Gaussian noise to noise of which any peak may be as high as a defect.
+# Bounds of ln(scale): from a third of Gaussian noise to noise of which any peak may be as high as a defect.
 _SCALES = (math.log(0.1), math.log(30.0))
 
 
 @dataclass(frozen=True)
 class Law:
-    """Peaks fall off above `NoiseTail.FROM` as exp(−x / scale) with x = (h^power − FROM^power) / power."""
+    """The share of peaks above a height h: exp(−x / scale), x = (h^power − FROM^power) / power, h in σ."""
 
     power: int
     scale: float
     share: float = 1.0
 
     def excess(self, score: float) -> float:
-        """Return x of a score."""
+        """Return x of a score in σ."""
         return max(score**self.power - NoiseTail.FROM**self.power, 0.0) / self.power
 
     def above(self, score: float) -> float:
-        """Return the share of all peaks that is above a score, times the law's own share."""
+        """Return the share of all peaks that exceed a score, times the law's own weight ``share``."""
         return self.share * math.exp(-self.excess(score) / self.scale)
 
     def density(self, score: float) -> float:
-        """Return the same per σ at a score."""
+        """Return minus the derivative of `above` at a score, per σ."""
         return self.above(score) * score ** (self.power - 1) / self.scale
 
 
 @dataclass(frozen=True)
 class NoiseTail:
-    """How many peaks of a height the same search finds in a wall without its findings.
+    """How many peaks of a given height the same search finds on this wall where there are no findings.
 
-    Gaussian noise falls off as exp(−h² / 2 w²), with w = 1. Where its size varies from place to place, and
-    where a codec holds errors over, great ones are more frequent, up to exp(−h / λ). Below the threshold
-    both laws look alike, so that each has a share by how well it fits what is seen there.
+    Gaussian noise falls off as exp(−h² / 2 w²) with w = 1. Where its size varies from place to place, and
+    where a codec carries errors over, high peaks are more frequent, up to exp(−h / λ). Below the threshold
+    both laws look alike; each gets a weight by its likelihood there.
 
     Attributes
     ----------
     peaks : float
-        Above `FROM` σ, on the whole wall.
+        Number of peaks above `FROM` σ on the whole wall.
     laws : tuple of Law
     """
 
@@ -63,16 +64,16 @@ class NoiseTail:
     FROM = 3.0
 
     def above(self, score: float) -> float:
-        """Return how many peaks of noise to expect above a score."""
+        """Return the expected number of noise peaks above a score, σ."""
         return self.peaks * sum(law.above(score) for law in self.laws)
 
     def density(self, score: float) -> float:
-        """Return how many peaks of noise to expect at a score, per σ."""
+        """Return the expected number of noise peaks at a score, per σ."""
         return self.peaks * sum(law.density(score) for law in self.laws)
 
 
 def noise_tail(relief: WallRelief, seeds: Detection, known: Bool) -> NoiseTail:
-    """Return what the search finds where it found no defect: in sampled rows, ``known`` (S, A) left out."""
+    """Return the noise of the search away from its findings: sampled rows without ``known`` cells (S, A)."""
     overlap = max(len(f.kernel) for f in seeds.filters) // 2
     heights, seen = [np.empty(0)], 0
     for rows in relief.sampled:
@@ -88,11 +89,11 @@ def noise_tail(relief: WallRelief, seeds: Detection, known: Bool) -> NoiseTail:
 
 
 def tail_of(peaks: Float, threshold: float, whole: float = 1.0) -> NoiseTail:
-    """Return the tail of noise by its peaks (n,) in a part of a wall that is ``whole`` times as large.
+    """Return the noise tail from its peaks (n,), σ, in a part of a wall that is ``whole`` times as large.
 
-    Peaks above the threshold became findings, whatever made them: those below tell how fast noise falls off,
-    as a sample that ends there. Taken as one without an end, it gave too thin a tail just for the findings
-    that noise makes.
+    Peaks above the threshold became findings, whatever made them, so that the laws are fitted to those below
+    as a sample truncated at the threshold. Treated as a complete sample, it gave too thin a tail and too much
+    trust in findings that noise makes.
     """
     below = peaks[peaks <= threshold]
     fits = [_fitted_law(power, below, threshold) for power in (2, 1)]
@@ -104,11 +105,11 @@ def tail_of(peaks: Float, threshold: float, whole: float = 1.0) -> NoiseTail:
 
 
 def _fitted_law(power: int, below: Float, threshold: float) -> tuple[Law, float]:
-    """Return a law and how surprising under it the peaks (n,) below the threshold are, −ln of likelihood."""
+    """Return a fitted law and the −ln of its likelihood for the peaks (n,) below the threshold."""
     unit = Law(power, 1.0)
     most = max(unit.excess(threshold), 1e-6)
     excess = np.array([unit.excess(float(h)) for h in below])
-    # Gaussian noise has x = 1 in the mean by its own law, and 1 / FROM by the other.
+    # The mean of x over Gaussian noise: 1 for power 2, and 1 / FROM for power 1.
     usual = NoiseTail.FROM ** (power - 2)
 
     def surprise(log_scale: float) -> float:
@@ -118,14 +119,14 @@ def _fitted_law(power: int, below: Float, threshold: float) -> tuple[Law, float]
         return len(excess) * log_scale + float(excess.sum()) / scale + cut + few
 
     found = minimize_scalar(surprise, bounds=_SCALES, method="bounded")
-    # The density is that of h: dx / dh = h^(power − 1).
+    # The likelihood is a density in h, not in x: dx / dh = h^(power − 1).
     slope = (power - 1) * float(np.log(below).sum())
     lost = _AS_GAUSSIAN * (float(found.x) + usual / math.exp(found.x))
     return Law(power, math.exp(float(found.x))), float(found.fun) - lost - slope
 
 
 def _peaks(score: Float) -> Float:
-    """Return the heights (n,) of the maxima of a score (rows, A) that are above `NoiseTail.FROM`."""
+    """Return the heights (n,) of the local maxima of a score (rows, A) above `NoiseTail.FROM`."""
     wide = np.concatenate([score[:, -_BESIDE:], score, score[:, :_BESIDE]], 1)
     top = maximum_filter(wide, 2 * _BESIDE + 1)[:, _BESIDE:-_BESIDE]
     return np.asarray(score[(score == top) & (score > NoiseTail.FROM)])

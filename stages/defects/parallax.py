@@ -1,10 +1,10 @@
-"""Whether lit pictures from other places bear a long finding out, or show the wall without it.
+"""Check a long finding against lit pictures taken from other places.
 
-What a ring shows of the wall is at one place of the image in one frame only. A drop that slides down the
-window moves the line for as long as it lies in its way, and looks like a groove or a ridge along the pipe. A
-lit picture taken before or after shows the same wall at another place of the image, beside the drop. Laid on
-the wall as the rings measured it, such pictures agree with each other where the depth is true, since they are
-taken from places apart: a false depth shifts them against each other by its size times their distance over
+A ring shows one place of the wall at one place of the image, in one frame only. A drop that slides down the
+window displaces the line as long as it is in front of it; the result looks like a groove or a ridge along the
+pipe. A lit picture taken before or after shows the same wall at another place of the image, beside the drop.
+Projected onto the wall as the rings measured it, such pictures agree with each other where the depth is true.
+A false depth shifts them against each other by its size times the distance between the camera positions over
 the pipe's radius.
 """
 
@@ -26,31 +26,33 @@ from stages.defects.depth import Depth
 from stages.defects.relief import Relief
 from stages.defects.segment import Region
 
-# Asked of findings from here on that are at least as long as wide: no drop that passes the line is shorter.
+# Only findings at least this long, and at least as long as wide, are checked: no drop crosses the line
+# faster.
 _LONG_MM = 8.0
-# Such a length of them is held against pictures taken from no farther off than this, and no nearer: beyond it
-# the wall is seen too obliquely, nearer by it the line itself, and what moves it, would be in the picture.
+# The finding is cut into parts of 8 mm, each compared in pictures whose line is 2 to 15 mm away: farther off
+# the wall is seen too obliquely, and nearer by, the line and what displaces it would be in the picture.
 _WINDOW_MM, _FARTHEST_MM, _CLEAR_MM = 8.0, 15.0, 2.0
-# Of each part so many pictures are taken, and two are needed; its points lie as dense as its texture shows.
-# What is broader than 2 mm is light, and so that it is known the flanks are taken in.
+# Up to 8 pictures are taken per part, at least 2 and 60 pixels of texture are needed; points lie 0.25 mm
+# apart. What is broader than 2 mm (8 points) is taken to be light and removed; 3 mm on either side are read
+# for that.
 _PICTURES, _LEAST_PICTURES, _LEAST_PIXELS, _PIXEL_MM, _BROAD_PX, _BESIDE_MM = 8, 2, 60, 0.25, 8.0, 3.0
-# Where the pictures disagree by so much more with the finding than without it, it is not on the wall. Debt:
-# data/debts.md.
+# If the disagreement is larger by this factor with the finding than without it, the finding is not on the
+# wall. Debt: data/debts.md.
 _DISAGREE = 1.5
 
 
 @dataclass(frozen=True)
 class LitPictures:
-    """The lit frames of a recording whose pose is known, and what places a finding in them."""
+    """The LED-lit frames of a recording with known pose, and the camera that projects a finding into them."""
 
     recording: Recording
     probe: Probe
     motion: Trajectory
 
     def contradict(self, region: Region, relief: Relief) -> bool:
-        """Whether pictures show the wall without a finding; what no two of them show is not contradicted.
+        """Whether pictures show the wall without a finding; False where fewer than two pictures show it.
 
-        ``region`` counts its rows from the first of ``relief``.
+        The rows of ``region`` count from the first row of ``relief``.
         """
         size = np.array(region.mask.shape) * relief.cell_mm
         if region.all_round or size[0] < max(_LONG_MM, size[1]):
@@ -65,7 +67,7 @@ class LitPictures:
         return bool(pixels.sum() > 0 and np.exp(pixels @ logs / pixels.sum()) > _DISAGREE)
 
     def _disagreement(self, region: Region, relief: Relief, rows: slice) -> tuple[int, float] | None:
-        """Return pixels of a part of a finding, and by how much more pictures disagree with it, as a log."""
+        """Return a part's pixels and ln(disagreement with the finding / without it); None if unseen."""
         part = Region(region.row + rows.start, region.column, region.mask[rows], region.sign)
         height = np.nan_to_num(part.cut(relief.local_mm))
         core = part.mask & (np.abs(height) > np.abs(height[part.mask]).max(initial=0.0) / 2)
@@ -86,7 +88,7 @@ class LitPictures:
         return int(inside.sum()), float(np.log(with_it / without))
 
     def drove_through(self, region: Region, depth: Depth, relief: Relief) -> bool:
-        """Whether the top of what stands inward is nearer to the camera's way than its own lamps are."""
+        """Whether the camera passed the top of an inward finding at less than the radius of its own lamps."""
         row, column = region.row + depth.peak[0], region.column + depth.peak[1]
         along = distance_along(self.motion.axis, self.motion.T_pc)
         s = relief.distance_mm[row]
@@ -99,7 +101,7 @@ class LitPictures:
         return bool(np.linalg.norm(top - camera) < self.probe.lighting.radius_mm)
 
     def _places(self, part: Region, relief: Relief, height: Float) -> tuple[Float, Float]:
-        """Return the wall's points (n, m, 3) in P without and with a finding's ``height`` (H, W)."""
+        """Return the wall's points (n, m, 3) in P, mm, without and with a finding's ``height`` (H, W), mm."""
         i, j = (np.arange(n) for n in part.mask.shape)
         s = relief.distance_mm[part.row + i]
         psi = relief.azimuth_rad[0] + (part.column + j) * (relief.azimuth_rad[1] - relief.azimuth_rad[0])
@@ -114,7 +116,7 @@ class LitPictures:
         return bare, from_pipe(self.motion.axis, along, around, radius + more)
 
     def _near(self, s: Float) -> Iterator[tuple[Float, Float]]:
-        """Yield pose (pipe to camera) and grey picture of lit frames whose line is beside ``s`` (H,)."""
+        """Yield pose (P to C) and grey picture of lit frames whose line is near but off ``s`` (H,), mm."""
         lit = np.isin(self.motion.frame, self.recording.frames.of(Illumination.LED, Illumination.BOTH))
         index = np.flatnonzero(lit)
         line = distance_along(self.motion.axis, self.motion.T_pc[index]) + self.probe.laser.baseline_mm
@@ -127,7 +129,7 @@ class LitPictures:
                 yield inverse(self.motion.T_pc[k]), np.asarray(image, np.float32)
 
     def _seen(self, xyz_p: Float, inside: Bool, T_cp: Float, image: Float) -> Float | None:
-        """Return the fine texture (n,) of the wall's points in a picture; None where it does not show all."""
+        """Return the normalised fine texture (n,) of wall points in a picture; None unless it shows all."""
         uv, valid = self.probe.camera.project(transform(T_cp, xyz_p))
         u, v = (uv[..., k].astype(np.float32) for k in (0, 1))
         within = valid & (u > 1) & (v > 1) & (u < image.shape[1] - 2) & (v < image.shape[0] - 2)
@@ -139,6 +141,6 @@ class LitPictures:
 
 
 def _agreement(pictures: Float) -> float:
-    """Return the mean correlation of pictures (P, n) of unit variance with each other."""
+    """Return the mean correlation between pairs of pictures (P, n), each of zero mean and unit variance."""
     one, other = np.triu_indices(len(pictures), 1)
     return float(np.mean(pictures[one] * pictures[other]))

@@ -1,4 +1,4 @@
-"""What kinds of defects look like, and how likely each is by the features of one."""
+"""What each kind of defect looks like, and how probable each kind is given a defect's features."""
 
 from __future__ import annotations
 
@@ -9,18 +9,19 @@ import numpy as np
 from pipeline.artefacts.findings import DefectKind
 from stages.defects.segment import Region
 
-# Half of the millimetre over which the wall is averaged where outlines are drawn.
+# Outlines are drawn on the wall averaged over 1 mm: half of that may be missing from or added to an edge.
 _EDGE_MM = 0.5
-# Features below this are taken for it: they have logarithms.
+# Smaller features are raised to this before their logarithm is taken.
 _LEAST = 1e-3
-# Sizes of kinds are those in a pipe of 4 inch. Whether they grow with the pipe is not known: they are taken
-# to lie half-way between, and half of the difference is added to their spread.
+# The sizes below are for a pipe of 4 inch. It is not known whether defects grow with the pipe: sizes are
+# scaled with the square root of the radius, and half of the full scaling's logarithm is added to their
+# spread.
 _PIPE_RADIUS_MM = 50.8
 
 
 @dataclass(frozen=True)
 class Features:
-    """Shape of a defect.
+    """Features of a defect's shape.
 
     Attributes
     ----------
@@ -31,9 +32,9 @@ class Features:
     elongation : float
         Larger axis over smaller.
     roughness, roughness_sigma : float
-        RMS from a smooth (quartic) surface over depth, and its 1 σ.
+        RMS distance from a smooth (quartic) surface over depth, and its 1 σ.
     direction_rad : float
-        Of the larger axis from the pipe's axis, in [0, π/2].
+        Angle between the larger axis and the pipe's axis, in [0, π/2].
     """
 
     length_mm: float
@@ -47,9 +48,9 @@ class Features:
 
 @dataclass(frozen=True)
 class Likeness:
-    """Median of a feature for a kind, and by which factor two of three examples stay around it.
+    """Lognormal distribution of a feature for a kind: its median, and exp(1 σ) as a factor.
 
-    An ``open`` one counts no less the more there is of it: a groove all round is longer than any gouge.
+    If ``open``, values above the median count like the median: a groove all round is longer than any gouge.
     """
 
     median: float
@@ -57,9 +58,10 @@ class Likeness:
     open: bool = False
 
     def log_likelihood(self, value: float, sigma: float) -> float:
-        """Return that of a lognormal with a floor, so that no single feature rules a kind out.
+        """Return the log likelihood of a value, with a floor so that no single feature excludes a kind.
 
-        A value with 1 σ ``sigma`` widens it; one below its own σ may be anything up to that.
+        ``sigma``, 1 σ of the value, widens the distribution; a value below its σ may be anything up to that
+        σ.
         """
         width = np.hypot(np.log(self.factor), sigma / max(value, sigma, _LEAST))
         value = max(value, min(sigma, self.median), _LEAST)
@@ -67,7 +69,7 @@ class Likeness:
         return float(np.log(np.exp(-0.5 * z * z) / width + 1e-4))
 
     def in_pipe(self, radius_mm: float) -> Likeness:
-        """Return that of a size in a pipe of another radius."""
+        """Return the distribution of a size in a pipe of another radius, mm."""
         half = 0.5 * np.log(radius_mm / _PIPE_RADIUS_MM)
         factor = np.exp(np.hypot(np.log(self.factor), half))
         return Likeness(self.median * float(np.exp(half)), float(factor), self.open)
@@ -75,7 +77,7 @@ class Likeness:
 
 @dataclass(frozen=True)
 class Portrait:
-    """What a kind looks like; ``sign`` is +1 for kinds into the wall."""
+    """The distributions of a kind's features; ``sign`` is +1 for kinds into the wall, −1 for inward ones."""
 
     kind: DefectKind
     sign: float
@@ -95,9 +97,9 @@ _PORTRAITS = (
 
 
 def probabilities(features: Features, region: Region, radius_mm: float) -> dict[DefectKind, float]:
-    """Return the probability of every kind that is possible, likeliest first (naive Bayes, equal priors).
+    """Return the probability of every possible kind, likeliest first (naive Bayes, equal priors).
 
-    ``radius_mm`` is the pipe's.
+    ``radius_mm`` is the radius of the pipe.
     """
     if region.all_round:
         return {DefectKind.WELD if region.sign < 0 else DefectKind.GOUGE: 1.0}

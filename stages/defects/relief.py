@@ -1,4 +1,4 @@
-"""What is left of the wall without its own smooth shape, the motion of single rings, and all-round beads."""
+"""The wall's relief: its radius without smooth shape, motion error of single rings, and all-round beads."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from stages.defects.parameters import DefectParameters
 
 @dataclass(frozen=True)
 class Typical:
-    """Medians over a wall: 1 σ of a cell of its relief, mm, and the part of it that is noise."""
+    """Medians over a wall: 1 σ of a cell of its relief, and the part of it that is noise, mm."""
 
     sigma_mm: float
     noise_mm: float
@@ -34,17 +34,17 @@ class Relief:
     radius_mm : float
         Mean radius of the whole wall.
     local_mm : (S, A)
-        Without whatever goes all round: for defects of a part of the circumference.
+        Deviation without anything that goes all round: for defects of a part of the circumference.
     all_mm : (S, A)
-        With welds left in.
+        Deviation with welds left in.
     noise_mm : (S, A)
         1 σ of single cells from noise and the wall's natural roughness; NaN where nothing was seen.
     sigma_mm : (S, A)
-        1 σ of ``local_mm``: as much, and more in rows that scatter more about the smooth shape.
+        1 σ of ``local_mm``: ``noise_mm``, and more in rows that scatter more about the smooth shape.
     welds : tuple of slice
         Rows of all-round beads of the whole wall, counted from the first row here.
     harmonics_mm : (S, 5)
-        Of the smooth shape that ``all_mm`` refers to: mean, cos ψ, sin ψ, cos 2ψ, sin 2ψ.
+        The smooth shape that ``all_mm`` is relative to: mean, cos ψ, sin ψ, cos 2ψ, sin 2ψ.
     typical : Typical
     """
 
@@ -60,7 +60,7 @@ class Relief:
     typical: Typical
 
     def shape_at(self, row: Float, column: Float) -> Float:
-        """Return the smooth shape's radius (N,) at fractional rows and columns (N,)."""
+        """Return the smooth shape's radius (N,), mm, at fractional rows and columns (N,)."""
         step = float(self.azimuth_rad[1] - self.azimuth_rad[0])
         basis = basis_of(self.azimuth_rad[0] + step * column)
         at = np.arange(len(self.harmonics_mm))
@@ -69,7 +69,7 @@ class Relief:
 
     @property
     def cell_mm(self) -> tuple[float, float]:
-        """Size of a cell along and around."""
+        """Size of a cell along and around the pipe, mm."""
         along = float(self.distance_mm[1] - self.distance_mm[0])
         return along, float(self.azimuth_rad[1] - self.azimuth_rad[0]) * self.radius_mm
 
@@ -81,7 +81,7 @@ class Relief:
 
 @dataclass(frozen=True)
 class WallRelief:
-    """The relief of a whole wall, of which rows are worked out when they are asked for.
+    """The relief of a whole wall; its rows are computed when they are asked for.
 
     Attributes
     ----------
@@ -89,13 +89,14 @@ class WallRelief:
     radius_mm : float
         Mean radius.
     local_shape_mm, whole_shape_mm : (S, 5)
-        Harmonics that are taken out for `Relief.local_mm` and for `Relief.all_mm`.
+        Harmonics that are subtracted for `Relief.local_mm` and for `Relief.all_mm`.
     welds : tuple of slice
+        Rows of all-round beads.
     roughness_mm2 : float
         Variance of the wall's natural roughness.
     typical : Typical
     sampled : tuple of slice
-        The rows of which medians over the wall are taken.
+        Rows from which medians over the wall are taken.
     """
 
     radius_map: RadiusMap
@@ -114,12 +115,12 @@ class WallRelief:
 
     @property
     def cell_mm(self) -> tuple[float, float]:
-        """Size of a cell along and around."""
+        """Size of a cell along and around the pipe, mm."""
         s, psi = self.radius_map.distance_mm, self.radius_map.azimuth_rad
         return float(s[1] - s[0]), float(psi[1] - psi[0]) * self.radius_mm
 
     def rows_in(self, length_mm: float) -> int:
-        """Return how many rows reach over a length."""
+        """Return how many rows cover a length."""
         return int(np.ceil(length_mm / self.cell_mm[0]))
 
     def rows(self, rows: slice) -> Relief:
@@ -139,12 +140,12 @@ class WallRelief:
 def smooth_shape_removed(
     radius_map: RadiusMap, parameters: DefectParameters, known: Bool | None = None
 ) -> WallRelief:
-    """Return the relief of a wall; ``known`` (S, A) marks defects that are known and kept out of all fits.
+    """Return the relief of a wall; cells that ``known`` (S, A) marks as defects are left out of all fits.
 
-    The slow shape is mean radius and harmonics 1 and 2 (off-centre, oval), each a spline along the pipe
-    fitted robustly, so that neither a defect nor a weld pulls it. What a single ring has of these harmonics
-    beyond the slow shape is error of motion unless it stands out: then it is a weld. Even there, the first
-    harmonic is motion: a ring cannot tell it from the probe's own shift.
+    The smooth shape is the mean radius and harmonics 1 and 2 (off-centre, oval), each a robust spline along
+    the pipe that neither a defect nor a weld pulls. What a single ring has of these harmonics beyond the
+    spline is motion error, unless it stands out: then it is a weld. The first harmonic is motion even there:
+    a ring cannot distinguish it from a shift of the probe.
     """
     basis = basis_of(radius_map.azimuth_rad)
     step = float(radius_map.distance_mm[1] - radius_map.distance_mm[0])
@@ -169,7 +170,7 @@ def smooth_shape_removed(
 
 
 def _by_ring(rows_of: Callable[[slice], Float], radius_map: RadiusMap) -> Float:
-    """Return the harmonics (S, 5) of every row that ``rows_of`` gives."""
+    """Return the harmonics (S, 5), mm, of every row that ``rows_of`` gives."""
     basis = basis_of(radius_map.azimuth_rad)
     parts = [ring_harmonics(rows_of(s.own), basis) for s in stretches(len(radius_map.distance_mm))]
     return np.concatenate(parts)
@@ -178,7 +179,7 @@ def _by_ring(rows_of: Callable[[slice], Float], radius_map: RadiusMap) -> Float:
 def _with_spread(
     radius_map: RadiusMap, local: Float, whole: Float, welds: tuple[slice, ...], sampled: tuple[slice, ...]
 ) -> WallRelief:
-    """Return the relief with its spread: roughness is what a wall scatters beyond its stated noise."""
+    """Return the relief with its spread; roughness is the wall's scatter beyond its stated noise."""
     basis = basis_of(radius_map.azimuth_rad)
     measured = [radius_map.radius_mm[rows].astype(float) for rows in sampled]
     rest = [m - local[rows] @ basis.T for m, rows in zip(measured, sampled, strict=True)]
@@ -195,13 +196,13 @@ def _median(parts: list[Float]) -> float:
 
 
 def _noise(radius_map: RadiusMap, rows: slice, local: Float, roughness_mm2: float = 0.0) -> Float:
-    """Return 1 σ of cells from what was measured of their noise, and the wall's roughness."""
+    """Return 1 σ of cells, mm, from their measured noise and the wall's roughness."""
     noise = np.sqrt(radius_map.sigma_random_mm[rows].astype(float) ** 2 + roughness_mm2)
     return np.where(np.isfinite(local), noise, np.nan)
 
 
 def _sigma(local: Float, noise: Float) -> Float:
-    """Return 1 σ of cells; rows that scatter more (flanks of a bead, a ring misplaced) are trusted less."""
+    """Return 1 σ of cells, mm; larger in rows that scatter more: a bead's flanks, a misplaced ring."""
     measured = np.isfinite(local).any(1)
     excess = np.ones((len(local), 1))
     row = MAD_TO_SIGMA * row_median(np.abs(local[measured]))
@@ -217,7 +218,7 @@ def _in_bands(bands: tuple[slice, ...], count: int) -> Bool:
 
 
 def _interpolated_across(rings: Float, bands: tuple[slice, ...], margin: int) -> Float:
-    """Return the ring harmonics with welds and unseen rows bridged from both sides."""
+    """Return the ring harmonics (S, 5), interpolated across welds with a margin and across unseen rows."""
     known = np.isfinite(rings[:, 0])
     for band in bands:
         known[max(0, band.start - margin) : band.stop + margin] = False
@@ -230,10 +231,10 @@ def _interpolated_across(rings: Float, bands: tuple[slice, ...], margin: int) ->
 def weld_rows(
     deviation: Callable[[slice], Float], mean_mm: Float, step: float, parameters: DefectParameters
 ) -> tuple[slice, ...]:
-    """Return the rows of all beads.
+    """Return the rows of all beads that go round the pipe.
 
-    ``deviation`` gives some rows (rows, A) of the wall's deviation from its slow shape, ``mean_mm`` (S,) is
-    the mean of every row of it.
+    ``deviation`` gives some rows (rows, A) of the wall's deviation from its slow shape, ``mean_mm`` (S,) the
+    mean of each row of it, ``step`` the spacing of rows; all mm.
     """
     mean = gaussian_filter1d(np.nan_to_num(mean_mm), 0.5 / step)
     limit = max(parameters.min_depth_mm / 2, 6 * robust_spread(mean))
@@ -252,7 +253,7 @@ def weld_rows(
 
 
 def _run_around(height: Float, peak: int, level: float, longest: int) -> slice | None:
-    """Return the rows about ``peak`` that are above ``level``, None where they are more than ``longest``."""
+    """Return the rows about ``peak`` that are above ``level``; None where there are more than ``longest``."""
     first = max(0, peak - longest - 1)
     near = height[first : peak + longest + 2] > level
     bead = next(r for r in runs_of(near) if r.start <= peak - first < r.stop)
@@ -260,7 +261,7 @@ def _run_around(height: Float, peak: int, level: float, longest: int) -> slice |
 
 
 def _all_round(height: Float, peak: float) -> bool:
-    """Tell whether a bead (rows, A) reaches a third of its peak in nine of ten sectors that were seen."""
+    """Return whether a bead (rows, A) reaches a third of its peak in nine of ten measured sectors."""
     seen = np.isfinite(height)
     sectors = [
         (np.where(s, h, 0.0).sum(1) / np.maximum(s.sum(1), 1)).max()

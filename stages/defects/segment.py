@@ -1,4 +1,4 @@
-"""From cells that stand out to instances, each with its own outline."""
+"""Split the detected cells into instances, each with its own outline."""
 
 from __future__ import annotations
 
@@ -20,17 +20,18 @@ from stages.defects.relief import WallRelief
 Labels = NDArray[np.int32]
 
 _EIGHT = np.ones((3, 3), int)
-_LONGEST_ROWS = 2000
+_LONGEST_ROWS = 2000  # a longer defect is given in parts of this length, to bound memory
 
 
 @dataclass(frozen=True)
 class Region:
-    """Cells of one defect, in a window that is cut out of the map and never crosses its seam.
+    """Cells of one defect in a window of the map; the window may cross the seam of the azimuth.
 
     Attributes
     ----------
     row, column : int
-        Of the window's first cell in the map; the column may be negative.
+        First cell of the window in the map. Columns are modulo the map's width, and ``column`` may be
+        negative.
     mask : (H, W) bool
     sign : float
         +1 into the wall, −1 inward.
@@ -49,7 +50,7 @@ class Region:
         return replace(self, row=self.row - row)
 
     def turned(self, columns: int) -> Region:
-        """Return the region so many columns further around the pipe."""
+        """Return the region moved by ``columns`` columns around the pipe."""
         return replace(self, column=self.column + columns)
 
     def cut(self, image: Float) -> Float:
@@ -59,10 +60,10 @@ class Region:
 
 
 def regions_of(relief: WallRelief, cells: Grown, gap_mm: float, scratch: Scratch) -> tuple[Region, ...]:
-    """Return what belongs together, and the welds, in order of distance.
+    """Return all defects and welds, sorted by distance.
 
-    Cells of one sign with a gap of less than ``gap_mm`` are one defect. What is longer than 2000 rows, a
-    groove along the whole pipe say, is given in parts of that length.
+    Cells of one sign with a gap of less than ``gap_mm`` are one defect. What is longer than 2000 rows, for
+    example a groove along the whole pipe, is returned in parts of that length.
     """
     regions = [_weld(relief, band) for band in relief.welds]
     for sign, mask in ((1.0, cells.into), (-1.0, cells.inward)):
@@ -78,7 +79,7 @@ def _weld(relief: WallRelief, band: slice) -> Region:
 def instances(
     mask: Bool, sign: float, cell_mm: tuple[float, float], gap_mm: float, scratch: Scratch
 ) -> list[Region]:
-    """Return what belongs together among cells (S, A) of one sign, wherever a long map is cut."""
+    """Return the connected regions of cells (S, A) of one sign; the result does not depend on stretches."""
     patches = _patches(mask, cell_mm, gap_mm, scratch)
     out: list[Region] = []
     for number, extent in enumerate(patches.extent):
@@ -89,7 +90,7 @@ def instances(
 
 
 def _region(cells: Bool, first_row: int, sign: float) -> Iterator[Region]:
-    """Yield the region of ``cells`` (rows, A), none where there is no cell."""
+    """Yield the region of ``cells`` (rows, A), or nothing where there is no cell."""
     if cells.any():
         first = _widest_gap_end(np.asarray(cells.any(0)))
         rolled = np.roll(cells, -first, 1)
@@ -112,9 +113,9 @@ class Patches:
     Attributes
     ----------
     label : (S, A) int32
-        0 where there is nothing, else a number that holds within one stretch.
+        0 where there is nothing, else the number of a piece that is connected within one stretch.
     patch : (L + 1,) int
-        The patch of every such number, −1 for 0.
+        The patch that each label belongs to, −1 for label 0.
     extent : tuple of slice
         Rows of every patch.
     """
@@ -124,12 +125,12 @@ class Patches:
     extent: tuple[slice, ...]
 
     def of(self, rows: slice) -> Int:
-        """Return the patches (rows, A) of some rows, −1 where there is none."""
+        """Return the patch numbers (rows, A) of some rows, −1 where there is none."""
         return self.patch[self.label[rows]]
 
 
 def _patches(mask: Bool, cell_mm: tuple[float, float], gap_mm: float, scratch: Scratch) -> Patches:
-    """Label what is connected stretch by stretch, and join what meets at the cuts and over the seam."""
+    """Label connected cells stretch by stretch; join labels that meet at cuts and across the seam."""
     labels = scratch.zeros(mask.shape, np.int32)
     rows_of: list[slice] = []
     meeting: list[Int] = [np.empty((0, 2), np.int64)]
@@ -152,7 +153,7 @@ def _patches(mask: Bool, cell_mm: tuple[float, float], gap_mm: float, scratch: S
 
 
 def _touching(above: Labels, below: Labels) -> list[Int]:
-    """Return pairs (n, 2) of labels of two periodic rows (A,), one under the other, that touch."""
+    """Return pairs (n, 2) of labels that touch between two neighbouring rows (A,), periodic in azimuth."""
     pairs = [np.stack([above, np.roll(below, shift)], -1) for shift in (-1, 0, 1)]
     return [np.unique(p[(p > 0).all(1)], axis=0) for p in pairs]
 
@@ -166,7 +167,7 @@ def _over_the_seam(labels: Labels) -> list[Int]:
 
 
 def _extents(patch: Int, rows_of: list[slice]) -> tuple[slice, ...]:
-    """Return the rows of every patch from those of its parts."""
+    """Return the rows of every patch from the rows of its labels."""
     count = int(patch.max(initial=-1)) + 1
     first, last = np.full(count, np.iinfo(np.int64).max), np.zeros(count, np.int64)
     np.minimum.at(first, patch, np.array([r.start for r in rows_of], np.int64))

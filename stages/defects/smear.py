@@ -1,7 +1,8 @@
-"""Depths that a noise filter or a codec flattened: each picture holds some of those before it.
+"""Depths flattened by a temporal noise filter or a codec: each picture retains a part of earlier ones.
 
-Such a picture shows a mean of the wall over the way that the probe went meanwhile. What that took off a
-finding's depth is told by what it would take off once more: as from a bell that loses as much then.
+Such a picture shows the wall averaged over the way that the probe travelled meanwhile. How much of a
+finding's depth was lost is estimated by filtering its profile once more: it equals what a bell has lost that
+would lose as much the second time.
 """
 
 from __future__ import annotations
@@ -18,19 +19,20 @@ from stages.defects.depth import Depth
 from stages.defects.segment import Region
 from stages.defects.surface import Surface
 
-# No finding is taken to have been narrower than the millimetre whose mean a depth is: 1 σ of a bell that is
-# 1 mm wide at half its height, mm.
+# A finding is taken to have been no narrower than the 1 mm over which a depth is averaged: 1 σ, mm, of a bell
+# that is 1 mm wide at half its height.
 _SHARPEST_MM = 0.42
-# Bells are tried up to so many ways over which a picture is held: the widest lose 1 / 450 of their height.
+# Bells are tried up to 30 times as wide as the way over which light is retained: the widest lose 1 / 450 of
+# their height.
 _WIDEST, _BELLS = 30.0, 40
 
 
 def flattened(depth: Depth, region: Region, surface: Surface, held: HeldOver, ways_mm: Float) -> Depth:
-    """Return a depth with a σ that holds what pictures which ``held`` earlier ones may have taken off it.
+    """Return a depth whose σ includes what pictures retaining earlier ones (``held``) may have taken off.
 
-    ``ways_mm`` (F,) is how far the probe went to each frame's ring since the one before.
-    A codec holds the fine structure of the line and shows a step of the wall anew, a noise filter flattens
-    both: likeness does not tell which, so that the depth itself is left as it is.
+    ``ways_mm`` (F,) is how far the probe moved to each frame's ring since the ring before. A codec retains
+    the fine structure of the line but draws a step of the wall afresh, a noise filter flattens both. How
+    alike pictures are does not show which of the two was at work, so that only σ changes and not the depth.
     """
     way_mm = usual_way(ways_mm[np.unique(surface.near.frame)])
     if not held.handed_on or not way_mm:
@@ -43,7 +45,7 @@ def flattened(depth: Depth, region: Region, surface: Surface, held: HeldOver, wa
 
 
 def _shown(region: Region, surface: Surface, column: int) -> Float:
-    """Return a finding's profile (H,) along the pipe, of what goes all round the median round the pipe."""
+    """Return a finding's profile (H,) along the pipe, mm; for an all-round one, its medians round it."""
     return (
         row_median(region.cut(surface.all_mm))
         if region.all_round
@@ -52,10 +54,10 @@ def _shown(region: Region, surface: Surface, column: int) -> Float:
 
 
 def _lost(profile: Float, share: float, cell_mm: float) -> float:
-    """Return how many times the height that a ``profile`` (H,) still has it lost.
+    """Return the lost height over the remaining height of a ``profile`` (H,).
 
-    It is what a bell lost of which once more takes off as much. Where even the sharpest keeps more, a finding
-    is taken to have been as sharp: the loss is then at most as large.
+    It is the loss of the bell that would lose the same fraction if filtered once more. Where even the
+    narrowest bell loses less, the finding is taken to have been that narrow, which bounds the loss.
     """
     held = 1 / (1 - share)
     sharpest = _SHARPEST_MM / cell_mm
@@ -69,14 +71,14 @@ def _lost(profile: Float, share: float, cell_mm: float) -> float:
 
 
 def _kept(profile: Float, share: float) -> float:
-    """Return which part of a profile's height (H,) is left once more, whichever way the probe went."""
+    """Return the fraction of a profile's height (H,) left if filtered once more, in the worse direction."""
     left = min(float(_held_over(p, share).max(initial=0.0)) for p in (profile, profile[::-1]))
     return left / max(float(profile.max(initial=0.0)), 1e-9)
 
 
 def _held_over(profile: Float, share: float) -> Float:
-    """Return a profile (H,) of which each cell holds such a share of the one before."""
-    # Loaded where it is needed, as few runs do: it brings scipy.stats, a fifth of the time of all imports.
+    """Return a profile (H,) in which each cell retains ``share`` of the cell before."""
+    # Imported here because few runs need it: it imports scipy.stats, a fifth of the time of all imports.
     from scipy.signal import lfilter
 
     return np.asarray(lfilter([1 - share], [1, -share], profile))

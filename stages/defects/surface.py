@@ -1,6 +1,6 @@
-"""Some rows of the wall with the points on them: what depths are read from.
+"""Some rows of the wall with their points, from which depths are read.
 
-Its 1 mm mean is taken from the points themselves, without what the map's smoothing takes off a peak.
+The 1 mm mean is computed from the points themselves, so that the smoothing of the map does not flatten peaks.
 """
 
 from __future__ import annotations
@@ -22,16 +22,16 @@ from stages.defects.relief import Relief, WallRelief
 from stages.defects.segment import Region
 
 _MARGIN_MM, _MARGIN_IN_RINGS = 10.0, 3.0
-# A sample that only one ring shows has a σ of 0.3 to 0.7 of its distance to the wall: from ten σ on this
-# tells it, and below it moves a depth by no more than its noise.
+# A sample that only one ring shows has a σ of 0.3 to 0.7 of its distance from the wall. From about ten σ on
+# such a sample is recognised by this limit; a nearer one moves a depth by no more than its noise.
 _UNSURE = 3.0
-_AROUND_MM = 0.45  # 1 σ of the kernel around the pipe: within a ring, samples lie close
-_LEAST = 12
+_AROUND_MM = 0.45  # 1 σ of the kernel around the pipe, where a ring's samples lie close together
+_LEAST = 12  # points, for a local quadratic of 6 coefficients
 
 
 @dataclass(frozen=True)
 class DeviationPoints:
-    """The cloud's points against the pipe's smooth shape, ordered by cell of the map.
+    """The cloud's points relative to the pipe's smooth shape, sorted by cell of the map.
 
     Attributes
     ----------
@@ -40,7 +40,7 @@ class DeviationPoints:
     row, column, deviation_mm : (M,)
         Fractional place in the map, and radius minus the smooth shape of ``Relief.all_mm``.
     weight : (M,)
-        The points' median variance over their own, at most 1.
+        Median variance of the points over the point's own, at most 1.
     spacing_mm : float
         Median distance between neighbouring rings.
     """
@@ -54,17 +54,17 @@ class DeviationPoints:
 
     @property
     def kernel_mm(self) -> tuple[float, float]:
-        """1 σ of the regression's kernel along and around: as narrow as the rings allow."""
+        """1 σ of the regression's kernel along and around the pipe: as narrow as the ring spacing allows."""
         return max(0.4, 0.55 * self.spacing_mm), _AROUND_MM
 
 
 def fine_surface(relief: Relief, points: DeviationPoints, wanted: Bool, coarse_mm: Float) -> Float:
-    """Return the 1 mm mean (S, A) of ``relief.all_mm`` by local quadratic regression on the points.
+    """Return the 1 mm mean (S, A) of ``relief.all_mm``, mm, by local quadratic regression on the points.
 
-    Samples where the line is dim, as on rust or at the bottom of a pit, count by their own variance. A local
-    quadratic has no bias from a peak's curvature (Fan & Gijbels, Local polynomial modelling and its
-    applications, 1996, § 3.2). Where too few points lie near, and where it is not ``wanted`` (S, A), the
-    map's own mean ``coarse_mm`` (S, A) stands in.
+    Samples of a dim line, as on rust or at the bottom of a pit, have less weight. A local quadratic has no
+    bias from a peak's curvature (Fan & Gijbels, Local polynomial modelling and its applications, 1996, §
+    3.2). Where too few points are near, and where it is not ``wanted`` (S, A), the map's own mean
+    ``coarse_mm`` (S, A) is used.
     """
     out = np.full(relief.local_mm.shape, np.nan)
     place = (points.first, points.row, points.column, points.deviation_mm, points.weight)
@@ -78,7 +78,7 @@ def fine_surface(relief: Relief, points: DeviationPoints, wanted: Bool, coarse_m
 
 
 def deviation_points(relief: Relief, points: PointCloud, spacing_mm: float) -> DeviationPoints:
-    """Return points on the rows of a relief against the smooth shape."""
+    """Return the points on the rows of a relief, relative to its smooth shape."""
     rows, columns = relief.local_mm.shape
     step = float(relief.azimuth_rad[1] - relief.azimuth_rad[0])
     i = (points.distance_mm.astype(float) - relief.distance_mm[0]) / relief.cell_mm[0]
@@ -112,10 +112,11 @@ class Surface:
     coarse_mm : (S, A)
         1 mm mean of the map's ``all_mm``, which smoothing has flattened.
     near : PointCloud
+        All points on these rows.
     points : DeviationPoints
-        Those of them that the surface goes by, against the smooth shape.
+        Those of them from which the surface was computed, relative to the smooth shape.
     left_out : tuple of int
-        Frames whose points it does not go by.
+        Frames whose points were not used.
     """
 
     relief: Relief
@@ -129,7 +130,7 @@ class Surface:
 
 @dataclass(frozen=True)
 class MeasuredWall:
-    """A whole wall: its relief, its points, and the median distance between neighbouring rings."""
+    """A whole wall: its relief, its points, and the median distance between neighbouring rings, mm."""
 
     relief: WallRelief
     cloud: CloudAlong
@@ -137,37 +138,37 @@ class MeasuredWall:
 
     @cached_property
     def ways_mm(self) -> Float:
-        """How far the probe went to each frame's ring (F,) since the ring before."""
+        """How far the probe moved to each frame's ring (F,) since the ring before, mm."""
         return self.cloud.ways_mm()
 
     @cached_property
     def rings_mm(self) -> float:
-        """1 σ by which median radii of rings scatter on sampled rows, by second differences; 0 if unknown."""
+        """1 σ of single rings' median radii on sampled rows, mm, by second differences; 0 if unknown."""
         s = self.relief.radius_map.distance_mm
         parts = [_bends(self.cloud.between(float(s[r][0]), float(s[r][-1]))) for r in self.relief.sampled]
         bends = np.concatenate(parts) if parts else np.empty(0)
         return float(robust_spread(bends) / np.sqrt(6)) if bends.size else 0.0
 
     def with_margin(self, rows: slice) -> Stretch:
-        """Return rows with those about them that have a say in their surface."""
+        """Return rows together with the neighbouring rows that influence their surface."""
         margin = self.relief.rows_in(max(_MARGIN_MM, _MARGIN_IN_RINGS * self.spacing_mm))
         return widened(rows, self.relief.shape[0], margin)
 
     def surface(
         self, rows: slice, wanted: Bool, every_point: bool = False, without: tuple[int, ...] = ()
     ) -> Surface:
-        """Return the surface of some rows; where not ``wanted`` (rows, A), the map's own mean stands in.
+        """Return the surface of some rows; where not ``wanted`` (rows, A), it is the map's own mean.
 
-        It goes by the points that are sure of themselves, or by ``every_point``, and ``without`` some frames.
+        It uses the points of usual σ, or ``every_point``, and leaves out the frames in ``without``.
         """
         relief = self.relief.rows(rows)
         half = relief.cell_mm[0] / 2
         near = self.cloud.between(relief.distance_mm[0] - half, relief.distance_mm[-1] + half)
-        used = near if every_point else chosen(near, sure_of_themselves(near))
+        used = near if every_point else chosen(near, of_usual_sigma(near))
         used = chosen(used, ~np.isin(used.frame, without)) if without else used
         points = deviation_points(relief, used, self.spacing_mm)
         coarse = millimetre_mean(relief.all_mm, relief.cell_mm)
-        # The map's own mean holds the frames that are left out.
+        # The map's own mean includes the frames that are left out, so it cannot be used then.
         stands_in = np.where(wanted, np.nan, coarse) if without else coarse
         everything = fine_surface(relief, points, wanted, stands_in)
         local = everything + relief.local_mm - relief.all_mm
@@ -176,10 +177,7 @@ class MeasuredWall:
     def surface_about(
         self, region: Region, every_point: bool, without: tuple[int, ...] = ()
     ) -> tuple[Surface, Region]:
-        """Return the surface about a region, and the region with its rows counted from the first there.
-
-        As in `surface`.
-        """
+        """Return the `surface` about a region, and the region with rows counted from the surface's first."""
         part = self.with_margin(slice(region.row, region.row + region.mask.shape[0]))
         here = region.counted_from(part.wide.start)
         columns = self.relief.shape[1]
@@ -199,8 +197,11 @@ def _bends(points: PointCloud) -> Float:
     return np.diff(rings[along], 2) if len(rings) > 2 else np.empty(0)
 
 
-def sure_of_themselves(points: PointCloud) -> Bool:
-    """Return which points (M,) have no σ far above the others': nothing but itself speaks for such a one."""
+def of_usual_sigma(points: PointCloud) -> Bool:
+    """Return which points (M,) have a σ of at most three times the median σ.
+
+    A point of larger σ is one that its own ring alone shows.
+    """
     return np.asarray(
         points.sigma_mm <= _UNSURE * np.median(points.sigma_mm) if len(points.frame) else [], bool
     )
@@ -232,7 +233,8 @@ def _regress(first, i, j, deviation, sure, cell_s, cell_a, along, around, least,
     for row, column in wanted:
         count = 0
         before = after = False
-        # Sums of weight times powers of s, the first digit, and q: all that the equations hold.
+        # Sums of weight × sᵃ qᵇ, named m followed by a and b (d: times the deviation), for the normal
+        # equations.
         m00 = m10 = m01 = m20 = m11 = m02 = m30 = m21 = m12 = m03 = m40 = m31 = m22 = m13 = m04 = 0.0
         d00 = d10 = d01 = d20 = d11 = d02 = 0.0
         for r in range(max(0, row - reach_s), min(rows, row + reach_s + 1)):
@@ -282,7 +284,7 @@ def _regress(first, i, j, deviation, sure, cell_s, cell_a, along, around, least,
 
 @numba.njit(cache=True, nogil=True)
 def _solve(matrix, right):  # type: ignore[no-untyped-def]
-    """Solve equations in place by Cholesky's way; of the matrix, positive definite, the upper half counts."""
+    """Solve a positive definite system in place by Cholesky's method, from the upper triangle."""
     n = len(right)
     for a in range(n):
         for k in range(a):

@@ -89,7 +89,7 @@ def test_what_is_left_out_of_a_surface_comes_not_back_by_the_map():
     assert np.nanmax(shown) < 0.9
 
 
-def test_rings_that_are_not_sure_of_themselves_do_not_speak_for_a_finding():
+def test_rings_that_are_not_of_usual_sigma_do_not_speak_for_a_finding():
     told = found(2, unsure=True)
     assert (len(told.items), len(told.unconfirmed)) == (0, 1)
 

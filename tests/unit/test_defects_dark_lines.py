@@ -179,7 +179,7 @@ def test_a_crack_that_rings_do_not_show_is_listed_and_not_counted() -> None:
     assert (line.kind, line.id) == (DefectKind.CRACK, 1)
     assert line.pacp_suggestion.startswith("CL")
     assert line.peak_clock == pytest.approx(3 + np.degrees(0.5) / 30, abs=0.2)
-    assert "The photo alone shows it" in line.statement
+    assert "Only the photo shows it" in line.statement
     assert np.isnan([line.probability, line.confidence]).all()
     assert abs(line.depth_mm) < 3 * line.depth_sigma_mm
     assert len(line.frames) > 20

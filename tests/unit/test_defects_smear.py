@@ -158,7 +158,7 @@ def test_a_finding_whose_depth_may_be_flattened_by_as_much_is_told_as_at_least_s
     told = found_on(seen, HeldOver(share ** np.arange(12)))
     assert (abs(told.depth_mm) < 1.96 * told.depth_sigma_mm) == flattened
     assert told.probability > 0.5
-    assert ("It is at least so deep" in told.statement) == flattened
+    assert ("This depth is a lower bound" in told.statement) == flattened
 
 
 def test_the_lower_bound_of_what_goes_all_round_is_no_glint_s() -> None:
@@ -175,6 +175,6 @@ def test_the_lower_bound_of_what_goes_all_round_is_no_glint_s() -> None:
     )
     (told,) = (d for d in found.items if d.kind == "weld")
     assert abs(told.depth_mm) < 1.96 * told.depth_sigma_mm
-    assert "It is at least so deep" in told.statement
+    assert "This depth is a lower bound" in told.statement
     assert abs(told.depth_mm) == pytest.approx(float(np.abs(seen).max()), abs=0.1)
     assert abs(told.depth_mm) < 1.0
