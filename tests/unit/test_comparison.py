@@ -10,8 +10,10 @@ from pipeline.artefacts.comparison import FAMILY_ERROR, Fate
 from pipeline.errors import UnusableError
 from stages.compare import changes, holm, put_together
 from stages.compare.paired import PairedWalls
+from stages.compare.patch import outline_mask
 from stages.compare.registration.by_marks import register
 from tests.two_walls import (
+    COLUMNS,
     FINE,
     NO_WELDS,
     PIPE,
@@ -136,3 +138,20 @@ def test_the_spread_of_a_median_of_correlated_diameters_is_stated_right(alike):
     z = [np.median(r) / (r.std() * np.sqrt(np.pi / 2 / independent_count(r))) for r in drawn]
     assert 0.8 < np.sqrt(np.mean(np.square(z))) < 1.25
     assert alike < 0.9 or np.sqrt(np.mean(np.square(white))) > 3
+
+
+@pytest.mark.parametrize("radius_mm", [RADIUS, 25.0])
+def test_the_foot_of_a_finding_reaches_across_the_seam_as_far_as_it_reaches_elsewhere(radius_mm):
+    """The foot beyond the first or last column was called clean wall; in narrow pipes it was too narrow."""
+    wall = PIPE.surface((), 3).wall
+    wall = replace(wall, radius_mm=np.full_like(wall.radius_mm, radius_mm))
+    registration = register(PIPE.surface((), 3), later((), 4), NO_WELDS, SAME)
+    pair = PairedWalls(wall, wall, registration)
+    half = 5.0 / radius_mm
+    counts = []
+    for middle in (0.0, -np.pi + half):  # the second begins at the seam
+        corners = [(s, middle + psi) for s, psi in ((50, -half), (60, -half), (60, half), (50, half))]
+        counts.append(outline_mask([np.array(corners)], pair).sum(1))
+    assert counts[1] == pytest.approx(counts[0], abs=2)
+    wide_mm = counts[0].max() * 2 * np.pi * radius_mm / COLUMNS
+    assert wide_mm == pytest.approx(10 + 2 * 2.0, abs=1.5)  # the finding, and 2 mm of foot on either side
