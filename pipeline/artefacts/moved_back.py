@@ -13,7 +13,7 @@ from scipy.ndimage import label
 
 from pipeline.arrays import Bool, Float, Int
 from pipeline.artefacts.measured import RingSamples, RingValidity, Trajectory
-from pipeline.geometry.axis import frames_at, to_pipe
+from pipeline.geometry.axis import distance_along, roll_at
 
 
 def told_by_roll(rings: RingSamples, trajectory: Trajectory) -> RingSamples:
@@ -37,9 +37,7 @@ def _roll_of(rings: RingSamples, trajectory: Trajectory) -> Float:
     """Return azimuth in P less azimuth in the image (F,)."""
     last = len(trajectory.frame) - 1
     T_pc = trajectory.T_pc[np.minimum(np.searchsorted(trajectory.frame, rings.frame), last)]
-    section = frames_at(trajectory.axis, to_pipe(trajectory.axis, T_pc[:, :3, 3])[0])[1]
-    turn = np.swapaxes(section, 1, 2) @ T_pc[:, :3, :3]
-    return np.asarray(np.arctan2(turn[:, 1, 0], turn[:, 0, 0]))
+    return roll_at(trajectory.axis, distance_along(trajectory.axis, T_pc), T_pc)
 
 
 def _widths(moved: Bool) -> Int:

@@ -76,8 +76,9 @@ class FixedPlace:
     ----------
     azimuth_rad, width_rad : float
         Where in the image it departs most, and how far it reaches around.
-    departure_mm : float
-        The largest departure, positive into the wall.
+    departure_mm, departure_sd_mm : float
+        The largest departure, positive into the wall, and its 1 σ: what clear places depart by over as long
+        a way.
     length_mm : float
         Length of pipe over which it stays.
     frame_from, frame_to : int
@@ -89,6 +90,7 @@ class FixedPlace:
     azimuth_rad: float
     width_rad: float
     departure_mm: float
+    departure_sd_mm: float
     length_mm: float
     frame_from: int
     frame_to: int

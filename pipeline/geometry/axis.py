@@ -109,6 +109,12 @@ def distance_along(axis: PipeAxis, T_pc: Float) -> Float:
     return to_pipe(axis, T_pc[..., :3, 3])[0]
 
 
+def roll_at(axis: PipeAxis, distance_mm: Float, T_pc: Float) -> Float:
+    """Return azimuth in P less azimuth in the image (N,), rad, of poses (N, 4, 4) at distances (N,)."""
+    turn = np.swapaxes(frames_at(axis, distance_mm)[1], -1, -2) @ T_pc[:, :3, :3]
+    return np.asarray(np.arctan2(turn[:, 1, 0], turn[:, 0, 0]))
+
+
 def _nearest(axis: PipeAxis, p: Float) -> Float:
     """Return the distance of the axis point nearest along the overall direction of the axis."""
     if len(axis.distance_mm) == 2:

@@ -18,7 +18,7 @@ from pipeline.artefacts.measured import RingPoints, RingSamples, RingValidity, T
 from pipeline.artefacts.moved_back import told_by_roll
 from pipeline.artefacts.wall_map import FixedPlace, FixedToProbe
 from pipeline.errors import UnusableError
-from pipeline.geometry.axis import frames_at
+from pipeline.geometry.axis import roll_at
 from pipeline.instrument.probe import Probe
 from pipeline.machine.stage import Context, Parameters, Stage
 from pipeline.pages import notation
@@ -65,9 +65,7 @@ def calibration_spread(
     count = min(len(usable), max(_RINGS, len(usable) // _EVERY))
     some = usable[np.unique(np.linspace(0, len(usable) - 1, count).astype(int))]
     index = np.searchsorted(trajectory.frame, rings.frame[some])
-    section = frames_at(trajectory.axis, survey.middle_mm[some])[1]
-    turn = np.swapaxes(section, 1, 2) @ trajectory.T_pc[index, :3, :3]
-    roll = np.arctan2(turn[:, 1, 0], turn[:, 0, 0])
+    roll = roll_at(trajectory.axis, survey.middle_mm[some], trajectory.T_pc[index])
     knock = trajectory.knock
     after = probe if knock is None else probe.after(knock)
     first = np.inf if knock is None else knock.frame
@@ -274,7 +272,7 @@ def _report(context: Context, wall: Wall, spread: CalibrationSpread) -> None:
 
 ACCUMULATE = Stage(
     "accumulate",
-    "14",
+    "15",
     AccumulateParameters,
     accumulate_wall,
     "point cloud and radius map about the pipe's own axis, with σ",

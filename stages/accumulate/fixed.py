@@ -77,13 +77,14 @@ def fixed_to_probe(
     blocks = _blocks_of(survey, rings, length / _BLOCKS)
     steady = _running_median(blocks.departure_mm)
     places, departure = [], scratch.zeros((len(grid.distance_mm), len(grid.azimuth_rad)), np.float32)
-    for place in _places(steady, robust_spread(steady[np.isfinite(steady)])):
+    spread = robust_spread(steady[np.isfinite(steady)])
+    for place in _places(steady, spread):
         row, sector = _where_it_shows(*place, steady, blocks)
         on_probe = _is_on_probe(row, sector, steady, blocks)
         if on_probe is False or blocks.length_mm(np.unique(row)) < _COVERED * length:
             continue
         _draw(departure, row, sector, steady, blocks, grid)
-        places.append(_described(row, sector, steady, blocks, frame, on_probe is True))
+        places.append(_described(row, sector, steady, spread, blocks, frame, on_probe is True))
     return FixedToProbe(departure, tuple(places)) if places else None
 
 
@@ -178,13 +179,13 @@ def _gap(blocks: _Blocks) -> float:
 
 
 def _described(
-    row: Int, sector: Int, steady: Float, blocks: _Blocks, frame: Int, on_probe: bool
+    row: Int, sector: Int, steady: Float, spread: float, blocks: _Blocks, frame: Int, on_probe: bool
 ) -> FixedPlace:
     step = 2 * np.pi / steady.shape[1]
     deepest = int(np.argmax(np.abs(steady[row, sector])))
     rings = np.concatenate([blocks.rings[b] for b in np.unique(row)])
     width = len(np.unique(sector)) * step
     return FixedPlace(
-        (sector[deepest] + 0.5) * step - np.pi, width, float(steady[row, sector][deepest]),
+        (sector[deepest] + 0.5) * step - np.pi, width, float(steady[row, sector][deepest]), spread,
         blocks.length_mm(np.unique(row)), int(frame[rings.min()]), int(frame[rings.max()]), on_probe,
     )  # fmt: skip

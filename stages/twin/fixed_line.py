@@ -15,11 +15,9 @@ from pipeline.arrays import Bool, Float, runs_of
 from pipeline.artefacts.measured import RingSamples
 from pipeline.artefacts.twin import Mismatch, NamedFigure
 from pipeline.artefacts.wall_map import FixedPlace, FixedToProbe
+from stages.twin.discs import meet
 from stages.twin.scene import Ring
 
-_FOUND = 8.0
-"""Robust σ, of all sectors over as long a way, from which a place is found: its departure is known to an
-eighth at least, and noise does not make one."""
 _SEEN = 0.5
 """Share of rings that show an azimuth, below which the line is not seen there. Chosen."""
 
@@ -42,7 +40,7 @@ def on_line(
             made.append(
                 _mismatch(part, samples.azimuth_rad, max(own, key=lambda p: abs(p.departure_mm)), ring)
             )
-    return tuple(m for m in made if not any(_touch(m, other) for other in others))
+    return tuple(m for m in made if not any(meet(m, other) for other in others))
 
 
 def _within(place: FixedPlace, azimuth_rad: Float) -> Bool:
@@ -66,17 +64,9 @@ def _mismatch(part: Bool, azimuth_rad: Float, place: FixedPlace, ring: Ring) -> 
     at = zip(("u_px", "v_px", "radius_px"), (look.u_px, look.v_px, radius), strict=True)
     return Mismatch(
         "", "line", "image", tuple(NamedFigure(n, float(x), radius / 2, "px") for n, x in at),
-        (NamedFigure("departure", place.departure_mm, abs(place.departure_mm) / _FOUND, "mm"),),
+        (NamedFigure("departure", place.departure_mm, place.departure_sd_mm, "mm"),),
         nan, nan, nan,
         f"About ({look.u_px:.0f}, {look.v_px:.0f}) the line lies {place.departure_mm:+.2f} mm aside in all "
         "frames, whatever wall goes by: a drop or a scratch on the window bends its light, or the sheet is "
         "not plane there.", look,
     )  # fmt: skip
-
-
-def _touch(one: Mismatch, other: Mismatch) -> bool:
-    at = [{p.name: p.value for p in m.place} for m in (one, other)]
-    if "radius_px" not in at[1]:
-        return False
-    away = np.hypot(at[0]["u_px"] - at[1]["u_px"], at[0]["v_px"] - at[1]["v_px"])
-    return bool(away < at[0]["radius_px"] + at[1]["radius_px"])

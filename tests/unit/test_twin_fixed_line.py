@@ -15,7 +15,7 @@ _RING = Ring((400.0, 300.0), 200.0, 50.0, 22.0)
 
 
 def _fixed(*more, on_probe=True):
-    place = FixedPlace(np.pi / 2, 0.2, -0.8, 60.0, 4, 90, on_probe)
+    place = FixedPlace(np.pi / 2, 0.2, -0.8, 0.02, 60.0, 4, 90, on_probe)
     return FixedToProbe(np.zeros((3, 3), np.float32), (place, *more))
 
 
@@ -39,7 +39,8 @@ def test_a_place_of_the_image_that_moves_the_line_is_told_without_a_name():
     (found,) = on_line(_fixed(), _rings(), _RING, ())
     assert (found.name, found.channel, found.fixed_to) == ("", "line", "image")
     assert [p.value for p in found.place] == pytest.approx([400, 500, 20], abs=2)
-    assert found.parameters[0].value == -0.8
+    # An eighth of the departure was said to be its σ, which nobody had measured.
+    assert (found.parameters[0].value, found.parameters[0].sd) == (-0.8, 0.02)
     assert "-0.80 mm" in found.statement
 
 
@@ -52,7 +53,7 @@ def test_a_groove_along_the_pipe_and_what_is_told_already_are_not():
 
 def test_a_drop_amid_which_the_line_is_not_seen_is_one_place_from_rim_to_rim():
     """A drop of 43 px was nothing at all: the line left the rings at both rims and was not found between."""
-    other = FixedPlace(np.radians(116.0), 0.04, 0.7, 60.0, 0, 90, on_probe=True)
+    other = FixedPlace(np.radians(116.0), 0.04, 0.7, 0.02, 60.0, 0, 90, on_probe=True)
     (found,) = on_line(_fixed(other), _rings(lost_deg=(90.0, 116.0)), _RING, ())
     u, v, radius = (p.value for p in found.place)
     middle = np.radians(100.7)
