@@ -26,7 +26,7 @@ from pipeline.simulator.scene import Rendering
 from pipeline.simulator.sensor import exposed, shade_of, through_lens, with_dark_signal
 from pipeline.simulator.sheet import ghost_table, profile_table, sheet_table
 from pipeline.simulator.surface import Surface, Texture, surface_of, texture_of
-from pipeline.simulator.truth import SceneTruth
+from pipeline.simulator.truth import SceneTruth, row_late_s
 from pipeline.simulator.view import Line, View, add_line, line_of, line_tiles
 from pipeline.simulator.wall.grid import Wall
 from pipeline.simulator.wall_light import glow_of_lamps, glow_of_line, lamps_of, stray_light
@@ -273,9 +273,8 @@ class Renderer:
         shutter, samples = instrument.shutter, self.truth.rendering.time_samples
         within = ((np.arange(samples) + 0.5) / samples - 0.5) * shutter.exposure_s
         height = instrument.camera.model.image_size[1]
-        late = np.full(1, self.truth.late_s(instrument))
-        if shutter.kind == "rolling" and shutter.readout_s > 0:
-            late = late + ((np.arange(height) + 0.5) / height - 0.5) * shutter.readout_s
+        rows = np.arange(height if shutter.kind == "rolling" and shutter.readout_s > 0 else 1)
+        late = self.truth.late_s(instrument) + row_late_s(instrument, rows)
         opened = self._time_s(number) + late[:, None] + within
         return opened, float(np.ptp(opened))
 

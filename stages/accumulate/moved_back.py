@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.ndimage import maximum_filter
 
-from pipeline.arrays import Float, Float32
+from pipeline.arrays import Float32
 from pipeline.artefacts.measured import RingSamples
 from pipeline.machine.scratch import Scratch
 from pipeline.machine.stage import Context
@@ -35,26 +36,16 @@ def shared_on_wall(rings: RingsOnWall, grid: MapGrid, gap_mm: float, scratch: Sc
     moved_px = rings.rings.moved_px
     if moved_px is None:
         return None
+    step = grid.distance_mm[1] - grid.distance_mm[0]
     shared = scratch.zeros((len(grid.distance_mm), len(grid.azimuth_rad)), np.float32)
     for rows in some_at_a_time(np.flatnonzero(moved_px.any(1))):
         samples = rings.samples(rows)
         of = samples.valid & (moved_px[rows] != 0)
         per_px = samples.sigma_mm[of] / rings.rings.sigma_px[rows][of]
         size = np.abs(moved_px[rows][of]) * per_px
-        _draw(shared, samples.distance_mm[of], samples.azimuth_rad[of], size, grid, gap_mm)
-    return shared
-
-
-def _draw(
-    shared: Float32, distance_mm: Float, azimuth_rad: Float, size_mm: Float, grid: MapGrid, gap_mm: float
-) -> None:
-    """Raise cells of ``shared`` (S, A) about each sample (n,) to its size."""
-    first, step = grid.distance_mm[0], grid.distance_mm[1] - grid.distance_mm[0]
-    row = np.rint((distance_mm - first) / step).astype(np.int64)
-    column = np.rint((azimuth_rad + np.pi) / (2 * np.pi) * shared.shape[1]).astype(np.int64)
-    reach = int(np.ceil(gap_mm / step))
-    for along in range(-reach, reach + 1):
-        for around in (-1, 0, 1):
-            on = (row + along >= 0) & (row + along < len(shared))
-            cell = row[on] + along, (column[on] + around) % shared.shape[1]
-            np.maximum.at(shared, cell, size_mm[on].astype(np.float32))
+        row = np.rint((samples.distance_mm[of] - grid.distance_mm[0]) / step).astype(np.int64)
+        column = np.rint((samples.azimuth_rad[of] + np.pi) / (2 * np.pi) * shared.shape[1]).astype(np.int64)
+        cell = np.clip(row, 0, len(shared) - 1), column % shared.shape[1]
+        np.maximum.at(shared, cell, size.astype(np.float32))
+    reach = 2 * int(np.ceil(gap_mm / step)) + 1, 3
+    return np.asarray(maximum_filter(shared, reach, output=shared, mode=("constant", "wrap")))

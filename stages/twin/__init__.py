@@ -286,7 +286,7 @@ PHOTOMETRY = Stage(
 )
 TWIN = Stage(
     "twin",
-    "37",
+    "38",
     TwinParameters,
     compare_with_twin,
     "recorded frames beside the same frames, re-rendered from what the run has measured",

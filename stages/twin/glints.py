@@ -19,6 +19,7 @@ from pipeline.artefacts.twin import Look, Mismatch, NamedFigure
 from pipeline.recording.base import Illumination
 from stages.twin.cells import half_turn, sigmas
 from stages.twin.compare import BLOCK_PX, of_blocks
+from stages.twin.discs import Disc, disc_of, meet
 from stages.twin.locate import FALSE_ALARM
 from stages.twin.render import Region, TwinFrame
 from stages.twin.scene import Ring
@@ -130,7 +131,8 @@ class SpotsOfFrames:
         wall from elsewhere.
         """
         places, left = list[Mismatch](), [s for s in self.spots if s.grey > _PALEST * lit_wall]
-        left = [s for s in left if not any(_lies_in(m, s) for m in bent)]
+        discs = [d for d in map(disc_of, bent) if d is not None]
+        left = [s for s in left if not any(d.touches(Disc(*s.image, s.radius_px)) for d in discs)]
         while left:
             tried = {order: _largest_group(left, order) for order in ("image", "wall")}
             count = {order: _frames_of(group) for order, group in tried.items()}
@@ -233,22 +235,8 @@ def told_apart(
 
     What has a name on the window bends or scatters light and makes spots; what is only brighter is a glint.
     """
-    kept = [g for g in glints if not any(w.name and _at_one_place(w, g) for w in window)]
-    return tuple(w for w in window if w.name or not any(_at_one_place(w, g) for g in kept)), tuple(kept)
-
-
-def _lies_in(place: Mismatch, spot: Spot) -> bool:
-    at = {p.name: p.value for p in place.place}
-    away = np.hypot(at["u_px"] - spot.image[0], at["v_px"] - spot.image[1])
-    return bool(away < at["radius_px"] + spot.radius_px)
-
-
-def _at_one_place(one: Mismatch, other: Mismatch) -> bool:
-    at = [{p.name: p.value for p in m.place} for m in (one, other)]
-    if not all("radius_px" in place for place in at):
-        return False
-    away = np.hypot(at[0]["u_px"] - at[1]["u_px"], at[0]["v_px"] - at[1]["v_px"])
-    return bool(away < _REACH_PX + at[0]["radius_px"] + at[1]["radius_px"])
+    kept = [g for g in glints if not any(w.name and meet(w, g, _REACH_PX) for w in window)]
+    return tuple(w for w in window if w.name or not any(meet(w, g, _REACH_PX) for g in kept)), tuple(kept)
 
 
 def _largest_group(spots: list[Spot], order: str) -> list[Spot]:

@@ -18,9 +18,10 @@ from scipy.ndimage import maximum_filter1d
 from scipy.stats import norm
 
 from pipeline.adjustment.robust import spread_about_median
-from pipeline.arrays import Bool, Float, Float32
+from pipeline.arrays import Bool, Float32
 from pipeline.artefacts.twin import Mismatch
 from stages.twin.compare import BLOCK_PX
+from stages.twin.discs import Disc, meet
 
 _FEWEST_OF_RING, _HALF_WIDTHS = 100, (0.5, 1.0, 2.0, 4.0)
 """Half the width of rings, blocks: the first that holds enough of them, of which a speck is a small part.
@@ -38,6 +39,8 @@ recordings stays below it."""
 
 LEAST_CONTRAST = 0.25
 """Smallest relative change of texture that counts: poses and radii that err blur it by a tenth or two."""
+_APART_PX = 2.0 * BLOCK_PX
+"""Places nearer to each other than two blocks are one."""
 LEAST_ASIDE_PX, _OF_PX = 0.3, 0.1
 """Least displacement of texture that counts, px: a map of the wall and a lens errs by a tenth or two; chosen.
 Relative change that stands for a pixel of it."""
@@ -63,6 +66,11 @@ class ImagePlace:
     change: float
     sd: float
     probability: float
+
+    @property
+    def disc(self) -> Disc:
+        """Where it lies."""
+        return Disc(self.u_px, self.v_px, self.radius_px)
 
     def most_of(self, aside: Float32 | None) -> float:
         """Return how far, px, texture is drawn aside at most, where (2, H, W) say by how much."""
@@ -148,23 +156,16 @@ def _joined(beyond: Bool) -> list[Bool]:
 
 def beside(places: tuple[ImagePlace, ...], others: tuple[ImagePlace, ...]) -> tuple[ImagePlace, ...]:
     """Return the places that do not touch any of others."""
-    apart = 2 * BLOCK_PX
-    return tuple(
-        p
-        for p in places
-        if all(np.hypot(p.u_px - o.u_px, p.v_px - o.v_px) > apart + p.radius_px + o.radius_px for o in others)
-    )
+    return tuple(p for p in places if not any(p.disc.touches(o.disc, _APART_PX) for o in others))
 
 
 def told_once(found: list[Mismatch]) -> tuple[Mismatch, ...]:
     """Return what is on the window without what names the same spot a second time, and less well."""
-    kept: list[tuple[Float, Mismatch]] = []
+    kept: list[Mismatch] = []
     for one in sorted(found, key=lambda m: m.chi2_after - m.chi2_before):
-        at = np.array([p.value for p in one.place])
-        same = [np.hypot(*(at - o)[:2]) < at[2] + o[2] + 2 * BLOCK_PX for o, m in kept if m.name == one.name]
-        if not any(same):
-            kept.append((at, one))
-    return tuple(m for _, m in kept)
+        if not any(m.name == one.name and meet(m, one, _APART_PX) for m in kept):
+            kept.append(one)
+    return tuple(kept)
 
 
 def _spread_of_rings(change: Float32, known: Bool) -> Float32:

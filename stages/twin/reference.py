@@ -19,6 +19,7 @@ from pipeline.arrays import Bool, Float, Float32, Int
 from pipeline.artefacts.twin import Look, Mismatch
 from stages.twin.cells import centred, sigmas
 from stages.twin.compare import BLOCK_PX, block_ratios, of_blocks
+from stages.twin.discs import disc_of
 from stages.twin.locate import ImagePlace
 from stages.twin.render import TwinFrame
 from stages.twin.scene import Ring
@@ -127,11 +128,9 @@ class BlockSamples:
     def clear_of(self, found: Sequence[Mismatch]) -> BlockSamples:
         """Return the blocks that lie beside what was found at places of the image."""
         keep = np.ones(len(self.change), bool)
-        for place in ({p.name: p.value for p in m.place} for m in found):
-            if "radius_px" in place:
-                u, v = ((a + 0.5) * BLOCK_PX for a in (self.column, self.row))
-                away = np.hypot(u - place["u_px"], v - place["v_px"])
-                keep &= away > place["radius_px"] + 2 * BLOCK_PX
+        u, v = ((a + 0.5) * BLOCK_PX for a in (self.column, self.row))
+        for place in filter(None, map(disc_of, found)):
+            keep &= np.hypot(u - place.u_px, v - place.v_px) > place.radius_px + 2 * BLOCK_PX
         return self.kept(keep) if keep.any() else self
 
     def kept(self, keep: Bool) -> BlockSamples:

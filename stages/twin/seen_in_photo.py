@@ -9,10 +9,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-import numpy as np
-
 from pipeline.artefacts.twin import Mismatch
 from stages.twin.cells import half_turn
+from stages.twin.discs import disc_of
 from stages.twin.scene import Ring
 
 _DIMS = ("window_dirt", "window_scatter", "droplet")
@@ -36,13 +35,6 @@ def _may_be_left_by(bright: Mismatch, dim: Mismatch, ring: Ring) -> bool:
     sizes = [next((p.value for p in m.parameters if p.name == "share"), 0.0) for m in (bright, dim)]
     if not 0 < -sizes[0] < sizes[1]:
         return False
-    (one, wide), (other, more) = (_around(m, ring) for m in (bright, dim))
+    discs = [d for d in map(disc_of, (bright, dim)) if d is not None]
+    (one, wide), (other, more) = (d.around(ring.centre_px) for d in discs)
     return abs(half_turn(one - other)) < wide + more
-
-
-def _around(mismatch: Mismatch, ring: Ring) -> tuple[float, float]:
-    """Return image azimuth and half the width around of a place, degrees."""
-    at = {p.name: p.value for p in mismatch.place}
-    u, v = at["u_px"] - ring.centre_px[0], at["v_px"] - ring.centre_px[1]
-    wide = np.arctan2(at["radius_px"], max(float(np.hypot(u, v)), 1.0))
-    return float(np.degrees(np.arctan2(v, u))), float(np.degrees(wide))

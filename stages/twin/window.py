@@ -16,6 +16,7 @@ from scipy.stats import t
 from pipeline.arrays import Bool, Float, Float32
 from pipeline.artefacts.twin import Look, Mismatch, NamedFigure
 from stages.twin.cells import half_turn, sigmas
+from stages.twin.discs import disc_of
 from stages.twin.laws import SECTOR_STEP_DEG
 from stages.twin.locate import FALSE_ALARM, LEAST_CHANGE, ImagePlace
 from stages.twin.render import Region, TwinFrame
@@ -256,13 +257,11 @@ def _or_window(sector: Mismatch) -> Mismatch:
 
 def _same_azimuth(sector: Mismatch, on_window: Mismatch, ring: Ring) -> bool:
     """Return whether a place of the window lies at the image azimuth of a sector."""
-    at = {p.name: p.value for p in (*sector.place, *on_window.place)}
-    if "u_px" not in at or on_window.fixed_to != "image":
+    disc = disc_of(on_window)
+    if disc is None or on_window.fixed_to != "image":
         return False
-    u, v = at["u_px"] - ring.centre_px[0], at["v_px"] - ring.centre_px[1]
-    wide = at["width_deg"] + SECTOR_STEP_DEG
-    reach = wide / 2 + float(np.degrees(at["radius_px"] / max(np.hypot(u, v), 1.0)))
-    return abs(half_turn(float(np.degrees(np.arctan2(v, u))) - at["azimuth_deg"])) < reach
+    at, (azimuth, half) = {p.name: p.value for p in sector.place}, disc.around(ring.centre_px)
+    return abs(half_turn(azimuth - at["azimuth_deg"])) < (at["width_deg"] + SECTOR_STEP_DEG) / 2 + half
 
 
 def _with_photo(share: NamedFigure) -> NamedFigure:
