@@ -273,7 +273,7 @@ class Renderer:
         shutter, samples = instrument.shutter, self.truth.rendering.time_samples
         within = ((np.arange(samples) + 0.5) / samples - 0.5) * shutter.exposure_s
         height = instrument.camera.model.image_size[1]
-        rows = np.arange(height if shutter.kind == "rolling" and shutter.readout_s > 0 else 1)
+        rows = np.arange(float(height if shutter.kind == "rolling" and shutter.readout_s > 0 else 1))
         late = self.truth.late_s(instrument) + row_late_s(instrument, rows)
         opened = self._time_s(number) + late[:, None] + within
         return opened, float(np.ptp(opened))
