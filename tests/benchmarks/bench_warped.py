@@ -232,9 +232,10 @@ def _sizes(effect: dict[str, dict[str, dict[str, float]]]) -> str:
     return " ".join(f"{k} {v['value']:.4g}±{v['sd']:.2g}" for k, v in effect["parameters"].items())
 
 
-def _another(name: str, after: list[str]) -> Case:
-    """Return the first case of ``after`` whose right answer is another than that of a name's case."""
-    own = CASES[name]
+def another(name: str) -> Case:
+    """Return the next of all cases, whichever were asked for, whose right answer is another than a name's."""
+    own, every = CASES[name], [*CASES]
+    after = every[every.index(name) :] + every
     return next(c for c in map(CASES.__getitem__, after) if (c.names, c.verdict) != (own.names, own.verdict))
 
 
@@ -246,11 +247,11 @@ def main() -> None:
     parser.add_argument("--others", action="store_true")
     asked = parser.parse_args()
     names, words = asked.cases or [*CASES], []
-    for place, name in enumerate(names):
+    for name in names:
         folder = asked.out / f"{asked.pair.replace('/', '-')}-{name}"
         folder.mkdir(parents=True, exist_ok=True)
         told = answered(CASES[name], asked.pair, folder)
-        held = _another(name, names[place:] + names[:place]) if asked.others else CASES[name]
+        held = another(name) if asked.others else CASES[name]
         word, text = line(name, held, told)
         words.append(word)
         print(text, flush=True)
