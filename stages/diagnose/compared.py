@@ -56,6 +56,7 @@ def compared(
     examined: Examined | None,
     gauge: Recording | None,
     correction: Correction | None,
+    encoder_share: float = 0.0,
 ) -> Compared | None:
     """Return the residuals of the field, else of the gauge; None where neither has any.
 
@@ -65,6 +66,8 @@ def compared(
         The field with the stated and with the corrected probe.
     examined, gauge
         What rings and fiducials of the gauge run say, and its recording.
+    encoder_share
+        By what share of its reading the inspection's encoder is known to read too much.
     """
     try:
         of_gauge = _of_gauge(gauge, examined) if gauge is not None and examined is not None else None
@@ -76,7 +79,7 @@ def compared(
             # What happens at a time of the gauge run need not happen in the field: the gauge's own held-out
             # rings tell.
             return _gauge_alone(of_gauge, examined)
-        return _in_field(field, corrected or field, linear, of_gauge)
+        return _in_field(field, corrected or field, linear, of_gauge, encoder_share)
     except np.linalg.LinAlgError:
         return None
 
@@ -128,10 +131,12 @@ def _gauge_alone(of: GaugeResiduals, examined: Examined | None) -> Compared:
     return Compared(of.before, of.after, examined.quality if examined is not None else None)
 
 
-def _in_field(field: FieldRun, corrected: FieldRun, linear: Linear, of: GaugeResiduals | None) -> Compared:
+def _in_field(
+    field: FieldRun, corrected: FieldRun, linear: Linear, of: GaugeResiduals | None, encoder_share: float
+) -> Compared:
     """Return the field's residuals; it was not used for the correction, so it is what is held out."""
     before = rings_against_texture(field)
-    after = rings_against_texture(corrected, linear)
+    after = rings_against_texture(corrected, linear, encoder_share)
     every = (of.before.rms_px, of.after.rms_px) if of is not None else (before.rms_px, after.rms_px)
     return Compared(before, after, FitQuality("px", *every, before.rms_px, after.rms_px, after.floor_px))
 

@@ -29,7 +29,7 @@ from stages.diagnose.compared import OnImage, compared, image_of, with_pictures,
 from stages.diagnose.compose import composed
 from stages.diagnose.correct import CORRECTED_MOTION, CORRECTION, Corrected, CorrectedMotion, Correction
 from stages.diagnose.effects.library import without as library_without
-from stages.diagnose.field.answer import borne_out, met_by_field, with_field
+from stages.diagnose.field.answer import borne_out, encoder_share, met_by_field, with_field
 from stages.diagnose.field.evidence import travel_of_run
 from stages.diagnose.field.run import FieldRun
 from stages.diagnose.gauge.answer import verdict_of
@@ -110,7 +110,8 @@ def diagnose(
     found = found.not_knowing(without)
     context.progress(1, _STEPS)
     examined = of_gauge.geometry if of_gauge is not None else None
-    seen = compared(run, run_corrected, examined, gauge, correction)
+    share = encoder_share(found, of_field, probe)
+    seen = compared(run, run_corrected, examined, gauge, correction, share)
     found = with_readings(with_pictures(found, seen), (of_field, of_gauge))
     context.report("verdict", str(found.verdict))
     found = replace(found, shortcomings=(*noticed.sentences, *found.shortcomings))
@@ -172,7 +173,7 @@ def _without_scale(seen: Seen, unsaid: Sequence[str]) -> Seen:
 
 
 DIAGNOSIS = Stage(
-    "diagnosis", "32", DiagnosisParameters, diagnose,
+    "diagnosis", "33", DiagnosisParameters, diagnose,
     "what physics was left out, where it shows, and what bears it out",
 )  # fmt: skip
 _OF_FIELD = (PREMISES, RINGS, TRIANGULATE, LINE_PROFILE, FREE_MOTION, FIELD_EVIDENCE)

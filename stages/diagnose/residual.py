@@ -14,7 +14,7 @@ from stages.diagnose.effects.base import EffectModel, Shape
 from stages.diagnose.field.reduce import reduced, rings_after
 from stages.diagnose.field.run import FieldRun
 from stages.diagnose.field.run import ring_points as field_points
-from stages.diagnose.field.system import field_system
+from stages.diagnose.field.system import ENCODER_SCALE, field_system
 from stages.diagnose.gauge.elimination import RING
 from stages.diagnose.gauge.fit import Fit, fit
 from stages.diagnose.gauge.linearise import ring_mm_per_px
@@ -163,7 +163,7 @@ def _gauge_residual(run: GaugeRun, found: Fit, frames: Int) -> RingResidual:
 
 
 def rings_against_texture(
-    run: FieldRun, terms: Sequence[tuple[EffectModel, Shape, Float]] = ()
+    run: FieldRun, terms: Sequence[tuple[EffectModel, Shape, Float]] = (), encoder_share: float = 0.0
 ) -> RingResidual:
     """Return the rings' residual with the probe as stated and poses by texture.
 
@@ -174,6 +174,8 @@ def rings_against_texture(
     ----------
     terms
         Effects, their shapes and amplitudes (Q,), whose shift is taken out to first order.
+    encoder_share
+        By what share of its reading the encoder is known to read too much.
 
     Raises
     ------
@@ -185,6 +187,7 @@ def rings_against_texture(
     relaxed = replace(system, rows=(replace(rings, sigma=_FIELD_RELAXED * rings.sigma), *system.rows[1:]))
     # From the instrument as this run would bend it back to the stated one.
     to = -system.value
+    to[system.names.index(ENCODER_SCALE)] += encoder_share
     if terms:
         amplitude = np.concatenate([a for _, _, a in terms])
         to[len(to) - len(amplitude) :] = amplitude

@@ -13,6 +13,9 @@ from pipeline.simulator.laws import bench_truth
 from pipeline.simulator.prior import Concealable, draw_pair, read_prior
 from stages.diagnose.effects.courses import SEARCHED, Coursed, shape_alike, with_courses
 from stages.diagnose.effects.library import LIBRARY, columns, ring_shift_px, texture_shift_px, without
+from stages.diagnose.gauge.answer import _in_the_end
+from stages.diagnose.gauge.confirm import Sized
+from stages.diagnose.gauge.run import Term
 from tests.shared_data import PROJECT_ROOT
 from tests.unit.wall_points import Bore, plain_probe, ring_points, texture_points
 
@@ -188,3 +191,25 @@ def test_a_drift_slower_than_its_run_is_told_by_its_growth_at_first(name, per_s)
     told = LIBRARY[name].statement((51.2,), np.array([-0.66]))
     assert f"shorter, by {per_s} in the first second" in told
     assert "-" not in told
+    assert "end" not in told
+
+
+def test_a_law_that_settles_under_no_name_of_its_own_is_told_by_its_growth_at_first():
+    settles = Coursed(LIBRARY["laser_tilt"], (), CourseKind.EXPONENTIAL)
+    told = settles.statement((51.2,), np.array([0.0, -10.0]))
+    assert "tilted by 0.193°" in told
+    assert "in the first second, with a time constant of 51.2 s" in told
+
+
+@pytest.mark.parametrize(
+    ("name", "shape", "sigma", "words"),
+    [
+        ("baseline_drift", (3.5,), 0.0013, " In the end it comes to 0.301 ± 0.001 mm."),
+        ("baseline_drift", (51.2,), 0.2, ""),
+        ("baseline_drift", (51.2,), np.nan, ""),
+        ("baseline", (), 0.0013, ""),
+    ],
+)
+def test_what_a_drift_comes_to_is_told_with_its_sigma_where_it_is_known(name, shape, sigma, words):
+    term = Term(LIBRARY[name], shape, np.array([-0.301]))
+    assert _in_the_end(Sized(term, np.array([[sigma**2]]))) == words

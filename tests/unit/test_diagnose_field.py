@@ -7,15 +7,26 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
+from pipeline.adjustment.rows import Rows
 from pipeline.artefacts.measured import RingSamples, RingValidity
 from pipeline.physics.effect import CourseKind
+from stages.diagnose import residual
 from stages.diagnose.channels import Seen
 from stages.diagnose.effects.courses import Coursed
 from stages.diagnose.effects.library import LIBRARY
-from stages.diagnose.field import left
+from stages.diagnose.field import answer, left
 from stages.diagnose.field.against_gauge import _same_step, met_in_field, not_refuted
-from stages.diagnose.field.answer import _alone, _knowing_encoder, _met, _scale_named, borne_out, field_answer
+from stages.diagnose.field.answer import (
+    _alone,
+    _knowing_encoder,
+    _met,
+    _scale_named,
+    borne_out,
+    field_answer,
+    with_field,
+)
 from stages.diagnose.field.evidence import FieldEvidence, scale_by_line
+from stages.diagnose.field.system import ENCODER_SCALE, FieldSystem
 from stages.diagnose.gauge.fit import fit
 from stages.diagnose.gauge.points import runs_across
 from stages.diagnose.gauge.run import Term
@@ -132,6 +143,44 @@ def test_only_a_name_that_is_sure_makes_an_encoder_known():
     assert _scale_named(replace(sure, verdict=Verdict.CLASS)) is None
 
 
+def with_this_encoder(known, monkeypatch):
+    """Return for which encoder's share what a tilted inspection shows was doubted."""
+    shares, seen = [], seen_with_way(0.5, -0.012)
+    monkeypatch.setattr(answer, "why_unexplained", lambda field, cause: shares.append(field.encoder_scale))
+    monkeypatch.setattr(answer, "location_in_field", lambda field, shown: None)
+    # Whose run it is makes no difference: nobody asks it.
+    seen.field = replace(seen.field, run=SimpleNamespace())
+    effect = EffectFound("encoder_scale", 0.99, {"relative": known}, "It counts short.", "")
+    found = Diagnosis("field", "gauge", Verdict.NAMED, 1e-9, effects=(effect,))
+    with_field(found, seen, None, (), stated_probe(), LIBRARY)
+    return shares
+
+
+def test_what_an_inspection_shows_is_doubted_beside_an_encoder_that_is_known(monkeypatch):
+    (share,) = with_this_encoder(Value(-0.012, 0.0007), monkeypatch)
+    assert share == pytest.approx(-0.012 / (1 - 0.012))
+    assert with_this_encoder(Value(0.03, 0.0007), monkeypatch) == [0.0]
+
+
+def test_rings_are_held_against_texture_with_the_encoder_as_it_is_known(monkeypatch):
+    """The step back to the stated instrument leads to the encoder's share, not to a right encoder."""
+    asked, row = [], Rows(np.zeros((1, 1), np.int64), np.zeros((1, 1, 7)), np.zeros((1, 3)), *np.ones((2, 1)))
+    names = (Column(INSTRUMENT, "cx"), ENCODER_SCALE, Column("laser_cone", "cone_deg"))
+    system = FieldSystem((row,), cast(Any, None), names, np.array([0.3, 0.0, 0.0]), np.ones(3))
+
+    def stopped(rows, found, named):
+        asked.append(named)
+        raise np.linalg.LinAlgError
+
+    monkeypatch.setattr(residual, "field_system", lambda *args: system)
+    monkeypatch.setattr(residual, "reduced", lambda *args: None)
+    monkeypatch.setattr(residual, "rings_after", stopped)
+    run = SimpleNamespace(state=SimpleNamespace(T_pc=np.zeros((1, 4, 4))))
+    with pytest.raises(np.linalg.LinAlgError):
+        residual.rings_against_texture(run, ((LIBRARY["laser_cone"], (), np.array([0.5])),), -0.012)
+    assert asked[0] == pytest.approx([-0.3, -0.012, 0.5])
+
+
 def met(agrees):
     return Confirmation("0.60", "0.59", agrees)
 
@@ -214,14 +263,17 @@ def test_what_the_likeliest_cause_leaves_most_of_is_not_explained(
     before_px, after_px, unexplained, monkeypatch
 ):
     """Rows of the sensor that waver were called a wavy sheet, a square pixel or an oval pipe."""
-    residual = {0: before_px, 1: after_px}
-    monkeypatch.setattr(
-        left,
-        "rings_against_texture",
-        lambda run, terms=(): SimpleNamespace(rms_px=residual[len(terms)], floor_px=0.12),
-    )
+    residual, shares = {0: before_px, 1: after_px}, []
+
+    def against_texture(run, terms, encoder_share):
+        shares.append(encoder_share)
+        return SimpleNamespace(rms_px=residual[len(terms)], floor_px=0.12)
+
+    monkeypatch.setattr(left, "rings_against_texture", against_texture)
     likeliest = seen_in_the_field("laser_cone", 0.1)
-    doubt = left.why_unexplained(cast(Any, None), likeliest)
+    seen = SimpleNamespace(run=SimpleNamespace(), encoder_scale=-0.012)
+    doubt = left.why_unexplained(cast(Any, seen), likeliest)
+    assert shares == [-0.012, -0.012]
     assert bool(doubt) is unexplained
     field = field_with(2.0 * WAVE @ [0.3, 0.4])
     answer = field_answer(field, LIBRARY, NOTHING_STATED)

@@ -129,8 +129,8 @@ class BaselineDrift(Drifting):
     static = Baseline()
     amplitudes = one(name, 0.05)
     words = (
-        "The baseline gets [longer|shorter], by {at_first:.4f} mm in the first second and {drift_mm:.3f} mm "
-        "in the end, with a time constant of {time_s:.1f} s."
+        "The baseline gets [longer|shorter], by {at_first:.4f} mm in the first second, with a time constant "
+        "of {time_s:.1f} s."
     )
 
 
@@ -141,8 +141,8 @@ class FocalDrift(Drifting):
     static = FocalScale()
     amplitudes = one(name, 1e-3)
     words = (
-        "The focal length gets [longer|shorter], by {at_first:.4%} in the first second and {relative:.3%} "
-        "in the end, with a time constant of {time_s:.1f} s."
+        "The focal length gets [longer|shorter], by {at_first:.4%} in the first second, with a time "
+        "constant of {time_s:.1f} s."
     )
 
 
@@ -153,8 +153,8 @@ class CentreDrift(Drifting):
     static = PrincipalPoint()
     amplitudes = along_x_and_y(name, 0.5)
     words = (
-        "The optical axis drifts toward {direction_deg:.1f}°, by {at_first:.4f} px in the first second and "
-        "{shift_px:.3f} px in the end, with a time constant of {time_s:.1f} s."
+        "The optical axis drifts toward {direction_deg:.1f}°, by {at_first:.4f} px in the first second, with "
+        "a time constant of {time_s:.1f} s."
     )
 
 

@@ -51,7 +51,7 @@ _STANDS, _ABOUT_S, _STILL = 0.1, 0.4, 0.01
 _WORDS: Mapping[CourseKind, str] = {
     CourseKind.STEP: "a step at {time_s:.2f} s: before it there is none of it",
     CourseKind.RAMP: "growing evenly from nothing at the first frame to this at {time_s:.1f} s",
-    CourseKind.EXPONENTIAL: "reached in the end, with a time constant of {time_s:.1f} s",
+    CourseKind.EXPONENTIAL: "grown in the first second, with a time constant of {time_s:.1f} s",
     CourseKind.SINUSOID: "the amplitude of a swing at {frequency_hz:.2f} Hz",
     CourseKind.SPEED: "at a speed of {speed_mm_s:.0f} mm/s, and in proportion to the speed",
     CourseKind.REVERSAL: "while the probe travels forward, and the opposite while it travels backward",
@@ -147,8 +147,11 @@ class Coursed(Product):
 
     def statement(self, shape: Shape, amplitude: Float) -> str:
         """Return the law's sentence, and how it comes."""
-        words = _WORDS[self.kind].format(**self.course(shape, amplitude))
-        return f"{self.static.statement(self.own, self._size(amplitude)).rstrip('.')} ({words})."
+        words, size = _WORDS[self.kind].format(**self.course(shape, amplitude)), self._size(amplitude)
+        if self.kind is CourseKind.EXPONENTIAL:
+            # What it comes to in the end, a short run only continues.
+            size = size * Course(self.kind, shape).factor(1.0, 0.0, 0.0)
+        return f"{self.static.statement(self.own, size).rstrip('.')} ({words})."
 
     def equation(self, shape: Shape, amplitude: Float) -> str:
         """Return the law and its course with the numbers to put into them."""

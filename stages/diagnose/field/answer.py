@@ -183,7 +183,7 @@ def with_field(
         return _met(found, dict(zip(names, met, strict=True)))
     if alone.shown:
         possible = alone.shown if examined is None else not_refuted(alone.shown, examined, stated)
-        doubt = why_unexplained(field.field.run, possible[0]) if possible and seen is field.field else ""
+        doubt = why_unexplained(seen, possible[0]) if possible else ""
         left = replace(alone, shown=() if doubt else possible)
         return _alone(found, alone, left, seen, gauge is not None, doubt)
     if found.verdict is Verdict.NOT_IDENTIFIABLE and gauge is None and travels(field.field.run):
@@ -195,6 +195,13 @@ def _scale_named(found: Diagnosis) -> Value | None:
     """Return by what share of the way the encoder surely reads too much, where that is named."""
     certain = found.effects if found.verdict in (Verdict.NAMED, Verdict.PARTLY) else ()
     return next((e.parameters["relative"] for e in certain if e.name == _SCALE), None)
+
+
+def encoder_share(found: Diagnosis, field: Seen | None, probe: Probe) -> float:
+    """Return by what share of its reading the encoder surely reads too much in the inspection; else 0."""
+    if field is None or field.field is None:
+        return 0.0
+    return _knowing_encoder(field, _scale_named(found), stated_belief(probe))[0].encoder_scale
 
 
 def _knowing_encoder(field: Seen, scale: Value | None, stated: Stated) -> tuple[FieldEvidence, Stated]:

@@ -16,8 +16,8 @@ from stages.diagnose.effects.base import EffectModel, ImagePoints, Shape
 from stages.diagnose.effects.kinds import Periodic
 from stages.diagnose.field.reduce import evidence_of, reduced
 from stages.diagnose.field.run import FieldRun, ring_points
-from stages.diagnose.field.system import OWN, Asked, field_system
-from stages.diagnose.inference import INSTRUMENT, Column, Evidence
+from stages.diagnose.field.system import ENCODER_SCALE, OWN, Asked, field_system
+from stages.diagnose.inference import Evidence
 from stages.diagnose.travel.evidence import TravelEvidence, travel_evidence
 from stages.diagnose.travel.sight import sight_of_trajectory
 
@@ -33,7 +33,6 @@ _FEWEST_LIT = 10
 # each with its right probe, was off by -0.09, 0.03 and 0.09 (open-1, open-3, a03). It scales the way seen.
 _LINE_PX = 0.08
 _LOST_SHARE = 0.25
-_ENCODER_SCALE = Column(INSTRUMENT, "encoder_scale")
 _LEAST_OFFSET_MM = 0.5
 _LEAST_ROLL_RAD = np.radians(5.0)
 
@@ -154,9 +153,9 @@ class FieldEvidence:
 
 def _about_encoder(found: Evidence, scale: float) -> Evidence:
     """Return the evidence with the encoder's scale counted from another value than the stated one."""
-    if _ENCODER_SCALE not in found.place:
+    if ENCODER_SCALE not in found.place:
         return found
-    own = found.place[_ENCODER_SCALE]
+    own = found.place[ENCODER_SCALE]
     by_scale = found.information[:, own]
     misfit = found.misfit - 2 * scale * found.right[own] + scale**2 * by_scale[own]
     return replace(found, right=found.right - scale * by_scale, misfit=float(misfit))

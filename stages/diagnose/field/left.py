@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from stages.diagnose.field.run import FieldRun
+from stages.diagnose.field.evidence import FieldEvidence
 from stages.diagnose.gauge.scan import Scored
 from stages.diagnose.residual import rings_against_texture
 
@@ -18,16 +18,19 @@ _LEFT = (
 )
 
 
-def why_unexplained(run: FieldRun, likeliest: Scored) -> str:
+def why_unexplained(field: FieldEvidence, likeliest: Scored) -> str:
     """Return why what rings show is not the likeliest effect; empty where that may be right, or nobody knows.
 
     What repeats at one azimuth of the image on other wall is no noise, but for where texture alone has the
     middle of a ring. An effect that explains the rest takes most of it: it does not where it leaves more than
     half, and more than noise and middle make besides.
     """
-    taken = [(likeliest.model, likeliest.shape, likeliest.score.amplitude)]
+    assert field.run is not None
+    taken = ((likeliest.model, likeliest.shape, likeliest.score.amplitude),)
     try:
-        before, after = rings_against_texture(run), rings_against_texture(run, taken)
+        before, after = (
+            rings_against_texture(field.run, terms, field.encoder_scale) for terms in ((), taken)
+        )
     except np.linalg.LinAlgError:
         return ""
     sound = before.floor_px**2 + _MIDDLE_PX**2

@@ -24,7 +24,8 @@ _RADIUS_SHARE = 0.1
 _SLIPPED_MM = 1e3
 _MORE_BIASES = 2
 _MIDDLE_RAD, _SPAN_RAD = 1.0, 0.35  # polar angles at which texture is tracked
-_HOLD, _ENCODER_SCALE = 1e3, 0.002
+_HOLD, _SCALE_SIGMA = 1e3, 0.002
+ENCODER_SCALE = Column(INSTRUMENT, "encoder_scale")
 # The pipe's own shape and the camera's way are unknowns of every field recording.
 OWN = frozenset({"ovality", "pipe_bend", "probe_vibration"})
 
@@ -70,7 +71,7 @@ def field_system(run: FieldRun, asked: Asked, slips: Int) -> FieldSystem:
     """
     known = np.flatnonzero(np.diag(run.probe.covariance) > 0)
     names = [Column(INSTRUMENT, run.probe.parameter_names[k]) for k in known]
-    names.append(Column(INSTRUMENT, "encoder_scale"))
+    names.append(ENCODER_SCALE)
     names += [Column(model.name, a.name, shape) for model, shape in asked for a in model.amplitudes]
     state, size = run.state, len(names)
     instrument = run.measured.unsure @ state.instrument[: run.measured.unsure.shape[1]]
@@ -85,7 +86,7 @@ def field_system(run: FieldRun, asked: Asked, slips: Int) -> FieldSystem:
     rows.append(_own_priors(state, size))
     plausible = [a.plausible for model, _ in asked for a in model.amplitudes]
     sigma = np.sqrt(np.diag(run.probe.covariance))[known]
-    held = (_HOLD * np.concatenate([sigma, [_ENCODER_SCALE], plausible])) ** -2.0
+    held = (_HOLD * np.concatenate([sigma, [_SCALE_SIGMA], plausible])) ** -2.0
     rows.append(_held(held, _own_size(state) + size))
     return FieldSystem(tuple(rows), _texture_rows(run, known, asked, size), tuple(names), value, held)
 

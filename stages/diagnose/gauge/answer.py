@@ -7,6 +7,9 @@ from itertools import chain
 
 import numpy as np
 
+from pipeline.physics.catalogue import effect
+from pipeline.physics.effect import CourseKind
+from stages.diagnose.agreement import TELLING
 from stages.diagnose.gauge.confirm import Sized, course_of, quantities
 from stages.diagnose.gauge.examine import Examined
 from stages.diagnose.gauge.formula import ADEQUATE
@@ -16,7 +19,7 @@ from stages.diagnose.gauge.run import Term
 from stages.diagnose.gauge.search import shift_px
 from stages.diagnose.gauge.unknown_laws import Unknown
 from stages.diagnose.inference import SURE, UNKNOWN
-from stages.diagnose.result import Candidate, Confirmation, EffectFound, Verdict
+from stages.diagnose.result import Candidate, Confirmation, EffectFound, Value, Verdict
 
 # What was held out is predicted to the noise where its r.m.s. is below so many noise floors. Under right
 # names, and where nothing is hidden, 10 runs at ring level come to 0.93–0.99 and five rendered ones to
@@ -125,9 +128,19 @@ def _found(
     model, shape = term.model, term.shape if sized.time_s is None else (sized.time_s.value,)
     return EffectFound(
         model.law, chance, quantities(sized),
-        model.statement(shape, term.amplitude), model.equation(shape, term.amplitude),
+        model.statement(shape, term.amplitude) + _in_the_end(sized), model.equation(shape, term.amplitude),
         confirmed, replace(course_of(sized), probability=verdicts.chance_of_course(term)),
     )  # fmt: skip
+
+
+def _in_the_end(sized: Sized) -> str:
+    """Return what a drift comes to, where that is known; of one slower than its run it is a continuation."""
+    size = next(iter(quantities(sized).values()), Value(0.0, 0.0))
+    if sized.term.model.kind is not CourseKind.EXPONENTIAL or not size.sd < TELLING * abs(size.value):
+        return ""
+    unit = effect(sized.term.model.law).quantities[0].unit
+    words = f" In the end it comes to {abs(size.value):.3g} ± {size.sd:.1g} {unit}"
+    return f"{words.rstrip()}."
 
 
 def candidates(examined: Examined) -> tuple[Candidate, ...]:
