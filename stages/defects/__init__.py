@@ -267,5 +267,5 @@ def _defects_of_run(
 
 
 DEFECTS = Stage(
-    "defects", "46", DefectParameters, _defects_of_run, "defects as instances with depth, clock and kind"
+    "defects", "48", DefectParameters, _defects_of_run, "defects as instances with depth, clock and kind"
 )

@@ -39,10 +39,10 @@ _HIGH, _LOWER, _HIGH_SIGMAS = 0.9, 0.75, 1.28
 _TAILS, _CRESTS, _CREST_SIGMA = (0.0, 0.257, 0.474), (1.0, 1.05, 1.87), 0.25
 # Heights 2 mm apart round the pipe count as independent: the width of a ring's sample and the 1 mm mean of a
 # depth correlate closer ones. A row of the map is used where at least half of it was seen.
-_PLACE_MM, _SEEN = 2.0, 0.5
+PLACE_MM, _SEEN = 2.0, 0.5
 # For n normal values: 1 σ of their median times √n, and the relative 1 σ of their 90 % quantile's distance
 # from the median times √n.
-_MEDIAN_ERRS, _HIGH_ERRS = 1.25, 1.33
+MEDIAN_ERRS, _HIGH_ERRS = 1.25, 1.33
 _EXACT_MM = 1e-6  # keeps divisions defined where nothing scatters
 
 
@@ -129,14 +129,14 @@ def measure_all_round(region: Region, surface: Surface, clean: CleanWall, bore: 
     height = np.where(region.mask, region.sign * region.cut(surface.all_mm), np.nan)
     row = _highest_row(height)
     seen = height[row][np.isfinite(height[row])]
-    places = max(2 * np.pi * relief.radius_mm / _PLACE_MM * len(seen) / len(height[row]), 1.0)
+    places = max(2 * np.pi * relief.radius_mm / PLACE_MM * len(seen) / len(height[row]), 1.0)
     noise = clean.noise_mm * float(np.nanmedian(noise_gain(region, relief)[row]))
     level, crest, crest_sigma = _crest(seen, noise, places)
     depth = level + crest
     flattened = row_median(region.cut(surface.all_mm - surface.coarse_mm))[row]
     sigma = [
         bore.sigma_mm,
-        _MEDIAN_ERRS * spread_about_median(seen) / np.sqrt(places),
+        MEDIAN_ERRS * spread_about_median(seen) / np.sqrt(places),
         crest_sigma,
         sharpening_sigma(float(flattened)),
         shape_sigma(relief, region, depth, surface.points.spacing_mm),

@@ -25,6 +25,10 @@ from stages.defects.surface import MeasuredWall
 # A finding fixed to the image, or where the line ends, is as likely as not on the wall: nothing tells.
 _WALL_OR_NOT = 0.5
 _UNSURE = "Its depth is less than twice its σ, so that it may be zero"
+# A finding whose σ, with all that widens it, exceeds so many times its depth is not confirmed. Chosen: one
+# that a noise filter or a codec flattened to a third still is, with a lower bound of its depth.
+_VAGUE = 4.0
+_IS_VAGUE = "The σ of its depth is more than four times the depth that is seen"
 _AT_LEAST = (
     "This depth is a lower bound, with ± {:.2f} mm from noise. The rest of σ is what pictures that repeat "
     "parts of earlier ones may have taken off the depth."
@@ -71,6 +75,11 @@ class Found:
             return False
         return is_depth_known(self.by_noise) and not is_depth_known(self.defect)
 
+    @property
+    def vague(self) -> bool:
+        """Whether next to nothing is known of its depth."""
+        return self.defect.depth_sigma_mm > _VAGUE * abs(self.defect.depth_mm)
+
     def with_probability(self, probability: float, counts: bool) -> Defect:
         """Return it with its probability and, if it counts, a sentence where its depth is a lower bound."""
         words = self._at_least() if counts else ""
@@ -104,12 +113,13 @@ def judged(
         real = deep if f.region.all_round else deep * credibility.chance_against_clutter(f.evidence)
         real = min(real, MOST_SURE) * (1.0 if f.evidence.on_wall else _WALL_OR_NOT)
         unsure, real = real >= COUNTED > real * f.bead, real * f.bead
-        counts = f.evidence.corroborated and real >= COUNTED and is_depth_known(f.by_noise)
+        counts = f.evidence.corroborated and real >= COUNTED and is_depth_known(f.by_noise) and not f.vague
         defect = f.with_probability(real, counts)
         if counts:
             confirmed.append(defect)
         else:
             doubt = f.evidence.doubt if is_depth_known(f.by_noise) or not f.evidence.corroborated else _UNSURE
+            doubt = _IS_VAGUE if f.vague and f.evidence.corroborated else doubt
             doubt = MAY_BE_STEP if unsure else doubt
             doubt = f"{IS_STEP}, with a probability of {min(1 - f.bead, MOST_SURE):.2f}" if f.step else doubt
             words = f"{defect.statement} Not confirmed. {doubt}."

@@ -15,6 +15,7 @@ from pipeline.adjustment.robust import row_median
 from pipeline.adjustment.shared_light import HeldOver
 from pipeline.arrays import Float
 from pipeline.artefacts.cloud_along import usual_way
+from stages.defects.all_round import MEDIAN_ERRS, PLACE_MM
 from stages.defects.depth import Depth
 from stages.defects.segment import Region
 from stages.defects.surface import Surface
@@ -25,6 +26,9 @@ _SHARPEST_MM = 0.42
 # Bells are tried up to 30 times as wide as the way over which light is retained: the widest lose 1 / 450 of
 # their height.
 _WIDEST, _BELLS = 30.0, 40
+# A profile may be lower than the wall by so many σ of its unevenness, and its flanks are compared over so
+# many cells: farther off next to nothing of any finding is left (both chosen).
+_LOWER_SIGMAS, _FLANK = 3.0, 64
 
 
 def flattened(depth: Depth, region: Region, surface: Surface, held: HeldOver, ways_mm: Float) -> Depth:
@@ -33,15 +37,42 @@ def flattened(depth: Depth, region: Region, surface: Surface, held: HeldOver, wa
     ``ways_mm`` (F,) is how far the probe moved to each frame's ring since the ring before. A codec retains
     the fine structure of the line but draws a step of the wall afresh, a noise filter flattens both. How
     alike pictures are does not show which of the two was at work, so that only σ changes and not the depth.
+    A flank that falls off faster than retained light could shows that less was retained.
     """
     way_mm = usual_way(ways_mm[np.unique(surface.near.frame)])
     if not held.handed_on or not way_mm:
         return depth
-    profile = np.fmax(np.sign(depth.depth_mm) * _shown(region, surface, depth.peak[1]), 0.0)
+    shown = np.sign(depth.depth_mm) * _shown(region, surface, depth.peak[1])
     cell_mm = surface.relief.cell_mm[0]
-    share = float(held.handed_on ** (cell_mm / way_mm))
-    lost = abs(depth.depth_mm) * _lost(profile, share, cell_mm)
+    most = _most_held(shown, _LOWER_SIGMAS * _unevenness(region, surface))
+    share = min(float(held.handed_on ** (cell_mm / way_mm)), most)
+    lost = abs(depth.depth_mm) * _lost(np.fmax(shown, 0.0), share, cell_mm)
     return replace(depth, sigma_mm=float(np.hypot(depth.sigma_mm, lost)))
+
+
+def _unevenness(region: Region, surface: Surface) -> float:
+    """Return 1 σ of a profile, mm; for an all-round one, that of medians of independent places round it."""
+    relief = surface.relief
+    places = 2 * np.pi * relief.radius_mm / PLACE_MM
+    return float(relief.typical.sigma_mm * (MEDIAN_ERRS / np.sqrt(places) if region.all_round else 1.0))
+
+
+def _most_held(shown: Float, lower_mm: float) -> float:
+    """Return the largest share of each cell that the next one may hold, whichever way the probe went.
+
+    Where each cell holds a share of the one before, k cells on at least the k-th power of it is left. The
+    profile ``shown`` (H,), NaN where unseen, may be lower than the wall by ``lower_mm``.
+    """
+
+    def most(profile: Float) -> float:
+        share = 1.0
+        for k in range(1, min(len(profile), _FLANK)):
+            out = (profile[:-k] > lower_mm) & np.isfinite(profile[k:])
+            left = np.maximum(profile[k:] + lower_mm, 0.0)[out] / profile[:-k][out]
+            share = min(share, float(left.min(initial=1.0)) ** (1 / k))
+        return share
+
+    return max(most(shown), most(shown[::-1]))
 
 
 def _shown(region: Region, surface: Surface, column: int) -> Float:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.ndimage import median_filter
 
+from pipeline.adjustment.robust import basis_of, ring_harmonics
 from pipeline.arrays import Bool, Byte, Float
 from pipeline.artefacts.measured import RingValidity
 from stages.rings.chain import Choice, choose_line
@@ -33,6 +34,10 @@ _LOST = 0.1
 # Sectors of the running median, as for outliers (`stages.rings.validity`): five or more that leave it are
 # wall.
 _EXPECTED_SECTORS = 9
+# Light that is farther from the ring's own course than a band is wide is the line where it is brighter than
+# what all but one in a hundred rays show there besides the line. One sector of four is looked at: beside each
+# other they share pixels, and of 1440 sectors 360 tell the one in a hundred.
+_OTHER_LIGHT, _OTHER_EVERY = 0.99, 4
 
 
 @dataclass(frozen=True)
@@ -73,13 +78,14 @@ def trace_ring(
 
     With the ring of the image ``before``, a band about it is searched first; without it, or when clearly less
     of the ring is in there than was before, the whole image is searched too, and the fuller ring counts.
-    ``clip_level``: grey level at which the line clips.
+    ``clip_level``: grey level at which the line clips. What lies far off the ring's own course is part of it
+    only where it is brighter than other light of the picture.
     """
     found = None if before is None else follow_ring(image, sectors, before)
     if found is None or before is None or found.coverage < before.coverage - _LOST:
         anew = discover_ring(image, sectors, clip_level)
         found = max((t for t in (found, anew) if t is not None), key=lambda t: t.coverage, default=None)
-    return found if found is not None and found.coverage > 0 else None
+    return _without_other_light(found, image, sectors) if found is not None and found.coverage > 0 else None
 
 
 def follow_ring(image: Image, sectors: Sectors, before: RingTrace) -> RingTrace | None:
@@ -160,6 +166,32 @@ def _search_rays(
     low, high = np.where(missing, 4 * width_px, np.nan), np.where(missing, far, np.nan)
     wide = search_band(image, sectors, low, high, width_px, noise).above(_limit(sectors, far))
     return Candidates(*(np.where(missing[:, None], w, p) for w, p in zip(wide, peaks, strict=True)))
+
+
+def _without_other_light(trace: RingTrace, image: Image, sectors: Sectors) -> RingTrace:
+    """Return a ring with the samples rejected that may as well be any other light of the image.
+
+    Where the line is too faint to be seen, texture of the lit wall, the end of the light far down the pipe or
+    a reflection is all that a ray shows. How bright such light is, is told by the rays that show the line.
+    """
+    valid = trace.validity == RingValidity.VALID
+    radius, band = np.where(valid, trace.fit.radius_px, np.nan), BAND_WIDTHS * trace.width_px
+    basis = basis_of(sectors.azimuth_rad)
+    course = ring_harmonics(radius[None], basis)[0] @ basis.T
+    aside = np.abs(radius - course) > band
+    told = np.flatnonzero(np.abs(radius - course) <= band)[::_OTHER_EVERY]
+    if not aside.any() or not len(told):
+        return trace
+    looked_at = aside.copy()
+    looked_at[told] = True
+    low = np.where(looked_at, 4 * trace.width_px, np.nan)
+    high = np.where(looked_at, float(sectors.radius_px.max()), np.nan)
+    peaks = search_band(image, sectors, low, high, trace.width_px, trace.response.dark_noise)
+    other = np.where(np.abs(peaks.radius_px - course[:, None]) > band, peaks.score, 0.0).max(1)
+    its_own = np.abs(peaks.radius_px - radius[:, None]) <= trace.width_px
+    score = np.where(its_own, peaks.score, 0.0).max(1)
+    lost = aside & (score <= np.quantile(other[told], _OTHER_LIGHT))
+    return replace(trace, validity=np.where(lost, RingValidity.GHOST, trace.validity))
 
 
 def _judged(
