@@ -1,4 +1,4 @@
-"""Twin: recorded frames beside the same frames, re-rendered from what a run has measured."""
+"""Compare recorded frames with their twins: the same frames, re-rendered from what a run has measured."""
 
 from __future__ import annotations
 
@@ -53,26 +53,25 @@ from stages.twin.worst import maps_of, worst_places
 
 _EVERY = 10
 _COLOURED = 3
-"""Laser frames whose colours are looked at for clipping, which takes three times as long to decode."""
+"""Number of laser frames whose colours are checked for clipping; decoding colour takes three times as
+long."""
 _CLIPPED_FRAMES = 8
-"""Compared laser frames, at least, whose colours tell what leaks from clipped pixels."""
+"""Least number of compared laser frames whose colours show what leaks from clipped pixels."""
 _ROUNDS = 3
-"""Times that texture is looked for where the round before has drawn it: the second finds a third of what the
-first did, the fourth hardly any."""
+"""Rounds in which the displacement of texture is measured, each in frames drawn with the one before: the
+second finds a third of the first, the fourth hardly any."""
 
 
 class PhotometryParameters(Parameters):
-    """Parameters of the photometric state."""
+    """Parameters of the estimate of the photometric state."""
 
     sampled: int = Field(
         12,
         ge=3,
         le=200,
-        description="measured frames of each light that lamps, laser and noise are taken from",
+        description="measured frames of each light from which lamps, laser and noise are estimated",
     )
-    blur_px: float = Field(
-        0.9, ge=0.3, le=5.0, description="1 σ of lens and pixel that the photo is seen with"
-    )
+    blur_px: float = Field(0.9, ge=0.3, le=5.0, description="1 σ of the blur by lens and pixel in the photo")
 
 
 class TwinParameters(Parameters):
@@ -85,18 +84,18 @@ class TwinParameters(Parameters):
 
 @dataclass(frozen=True)
 class Photometry:
-    """The photometric state of a run, and where the image differs alike in all frames.
+    """The photometric state of a run, and places where all frames differ from their twins.
 
     Attributes
     ----------
     state : PhotometricState
-        Its ``gain_map`` holds what dirt lets through, where some was found.
+        Its ``gain_map`` holds the transmission of dirt on the window, where some was found.
     places : tuple of ImagePlace
         Where texture is displaced, then where the image is darker or brighter.
     blurred : tuple of ImagePlace
-        Places, none of those, where texture is fainter or stronger.
+        Other places, where texture is fainter or stronger.
     blur_px : float
-        1 σ of lens and pixel that it holds for.
+        1 σ of the blur by lens and pixel that was assumed, px.
     pixels : tuple of Mismatch
         Defective pixels of the sensor.
     """
@@ -120,7 +119,7 @@ def measure_photometry(
     context: Context,
 ) -> Photometry:
     """Estimate camera noise, lamps, laser line, blur and dirt from frames that the run has measured."""
-    with threadpool_limits(1, "blas"):  # its threads wait for each other longer than they work
+    with threadpool_limits(1, "blas"):  # more BLAS threads wait for each other longer than they work
         scene = scene_of(probe, trajectory, wall, texture, parameters.blur_px)
         return photometry_of(scene, recording, frames, rings, parameters, context)
 
@@ -150,7 +149,7 @@ def photometry_of(
         state = replace(state, aside=whole if state.aside is None else state.aside + whole)
     places, gain = places_in_image(ratios)
     blurred, _ = places_in_image([contrast for contrast, _ in textures], LEAST_CONTRAST)
-    # A drop that draws texture aside leaves bright and dark fragments of it.
+    # A drop that displaces texture leaves bright and dark fragments of it, which are no separate places.
     places = (*displaced, *beside(places, displaced))
     if gain is not None:
         state = replace(state, gain_map=full_size(gain, state.outside.shape))
@@ -174,12 +173,12 @@ def compare_with_twin(
     parameters: TwinParameters,
     context: Context,
 ) -> Twin:
-    """Re-render frames, compare them with the recorded ones, and say where and why they differ.
+    """Re-render frames, compare them with the recorded ones, and report where they differ and for what cause.
 
     Raises
     ------
     UnusableError
-        When no frame could be re-rendered.
+        When no frame could be decoded.
     """
     with threadpool_limits(1, "blas"):
         scene = scene_of(probe, trajectory, wall, texture, photometry.blur_px)
@@ -190,7 +189,10 @@ def compared_with(
     scene: Scene, recording: Recording, frames: CheckedFrames, rings: RingSamples, photometry: Photometry,
     parameters: TwinParameters, context: Context, fixed: FixedToProbe | None = None,
 ) -> Twin:  # fmt: skip
-    """Return what frames of a scene show, with what is ``fixed`` of its line; see `compare_with_twin`."""
+    """Compare frames of a scene with their twins; ``fixed`` is what stays at one place of the line.
+
+    See `compare_with_twin`.
+    """
     compared, _ = _split(frames, scene.trajectory, parameters.compared)
     if frames.withheld is None:
         context.warn(_NONE_WITHHELD)
@@ -238,14 +240,14 @@ def compared_with(
 
 
 _NONE_WITHHELD = (
-    "no frame was withheld from the run, so that the compared frames are ones that wall, motion and photo "
-    "were made from: errors that the run has fitted away do not show. What to do: run the recording with "
+    "no frame was withheld from the run: the compared frames are among those that wall, motion and photo "
+    "were made from, so that errors absorbed in the fit do not show. What to do: run the recording with "
     "--set premises.withhold=10"
 )
 
 
 def _split(frames: CheckedFrames, trajectory: Trajectory, most: int) -> tuple[Int, Bool]:
-    """Return up to ``most`` frames to compare, and which (N,) of all the run has measured."""
+    """Return up to ``most`` frames to compare, and a mask (N,) of all frames that the run has measured."""
     posed = np.isin(frames.frame, trajectory.frame)
     if frames.withheld is None:
         chosen = np.zeros(len(frames.frame), bool)
@@ -261,7 +263,7 @@ def _split(frames: CheckedFrames, trajectory: Trajectory, most: int) -> tuple[In
 def _blocks(
     scene: Scene, state: PhotometricState, sampled: list[Sampled]
 ) -> tuple[list[Float32], list[tuple[Float32, Float32]]]:
-    """Return of the sampled lit frames recorded over predicted brightness, and the texture, of blocks."""
+    """Return, for blocks of the sampled lit frames, recorded over predicted brightness, and texture."""
     noise, renderer = state.noise, Renderer(replace(scene, outside=state.outside), state)
     lit = [s for s in sampled if s.light in state.shows_wall]
     twins = [renderer.frame(s.frame, s.light).drawn_aside(state.aside) for s in lit]

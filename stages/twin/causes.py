@@ -1,8 +1,8 @@
-"""Causes of differences over time and along the laser line, named only if other frames fit better so.
+"""Causes of differences over time and along the laser line, named only if other frames then fit better.
 
-Lit frames: the exposure steps, an LED fails, the light flickers. Frames of the line: the laser's power steps,
-it flickers, a sector of the sheet is dim. What wall, photo and light may leave over without a name is granted
-first: a brightness of every sector that stays (of the line: two harmonics), and a slow drift.
+In lit frames: a step of the exposure, an LED that fails, flicker. In laser frames: a step of the laser's
+power, flicker, a dim sector of the sheet. What wall, photo and light may leave without a named cause is
+fitted first: a constant brightness of every sector (for the line: two harmonics), and a slow drift.
 """
 
 from __future__ import annotations
@@ -34,28 +34,30 @@ from stages.twin.locate import FALSE_ALARM
 from stages.twin.scene import Ring
 
 _FEWEST_FRAMES, _ROUNDS, _BESIDE = 6, 3, 3
-"""Frames that a light needs, causes looked for one after the other, frames that show a step on each side."""
+"""Least frames per light; most causes per light; frames on each side that show a step."""
 _SURE = 3.0
-"""σ, from frame to frame, by which one law must fit better than another to be told from it."""
+"""σ, by the spread from frame to frame, by which one law must fit better than another to be distinguished."""
 _LEAST = {"step": 0.02, "flicker": 0.01, "laser_flicker": 0.04, "led_dead": 0.2, "laser_sector": 0.25}
-"""Smallest sizes that are named: a photo errs by a per cent or two from frame to frame, and so does the
-wall's reflectance for the laser's colour, by more, from place to place."""
+"""Smallest sizes that are named. A photo errs by one or two per cent from frame to frame; for the laser's
+colour, the wall's reflectance errs by more, from place to place."""
 _LOBE = 0.15
-"""Relative 1 σ of an LED's share for want of its lobe, which no probe states: even light and one that falls
-as the cosine differ by so much at the ring."""
+"""Relative 1 σ of an LED's share of the light because its lobe is unknown: uniform emission and emission as
+the cosine differ by this much at the ring."""
 _SHAPE, _NARROW_DEG, _OF_WIDTH = 0.03, 20.0, 0.08
-"""1 σ of a sector's loss for want of its shape. Of one narrower than two cells only loss times width shows,
-and widths are tried in steps of a quarter: relative 1 σ of the loss, half a step over √3."""
+"""1 σ of a sector's loss because its shape is unknown. For a sector narrower than two cells, 20°, only loss
+times width is measured, and widths are tried in steps of a quarter: relative 1 σ of the loss, half a step
+over √3."""
 _OWN_STEP = {"LEDs": "lamp_step", "laser": "laser_step"}
 _USUAL, _FEW = 0.4, 10
-"""Robust spread of steps from frame to frame over the spread of all: 1 for normal numbers, more for a sine. A
-weld or a joint changes the whole bore in a few frames, and is no flicker. Frames that tell it. Chosen."""
+"""For flicker, the robust spread of steps between frames must be at least this share of the plain spread: it
+is 1 for normal numbers, and more for a sine, but small where a weld or a joint changes the whole bore in a
+few frames. Tested from so many frames on. Chosen."""
 _HALF_SECTORS = 3
-"""Sectors side by side in the same half, when one half of the picture is to foretell the other."""
+"""Number of neighbouring sectors in one group, when one half of the picture is to predict the other."""
 
 
 def causes(lit: Cells | None, line: Cells | None, lighting: Lighting, ring: Ring) -> tuple[Mismatch, ...]:
-    """Return what changes over time and along the line, from the cells of compared frames of each light."""
+    """Return causes of changes over time and along the line, from the cells of each light's frames."""
     found: list[Mismatch] = []
     steps: dict[str, tuple[Fitted, Cells]] = {}
     for light, cells in (("LEDs", lit), ("laser", line)):
@@ -75,9 +77,9 @@ def causes(lit: Cells | None, line: Cells | None, lighting: Lighting, ring: Ring
 def _chosen(
     cells: Cells, base: Float, laws: Sequence[Law], light: str
 ) -> tuple[list[tuple[Fitted, list[str]]], Float, Fitted | None]:
-    """Return causes one after the other, with those that cannot be told from each, and the base with them.
+    """Return the causes found one after the other, each with rivals that fit as well, and the base with them.
 
-    At last the cause that would come next and that these frames are too few to be sure of, if there is one.
+    Last is the next cause, for which there are too few frames to be certain, or None.
     """
     chosen: list[tuple[Fitted, list[str]]] = []
     unsure = None
@@ -86,7 +88,7 @@ def _chosen(
         tries.sort(key=lambda f: -f.fall.sum())
         best = _by_other_sectors(tries[0], cells, base)
         size, led = size_of(best), best.law.name == "led_dead"
-        most = 1.0 + _SURE * _size_sd(best) if led else np.inf  # no LED loses more than it has
+        most = 1.0 + _SURE * _size_sd(best) if led else np.inf  # no LED can lose more than all its light
         if not _LEAST[best.law.name] < size < most:
             break
         if best.law.name == "step" and _at_once(best, cells) / best.size <= 0.5:
@@ -106,7 +108,7 @@ def _chosen(
 
 
 def _same_sector(one: Fitted, other: Fitted) -> bool:
-    """Return whether two dim sectors overlap: the second is what the first one's shape leaves over."""
+    """Return whether two dim sectors overlap: the second is then a misfit of the first one's shape."""
     if not one.law.name == other.law.name == "laser_sector":
         return False
     away = abs(half_turn(float(one.place[0] - other.place[0])))
@@ -114,7 +116,7 @@ def _same_sector(one: Fitted, other: Fitted) -> bool:
 
 
 def _at_once(step: Fitted, cells: Cells) -> float:
-    """Return by how much the frames next to a step differ: drift may make up the rest of it."""
+    """Return by how much the frames next to a step differ, as a logarithm: the rest may be drift."""
     mean = cells.log_ratio.sum(1) / np.maximum(cells.usable.sum(1), 1)
     first = int(step.place[0])
     after, before = mean[first : first + _BESIDE], mean[max(first - _BESIDE, 0) : first]
@@ -122,12 +124,12 @@ def _at_once(step: Fitted, cells: Cells) -> float:
 
 
 def _places(law: Law) -> int:
-    """Return how many places a law has that are not nearly the same."""
+    """Return how many independent places a law may have."""
     return {"laser_sector": SECTORS, "led_dead": len(law.columns) // 3}.get(law.name, len(law.columns))
 
 
 def _by_other_sectors(best: Fitted, cells: Cells, base: Float) -> Fitted:
-    """Return a dim sector with the chance that sectors which vary as the others do show as much."""
+    """Return a dim sector with the probability that the scatter of the other sectors makes one as deep."""
     if best.law.name != "laser_sector":
         return best
     with_it = np.concatenate([base, best.change[None]])
@@ -140,7 +142,7 @@ def _by_other_sectors(best: Fitted, cells: Cells, base: Float) -> Fitted:
 
 
 def size_of(found: Fitted) -> float:
-    """Return the size of a cause in the unit of its law, 0 where its sign is not the law's."""
+    """Return the size of a cause in the unit of its law; 0 where its sign is opposite to the law's."""
     if found.law.name == "step":
         return float(abs(np.expm1(found.size)))
     if found.law.name == "led_dead":
@@ -162,7 +164,7 @@ def _mismatch(best: Fitted, rivals: list[str], cells: Cells, ring: Ring) -> Mism
     name = best.law.name
     if name == "led_dead":
         place = _of_led(best, cells)
-        said = f"From frame {place[0].value:.0f} on the LED at image azimuth {place[1].value:.0f}° has lost"
+        said = f"From frame {place[0].value:.0f} on, the LED at image azimuth {place[1].value:.0f}° has lost"
         fixed_to, look = "time", ring.at(cells.frame[int(best.place[1])], float(best.place[0]))
     else:
         where, width = best.place[:2]
@@ -174,7 +176,7 @@ def _mismatch(best: Fitted, rivals: list[str], cells: Cells, ring: Ring) -> Mism
         fixed_to, look = "line", ring.at(cells.frame[0], np.radians(where))
     said += f" {100 * size.value:.0f} % of its light."
     if rivals:
-        said += " Frames do not tell this from: " + ", ".join(rivals).replace("_", " ") + "."
+        said += " The frames do not distinguish this from: " + ", ".join(rivals).replace("_", " ") + "."
     return Mismatch(
         " or ".join([name, *rivals]), "line" if fixed_to == "line" else "intensity", fixed_to, place, (size,),
         best.probability, best.chi2_before, best.chi2_after, said, look,
@@ -197,10 +199,11 @@ def _steps(
         when = _when(cells.frame, first)
         same = _same_step(best, cells.frame[first - 1 : first + 1], other)
         if same and light == "laser" and "LEDs" in steps:
-            continue  # told already
+            continue  # already reported
         own = _OWN_STEP[light]
         name = {True: "exposure_step", False: own, None: f"exposure_step or {own}"}[same]
-        # All frames tell it by one drift, those next to it by none: their disagreement counts.
+        # With drift all frames measure a step, without it only the frames beside it: σ includes their
+        # disagreement.
         sd = float(np.exp(best.size) * np.hypot(best.sd, _at_once(best, cells) - best.size))
         size = NamedFigure("change", float(np.expm1(best.size)), sd, "relative")
         what = {
@@ -212,14 +215,14 @@ def _steps(
         found.append(Mismatch(
             name, "line" if light == "laser" and not same else "intensity", "time", (when,), (size,),
             best.probability, best.chi2_before, best.chi2_after,
-            f"From frame {when.value:.0f} on {what} {100 * abs(size.value):.0f} % {way}.",
+            f"From frame {when.value:.0f} on, {what} {100 * abs(size.value):.0f} % {way}.",
             ring.whole(cells.frame[first]),
         ))  # fmt: skip
     return found
 
 
 def _same_step(best: Fitted, between: Int, other: Cells | None) -> bool | None:
-    """Return whether frames of the other light step alike between two frames; None if they cannot tell."""
+    """Return whether frames of the other light step alike at that time; None if they cannot decide."""
     if other is None or len(other.frame) < _FEWEST_FRAMES:
         return None
     columns, first = steps_of(len(other.frame))
@@ -238,7 +241,7 @@ def _same_step(best: Fitted, between: Int, other: Cells | None) -> bool | None:
 def _flicker_or_else(
     cells: Cells, base: Float, unsure: Fitted | None, light: str, ring: Ring
 ) -> list[Mismatch]:
-    """Return flicker; where it is gone once a cause that frames are unsure of is granted, either of both."""
+    """Return flicker; as "flicker or X" if it vanishes once the uncertain cause X is fitted."""
     found = _flicker(cells, base, light, ring)
     if not found or unsure is None or unsure.law.name == "laser_sector":  # a sector changes no frame alone
         return found
@@ -250,21 +253,21 @@ def _flicker_or_else(
         place = _of_led(unsure, cells)
         what, name = f"an LED that fails at image azimuth {place[1].value:.0f}°", unsure.law.name
     said = (
-        f"{found[0].statement} {len(cells.frame)} frames do not tell this from {what} from frame "
-        f"{place[0].value:.0f} on: withhold more frames to tell."
+        f"{found[0].statement} {len(cells.frame)} frames do not distinguish this from {what} from frame "
+        f"{place[0].value:.0f} on. What to do: withhold more frames."
     )
     return [replace(found[0], name=f"{found[0].name} or {name}", place=place, statement=said)]
 
 
 def _of_led(found: Fitted, cells: Cells) -> tuple[NamedFigure, NamedFigure]:
-    """Return when and where an LED fails."""
+    """Return when an LED fails (frame) and where (image azimuth)."""
     where = half_turn(float(np.degrees(found.place[0])))
     at = NamedFigure("azimuth_deg", where, 180 / LED_AZIMUTHS, "deg")
     return _when(cells.frame, int(found.place[1])), at
 
 
 def _flicker(cells: Cells, base: Float, light: str, ring: Ring) -> list[Mismatch]:
-    """Return flicker: what one half of the picture is brighter in a frame foretells the other half."""
+    """Return flicker: in a frame, the brightness of one half of the picture predicts that of the other."""
     whole = np.ones(len(cells.frame), bool)
     known = fitted(cells, base, whole)
     half = np.arange(SECTORS) // _HALF_SECTORS % 2
@@ -274,7 +277,7 @@ def _flicker(cells: Cells, base: Float, light: str, ring: Ring) -> list[Mismatch
     ])  # fmt: skip
     parts = parts - parts.mean(1, keepdims=True)
     product, frames = parts[0] * parts[1], len(cells.frame)
-    granted = len(drift(frames))  # what the drift takes up of the frames' changes
+    granted = len(drift(frames))  # frames' changes that the drift absorbs
     spread = float(np.sqrt(max(product.sum() / max(frames - granted, 1), 0.0)))
     alike = min(float(product.mean() / max(parts[0].std() * parts[1].std(), 1e-12)), 1 - 1e-9)
     chance = float(t.sf(alike * np.sqrt((frames - 2) / (1 - alike**2)), frames - 2))

@@ -1,8 +1,8 @@
-"""Brightness of compared frames in sectors of image azimuth, and what changes of it fit other frames, too.
+"""Brightness of compared frames in sectors of image azimuth, and tests of laws on frames not used in the fit.
 
-Every frame keeps, for each sector, the sums from which χ² per pixel follows for any factor put on the twin:
-a cause is put in by its law, pixel by pixel, without rendering the frame again. A law is fitted to every
-other frame and judged on those between: χ² there must fall, by what frames themselves say of chance.
+For each sector, every frame keeps the sums from which χ² per pixel follows for any factor on the twin: a
+cause is applied through its law without rendering the frame again. A law is fitted to every second frame and
+judged on the others: χ² must fall there by more than its scatter from frame to frame explains.
 """
 
 from __future__ import annotations
@@ -21,10 +21,11 @@ from stages.twin.render import Region, TwinFrame
 Angle = TypeVar("Angle", float, Float)
 SECTORS = 36
 _FEWEST_PIXELS, _LEAST_RATIO = 60, 0.02
-"""A sector counts with so many pixels; one with less than this share of the light foretold has none."""
+"""A sector is used with at least 60 pixels; a ratio of recorded to predicted light below 0.02 counts as
+0.02."""
 _DRIFT_KNOTS, _FRAMES_OF_KNOT = 4, 4
-"""Most knots of the slow change of brightness that is granted to wall, photo and light without a name, and
-frames for each: fewer would be drawn along by a single frame."""
+"""Most knots of the slow drift of brightness that is fitted before any cause, and frames per knot: with fewer
+frames a single one would pull the drift."""
 
 
 @dataclass(frozen=True)
@@ -35,8 +36,9 @@ class Cells:
     ----------
     frame : (F,) int
     square, cross, own : float
-        Of recorded², recorded · twin, twin², grey levels above black.
+        Sums of recorded², recorded · twin and twin²; grey levels above black.
     pixels : float
+        Number of pixels.
     """
 
     frame: Int
@@ -47,12 +49,12 @@ class Cells:
 
     @property
     def usable(self) -> Bool:
-        """(F, S) sectors with enough pixels of which light is foretold."""
+        """(F, S) sectors with enough pixels and with predicted light."""
         return (self.pixels >= _FEWEST_PIXELS) & (self.own > 0)
 
     @property
     def log_ratio(self) -> Float:
-        """(F, S) logarithm of recorded over twin, `_LEAST_RATIO` at least; 0 where it cannot be used."""
+        """(F, S) logarithm of recorded over twin, at least that of `_LEAST_RATIO`; 0 where unusable."""
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.where(self.usable, np.log(np.maximum(self.cross / self.own, _LEAST_RATIO)), 0.0)
 
@@ -64,11 +66,11 @@ class Cells:
 
     @property
     def counted(self) -> Float:
-        """(F,) pixels of the usable sectors."""
+        """(F,) number of pixels in the usable sectors."""
         return np.asarray(np.where(self.usable, self.pixels, 0.0).sum(1))
 
     def on(self, log_factor: Float) -> Cells:
-        """Return the sums for a twin brighter by a factor (F, S)."""
+        """Return the sums for a twin multiplied by exp(``log_factor``) (F, S)."""
         factor = np.exp(log_factor)
         return replace(self, cross=self.cross * factor, own=self.own * factor**2)
 
@@ -81,15 +83,15 @@ class CellsOfFrames:
     parts: list[Float] = field(default_factory=list)
 
     def add(self, frame: int, above: Float32, twin: TwinFrame, white: float, sector: Byte) -> None:
-        """Take the lit wall below ``white`` in the sectors (H, W); ``above`` is given above black."""
+        """Add a frame's lit wall below ``white``, by sectors (H, W); grey levels are above black."""
         self.frame.append(frame)
         self.parts.append(self._sums(above, twin, white, sector, (Region.WALL, Region.WALL))[:4])
 
     def add_line(self, frame: int, above: Float32, twin: TwinFrame, white: float, sector: Byte) -> None:
-        """Take the pixels of a laser frame, whose light counts wherever across the line it lies.
+        """Add the light of a laser frame within the band about the line, wherever across the line it lies.
 
-        A line beside its predicted place, for want of the right sheet or radius, is no darker for that:
-        sectors are compared by all light about the line, as if it had its twin's place and profile.
+        A line beside its predicted place, because sheet or radius are wrong, is not darker for that: sectors
+        are compared by their whole light, as if the line had its twin's place and profile.
         """
         sums = self._sums(above, twin, white, sector, (Region.LINE_CORE, Region.LINE_FLANK))
         own, pixels, light, foretold = sums[2:]
@@ -132,7 +134,7 @@ def _sector_sums(above, level, variance, region, sector, white, kind, other):  #
 
 @dataclass(frozen=True)
 class Law:
-    """What a cause does to the logarithm of brightness, for each place where it may be.
+    """What a cause does to the logarithm of brightness, for each place where it may act.
 
     Attributes
     ----------
@@ -140,7 +142,7 @@ class Law:
     columns : (C, F, S)
         Change per unit of size.
     places : (C, P)
-        What each column stands for.
+        Place of each column, for example a frame and an azimuth.
     """
 
     name: str
@@ -156,15 +158,16 @@ class Fitted:
     ----------
     law : Law
     column : int
+        Index of the best place.
     size, sd : float
-        1 σ from the spread from frame to frame.
+        Size and its 1 σ, by the spread from frame to frame.
     probability : float
-        That chance gives such a size, by the spread from frame to frame, anywhere it was looked for; 1 where
-        frames without a part in the fit do not fit better.
+        Probability that chance gives such a size at any of the tried places; 1 where frames outside the fit
+        do not fit better.
     fall : (F,)
-        By how much χ² of each frame falls that had no part in the fit.
+        Fall of χ² of each frame with sizes fitted to the half of the frames without it.
     chi2_before, chi2_after : float
-        Per pixel of the frames, each without a part in the fit.
+        χ² per pixel without and with the law, with sizes fitted to the other half of the frames.
     """
 
     law: Law
@@ -183,28 +186,28 @@ class Fitted:
 
     @property
     def place(self) -> Float:
-        """What its column stands for."""
+        """The place that its column stands for."""
         return np.asarray(self.law.places[self.column])
 
 
 def sectors_of(phi_rad: Float32) -> Byte:
-    """Return the sector of image azimuths, the first beginning at −π."""
+    """Return the sectors of image azimuths; sector 0 begins at −π."""
     turn = np.nan_to_num(phi_rad + np.pi) / (2 * np.pi)
     return np.asarray((turn * SECTORS).astype(np.int64) % SECTORS, np.uint8)
 
 
 def sector_azimuth_rad() -> Float:
-    """Return the middles (S,) of the sectors."""
+    """Return the azimuths (S,) of the middles of the sectors."""
     return np.asarray(-np.pi + 2 * np.pi * (np.arange(SECTORS) + 0.5) / SECTORS)
 
 
 def half_turn(angle_deg: Angle) -> Angle:
-    """Return angles within half a turn of 0, from −180° on."""
+    """Return angles in degrees, brought into [−180°, 180°)."""
     return (angle_deg + 180) % 360 - 180
 
 
 def drift(frames: int) -> Float:
-    """Return columns (K, F, S) of a slow change over the frames."""
+    """Return columns (K, F, S) for a slow change over the frames."""
     knots = int(np.clip(frames // _FRAMES_OF_KNOT, 1, _DRIFT_KNOTS))
     x = np.linspace(0, knots - 1, frames)
     hats = np.maximum(0.0, 1 - np.abs(x[None] - np.arange(knots)[:, None]))
@@ -212,32 +215,33 @@ def drift(frames: int) -> Float:
 
 
 def of_sectors(frames: int, around: Float) -> Float:
-    """Return columns (K, F, S) that stay over all frames, for patterns (K, S) around the image."""
+    """Return columns (K, F, S) that are constant over the frames, with patterns (K, S) around the image."""
     return np.asarray(np.repeat(around[:, None], frames, 1), float)
 
 
 def fitted(cells: Cells, base: Float, use: Bool) -> Float:
-    """Return the change (F, S) that columns (K, F, S) make of the frames in ``use`` (F,)."""
+    """Return the change (F, S) predicted by columns (K, F, S) fitted to the frames in ``use`` (F,)."""
     inside = cells.usable & use[:, None]
     size = np.linalg.lstsq(base[:, inside].T, cells.log_ratio[inside], rcond=None)[0]
     return np.asarray(np.tensordot(size, base, 1), float)
 
 
 def try_law(cells: Cells, base: Float, law: Law, places: int) -> Fitted:
-    """Return a law's best place and size beyond base columns (K, F, S), and how frames bear it out.
+    """Return a law's best place and size beyond base columns (K, F, S), and how other frames support it.
 
-    ``places`` is how many places that differ it, and the other laws, may be at: chance has as many tries.
+    ``places`` is the number of independent places of this and of the other laws: chance has as many tries.
     """
     frames = np.arange(len(cells.frame))
     fall, before = np.zeros(len(frames)), np.zeros(len(frames))
-    # Half of the frames leave open between which two of all of them a step lies: the place is that of all.
+    # Half of the frames leave open between which two neighbours a step lies: all frames are used for the
+    # place.
     column, size, sd = _best(cells, base, law, np.ones(len(frames), bool))
     for half in (frames % 2 == 0, frames % 2 == 1):
         without = fitted(cells, base, half)
         with_it = fitted(cells, np.concatenate([base, law.columns[column][None]]), half)
         left = cells.chi2(without)
         before[~half], fall[~half] = left[~half], (left - cells.chi2(with_it))[~half]
-    # A law that frames without a part in the fit contradict is chance, however sure the fit is of it.
+    # A law that frames outside the fit contradict is chance, however significant the fit is.
     freedom = max(len(frames) - 1 - _DRIFT_KNOTS, 1)
     chance = float(2 * places * t.sf(abs(size) / max(sd, 1e-12), freedom)) if fall.sum() > 0 else 1.0
     pixels = max(float(cells.counted.sum()), 1.0)
@@ -248,7 +252,7 @@ def try_law(cells: Cells, base: Float, law: Law, places: int) -> Fitted:
 
 
 def _best(cells: Cells, base: Float, law: Law, use: Bool) -> tuple[int, float, float]:
-    """Return the column whose size explains most beyond base columns, the size, and its σ over frames."""
+    """Return the column that explains most beyond the base columns, its size, and its σ over frames."""
     inside = cells.usable & use[:, None]
     direction = np.linalg.svd(base[:, inside].T, full_matrices=False)
     kept = direction[0][:, direction[1] > 1e-9 * max(direction[1].max(), 1e-30)]
@@ -264,14 +268,15 @@ def _best(cells: Cells, base: Float, law: Law, use: Bool) -> tuple[int, float, f
     of_frame = np.bincount(np.nonzero(inside)[0], left, len(use))
     weight = np.bincount(np.nonzero(inside)[0], columns[best] ** 2, len(use))
     seen = weight > 0
-    # Few frames with much weight make their own spread look small: that of all frames is the least.
+    # A few frames of high weight make their own scatter look small: the scatter of all frames is the lower
+    # bound.
     spread = max((of_frame**2).sum(), norm[best] * (of_frame[seen] ** 2 / weight[seen]).mean())
     spread *= seen.sum() / max(seen.sum() - 1 - _DRIFT_KNOTS, 1)
     return best, float(size[best]), float(np.sqrt(spread)) / float(norm[best])
 
 
 def sigmas(fall: Sequence[float] | Float) -> float:
-    """Return by how many σ, taken from frame to frame, the mean of falls (F,) is above 0."""
+    """Return by how many σ, estimated from frame to frame, the mean of the falls (F,) is above 0."""
     if len(fall) < 2:
         return 0.0
     sd = float(np.std(fall, ddof=1)) / np.sqrt(len(fall))
@@ -279,12 +284,12 @@ def sigmas(fall: Sequence[float] | Float) -> float:
 
 
 def chance_of(size: Float) -> float:
-    """Return the probability that chance makes frames (F,) agree so well on a size other than 0."""
+    """Return the probability that frames (F,) agree so well by chance on a size other than 0."""
     return float(2 * t.sf(abs(sigmas(size)), max(len(size) - 1, 1)))
 
 
 def centred(value: Float, *groups: Int) -> Float:
-    """Return values (N,) less their means over each of the groupings (N,), in turns."""
+    """Return values (N,) minus their means over each of the groupings (N,), iterated."""
     for _ in range(4):
         for group in groups:
             count = np.bincount(group)

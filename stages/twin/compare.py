@@ -1,4 +1,4 @@
-"""Recorded frames less re-rendered ones, over the noise: χ² by region, maps, and the frames to look at."""
+"""Differences between recorded and re-rendered frames over the noise: χ² by region, maps, and views."""
 
 from __future__ import annotations
 
@@ -15,18 +15,19 @@ from stages.twin.noise import CameraNoise
 from stages.twin.render import Region, TwinFrame
 
 BLOCK_PX = 8
-"""Side of the blocks in which a difference is looked for that stays in one place of the image."""
+"""Side of the blocks, px, in which differences are sought that stay at one place of the image."""
 _LEVELS = (0, 10, 20, 40, 80, 120, 160, 200)
 _FULL_SCALE, _STRAY = 255.0, 5.0
 _SILENT = 0.92
-"""Share of pixels at one grey level from which noise is less than that of rounding, 1/√12: erf(√1.5)."""
+"""Share of pixels at one grey level from which on noise is below that of rounding, 1/√12: erf(√1.5)."""
 _LEAST_TEXTURE = 4.0
-"""Variance of fine texture, grey levels squared, from which its share shows through noise of 576 pixels."""
+"""Variance of fine texture, grey levels squared, above which its contrast is measurable in 576 noisy
+pixels."""
 _LEAST_SLOPES = 0.2
-"""Geometric mean of a block's slopes in both directions, as a share of their sum, from which its place is
-known both ways: 0.5 where both are alike, 0 along a stripe. Chosen."""
+"""Geometric mean of a block's squared slopes in two directions, as a share of their sum, from which on its
+displacement is known both ways: 0.5 where both are alike, 0 along a stripe. Chosen."""
 _DARK, _WALL, _CORE, _AT_BLACK = int(Region.DARK), int(Region.WALL), int(Region.LINE_CORE), 0.5
-"""Regions as the compiled sums know them; half a grey level: at black to the level."""
+"""Region numbers for the compiled sums; a pixel within half a grey level of black is at black."""
 _COUNTED = (Region.LINE_CORE, Region.LINE_FLANK, Region.WALL)
 
 
@@ -37,24 +38,24 @@ class Comparison:
     Attributes
     ----------
     pixels, before, after : (6,)
-        Per `Region`: pixels, and χ² without and with what was found.
+        Per `Region`: pixels, and χ² before and after the named causes are applied.
     square, noise, lit : float
         Of lit wall: squared differences, their variance by the noise, and pixels.
     camera : float
         Of lit wall: squared differences over the variance of the camera's noise alone.
     stray : float
-        Dark pixels that are brighter than their twin by more than five σ.
+        Dark pixels brighter than their twin by more than five σ.
     clipped : bool
-        Whether black is so low that the noise of dark pixels is cut off.
+        Whether black is so low that the noise of dark pixels is clipped at grey level 0.
     still : float
         Dark pixels that are at black to the grey level.
     seen, view : float
-        Pixels whose wall is known, and all within the view, in lit frames.
+        Pixels whose wall is known, and all pixels within the view, in lit frames.
     clipped_wall : float
-        Pixels of lit wall at the level where grey levels pile up.
+        Pixels of lit wall at the level where grey levels clip.
     views : list of TwinView
     by_level : (2, L)
-        Of lit wall: pixels, and squares of z, by the brightness of the twin.
+        Of lit wall, by the brightness of the twin: pixels, and squares of z.
     """
 
     pixels: Float = field(default_factory=lambda: np.zeros(len(Region)))
@@ -77,7 +78,7 @@ class Comparison:
         self, frame: int, light: Illumination, above_black: Float32, before: TwinFrame, after: TwinFrame,
         noise: CameraNoise,
     ) -> None:  # fmt: skip
-        """Count a frame, its grey levels (H, W) given above black."""
+        """Add a frame; ``above_black`` are its grey levels (H, W) above black."""
         z, sums, of_wall, by_level = _differences(
             before.region, above_black, *_pair(before), *_pair(after), np.array(noise.polynomial),
             np.float32(noise.full_scale), np.array(_LEVELS, np.float32), _STRAY,
@@ -104,10 +105,10 @@ class Comparison:
         self.views.append(_view(frame, light, chi2, above_black, after, z, noise.black.value))
 
     def regions(self) -> tuple[RegionFit, ...]:
-        """Return χ² per pixel by region; NaN where pixels are counted and not compared.
+        """Return χ² per pixel by region; NaN where pixels are counted but not compared.
 
-        At the edge of the view a pixel is part wall, part mask, and no photo says how much. Of dark pixels
-        the noise is not known where it is cut off at black, or where a codec has swallowed it.
+        At the edge of the view a pixel is part wall, part mask, in unknown shares. The noise of dark pixels
+        is unknown where it is clipped at black or suppressed by a codec.
         """
         return tuple(
             RegionFit(
@@ -118,7 +119,7 @@ class Comparison:
         )
 
     def levels(self) -> tuple[NamedFigure, ...]:
-        """Return χ² per pixel of lit wall by brightness."""
+        """Return χ² per pixel of lit wall for ranges of brightness."""
         return tuple(
             NamedFigure(f"from {low}", square / count, float(np.sqrt(2 / count)))
             for low, count, square in zip(_LEVELS, *self.by_level.tolist(), strict=True)
@@ -133,7 +134,7 @@ class Comparison:
 
     @property
     def chi2_camera(self) -> float:
-        """χ² per pixel of lit wall by the camera's noise alone; NaN without any."""
+        """χ² per pixel of lit wall with the camera's noise alone; NaN without lit wall."""
         return self.camera / self.lit if self.lit else float("nan")
 
     @property
@@ -142,7 +143,7 @@ class Comparison:
         return self.stray / max(float(self.pixels[Region.DARK]), 1.0)
 
     def psnr_db(self, without_noise: bool) -> float:
-        """Return 20 log of full scale over the root mean square difference of lit wall; NaN without any."""
+        """Return 20 log₁₀ of full scale over the RMS difference of lit wall, dB; NaN without lit wall."""
         left = self.square - (self.noise if without_noise else 0.0)
         if not self.lit:
             return float("nan")
@@ -157,10 +158,10 @@ def _pair(twin: TwinFrame) -> tuple[Float32, Float32]:
 def _differences(  # type: ignore[no-untyped-def]
     region, above, level, variance, level_after, variance_after, noise, white, levels, stray
 ):
-    """Return z (H, W) after; of each region pixels and χ² before and after, then stray and still dark.
+    """Return z (H, W) after; per region, pixels and χ² before and after; counts of stray and still pixels.
 
-    Then of the wall its squared differences, those over the camera's noise alone, its variances and its
-    clipped pixels; at last its pixels and squares of z by brightness (2, L).
+    Then, of lit wall: squared differences, those over the camera's noise alone, variances and clipped pixels;
+    last, pixels and squares of z by brightness (2, L).
     """
     z, sums = np.empty_like(above), np.zeros((4, 6))
     of_wall, by_level = np.zeros(4), np.zeros((2, len(levels)))
@@ -209,7 +210,7 @@ def _view(
 
 
 def exposure_of(above_black: Float32, twin: TwinFrame) -> float:
-    """Return the logarithm by which a frame is brighter than its twin, over line and lit wall."""
+    """Return ln of the factor by which a frame is brighter than its twin, over line and lit wall."""
     cross, own = _exposure(above_black, twin.level, twin.variance, twin.region)
     return float(np.log(max(cross / own, 1e-3))) if own > 0 else 0.0
 
@@ -228,30 +229,30 @@ def _exposure(above, level, variance, region):  # type: ignore[no-untyped-def]
 
 
 def of_blocks(values: Float32 | Bool) -> Float32:
-    """Return the means (rows, columns) of whole blocks of a picture (H, W)."""
+    """Return the means (rows, columns) over whole blocks of a picture (H, W)."""
     rows, columns = (n // BLOCK_PX for n in values.shape)
     inside = values[: rows * BLOCK_PX, : columns * BLOCK_PX].astype(np.float32)
     return np.asarray(cv2.resize(inside, (columns, rows), interpolation=cv2.INTER_AREA))
 
 
 def block_ratios(above_black: Float32, twin: TwinFrame, white_above_black: float) -> Float32:
-    """Return by how much each block is brighter than its twin; NaN where not all of it is lit wall."""
+    """Return recorded over predicted brightness of each block; NaN unless all of it is lit wall."""
     use = (twin.region == Region.WALL) & (above_black < white_above_black)
     level = np.where(use, twin.level, np.float32(0))
     above, below = of_blocks(level * above_black), of_blocks(level * level)
     with np.errstate(divide="ignore", invalid="ignore"):
-        # 0.99: whole blocks alone, up to rounding.
+        # 0.99: a whole block, up to rounding.
         return np.where(of_blocks(use) > 0.99, above / below, np.float32(np.nan)).astype(np.float32)
 
 
 def block_textures(
     above_black: Float32, twin: TwinFrame, white_above_black: float
 ) -> tuple[Float32, Float32]:
-    """Return which share of its twin's fine texture each block shows, and where that lies.
+    """Return the contrast of each block's fine texture over that of its twin, and the texture's displacement.
 
-    The place (2, rows, columns) is relative to the twin's, px to the right and down, from recorded − twin
-    = −∇twin · place, by least squares over three by three blocks (B. Lucas, T. Kanade, 1981). Both are NaN
-    without lit wall and texture about.
+    The displacement (2, rows, columns), px to the right and down from the twin's, solves recorded − twin =
+    −∇twin · displacement by least squares over three by three blocks (B. Lucas, T. Kanade, 1981). Both are
+    NaN without lit wall and texture around.
     """
     use = (twin.region == Region.WALL) & (above_black < white_above_black)
 
@@ -270,7 +271,7 @@ def block_textures(
     rr, rd, dd = about(right**2), about(right * down), about(down**2)
     to_right, to_down = (-about(slope * (seen - made)) for slope in (right, down))
     whole = rr * dd - rd**2
-    # At the border of the view light and texture end: what lies two blocks from it is no place of its own.
+    # At the border of the view light and texture end: blocks within two of it are not measured.
     inside = cv2.erode((about(use) > 0.99).astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
     known = inside & (own > _LEAST_TEXTURE)
     nan, contrast = np.float32(np.nan), cross / np.maximum(own, _LEAST_TEXTURE)

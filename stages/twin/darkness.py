@@ -1,4 +1,4 @@
-"""How bright a frame is where it sees no wall: black, as this frame has it."""
+"""The brightness of a frame where it sees no wall: the black level of that frame."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ it may be brighter, as much as light that is named; fewest pixels. Chosen."""
 
 
 def level_of_no_wall(above: Float32, unlit: Bool) -> float:
-    """Return the mean level of a frame (H, W) where it sees no wall; NaN without such a place.
+    """Return the mean level of a frame (H, W) where it sees no wall; NaN if there is no such place.
 
-    Wall among what no LED lights, ``unlit`` (H, W), may be lit while the LEDs are off: the darkest places
-    count, and what is as dark as they.
+    Places that no LED lights, ``unlit`` (H, W), may still be wall lit by something else while the LEDs are
+    off: only the darkest of them count, and those equally dark.
     """
     if not unlit.any():
         return float("nan")

@@ -1,13 +1,14 @@
-"""An LED that may be dim throughout a recording, although the wall's photo was made in its light.
+"""Detect an LED that may have been dim throughout a recording, although the photo was made in its light.
 
-The run's own photo is darker where the dim LED shone: frames are foretold as dark as they are, and nothing
-differs around the picture. But an LED sends every polar angle another share of the light: of a near ring of
-wall one side is dark, far ahead all sides are, a little. The same wall is photographed once and seen at many
-polar angles as the probe goes on, which shows that. Lamps that lean, a lens or a bore that is no circle make
-first and second harmonics around the picture, which are granted at every polar angle.
+The run's own photo is darker where the dim LED shone: predicted frames are equally dark, and no difference
+around the picture remains. But the LED's share of the light depends on the polar angle: a near ring of wall
+is dark on one side, far ahead all sides are a little darker. The same wall is in the photo once but is seen
+at many polar angles as the probe advances, which shows the difference. Lamps that lean, a lens, or a bore
+that is not circular make first and second harmonics around the picture; these are fitted freely at every
+polar angle.
 
-This bears no name out, though: of an LED's light no more than a thousandth is narrower than these harmonics,
-and dirt on the window, shade or a third harmonic make as much.
+This does not justify a name, however: no more than a thousandth of an LED's light is narrower than these
+harmonics, and dirt on the window, shade or a third harmonic have effects of the same size.
 """
 
 from __future__ import annotations
@@ -29,20 +30,20 @@ from stages.twin.scene import Scene
 from stages.twin.switched import share_at
 
 _LEAST, _SURE = 0.25, 3.0
-"""Least loss that is said to be one perhaps, chosen; σ."""
+"""Smallest loss that is mentioned, chosen; and its significance, σ."""
 _MOST_BLOCKS = 100_000
-"""Blocks that patterns are fitted to, about: 50 columns of them take 40 MB, of 12 MP 2 GB."""
+"""Approximate number of blocks in the fit: 50 columns of them take 40 MB, of all blocks of 12 MP 2 GB."""
 _PARTS, _FEWEST_FRAMES = 6, 6
-"""Parts of the frames of which each is left out once for a σ; fewest lit frames."""
+"""Number of parts of the frames, each of which is left out once for a σ; least number of lit frames."""
 _FALLOFF_RAD, _HARMONIC_RAD = 0.1, 0.3
-"""Steps of polar angle between which falloff, and harmonics around the picture, are taken as straight."""
+"""Knot spacing over the polar angle, of the falloff and of the harmonics around the picture."""
 _AS_DARK, _ALIKE = 0.999, 1e-6
-"""Of an LED's share that is taken for all of it: its logarithm stays finite. Relative size of columns that
-say what others do."""
+"""Largest share of the light that an LED may have, so that the logarithm stays finite. Relative size below
+which a column is taken to be a combination of others."""
 
 
 def seen_from(samples: BlockSamples, scene: Scene) -> tuple[Float32, Float32]:
-    """Return the polar angles and image azimuths (N,), rad, of the middles of blocks."""
+    """Return polar angles and image azimuths (N,), rad, of the middles of blocks."""
     rows, columns = (BLOCK_PX * (a.max() + 1) for a in (samples.row, samples.column))
     middle = (slice(BLOCK_PX // 2, rows, BLOCK_PX), slice(BLOCK_PX // 2, columns, BLOCK_PX))
     theta, phi = (np.nan_to_num(a[middle])[samples.row, samples.column] for a in scene.polar[:2])
@@ -50,9 +51,9 @@ def seen_from(samples: BlockSamples, scene: Scene) -> tuple[Float32, Float32]:
 
 
 def dead_led(samples: BlockSamples | None, scene: Scene) -> tuple[Mismatch, ...]:
-    """Return the LED that all frames may be without, if the same wall at several polar angles looks like it.
+    """Return the LED that may be dim in all frames, if the same wall at several polar angles suggests one.
 
-    It cannot be told from other patterns that stand still in the picture, and is no finding: it has no size.
+    It is not a finding and has no size, since other patterns that stay still in the picture look the same.
     """
     if samples is None or len(samples.number) < _FEWEST_FRAMES:
         return ()
@@ -69,16 +70,16 @@ def dead_led(samples: BlockSamples | None, scene: Scene) -> tuple[Mismatch, ...]
         return ()
     where, nan = half_turn(float(np.degrees(law.azimuth_rad))), float("nan")
     said = (
-        f"Wall near the lamps is too dark about image azimuth {where:.0f}°, held against the same wall seen "
-        "farther ahead, as if an LED there were dim in all frames: this cannot be told from dirt or shade on "
-        "the window, nor from other patterns that stand still in the picture. What to do: look at the LEDs."
+        f"Near the lamps the wall is too dark about image azimuth {where:.0f}°, compared with the same "
+        "wall seen farther ahead, as if an LED there were dim in all frames. Dirt or shade on the window, or "
+        "another pattern that stays still in the picture, looks the same. What to do: check the LEDs."
     )
     look = scene.ring.at(int(samples.number[0]), law.azimuth_rad)
     return (Mismatch("led_dead", "intensity", "image", (), (), min(chance, 1.0), nan, nan, said, look),)
 
 
 def _thinned(samples: BlockSamples) -> BlockSamples:
-    """Return all views of some cells of the wall, drawn at random, so many that blocks are few."""
+    """Return all views of randomly drawn cells of the wall, so that about `_MOST_BLOCKS` blocks remain."""
     wall = samples.orders["wall"]
     drawn = np.random.default_rng(1).random(wall.max() + 1)
     return samples.kept(drawn[wall] < _MOST_BLOCKS / len(wall))
@@ -86,7 +87,7 @@ def _thinned(samples: BlockSamples) -> BlockSamples:
 
 @dataclass(frozen=True)
 class _Law:
-    """Logarithm (N,) of the light of blocks without an LED over that of their photo, and its azimuth.
+    """Logarithm (N,) of the light of blocks without an LED over that in their photo, and the LED's azimuth.
 
     ``most`` is the largest share of the light that it has in any block.
     """
@@ -96,7 +97,7 @@ class _Law:
     most: float
 
     def lost(self, size: float) -> float:
-        """Return which share of its light the LED has lost, for a size of the logarithm."""
+        """Return which share of its light the LED has lost, from a fitted factor on the logarithm."""
         return float((1 - (1 - _AS_DARK * self.most) ** max(size, 0.0)) / self.most)
 
 
@@ -108,7 +109,7 @@ def _law_at(samples: BlockSamples, scene: Scene, angles: tuple[Float32, Float32]
 
 @dataclass(frozen=True)
 class _Beside:
-    """Brightness (N,) of blocks, and columns (N, K), orthonormal, of what is granted beside a law.
+    """Log brightness (N,) of blocks, and orthonormal columns (N, K) that are fitted beside a law.
 
     Frames (N,) are counted from 0.
     """
@@ -119,7 +120,7 @@ class _Beside:
 
     @classmethod
     def harmonics(cls, samples: BlockSamples, theta_rad: Float32, phi_rad: Float32, most: int) -> _Beside:
-        """Grant light to any power, any falloff over polar angle, and harmonics that change with it."""
+        """Fit a power of the light, any falloff over polar angle, and harmonics at every polar angle."""
         groups = samples.orders["wall"], samples.frame
         theta, phi = (np.asarray(a, float) for a in (theta_rad, phi_rad))
         waves = [f(m * phi) for m in range(1, most + 1) for f in (np.cos, np.sin)]
@@ -133,18 +134,18 @@ class _Beside:
         return np.asarray(values - self.granted @ (self.granted.T @ values))
 
     def products(self, law: Float) -> Float:
-        """Return of each frame (F, 2) the sums of law times brightness, and of its square."""
+        """Return for each frame (F, 2) the sums of law × brightness and of law²."""
         law, frames = self._beyond(law), int(self.frame.max()) + 1
         bright = self._beyond(self.bright)
         return np.stack([np.bincount(self.frame, law * a, frames) for a in (bright, law)], 1)
 
     def fall(self, law: Float) -> float:
-        """Return by how much squares of brightness fall with a law, less than 0 with one of other sign."""
+        """Return by how much squares of brightness fall with a law; negative for the opposite sign."""
         cross, own = self.products(law).sum(0)
         return float(cross * abs(cross) / max(own, 1e-12))
 
     def size(self, law: Float) -> tuple[float, float]:
-        """Return the size of a law and its 1 σ, parts of the frames left out in turns."""
+        """Return the size of a law and its 1 σ, by leaving out parts of the frames in turn."""
         each = self.products(law)
         parts = np.arange(len(each)) * _PARTS // len(each)
         sums = np.stack([np.bincount(parts, each[:, k], _PARTS) for k in (0, 1)], 1)
@@ -154,6 +155,6 @@ class _Beside:
 
 
 def _hats(angle_rad: Float, step_rad: float) -> list[Float]:
-    """Return hat functions (N,) of polar angles over all that are there."""
+    """Return hat functions (N,) of polar angles, with knots over their whole range."""
     knots = np.arange(float(angle_rad.min()), float(angle_rad.max()) + step_rad, step_rad)
     return [np.maximum(0.0, 1 - np.abs(angle_rad - k) / step_rad) for k in knots]

@@ -1,4 +1,4 @@
-"""By how much frames fit better, and the chance of that: frames that follow each other see the same wall."""
+"""Significance of an improvement over frames; consecutive ones see the same wall and are dependent."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from pipeline.arrays import Float
 from stages.twin.cells import sigmas
 
 _MOST_ALIKE = 0.9
-"""Correlation of neighbours that counts at most: of so few frames it is not told better."""
+"""Largest correlation of neighbours that is used: a higher one cannot be estimated from so few frames."""
 
 
 def over_frames(fall: Float) -> tuple[float, float]:
-    """Return by how many σ falls (F,) in the order of time are above 0, and the chance of that.
+    """Return by how many σ the mean of falls (F,), in order of time, is above 0, and the chance of that.
 
-    Frames that follow each other see the same wall: as far as their falls are alike they count as fewer.
+    Consecutive frames see the same wall: correlated falls count as fewer independent frames.
     """
     if len(fall) < 3:
         return 0.0, 1.0

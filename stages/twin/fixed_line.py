@@ -1,8 +1,8 @@
-"""Where the line lies aside in all rings at one place of the image, whatever wall passes by.
+"""Places of the image at which the line is displaced in all rings, whatever wall passes by.
 
-What bends the line's light hides in the wall that is measured through it, and lit frames are compared with a
-photo of that wall: they may show nothing. That the wall is not so, `stages.accumulate.fixed` tells by the
-probe's roll.
+What bends the line's light displaces the wall that is measured through it. Lit frames are compared with a
+photo of that wall and may show nothing. `stages.accumulate.fixed` uses the probe's roll to show that the wall
+itself is not displaced.
 """
 
 from __future__ import annotations
@@ -19,16 +19,16 @@ from stages.twin.discs import meet
 from stages.twin.scene import Ring
 
 _SEEN = 0.5
-"""Share of rings that show an azimuth, below which the line is not seen there. Chosen."""
+"""Share of rings that must show an azimuth, else the line is not seen there. Chosen."""
 
 
 def on_line(
     fixed: FixedToProbe | None, samples: RingSamples, ring: Ring, others: Sequence[Mismatch]
 ) -> tuple[Mismatch, ...]:
-    """Return places at which the line lies aside, beside ``others`` that have a place in the image.
+    """Return places at which the line is displaced, other than the places of ``others``.
 
-    Places that a groove along the pipe would make as well are left out. Amid a drop the line may not be seen
-    at all: azimuths that join a place, and at which most rings have no line, belong to it.
+    Places that a groove along the pipe would explain as well are left out. Inside a drop the line may not be
+    seen at all: neighbouring azimuths at which most rings have no line belong to the place.
     """
     places = () if fixed is None else tuple(p for p in fixed.places if p.on_probe)
     at = [_within(p, samples.azimuth_rad) for p in places]
@@ -44,13 +44,13 @@ def on_line(
 
 
 def _within(place: FixedPlace, azimuth_rad: Float) -> Bool:
-    """Return which azimuths (A,) a place covers: the nearest at least."""
+    """Return which azimuths (A,) a place covers; at least the nearest one."""
     away = np.abs(np.angle(np.exp(1j * (azimuth_rad - place.azimuth_rad))))
     return np.asarray(away <= max(place.width_rad / 2, float(away.min())))
 
 
 def _parts(marked: Bool) -> list[Bool]:
-    """Return the stretches of marked azimuths (A,) of a circle."""
+    """Return the runs of marked azimuths (A,), periodic around the circle."""
     start = int(np.argmin(marked))
     parts = runs_of(np.roll(marked, -start))
     index = np.arange(len(marked))
@@ -66,7 +66,7 @@ def _mismatch(part: Bool, azimuth_rad: Float, place: FixedPlace, ring: Ring) -> 
         "", "line", "image", tuple(NamedFigure(n, float(x), radius / 2, "px") for n, x in at),
         (NamedFigure("departure", place.departure_mm, place.departure_sd_mm, "mm"),),
         nan, nan, nan,
-        f"About ({look.u_px:.0f}, {look.v_px:.0f}) the line lies {place.departure_mm:+.2f} mm aside in all "
-        "frames, whatever wall goes by: a drop or a scratch on the window bends its light, or the sheet is "
-        "not plane there.", look,
+        f"About ({look.u_px:.0f}, {look.v_px:.0f}) the line is displaced by {place.departure_mm:+.2f} mm in "
+        "all frames, whatever wall passes by: a drop or a scratch on the window bends its light, or the "
+        "laser sheet is not plane there.", look,
     )  # fmt: skip

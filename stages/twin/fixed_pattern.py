@@ -1,8 +1,9 @@
-"""The sensor's fixed pattern: what each pixel adds and multiplies by itself, the same in all frames.
+"""The sensor's fixed pattern: each pixel's own offset and gain, the same in all frames.
 
-EMVA 1288's DSNU and PRNU. The wall moves and noise changes between frames; what two frames leave over alike
-at one pixel is the pixel's own. Its covariance is D² + G² · level₁ · level₂, D the spread of the dark signals
-and G that of the gains. Lenses, lamps and dirt are broad, and are taken off with the mean of five by five.
+These are DSNU and PRNU of EMVA 1288. The wall moves and noise changes between frames; what remains the same
+at a pixel in two frames is its own. Its covariance is D² + G² · level₁ · level₂, with D the spread of the
+dark signals and G that of the gains. Lenses, lamps and dirt vary slowly and are removed with the mean over
+five by five pixels.
 """
 
 from __future__ import annotations
@@ -21,26 +22,26 @@ from pipeline.artefacts.twin import NamedFigure
 from stages.twin.lamp_light import Figure
 
 _AROUND_PX, _EVERY, _BINS, _FEWEST_PIXELS = 5, 2, 8, 5000
-"""Side of what is taken off; every how many pixels are looked at; bins of brightness; fewest pixels that two
-frames must share."""
+"""Side of the local mean, px; every how many pixels one is used; bins of brightness; least number of pixels
+that two frames must share."""
 _OF_PHOTO = 0.04
-"""Relative 1 σ: the wall's photo was made from these very frames, and takes up their share of its views."""
+"""Relative 1 σ: the wall's photo was made from the same frames, and absorbs the share that each has in it."""
 _LARGEST = 6.0
-"""Robust σ beyond which what is left over is no pattern but a hot pixel or an edge of the photo."""
+"""Robust σ beyond which a residual is not pattern but a hot pixel or an edge of the photo."""
 
 
 @dataclass(frozen=True)
 class FixedPattern:
-    """1 σ of the pixels' dark signals, grey levels, and of their gains, relative."""
+    """1 σ of the pixels' dark signals, grey levels, and of their gains, relative to 1."""
 
     dark: Figure
     gain: Figure
 
 
 def fixed_pattern(frames: Sequence[tuple[Float32, Float32, Bool]]) -> FixedPattern | None:
-    """Return what lit frames show alike at each pixel; None where too few share enough pixels.
+    """Return the fixed pattern seen in lit frames; None where too few frames share enough pixels.
 
-    Each frame is recorded less predicted, predicted above black, and which pixels count, (H, W) each.
+    Each frame is given as recorded − predicted, predicted above black, and which pixels count, (H, W) each.
     """
     few = (slice(None, None, _EVERY),) * 2
     fine = [(_detail(rest, use)[few], level[few]) for rest, level, use in frames]
@@ -49,7 +50,7 @@ def fixed_pattern(frames: Sequence[tuple[Float32, Float32, Bool]]) -> FixedPatte
         return None
     each = np.array(told)
     mean = each.mean(0)
-    # A frame takes part in several pairs: there are as many independent ones as frames.
+    # A frame is part of several pairs: only as many pairs as frames are independent.
     sd = each.std(0, ddof=1) / np.sqrt(len(frames))
     one = np.sqrt(mean)
     each_sd = np.hypot(sd / (2 * np.sqrt(np.maximum(np.maximum(mean, sd), 1e-12))), _OF_PHOTO * one)
@@ -58,7 +59,7 @@ def fixed_pattern(frames: Sequence[tuple[Float32, Float32, Bool]]) -> FixedPatte
 
 
 def pattern_figures(pattern: FixedPattern | None) -> tuple[NamedFigure, ...]:
-    """Return what a twin states of the fixed pattern; a lossy codec takes most of it away."""
+    """Return the figures of the fixed pattern for twin.json; a lossy codec removes most of the pattern."""
     if pattern is None:
         return ()
     return (
@@ -68,7 +69,7 @@ def pattern_figures(pattern: FixedPattern | None) -> tuple[NamedFigure, ...]:
 
 
 def _detail(rest: Float32, use: Bool) -> Float32:
-    """Return what is left over (H, W) less its mean about each pixel, NaN where that is not all in use."""
+    """Return a residual (H, W) minus its local mean; NaN where not all pixels of the mean are in use."""
     size = (_AROUND_PX, _AROUND_PX)
     whole = cv2.erode(use.astype(np.uint8), np.ones(size, np.uint8)) > 0
     filled = np.where(use, np.nan_to_num(rest), np.float32(0))
@@ -80,7 +81,7 @@ def _detail(rest: Float32, use: Bool) -> Float32:
 
 
 def _covariance(product: Float32, levels: Float32) -> Float | None:
-    """Return D² and G² that products (H, W) of two frames follow over products of their levels."""
+    """Return D² and G² fitted to products (H, W) of two frames' residuals over products of their levels."""
     known = np.isfinite(product)
     if known.sum() < _FEWEST_PIXELS:
         return None

@@ -78,7 +78,7 @@ def test_few_frames_call_an_led_that_fails_either_that_or_flicker(monkeypatch):
     share = (1 + 0.3 * np.cos(np.radians(AZIMUTH_DEG - 60))) / 8
     (led,) = _found(np.log1p(-share) * _step(3))
     assert led.name == "flicker or led_dead"
-    assert "6 frames do not tell this from an LED that fails" in led.statement
+    assert "6 frames do not distinguish this from an LED that fails" in led.statement
     assert led.place[0].value == 25
     assert led.place[1].value == pytest.approx(60, abs=20)
     (flicker,) = _found(0.06 * np.random.default_rng(4).standard_normal(6)[:, None])
