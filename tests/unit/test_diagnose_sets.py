@@ -8,12 +8,17 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from pipeline.physics.effect import CourseKind
 from stages.diagnose.effects.base import EffectModel, Shape
+from stages.diagnose.effects.courses import Coursed
 from stages.diagnose.effects.free_profile import FREE_PROFILES
 from stages.diagnose.effects.library import LIBRARY
 from stages.diagnose.effects.nameless import GENERIC, STEADY
+from stages.diagnose.effects.pattern_in_course import PatternInCourse
+from stages.diagnose.gauge.run import Term
 from stages.diagnose.gauge.sets import Member, Sets, believed, cause_of, members_of
 from stages.diagnose.inference import INSTRUMENT, PRIOR_PLAUSIBLE, Column, Evidence, Stated
+from tests.unit.wall_points import Bore, plain_probe, ring_points
 
 CONE, BASELINE, FOCAL = (LIBRARY[name] for name in ("laser_cone", "baseline", "focal_scale"))
 LINE = next(t for t in GENERIC if t.name == "generic_line_0_2")
@@ -112,6 +117,50 @@ def test_waves_of_every_order_may_be_in_a_set_whichever_was_the_best_alone():
     members = members_of(cast(Any, run), cast(Any, found), cast(Any, scores), 30)
     assert {m.shape[0] for m in members if m.model is waves} == {2.0, 3.0, 4.0, 5.0, 6.0}
     assert sum(m.model is CONE for m in members) == 1
+
+
+SETTLING = Coursed(CONE, (), CourseKind.EXPONENTIAL)
+
+
+def members_beside(model: EffectModel, shape: Shape) -> tuple[Member, ...]:
+    """Return what may be in the place of one effect that was found in a run of 10 s."""
+    run = SimpleNamespace(time_s=np.arange(10.0))
+    found = SimpleNamespace(terms=(Term(model, shape, np.full(len(model.amplitudes), 0.5)),))
+    return members_of(cast(Any, run), cast(Any, found), (), 30)
+
+
+def test_what_settles_has_patterns_of_line_and_picture_beside_it_that_settle_as_well():
+    """A focal length that changed as no law of the library does was called a cone at .996."""
+    beside = [m for m in members_beside(SETTLING, (12.6,)) if isinstance(m.model, PatternInCourse)]
+    names = {m.model.name for m in beside}
+    powers = {f"generic_{moves}_0_{p}" for moves in ("line", "outward") for p in range(4)}
+    assert {f"{power} as {SETTLING.name}" for power in powers} < names
+    assert all("_0_" in name for name in names)
+    assert all(m.nameless and m.shape == (12.6,) for m in beside)
+    points = ring_points(plain_probe(), Bore(50.8), 90, 1.3)
+    outward = next(m.model for m in beside if m.model.name.startswith("generic_outward_0_1"))
+    steady = next(t for t in GENERIC if t.name == "generic_outward_0_1")
+    share = -np.expm1(-points.time_s / 12.6)[:, None]
+    moved = share * steady.image_shift_px(points, STEADY, np.array([0.3]))
+    assert outward.image_shift_px(points, (12.6,), np.array([0.3])) == pytest.approx(moved)
+    assert outward.formula((12.6,)) == "(image outward: a θ^1) × (1 − exp(−t / time_s), time_s = 12.6)"
+
+
+def test_such_a_pattern_is_as_likely_beside_its_effect_as_a_steady_one_beside_a_steady_effect():
+    def beside(name: str, model: EffectModel, shape: Shape) -> float:
+        before = {m.model.name: m.beforehand for m in members_beside(model, shape)}
+        return before[name] - before[model.name]
+
+    settles = beside(f"generic_line_0_1 as {SETTLING.name}", SETTLING, (12.6,))
+    assert settles == pytest.approx(beside("generic_line_0_1", CONE, ()))
+
+
+def test_what_stays_has_no_more_patterns_and_a_swing_has_sine_and_cosine_of_each():
+    assert not any(isinstance(m.model, PatternInCourse) for m in members_beside(CONE, ()))
+    swinging = members_beside(LIBRARY["laser_rocking"], (0.7,))
+    beside = [m.model for m in swinging if isinstance(m.model, PatternInCourse)]
+    assert {len(p.amplitudes) for p in beside if p.name.startswith("generic_line_1_2")} == {4}
+    assert beside[0].quantities((0.7,), np.array([3.0, 0.0, 0.0, 4.0])) == {"amplitude": 5.0}
 
 
 def test_a_free_profile_holds_every_power_of_its_harmonic():

@@ -13,7 +13,7 @@ import numpy as np
 
 from pipeline.arrays import Bool, Float
 from pipeline.physics.catalogue import effect
-from pipeline.physics.effect import Course, CourseKind
+from pipeline.physics.effect import COURSES, Course, CourseKind
 from stages.diagnose.effects.base import Amplitude, EffectModel, Factored, ImagePoints, Product, Shape
 from stages.diagnose.effects.kinds import Drifting
 
@@ -163,6 +163,12 @@ class Coursed(Product):
 def of_own_clock(model: EffectModel) -> bool:
     """Return whether an effect comes at times of its own recording, which no other has to share."""
     return model.kind in _OWN_CLOCK
+
+
+def in_words(kind: CourseKind, shape: Shape) -> str:
+    """Return a course as a formula with its numbers; of a swing its phase is left open."""
+    numbers = ", ".join(f"{q.name} = {v:.3g}" for q, v in zip(COURSES[kind], shape, strict=False))
+    return f"{_FORMULAS[kind]}, {numbers}" if numbers else _FORMULAS[kind]
 
 
 def with_courses(

@@ -21,11 +21,11 @@ from stages.diagnose.effects.nameless import GenericTerm, Moves
 from stages.diagnose.gauge.confirm import Sized, confirmations, sizes_of
 from stages.diagnose.gauge.feasible import ability, feasibility, not_told_apart
 from stages.diagnose.gauge.fit import fit
-from stages.diagnose.gauge.formula import ADEQUATE, pattern_of, patterns_by_chance, swings
+from stages.diagnose.gauge.formula import ADEQUATE, patterns_by_chance, swings
 from stages.diagnose.gauge.heldout import fit_quality
 from stages.diagnose.gauge.hypotheses import Judged, judged_of, regimes_of
 from stages.diagnose.gauge.judge import Verdicts, judge
-from stages.diagnose.gauge.run import GaugeRun, Term
+from stages.diagnose.gauge.run import GaugeRun, Term, pattern_of
 from stages.diagnose.gauge.search import DETECTED, Search, prepare, search
 from stages.diagnose.gauge.sets import believed
 from stages.diagnose.gauge.unknown_laws import Unknown, excess_exponent, odds_of_unknown_laws

@@ -7,16 +7,12 @@ from which poses and the stated instrument have been taken out.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from types import MappingProxyType
 
 import numpy as np
 from scipy import stats
 
 from pipeline.arrays import Int
-from pipeline.physics.catalogue import EFFECTS
-from pipeline.physics.effect import CourseKind
 from stages.diagnose.effects.base import EffectModel, Shape
-from stages.diagnose.effects.courses import Coursed
 from stages.diagnose.effects.nameless import SWINGS, VOCABULARY, Nameless
 from stages.diagnose.gauge.fit import Fit, evidence, fit
 from stages.diagnose.gauge.linearise import asking, linearise
@@ -47,29 +43,6 @@ APART = 14.0
 # Directions with less information than this share of the best one are left out of the test of adequacy.
 # Debt: data/debts.md.
 _WEAK = 1e-3
-
-_IN_TIME = MappingProxyType({
-    CourseKind.CONSTANT: "static", CourseKind.STEP: "event", CourseKind.RAMP: "drift",
-    CourseKind.EXPONENTIAL: "drift", CourseKind.SINUSOID: "periodic", CourseKind.SPEED: "speed",
-    CourseKind.REVERSAL: "reversal", CourseKind.DISTANCE: "static",
-})  # fmt: skip
-
-
-def pattern_of(term: Term) -> tuple[str, str, int | None]:
-    """Return what a term is fixed to, its behaviour in time and its harmonic."""
-    model = term.model
-    if isinstance(model, Nameless):
-        fixed_to, time, harmonic = model.goes_with(term.shape)
-        return str(fixed_to), time, harmonic
-    known = EFFECTS[model.law]
-    numbers = model.quantities(term.shape, term.amplitude)
-    order = int(numbers["order"]) if "order" in numbers else known.harmonic
-    return str(known.fixed_to), behaviour(model), order
-
-
-def behaviour(model: EffectModel) -> str:
-    """Return how an effect of the library behaves in time."""
-    return _IN_TIME[model.kind] if isinstance(model, Coursed) else EFFECTS[model.law].time
 
 
 def empirical(run: GaugeRun, before: Fit, stated: Stated, swung: Sequence[Scored]) -> Fit:

@@ -3,16 +3,27 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, fields
+from types import MappingProxyType
 
 from pipeline.adjustment.levenberg_marquardt import Watch, unwatched
 from pipeline.adjustment.rows import Rows
 from pipeline.arrays import Float
 from pipeline.files.codec import NOT_STORED
+from pipeline.physics.catalogue import EFFECTS
+from pipeline.physics.effect import CourseKind
 from pipeline.recording.base import Encoder
 from stages.calibrate.gauge.edges import Edges
 from stages.calibrate.gauge.geometry import BoreRings
 from stages.diagnose.effects.base import Amplitude, EffectModel, ImagePoints, Shape, Travel
+from stages.diagnose.effects.courses import Coursed
+from stages.diagnose.effects.nameless import Nameless
 from stages.diagnose.gauge.elimination import Equations
+
+_IN_TIME = MappingProxyType({
+    CourseKind.CONSTANT: "static", CourseKind.STEP: "event", CourseKind.RAMP: "drift",
+    CourseKind.EXPONENTIAL: "drift", CourseKind.SINUSOID: "periodic", CourseKind.SPEED: "speed",
+    CourseKind.REVERSAL: "reversal", CourseKind.DISTANCE: "static",
+})  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -89,3 +100,20 @@ class Linearised:
     rings: ImagePoints
     edges: ImagePoints
     travel: Travel
+
+
+def pattern_of(term: Term) -> tuple[str, str, int | None]:
+    """Return what a term is fixed to, its behaviour in time and its harmonic."""
+    model = term.model
+    if isinstance(model, Nameless):
+        fixed_to, time, harmonic = model.goes_with(term.shape)
+        return str(fixed_to), time, harmonic
+    known = EFFECTS[model.law]
+    numbers = model.quantities(term.shape, term.amplitude)
+    order = int(numbers["order"]) if "order" in numbers else known.harmonic
+    return str(known.fixed_to), behaviour(model), order
+
+
+def behaviour(model: EffectModel) -> str:
+    """Return how an effect of the library behaves in time."""
+    return _IN_TIME[model.kind] if isinstance(model, Coursed) else EFFECTS[model.law].time

@@ -22,8 +22,9 @@ from stages.diagnose.effects.base import EffectModel, Shape
 from stages.diagnose.effects.courses import SEARCHED, Coursed
 from stages.diagnose.effects.free_profile import FREE_PROFILES
 from stages.diagnose.effects.nameless import VOCABULARY, Nameless
+from stages.diagnose.effects.pattern_in_course import PatternInCourse, patterns_in_course
 from stages.diagnose.gauge.fit import Fit
-from stages.diagnose.gauge.run import GaugeRun, Term
+from stages.diagnose.gauge.run import GaugeRun, Term, pattern_of
 from stages.diagnose.gauge.scan import Scored, span
 from stages.diagnose.inference import (
     INSTRUMENT,
@@ -107,6 +108,9 @@ def _one_beforehand(run: GaugeRun, model: EffectModel, shape: Shape, laws: int) 
     """Return −2 ln of the chance of an effect or pattern among its own kind."""
     if (model, shape) in PATTERNS:
         return float(2 * np.log(len(PATTERNS)))
+    if isinstance(model, PatternInCourse):
+        # As likely beside the effect as a steady pattern is beside a steady effect.
+        return _one_beforehand(run, model.like, shape, laws) + float(2 * np.log(len(PATTERNS) / laws))
     courses = len(SEARCHED) if isinstance(model, Coursed) else 1
     return float(2 * np.log(laws * courses * max(len(model.shapes(*span(run))) / _PEAK, 1.0)))
 
@@ -125,7 +129,7 @@ def prior_sigma(of: Evidence, terms: Sequence[Term]) -> Float:
 def members_of(run: GaugeRun, found: Fit, scores: Sequence[Scored], laws: int) -> tuple[Member, ...]:
     """Return what may be in the place of a fit's effects or beside them: these, all scored, all patterns.
 
-    Laws that come at a time may come at that of a found one.
+    Laws that come at a time may come at that of a found one, and patterns as a found one does.
     """
     asked = [(t.model, t.shape) for t in found.terms]
     asked += [(s.model, s.shape) for s in scores]
@@ -137,7 +141,9 @@ def members_of(run: GaugeRun, found: Fit, scores: Sequence[Scored], laws: int) -
         for t in found.terms
         if s.model.kind is t.model.kind and s.model.kind is not CourseKind.CONSTANT
     ]
-    each = dict.fromkeys((*asked, *PATTERNS))
+    known = [t for t in found.terms if not isinstance(t.model, Nameless)]
+    as_found = [(p, t.shape) for t in known for p in patterns_in_course(t.model, pattern_of(t)[2])]
+    each = dict.fromkeys((*asked, *PATTERNS, *as_found))
     return tuple(Member(model, shape, _one_beforehand(run, model, shape, laws)) for model, shape in each)
 
 

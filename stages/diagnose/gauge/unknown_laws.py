@@ -25,10 +25,9 @@ from stages.diagnose.effects.base import EffectModel
 from stages.diagnose.effects.courses import SEARCHED, Coursed
 from stages.diagnose.effects.kinds import Drifting
 from stages.diagnose.gauge.fit import evidence
-from stages.diagnose.gauge.formula import behaviour, pattern_of
 from stages.diagnose.gauge.hypotheses import Judged
 from stages.diagnose.gauge.otherwise import other_course, other_growth
-from stages.diagnose.gauge.run import GaugeRun, Term
+from stages.diagnose.gauge.run import GaugeRun, Term, behaviour, pattern_of
 from stages.diagnose.gauge.scan import span
 from stages.diagnose.gauge.sets import NAMELESS, beforehand, prior_sigma
 from stages.diagnose.inference import INSTRUMENT, Evidence, Stated, estimate, places_of

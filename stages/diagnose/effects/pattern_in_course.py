@@ -1,0 +1,60 @@
+"""Patterns without a cause that come as an effect does which was found: what else may be there in its place.
+
+A slow change of the focal length that the library lacked was called a cone of the sheet at .996: patterns of
+the picture that stay or grow evenly were beside it, and none that settles as it did.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from pipeline.arrays import Float
+from pipeline.physics.effect import CourseKind
+from stages.diagnose.effects.base import Amplitude, EffectModel, Factored, ImagePoints, Product, Shape
+from stages.diagnose.effects.courses import in_words
+from stages.diagnose.effects.free_profile import FREE_PROFILES
+from stages.diagnose.effects.nameless import GENERIC, STEADY, Moves, Nameless
+
+_MOVES = (Moves.LINE, Moves.OUTWARD)
+
+
+@dataclass(frozen=True)
+class PatternInCourse(Nameless, Product):
+    """A steady pattern with the course of an effect; the shape is the course's."""
+
+    steady: Nameless
+    like: EffectModel
+    name: str = field(init=False)
+    harmonic: int = field(init=False)
+    amplitudes: tuple[Amplitude, ...] = field(init=False)
+
+    def __post_init__(self) -> None:
+        waves = ("sine ", "cosine ") if self.like.kind is CourseKind.SINUSOID else ("",)
+        each = tuple(replace(a, name=wave + a.name) for wave in waves for a in self.steady.amplitudes)
+        object.__setattr__(self, "name", f"{self.steady.name} as {self.like.name}")
+        object.__setattr__(self, "harmonic", self.steady.harmonic)
+        object.__setattr__(self, "amplitudes", each)
+
+    def factored(self, points: ImagePoints, shape: Shape) -> Factored:
+        """Return the effect's course, and the pattern."""
+        of_effect = self.like.factored(points, shape)
+        assert of_effect is not None
+        return of_effect[0], self.steady, STEADY
+
+    def quantities(self, shape: Shape, amplitude: Float) -> dict[str, float]:
+        """Return the root sum of squares of all amplitudes."""
+        return {"amplitude": float(np.linalg.norm(amplitude))}
+
+    def formula(self, shape: Shape) -> str:
+        """Return the pattern and the course as a formula."""
+        return f"({self.steady.formula(STEADY)}) × ({in_words(self.like.kind, shape)})"
+
+
+def patterns_in_course(like: EffectModel, harmonic: int | None) -> tuple[PatternInCourse, ...]:
+    """Return the patterns of a harmonic that move line or picture as an effect comes; none of what stays."""
+    if like.kind is CourseKind.CONSTANT:
+        return ()
+    steady = (*(t for t in GENERIC if t.moves in _MOVES), *(profile for profile, _ in FREE_PROFILES))
+    return tuple(PatternInCourse(p, like) for p in steady if p.harmonic == harmonic)
