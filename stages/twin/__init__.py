@@ -37,7 +37,7 @@ from stages.twin.on_wall import ring_step_mm, unnamed
 from stages.twin.pixels import defective_pixels
 from stages.twin.render import Region, Renderer
 from stages.twin.scene import Scene, scene_of
-from stages.twin.seen_in_photo import parted_from_photo
+from stages.twin.seen_in_photo import beside_sectors, parted_from_photo
 from stages.twin.state import (
     PhotometricState,
     Sampled,
@@ -48,7 +48,7 @@ from stages.twin.state import (
     sample_frames,
 )
 from stages.twin.sums import Sums
-from stages.twin.window import beside_blur, through_window
+from stages.twin.window import beside_blur, or_on_window
 from stages.twin.worst import maps_of, worst_places
 
 _EVERY = 10
@@ -210,7 +210,7 @@ def compared_with(
     if not comparison.views:
         raise UnusableError("twin", "no frame could be decoded", hint="copy the video again")
     state, samples = photometry.state, sums.blocks.samples()
-    over_time = causes(*sums.cells(), scene.probe.lighting, scene.ring)
+    over_time = or_on_window(causes(*sums.cells(), scene.probe.lighting, scene.ring))
     over_time = (*over_time, *flicker_of_measured(photometry.state, over_time, scene.ring))
     failed = any("led_dead" in m.name for m in over_time)
     whole, withdrawn = sums.named(samples, recording, failed)
@@ -220,9 +220,10 @@ def compared_with(
     on_window, glints = told_apart((*on_window, *bent), sums.glints(whole, bent))
     apart_mm, clear = ring_step_mm(rings, scene.trajectory), (*on_window, *glints, *of_photo)
     line_rad = float(np.arctan2(scene.ring.radius_mm, scene.ring.ahead_mm))
+    of_wall = unnamed(samples and samples.clear_of(clear), scene.surface, apart_mm, line_rad)
+    places, beside = beside_sectors((*on_window, *of_wall), over_time, scene.ring)
     found: tuple[Mismatch, ...] = (
-        *through_window(over_time, on_window, scene.ring), *on_window, *photometry.pixels,
-        *unnamed(samples and samples.clear_of(clear), scene.surface, apart_mm, line_rad), *whole, *glints,
+        *over_time, *places, *photometry.pixels, *whole, *glints,
         *clipped(rings, state.line_clipped, comparison.clipped_wall / max(comparison.lit, 1.0)),
     )  # fmt: skip
     fall, unnamed_map = left_over(None if samples is None else samples.seen_through(state.gain_map))
@@ -234,8 +235,9 @@ def compared_with(
         (*state_figures(state), *lamp_power(samples), *unnamed_map),
         comparison.regions(), found,
         comparison.psnr_db(False), comparison.psnr_db(True), comparison.chi2_camera, comparison.stray_share,
-        comparison.seen / max(comparison.view, 1.0), cannot_tell(state), tuple(comparison.views),
-        maps_of(samples), comparison.levels(), worst_places(samples), (*withdrawn, *unsure, *of_photo),
+        comparison.seen / max(comparison.view, 1.0), cannot_tell(state, comparison.silent),
+        tuple(comparison.views), maps_of(samples), comparison.levels(), worst_places(samples),
+        (*withdrawn, *unsure, *of_photo, *beside),
     )  # fmt: skip
 
 
@@ -288,7 +290,7 @@ PHOTOMETRY = Stage(
 )
 TWIN = Stage(
     "twin",
-    "38",
+    "39",
     TwinParameters,
     compare_with_twin,
     "recorded frames beside the same frames, re-rendered from what the run has measured",

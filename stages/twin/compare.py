@@ -127,10 +127,14 @@ class Comparison:
         )
 
     def _mean(self, total: Float, region: Region) -> float:
-        silent = self.clipped or self.still > _SILENT * self.pixels[Region.DARK]
-        left_out = region == Region.EDGE or (region == Region.DARK and silent)
+        left_out = region == Region.EDGE or (region == Region.DARK and self.silent)
         compared = self.pixels[region] and not left_out
         return float(total[region] / self.pixels[region]) if compared else float("nan")
+
+    @property
+    def silent(self) -> bool:
+        """Whether dark pixels show no noise: it is cut off at black, or less than rounding."""
+        return bool(self.clipped or self.still > _SILENT * self.pixels[Region.DARK])
 
     @property
     def chi2_camera(self) -> float:

@@ -225,8 +225,8 @@ def state_figures(state: PhotometricState) -> tuple[NamedFigure, ...]:
     return tuple(found)
 
 
-def cannot_tell(state: PhotometricState) -> tuple[str, ...]:
-    """Return what such recordings do not tell, as sentences."""
+def cannot_tell(state: PhotometricState, silent: bool = False) -> tuple[str, ...]:
+    """Return what such recordings do not tell, as sentences; ``silent`` dark pixels show no noise."""
     said = [
         "Vignetting cannot be told from the LEDs' lobe: both change brightness with the polar angle alone.",
         "A power response cannot be told from the wall's contrast: the photo has it, too; gamma is read "
@@ -236,6 +236,11 @@ def cannot_tell(state: PhotometricState) -> tuple[str, ...]:
         "Frames that all move alike while they are exposed leave their blur in the wall's photo, too: motion "
         "blur is told only of frames that are more blurred than the others.",
     ]
+    if silent:
+        said.append(
+            "Nearly all dark pixels are at black to the grey level, or cut off there: light fainter than "
+            "half a level is rounded away, as most of what a wall throws back of the line is."
+        )
     if np.isnan(state.photo_black):
         said.append(
             "Whether the black level is in the wall's photo is not known, for want of a frame of the laser "

@@ -11,7 +11,8 @@ from dataclasses import replace
 
 from pipeline.artefacts.twin import Mismatch
 from stages.twin.cells import half_turn
-from stages.twin.discs import disc_of
+from stages.twin.discs import Disc, disc_of
+from stages.twin.laws import SECTOR_STEP_DEG
 from stages.twin.scene import Ring
 
 _DIMS = ("window_dirt", "window_scatter", "droplet")
@@ -29,6 +30,32 @@ def parted_from_photo(
     said = "{} But the photo may be darker there, since it was made through what lies at the same azimuth."
     withdrawn = tuple(replace(m, statement=said.format(m.statement)) for m in left)
     return tuple(m for m in found if m not in left), withdrawn
+
+
+def beside_sectors(
+    found: Sequence[Mismatch], sectors: Sequence[Mismatch], ring: Ring
+) -> tuple[tuple[Mismatch, ...], tuple[Mismatch, ...]]:
+    """Return what was found, and what has no name at the azimuth of a sector that the window may dim.
+
+    Its photo was then made through what lies there: wall that frames show beside it differs from the photo.
+    """
+    reach = [
+        (at["azimuth_deg"], (at["width_deg"] + SECTOR_STEP_DEG) / 2)
+        for at in ({p.name: p.value for p in m.place} for m in sectors if "window_scatter" in m.names)
+        if "width_deg" in at
+    ]
+    left = [m for m in found if not m.name and any(_looks_at(m, *r, ring) for r in reach)]
+    said = "{} But the photo may be made through what dims the line at that azimuth: it cannot be told."
+    withdrawn = tuple(replace(m, statement=said.format(m.statement)) for m in left)
+    return tuple(m for m in found if m not in left), withdrawn
+
+
+def _looks_at(found: Mismatch, azimuth_deg: float, half_deg: float, ring: Ring) -> bool:
+    """Return whether a mismatch is looked at within some degrees of an azimuth of the image."""
+    if found.look is None:
+        return False
+    at = Disc(found.look.u_px, found.look.v_px, 0.0).around(ring.centre_px)[0]
+    return abs(half_turn(at - azimuth_deg)) < half_deg
 
 
 def _may_be_left_by(bright: Mismatch, dim: Mismatch, ring: Ring) -> bool:

@@ -15,12 +15,9 @@ from scipy.stats import t
 
 from pipeline.arrays import Bool, Float, Float32
 from pipeline.artefacts.twin import Look, Mismatch, NamedFigure
-from stages.twin.cells import half_turn, sigmas
-from stages.twin.discs import disc_of
-from stages.twin.laws import SECTOR_STEP_DEG
+from stages.twin.cells import sigmas
 from stages.twin.locate import FALSE_ALARM, LEAST_CHANGE, ImagePlace
 from stages.twin.render import Region, TwinFrame
-from stages.twin.scene import Ring
 from stages.twin.spot import PARTS, WIDEST_PX, FittedLaw, fall_of_spot
 
 _POWER_STEP, _ASIDE_PX = 0.4, 0.5
@@ -234,34 +231,21 @@ def beside_blur(
     return tuple(m for m in found if m not in unsure), withdrawn
 
 
-def through_window(
-    found: Sequence[Mismatch], on_window: Sequence[Mismatch], ring: Ring
-) -> tuple[Mismatch, ...]:
+def or_on_window(found: Sequence[Mismatch]) -> tuple[Mismatch, ...]:
     """Return what was found, a dim sector of the laser being either that or what is on the window there.
 
     The wall's photo was made through the same window, mostly where the line is: what lies across the line
-    hides in it, and shows in lit frames at the same azimuth, nearer or farther, as the opposite of itself.
+    hides in it, and lit frames need not show it. What scatters takes no light from lit wall at all.
     """
-    return tuple(
-        _or_window(m)
-        if "laser_sector" in m.names and any(_same_azimuth(m, w, ring) for w in on_window)
-        else m
-        for m in found
-    )
+    return tuple(_or_window(m) if "laser_sector" in m.names else m for m in found)
 
 
 def _or_window(sector: Mismatch) -> Mismatch:
-    said = f"{sector.statement} Or dirt on the window or the lens, which lies there, dims the line."
+    said = (
+        f"{sector.statement} Or something on the window or the lens dims the line there: the wall's photo "
+        "was made through it, too, and lit frames need not show it."
+    )
     return replace(sector, name=" or ".join((sector.name, *_AT_LINE)), statement=said)
-
-
-def _same_azimuth(sector: Mismatch, on_window: Mismatch, ring: Ring) -> bool:
-    """Return whether a place of the window lies at the image azimuth of a sector."""
-    disc = disc_of(on_window)
-    if disc is None or on_window.fixed_to != "image":
-        return False
-    at, (azimuth, half) = {p.name: p.value for p in sector.place}, disc.around(ring.centre_px)
-    return abs(half_turn(azimuth - at["azimuth_deg"])) < (at["width_deg"] + SECTOR_STEP_DEG) / 2 + half
 
 
 def _with_photo(share: NamedFigure) -> NamedFigure:

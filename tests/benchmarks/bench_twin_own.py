@@ -85,6 +85,8 @@ class Case:
 
 _OF_COLOUR = float(np.linalg.norm(LUMA_BGR))  # noise of grey over that of each colour
 _EXACT = (("codec", "ffv1"),)  # a lossy codec takes fine noise away
+_BRIGHT = (("laser.peak", 4.0),)
+"""Else a wall throws half a grey level back of the line at most, which rounding takes away."""
 _MIRRORS = (("probe.laser.opening_angle_deg", 168.0), ("pipe.relief.roughness_mm", 0.002))
 """A wall mirrors a flat sheet's line onto itself; a cone's, 6° forward, lands 10.7 mm ahead. Rough wall blurs
 that over a dozen pixels: what mirrors is smooth."""
@@ -96,7 +98,7 @@ CASES = (
     Case("window_scatter", (0.5, -100.0, 6.0), ("window_scatter",), 0.5, "spot"),
     Case("droplet", (1.0, 150.0, 6.0), ("droplet",), None, "spot"),
     Case("saturation", (3.0,), ("saturation",)),
-    Case("bloom", (0.3, 6.0), ("bloom",), changes=(("laser.peak", 4.0),), also=("saturation",)),
+    Case("bloom", (0.3, 6.0), ("bloom",), changes=_BRIGHT, also=("saturation",)),
     Case("gamma", (0.6,), ("response",), figure=("lamp_power", 0.6), changes=_EXACT),
     Case("black_level", (12.0,), figure=("black_dn", 16 + 12 * 219 / 255)),  # of luma in limited range
     Case("defocus", (1.8, 0.0), ("defocus",), figure=("lens_blur_px", math.hypot(0.7, 1.8))),
@@ -105,7 +107,9 @@ CASES = (
     Case("full_well", (3000.0,), figure=("gain_e_per_dn", 3000 / 255 / _OF_COLOUR**2), changes=_EXACT),
     Case("fixed_pattern", (0.03,), figure=("gain_pattern", 0.03), changes=_EXACT),
     Case("dark_pattern", (0.02,), figure=("dark_pattern_dn", 0.02 * 255), changes=_EXACT),
-    Case("interreflection", (1.0,), ("interreflection", "ambient_light")),
+    Case(
+        "interreflection", (1.0,), ("interreflection", "ambient_light"), changes=_BRIGHT, also=("saturation",)
+    ),
     Case("ambient_light", (0.2,), ("ambient_light", "interreflection")),
     Case("ghost_ring", (0.1,), ("second_line",), changes=_MIRRORS),
     Case("motion_blur", (0.03,), ("motion_blur",)),
@@ -198,12 +202,18 @@ def _lies_at(case: Case, found: dict[str, Any], spot: tuple[float, float]) -> bo
     """Return whether a mismatch lies where its effect was put."""
     at = {p["name"]: p["value"] for p in found["place"]}
     if case.place == "spot":
+        if found["fixed_to"] == "line" and "azimuth_deg" in at:  # the spot lies on the line
+            return _near_azimuth(case, at)
         here = (at.get("u_px", np.inf), at.get("v_px", np.inf))
         return bool(np.hypot(here[0] - spot[0], here[1] - spot[1]) < _NEAR_PX)
     if case.place == "azimuth":
-        away = abs(at.get("azimuth_deg", np.inf) - case.numbers[1]) % 360
-        return bool(min(away, 360 - away) < _NEAR_DEG)
+        return _near_azimuth(case, at)
     return True
+
+
+def _near_azimuth(case: Case, at: dict[str, float]) -> bool:
+    away = abs(at.get("azimuth_deg", np.inf) - case.numbers[1]) % 360
+    return bool(min(away, 360 - away) < _NEAR_DEG)
 
 
 def spot_of(case: Case, given: argparse.Namespace) -> tuple[float, float]:

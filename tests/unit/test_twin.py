@@ -166,6 +166,17 @@ def test_light_in_the_dark_is_counted():
     assert comparison.stray_share == pytest.approx(0.1)
 
 
+@pytest.mark.parametrize(("noise", "silent"), [(2.0, False), (0.0, True)])
+def test_where_dark_pixels_are_still_faint_light_is_said_to_be_lost(noise, silent):
+    """The half grey level that a wall throws back of the line was looked for, and nothing said of it."""
+    above = np.rint(noise * np.random.default_rng(2).standard_normal((40, 50))).astype(np.float32)
+    comparison, frame = Comparison(), _frame(np.zeros_like(above), Region.DARK)
+    comparison.add(7, Illumination.LASER, above, frame, frame, NOISE)
+    assert comparison.silent == silent
+    state = PhotometricState(None, None, None, *(np.zeros(1) for _ in range(5)))
+    assert any("rounded away" in said for said in cannot_tell(state, comparison.silent)) == silent
+
+
 def test_clipping_is_counted_and_a_wide_line_held_against_a_lens_in_focus():
     rings = SimpleNamespace(validity=np.array([RingValidity.SATURATED] * 2 + [RingValidity.VALID] * 8))
     line, wall = clipped(rings, 0.0, 0.3)

@@ -1,10 +1,11 @@
 """Dirt that the photo holds, too, is not told a second time where frames show the wall beside it."""
 
+import numpy as np
 import pytest
 
-from pipeline.artefacts.twin import Mismatch, NamedFigure
+from pipeline.artefacts.twin import Look, Mismatch, NamedFigure
 from stages.twin.scene import Ring
-from stages.twin.seen_in_photo import parted_from_photo
+from stages.twin.seen_in_photo import beside_sectors, parted_from_photo
 
 _RING = Ring((400.0, 298.0), 207.0, 50.0, 22.0)
 
@@ -33,3 +34,19 @@ def test_what_the_photo_holds_of_dirt_is_withdrawn_at_its_azimuth(bright, left):
     assert len(withdrawn) == left
     assert all("darker there" in m.statement for m in withdrawn)
     assert parted_from_photo((bright,), _RING) == ((bright,), ())
+
+
+@pytest.mark.parametrize(
+    ("name", "at_deg", "left"), [("", -97.0, True), ("", -60.0, False), ("glint", -97.0, False)]
+)
+def test_a_region_of_the_wall_where_the_window_may_dim_the_line_cannot_be_told(name, at_deg, left):
+    """Scatter across the line at −100° left wall in its photo that seemed to shine at −97°."""
+    place = (NamedFigure("azimuth_deg", -100.0, 3.0), NamedFigure("width_deg", 20.0, 5.0))
+    turn, other = np.radians(at_deg), (0.0, 2.0, 1.0)
+    sector = Mismatch("laser_sector or window_scatter", "line", "line", place, (), *other, "")
+    look = Look(8, 400 + 250 * np.cos(turn), 298 + 250 * np.sin(turn), 60.0)
+    region = Mismatch(name, "intensity", "wall", (), (), *other, "It shines.", look)
+    kept, withdrawn = beside_sectors((region,), (sector,), _RING)
+    assert (len(kept), len(withdrawn)) == (not left, left)
+    assert all("cannot be told" in m.statement for m in withdrawn)
+    assert beside_sectors((region,), (), _RING) == ((region,), ())
