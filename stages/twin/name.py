@@ -264,7 +264,9 @@ def cannot_tell(state: PhotometricState, silent: bool = False) -> tuple[str, ...
             "near the line are not compared."
         )
     else:
-        said.append(
-            "The sheet's thickness is the stated one: in one diameter it cannot be told from the lens' blur."
-        )
+        said += [
+            "The sheet's thickness is the stated one: in one diameter it cannot be told from the lens' blur.",
+            "A second line is looked for at one ratio of radii all round: one that the wall mirrors farther "
+            "ahead lies at another in each direction where the probe is askew, and may not be seen.",
+        ]
     return tuple(said)
