@@ -221,9 +221,9 @@ def compared_with(
     apart_mm, clear = ring_step_mm(rings, scene.trajectory), (*on_window, *glints, *of_photo)
     line_rad = float(np.arctan2(scene.ring.radius_mm, scene.ring.ahead_mm))
     of_wall = unnamed(samples and samples.clear_of(clear), scene.surface, apart_mm, line_rad)
-    places, beside = beside_sectors((*on_window, *of_wall), over_time, scene.ring)
+    placed, beside = beside_sectors((*on_window, *of_wall), over_time, scene.ring)
     found: tuple[Mismatch, ...] = (
-        *over_time, *places, *photometry.pixels, *whole, *glints,
+        *over_time, *placed, *photometry.pixels, *whole, *glints,
         *clipped(rings, state.line_clipped, comparison.clipped_wall / max(comparison.lit, 1.0)),
     )  # fmt: skip
     fall, unnamed_map = left_over(None if samples is None else samples.seen_through(state.gain_map))
