@@ -145,7 +145,7 @@ def verdict_of_rings(examined: Examined | None, claimed: bool) -> Verdict:
     if examined is None:
         return Verdict.NOT_IDENTIFIABLE
     verdict = of_gauge.verdict_of(examined)
-    patternless = examined.best is not None and not examined.best.names
+    patternless = examined.best is None or not examined.best.names
     return Verdict.CONSISTENT if claimed and patternless and verdict is Verdict.UNEXPLAINED else verdict
 
 

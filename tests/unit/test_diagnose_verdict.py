@@ -6,10 +6,12 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
+from stages.diagnose.compose import verdict_of_rings
 from stages.diagnose.effects.library import LIBRARY
 from stages.diagnose.field.run import warn_of_knock
 from stages.diagnose.gauge import answer
 from stages.diagnose.gauge.confirm import passes_again
+from stages.diagnose.gauge.examine import Examined
 from stages.diagnose.gauge.hypotheses import Judged
 from stages.diagnose.gauge.judge import Unfitted
 from stages.diagnose.gauge.run import Term
@@ -54,6 +56,27 @@ def examined(
             unknown_laws=(Unknown(grown, changed),) * len(library),
         ),
     )
+
+
+@pytest.mark.parametrize(
+    ("heldout_px", "floor_px", "verdict"),
+    [
+        (0.284, 0.126, Verdict.UNEXPLAINED),
+        (0.13, 0.126, Verdict.CONSISTENT),
+        (0.284, np.nan, Verdict.CONSISTENT),
+        (np.nan, 0.126, Verdict.CONSISTENT),
+    ],
+)
+def test_what_repeats_on_other_wall_is_not_consistent_though_nothing_was_found(heldout_px, floor_px, verdict):
+    """Rows that wavered left .28 px in a gauge run alone, where noise made .13: "consistent"."""
+    searched = cast(Any, SimpleNamespace(steps=(SimpleNamespace(by_chance=0.5),)))
+    quality = FitQuality("px", 0.31, 0.3, 0.29, heldout_px, floor_px)
+    seen = Examined(searched, None, (), (), quality=quality)
+    assert answer.verdict_of(seen) is verdict
+    assert (seen.global_p < 1e-6) is (verdict is Verdict.UNEXPLAINED)
+    assert ("0.28 px" in answer.formula(seen)) is (verdict is Verdict.UNEXPLAINED)
+    # Beside a claim of another channel it is that claim's doing.
+    assert verdict_of_rings(seen, claimed=True) is Verdict.CONSISTENT
 
 
 @pytest.mark.parametrize(

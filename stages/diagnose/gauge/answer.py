@@ -11,7 +11,7 @@ from pipeline.physics.catalogue import effect
 from pipeline.physics.effect import CourseKind
 from stages.diagnose.agreement import TELLING
 from stages.diagnose.gauge.confirm import Sized, course_of, quantities
-from stages.diagnose.gauge.examine import Examined
+from stages.diagnose.gauge.examine import MOST_OF_FLOOR, Examined
 from stages.diagnose.gauge.formula import ADEQUATE
 from stages.diagnose.gauge.hypotheses import Judged
 from stages.diagnose.gauge.judge import Verdicts
@@ -21,14 +21,14 @@ from stages.diagnose.gauge.unknown_laws import Unknown
 from stages.diagnose.inference import SURE, UNKNOWN
 from stages.diagnose.result import Candidate, Confirmation, EffectFound, Value, Verdict
 
-# What was held out is predicted to the noise where its r.m.s. is below so many noise floors. Under right
-# names, and where nothing is hidden, 10 runs at ring level come to 0.93–0.99 and five rendered ones to
-# 1.00–1.02 (mean of all 0.974, s.d. 0.030); this is 5 s.d. beyond. A wrong explanation of four effects came
-# to 1.17 (`bench_diagnosis --mode several`, case 1, by an older floor and the ratio of both floors).
-_MOST_OF_FLOOR = 1.12
 # Explanations that were only weighed are listed when their chance is above this: all others together change
 # no answer.
 _LISTED = 1e-3
+_REPEATS = (
+    "Rings and fiducials of the gauge run lie {:.2f} px from where its other parts have them, and noise is "
+    "{:.2f} px of it. The rest is alike at one place of the image on other wall, and no effect or simple "
+    "pattern explains it."
+)
 
 
 def effects_found(examined: Examined) -> tuple[EffectFound, ...]:
@@ -89,7 +89,7 @@ def _fits(examined: Examined) -> bool:
     quality = examined.quality
     if quality is None or np.isnan(quality.heldout_after):
         return True
-    return bool(quality.heldout_after <= _MOST_OF_FLOOR * quality.noise_floor)
+    return bool(quality.heldout_after <= MOST_OF_FLOOR * quality.noise_floor)
 
 
 def unknown_rivals(examined: Examined) -> tuple[str, ...]:
@@ -179,9 +179,10 @@ def members(examined: Examined) -> tuple[str, ...]:
 
 
 def formula(examined: Examined) -> str:
-    """Return the empirical formula for what nothing of the library explains."""
+    """Return the empirical formula for what nothing of the library explains, or how much it is."""
     if examined.verdicts is None:
-        return ""
+        quality = examined.quality if examined.repeats else None
+        return _REPEATS.format(quality.heldout_after, quality.noise_floor) if quality is not None else ""
     best = examined.best
     patterns = best.fit.terms[len(best.library_terms) :] if best is not None and best.library_terms else ()
     terms = patterns or examined.verdicts.formula.fit.terms
@@ -192,7 +193,7 @@ def verdict_of(examined: Examined) -> Verdict:
     """Return what rings and fiducials alone come to."""
     best, verdicts = examined.best, examined.verdicts
     if best is None or verdicts is None:
-        return Verdict.CONSISTENT
+        return Verdict.UNEXPLAINED if examined.repeats else Verdict.CONSISTENT
     contradicted = [any(not c.agrees for c in each) for each in examined.confirmed]
     # What does not predict the measurements that were held out, leaves out what nobody knows.
     if not best.library_terms or verdicts.adequacy < ADEQUATE or not _fits(examined) or all(contradicted):
