@@ -1,8 +1,9 @@
-"""The gate of names: an effect is switched on in withheld frames rendered again, which must fit better.
+"""Decide whether a suspected effect is named: withheld frames rendered again with it must fit better.
 
-Single frames agree on a law of the whole picture by chance, or because something else resembles it. Its size
-as every other frame tells it is therefore switched on in the frames between; the squares of z must fall there
-from frame to frame. A name that does not pass is withdrawn, and said to be one that cannot be told.
+Single frames may agree on a law of the whole picture by chance, or because something else resembles it.
+Therefore the size from one half of the frames is applied in the frames of the other half; there the sum of
+squares of z must fall by more than its scatter from frame to frame. An effect that does not pass is
+withdrawn, and reported as one that cannot be distinguished from what resembles it.
 """
 
 from __future__ import annotations
@@ -19,36 +20,37 @@ from stages.twin.locate import FALSE_ALARM
 from stages.twin.switched import Law, Pair, Shown
 
 _SURE, _MOST, _FEWEST = 3.0, 16, 6
-"""σ from frame to frame that z must fall by; most frames that are rendered again, and fewest that judge."""
+"""σ, from frame to frame, by which z² must fall; most frames that are rendered again; fewest frames for a
+decision."""
 _MOST_SQUARE = 25.0
-"""Square of z that a pixel counts with at most: a glint of thirty σ would outweigh a thousand pixels."""
+"""Largest z² of a pixel: otherwise a glint of thirty σ would outweigh a thousand pixels."""
 _LEAST_FALL = 0.05
-"""Of the usual fall: frames that an effect should change by less say nothing of it. Chosen."""
+"""Share of the usual predicted fall: frames that the effect should change by less are not used. Chosen."""
 _FEWEST_PIXELS = 200
-"""Pixels at which an effect acts, from which a frame judges it."""
+"""Fewest pixels on which an effect acts in a frame, for the frame to be used."""
 
 Again = Callable[[Int], Iterable[tuple[int, Shown]]]
-"""Gives frames by their numbers, each with its number, to be rendered again."""
+"""Yields the frames of given numbers, each with its number, for rendering again."""
 
 
 @dataclass(frozen=True)
 class Suspected:
-    """A law that single frames agree on.
+    """An effect on the whole picture whose size single frames agree on.
 
     Attributes
     ----------
     mismatch : Mismatch
-        As it would be told.
+        What is reported if the effect is confirmed.
     law : callable
-        Switches it on.
+        Returns a frame without and with the effect.
     frame : (F,) int
-        Frames that told of it, ascending.
+        Frames in which its size was measured, ascending.
     told : (F, K)
-        What each told of its sizes.
+        The sizes measured in each frame.
     size_of : callable
-        From the mean (K,) of what frames told to the numbers that the law takes.
+        Maps the mean (K,) of the measured sizes to the numbers that the law takes.
     measured : callable, optional
-        Gives the size anew from a frame rendered again; the mean of frames is then told.
+        Measures the size in a frame rendered again; the mean over frames is then reported.
     """
 
     mismatch: Mismatch
@@ -59,26 +61,26 @@ class Suspected:
     measured: Callable[[Shown, Float], float] | None = None
 
     def by_others(self, frame: int) -> Float:
-        """Return the law's numbers as the half of the frames told that does not hold this one."""
+        """Return the law's numbers from the half of the frames that does not contain this one."""
         half = np.arange(len(self.frame)) % 2
         own = half[int(np.searchsorted(self.frame, frame))]
         return np.asarray(self.size_of(self.told[half != own].mean(0)), float)
 
     @property
     def judges(self) -> Int:
-        """Frames that judge, spread over those that told."""
+        """Frames that are rendered again, spread over those in which the size was measured."""
         few = np.linspace(0, len(self.frame) - 1, min(_MOST, len(self.frame)))
         return np.asarray(self.frame[np.unique(few.round().astype(int))])
 
 
 def judged(suspected: Sequence[Suspected], again: Again) -> tuple[tuple[Mismatch, ...], tuple[Mismatch, ...]]:
-    """Return the mismatches that frames rendered again bear out, and those that are withdrawn."""
+    """Return the effects that frames rendered again confirm, and those that are withdrawn."""
     made = [_judged(one, again) for one in suspected]
     return tuple(m for m, kept in made if kept), tuple(m for m, kept in made if not kept)
 
 
 def _judged(one: Suspected, again: Again) -> tuple[Mismatch, bool]:
-    """Return the mismatch as frames rendered again have it, and whether its name stays."""
+    """Return the mismatch with the figures from frames rendered again, and whether its name stays."""
     squares, sizes = [np.zeros((0, 4))], []
     for frame, shown in again(one.judges):
         numbers = one.by_others(frame)
@@ -99,11 +101,11 @@ def _judged(one: Suspected, again: Again) -> tuple[Mismatch, bool]:
 
 
 def _borne_out(fall: Float, foretold: Float) -> tuple[float, float]:
-    """Return by how many σ falls (F,) are above 0, and the chance of that.
+    """Return by how many σ the falls (F,) of z² are above 0, and the chance of that.
 
-    An effect that some frames show ten times as strongly as others makes their falls as unequal, which looks
-    like chance. Falls over what the effect should make them, where it acts, are alike: of both the surer one
-    counts, at the chance of that in two tries.
+    An effect that is ten times as strong in some frames as in others makes falls that are as unequal, which
+    looks like chance. Divided by the predicted falls, in frames where it acts, they are alike: the more
+    significant of both tests counts, with a chance doubled for two tries.
     """
     each = [over_frames(fall)]
     acts = foretold > _LEAST_FALL * np.median(foretold) if len(foretold) else foretold > 0
@@ -114,7 +116,7 @@ def _borne_out(fall: Float, foretold: Float) -> tuple[float, float]:
 
 
 def _squares(shown: Shown, pair: Pair) -> Float:
-    """Return squares of z of a frame without and with an effect, of the effect, and the pixels that count."""
+    """Return sums of z² of a frame without and with an effect, and of the effect; and the pixels."""
     above = np.asarray(shown.above[pair.use])
     weight = np.asarray(1 / shown.twin.variance[pair.use], np.float32)
     levels = [
@@ -126,7 +128,7 @@ def _squares(shown: Shown, pair: Pair) -> Float:
 
 
 def _taken_up(level: Float32, above: Float32, weight: Float32, free_of: str) -> Float32:
-    """Return a frame's levels (N,) with the exposure, or the offset, that suits it best."""
+    """Return a frame's levels (N,) with the exposure ("scale") or constant ("offset") that fits best."""
     if free_of == "scale":
         own = float((weight * level * level).sum(dtype=float))
         return level * np.float32(float((weight * level * above).sum(dtype=float)) / max(own, 1e-9))
@@ -143,15 +145,15 @@ def _with_size(found: Mismatch, sizes: list[float]) -> tuple[NamedFigure, ...]:
 
 
 _OF_PROFILE = 0.02
-"""Relative 1 σ of a size told by a profile: half of what a line varies by about its profile."""
+"""Relative 1 σ of a size measured through a profile: half of the variation of a line about its profile."""
 
 
 def _withdrawn(found: Mismatch, fall: Float, told: float) -> Mismatch:
     words = found.name.replace("_", " ") or "what has no name"
     why = (
-        f"{len(fall)} frames rendered again with it fit no better beyond chance ({told:+.1f} σ)"
+        f"{len(fall)} frames rendered again with it fit no better than by chance ({told:+.1f} σ)"
         if len(fall) >= _FEWEST
         else f"only {len(fall)} frames could be rendered again with it"
     )
-    said = f"Single frames look like {words}, but {why}: it cannot be told from what resembles it."
+    said = f"Single frames suggest {words}, but {why}: something else may look alike."
     return replace(found, statement=said)

@@ -1,10 +1,10 @@
-"""The laser line of a gauge run re-rendered with an instrument, to see whether a diagnosis makes it fit.
+"""Re-render the laser line of a gauge run with an instrument, to check whether a diagnosis makes it fit.
 
-In an inspection an instrument's error hides: wall and poses are measured with the very instrument. In a gauge
-run nothing is left for it to hide in: the bore is stated, fiducials alone place the camera, and the rings
-have no say. The line's light (its brightness in each block of 1.5° and its profile) is taken as it is
-recorded; where the line lies is predicted by the simulator. What is compared are pixels about the line,
-as far from steps of the bore and from fiducials as the calibration keeps.
+In an inspection an instrument's error may hide, since wall and poses are measured with the same instrument.
+In a gauge run it cannot: the bore is known, and only fiducials determine the camera's pose, rings do not. The
+line's light (its brightness in each block of 1.5° and its profile) is taken from the recording; the line's
+place is predicted by the simulator. Pixels about the line are compared, as far from steps of the bore and
+from fiducials as the calibration requires.
 """
 
 from __future__ import annotations
@@ -42,19 +42,21 @@ from stages.twin.line_blocks import BlockLight, LineBlocks, blocks_of, light_of,
 
 _SOLVE, _SLOPE_PX, _FARTHEST_PX, _SETTLED_PX = 5, 0.5, 6.0, 0.02
 _SURE = 3.0
-"""σ, from frame to frame, of a difference of χ² from which on one instrument fits better than another."""
+"""σ, from frame to frame, of a difference of χ² above which one instrument fits better than another."""
 _PROBED_PX, _TOLD = 0.2, 0.1
-"""The power is stated as the displacement that raises χ² by a tenth, found from one of 0.2 px."""
+"""The sensitivity is stated as the displacement that raises χ² by a tenth, extrapolated from one of 0.2
+px."""
 _PLACE_ROUNDS, _PLACE_STEPS = 2, 3
-"""Rounds of predicting how effects shift the fiducials, and Gauss-Newton steps of the poses in each."""
+"""Rounds in which the effects' shifts of the fiducials are predicted, and Gauss-Newton steps of the poses per
+round."""
 _NEWTON = 8
-"""Steps that lead a pixel to the point that it sees; each makes the miss ten times smaller."""
+"""Steps that find the point that a pixel sees; each makes the miss about ten times smaller."""
 
 
 class GaugeLineParameters(GaugeParameters):
-    """Parameters of the gauge run's twin."""
+    """Parameters of the twin of a gauge run."""
 
-    effects: tuple[str, ...] = Field((), description="effects that are switched on, as simulate takes them")
+    effects: tuple[str, ...] = Field((), description="effects to be switched on, written as for simulate")
     frames: int = Field(40, ge=4, le=400, description="most laser frames that are compared")
 
 
@@ -72,9 +74,9 @@ def compare_gauge_line(
     Raises
     ------
     InputError
-        When an effect is not known or does not fit the scene.
+        When an effect is unknown or does not fit the scene.
     UnusableError
-        When fiducials or rings are too few.
+        When there are too few fiducials or rings.
     """
     if fiducials.run is None:
         raise UnusableError("gauge_line", fiducials.problem, hint="record the gauge run again")
@@ -94,7 +96,7 @@ def compare_gauge_line(
 
 @dataclass(frozen=True)
 class GaugeLine:
-    """The line of a gauge run, to be held against instruments: see `gauge_line_of`.
+    """The line of a gauge run, to be compared with instruments; made by `gauge_line_of`.
 
     Attributes
     ----------
@@ -112,19 +114,19 @@ class GaugeLine:
     light: BlockLight
 
     def displacement_px(self, effects: Sequence[Switch]) -> Float:
-        """Return how far (B,) beyond the measured ring the stated instrument with effects has the line."""
+        """Return how far (B,), px, the stated instrument with effects puts the line beyond the ring."""
         with threadpool_limits(1):
             scene = scene_with(self.recording, self.run, effects, self.parameters)
             return _displacement_px(scene, self.blocks)
 
     def chi2(self, displacement_px: Float) -> Float:
-        """Return χ² per pixel (F,) of the frames for a line so displaced (B,)."""
+        """Return χ² per pixel (F,) of the frames for a line with such a displacement (B,), px."""
         each = squares(self.blocks, self.light, displacement_px) / self.light.variance
         return np.bincount(self.blocks.of_frame[self.blocks.block], each) / self.pixels
 
     @property
     def pixels(self) -> Int:
-        """(F,) pixels compared in each frame."""
+        """(F,) number of compared pixels in each frame."""
         return np.bincount(self.blocks.of_frame[self.blocks.block])
 
 
@@ -136,14 +138,14 @@ def gauge_line_of(
     Raises
     ------
     UnusableError
-        When too few laser frames lie near frames with fiducials.
+        When too few laser frames are near frames with fiducials.
     """
     blocks = blocks_of(recording, rings, run, parameters.frames)
     return GaugeLine(recording, run, parameters, blocks, light_of(blocks))
 
 
 def _displacement_px(scene: SceneTruth, blocks: LineBlocks) -> Float:
-    """Return how far (B,) beyond the measured ring a scene has the line; NaN where it has none near it."""
+    """Return how far (B,), px, a scene's line lies beyond the measured ring; NaN where it has none nearby."""
     out = np.full(len(blocks.of_frame), np.nan)
     for k, frame in enumerate(blocks.frame):
         here = blocks.of_frame == k
@@ -162,7 +164,7 @@ def _displacement_px(scene: SceneTruth, blocks: LineBlocks) -> Float:
 def scene_with(
     recording: Recording, run: MeasuredRun, effects: Sequence[Switch], parameters: GaugeParameters
 ) -> SceneTruth:
-    """Return a gauge run's scene with the stated instrument and effects, the camera placed by fiducials.
+    """Return a gauge run's scene with the stated instrument and effects; fiducials determine the poses.
 
     Raises
     ------
@@ -170,7 +172,7 @@ def scene_with(
         When an effect does not fit the scene.
     """
     start = run.start
-    # One unknown that changes nothing: the adjustment is to move poses and fiducials, not the instrument.
+    # One unknown without effect: the adjustment may move poses and fiducials, but not the instrument.
     state = replace(start, instrument=np.zeros(1), unsure=np.zeros((len(start.stated.parameters), 1)))
     no_rings = run.measured.rings.select(np.zeros(len(run.measured.rings.frame), bool))
     smooth = third_difference_sigma(start.T_pc, run.measured.time_s, run.posed)
@@ -185,7 +187,7 @@ def scene_with(
 
 
 def _shift_px(scene: SceneTruth, frame: Int, xyz_p: Float) -> Float:
-    """Return how far (M, 2) beside the stated camera's image the scene's camera sees points (M, 3) in P."""
+    """Return the scene camera's image of points (M, 3) in P, mm, minus the stated camera's (M, 2), px."""
     out = np.zeros((len(frame), 2))
     for number in np.unique(frame):
         here = frame == number
@@ -198,7 +200,7 @@ def _shift_px(scene: SceneTruth, frame: Int, xyz_p: Float) -> Float:
 
 
 def seen_at(camera: TrueCamera, xyz_c: Float) -> Float:
-    """Return the pixels (M, 2) whose viewing rays pass through points (M, 3) in C."""
+    """Return the pixels (M, 2) whose viewing rays pass through points (M, 3) in C, mm."""
     uv = camera.model.project(xyz_c).uv
     by_point = camera.model.project_jacobian(xyz_c).by_point
     for _ in range(_NEWTON):
@@ -210,7 +212,7 @@ def seen_at(camera: TrueCamera, xyz_c: Float) -> Float:
 
 
 def _judged(line: GaugeLine, switches: Sequence[Switch], place: Sequence[Float]) -> GaugeTwin:
-    """Return χ² for places of the line: as stated, with all effects, with wrong ones, and less one each."""
+    """Return χ² for the line's places as stated, with all effects, with wrong ones, and without each one."""
     blocks, pixels = line.blocks, line.pixels
     stated, diagnosed, wrong, *less = (line.chi2(p) for p in place)
     nowhere = np.zeros(len(blocks.of_frame))

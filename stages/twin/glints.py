@@ -1,8 +1,8 @@
-"""Spots far brighter than foretold: glints of lamps or laser on bare, wet or raised wall.
+"""Find spots far brighter than predicted: glints of lamps or laser on bare, wet or raised wall.
 
-No law tells in advance where a facet of the wall mirrors a lamp, but spots that come back tell where one
-does. A place where half of the frames are too bright must be so in the other half, those without a spot there
-included; else nothing is named. Spots that come back nowhere are counted, without a name.
+No law predicts where a facet of the wall mirrors a lamp, but recurring spots show it. A place where half of
+the frames are too bright must be so in the other half, too, including frames without a spot there; otherwise
+nothing is named. Spots that do not recur are counted, without a name.
 """
 
 from __future__ import annotations
@@ -25,26 +25,27 @@ from stages.twin.render import Region, TwinFrame
 from stages.twin.scene import Ring
 
 _LEAST_GREY, _LEAST_SIGMA = 40.0, 8.0
-"""Grey levels, and σ, by which each pixel of a spot is brighter than its twin. Chosen: a photo that lies
-beside its place by its own σ makes a tenth of that."""
+"""Grey levels, and σ, by which each pixel of a spot exceeds its twin. Chosen: a photo displaced by its own σ
+makes a tenth of that."""
 _PIXELS = (20, 12_000)
-"""Fewest and most pixels of a spot: noise makes no smaller one as bright, and what is larger is no spot."""
+"""Fewest and most pixels of a spot: noise makes no smaller one as bright, and anything larger is not a
+spot."""
 _MOST_OF_VIEW = 0.05
-"""Share of a frame from which too bright pixels are no spots: there light or response is another."""
+"""Share of too bright pixels in a frame above which they are not spots: then light or response differ."""
 _REACH_PX, _MORE, _FEWEST, _SURE = 16.0, 2, 3, 3.0
-"""Spots so near each other are at one place: a glint wanders by some pixels as the probe swings. Frames by
-which spots must come back more often on the wall than in the image, or less, to tell to which they are fixed;
-fewest frames; and σ by which other frames must bear it out."""
+"""Spots closer than this, px, are at one place: a glint wanders by some pixels as the probe swings. By how
+many frames spots must recur more often on the wall than in the image, or less often, to decide to which they
+are fixed; fewest frames; σ by which other frames must confirm it."""
 
 _PALEST = 2.0
-"""Brightness of the palest wall over what nineteen of twenty places do not reach; chosen."""
-_OR_DROP = ", or a drop on the window bends light of the line to it"
-"""A drop that is not told by lit wall, which it draws aside, may still show in the dark beside the line."""
+"""Brightness of the palest wall over the 95 % quantile of the wall; chosen."""
+_OR_DROP = ", or a drop on the window bends light of the line there"
+"""A drop that lit wall does not reveal by its displacement may still show in the dark beside the line."""
 
 
 @dataclass(frozen=True)
 class Spot:
-    """A spot in one frame: place in the image and on the wall (px there, too), radius and excess."""
+    """A spot in one frame: place in the image and on the wall (px, at the ring), radius, and excess."""
 
     frame: int
     image: tuple[float, float]
@@ -53,13 +54,13 @@ class Spot:
     grey: float
 
     def at(self, order: str) -> tuple[float, float]:
-        """Return its place in the image or on the wall."""
+        """Return its place in the image or on the wall, px."""
         return self.wall if order == "wall" else self.image
 
 
 @dataclass
 class SpotsOfFrames:
-    """Collects the spots of compared frames of one light, and by how much blocks are brighter than foretold.
+    """Collects the spots of compared frames of one light, and the excess brightness of blocks.
 
     Attributes
     ----------
@@ -67,9 +68,10 @@ class SpotsOfFrames:
     ring : Ring
     frame, spots : list
     excess : list of (h, w) float32
-        Of the blocks of each frame, grey levels; NaN where not all of a block is compared.
+        Recorded minus predicted brightness of the blocks of each frame, grey levels; NaN where a block is not
+        compared entirely.
     variance : list of (h, w) float32
-        Of single pixels.
+        Variance of single pixels.
     wall : list of (2, h, w) float32
         Place of each block on the wall, px at the ring.
     """
@@ -83,12 +85,12 @@ class SpotsOfFrames:
     wall: list[Float32] = field(default_factory=list)
 
     def add(self, frame: int, above: Float32, twin: TwinFrame) -> None:
-        """Take a frame (H, W) whose twin has its exposure."""
+        """Add a frame (H, W) of grey levels above black; its twin has the frame's exposure."""
         known = twin.region == (Region.DARK if self.light == Illumination.LASER else Region.WALL)
         more = np.where(known, above - twin.level, np.float32(0))
         beyond = (more > _LEAST_GREY) & (more * more > np.float32(_LEAST_SIGMA**2) * twin.variance)
         self.frame.append(frame)
-        # 0.99: whole blocks alone, up to rounding.
+        # 0.99: whole blocks only, up to rounding.
         self.excess.append(np.where(of_blocks(known) > 0.99, of_blocks(more), np.float32(np.nan)))
         self.variance.append(of_blocks(twin.variance))
         shape, middle = self.excess[-1].shape, (slice(BLOCK_PX // 2, None, BLOCK_PX),) * 2
@@ -107,7 +109,8 @@ class SpotsOfFrames:
         joined = cv2.morphologyEx(beyond.astype(np.uint8), cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8))
         count, label, stats, centre = cv2.connectedComponentsWithStats(joined)
         line = np.isin(twin.region, (Region.LINE_CORE, Region.LINE_FLANK)).astype(np.uint8)
-        # What joins the line is the line: drawn aside where the wall is elsewhere, or wide where it clips.
+        # What touches the line is the line itself: displaced where the wall is elsewhere, or wide where it
+        # clips.
         of_line = set(np.unique(label[cv2.dilate(line, np.ones((3, 3), np.uint8)) > 0]).tolist())
         found = []
         for k in sorted(set(range(1, count)) - of_line):
@@ -124,11 +127,11 @@ class SpotsOfFrames:
         return found
 
     def found(self, lit_wall: float = 0.0, bent: Sequence[Mismatch] = ()) -> tuple[Mismatch, ...]:
-        """Return the places where spots come back, and a count of the other spots.
+        """Return the places where spots recur, and a count of the other spots.
 
-        ``lit_wall`` is how bright, in grey levels, other light makes wall that is dark in the twin: what is
-        not far brighter is the palest of the wall. Spots at places of the image where light is ``bent`` are
-        wall from elsewhere.
+        ``lit_wall`` is the brightness, in grey levels, that other light gives to wall that is dark in the
+        twin: a spot not far brighter than that is the palest wall. Spots at places of the image where light
+        is ``bent`` are wall from elsewhere.
         """
         places, left = list[Mismatch](), [s for s in self.spots if s.grey > _PALEST * lit_wall]
         discs = [d for d in map(disc_of, bent) if d is not None]
@@ -146,13 +149,13 @@ class SpotsOfFrames:
         return (*places, *self._others(left))
 
     def _chance(self, frames: int) -> float:
-        """Return the probability that spots strewn at random anywhere come to one place in so many frames."""
+        """Return the probability that randomly scattered spots fall on one place in so many frames."""
         view = float(np.isfinite(self.excess[0]).sum()) * BLOCK_PX**2
         each = min(1.0, len(self.spots) / len(self.frame) * np.pi * _REACH_PX**2 / max(view, 1.0))
         return float(min(1.0, 2 * len(self.spots) * binom.sf(frames - 2, len(self.frame) - 1, each)))
 
     def _at_one_place(self, group: list[Spot], order: str, fixed_to: str) -> Mismatch | None:
-        """Return what comes back at a group's place; None where other frames are no brighter there."""
+        """Return what recurs at a group's place; None where other frames are not brighter there."""
         middle = np.median([s.at(order) for s in group], 0)
         spread = float(np.std([s.at(order) for s in group], 0).max())
         radius = float(np.median([s.radius_px for s in group]))
@@ -175,7 +178,7 @@ class SpotsOfFrames:
         return Mismatch(
             name, "line" if self.light == Illumination.LASER else "intensity", fixed_to, place, (size,),
             chance, float((value**2 / variance).mean()), float(((value - other) ** 2 / variance).mean()),
-            f"{said} a spot is far brighter than foretold, in {_frames_of(group)} of {len(value)} frames "
+            f"{said} a spot is far brighter than predicted, in {_frames_of(group)} of {len(value)} frames "
             f"that show the place: the wall mirrors a lamp there{drop}.",
             Look(brightest.frame, *brightest.image, 4 * brightest.radius_px),
         )  # fmt: skip
@@ -197,7 +200,7 @@ class SpotsOfFrames:
         return f"At {distance.value:.0f} mm, azimuth {degrees:.0f}°, of the wall", (distance, azimuth)
 
     def _brightness(self, middle: Float, radius_px: float, order: str) -> tuple[Float, Float]:
-        """Return mean excess, and variance of a pixel, (F,) at a place in the frames that show it."""
+        """Return (F,) mean excess, and variance of a pixel, at a place, in the frames that show it."""
         rows, columns = np.mgrid[: self.excess[0].shape[0], : self.excess[0].shape[1]]
         image, made = ((columns + 0.5) * BLOCK_PX, (rows + 0.5) * BLOCK_PX), []
         for excess, variance, wall in zip(self.excess, self.variance, self.wall, strict=True):
@@ -210,7 +213,7 @@ class SpotsOfFrames:
         return value, variances
 
     def _others(self, spots: list[Spot]) -> tuple[Mismatch, ...]:
-        """Return how many spots there are that come back nowhere."""
+        """Return the number of spots that do not recur."""
         frames, laser, nan = _frames_of(spots), self.light == Illumination.LASER, float("nan")
         if frames < _FEWEST:
             return ()
@@ -219,7 +222,7 @@ class SpotsOfFrames:
         return (Mismatch(
             "", "line" if laser else "intensity", "time", (), (rate,), nan, nan, nan,
             f"In {frames} of {count} frames of the {'laser' if laser else 'lit wall'} spots are far brighter "
-            "than foretold, each time elsewhere: as glints are, or sparks, drops and dust in flight.",
+            "than predicted, each time elsewhere: glints, sparks, or drops and dust in flight.",
             Look(brightest.frame, *brightest.image, 4 * brightest.radius_px),
         ),)  # fmt: skip
 
@@ -231,7 +234,7 @@ def _frames_of(spots: Sequence[Spot]) -> int:
 def told_apart(
     window: Sequence[Mismatch], glints: Sequence[Mismatch]
 ) -> tuple[tuple[Mismatch, ...], tuple[Mismatch, ...]]:
-    """Return what is on the window and what are glints, a place of the image once.
+    """Return what is on the window and what are glints, so that no place of the image is in both.
 
     What has a name on the window bends or scatters light and makes spots; what is only brighter is a glint.
     """
@@ -240,7 +243,7 @@ def told_apart(
 
 
 def _largest_group(spots: list[Spot], order: str) -> list[Spot]:
-    """Return the spots near the one that spots of most frames are near to, in the image or on the wall."""
+    """Return the spots near the one that has spots of most frames nearby, in the image or on the wall."""
     at = np.array([s.at(order) for s in spots])
     near = np.hypot(*np.moveaxis(at[:, None] - at[None], -1, 0)) < _REACH_PX
     groups = [[s for s, at_one in zip(spots, row, strict=True) if at_one] for row in near]

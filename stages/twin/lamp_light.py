@@ -1,8 +1,8 @@
 """Light of the LEDs: falloff over the polar angle, pattern around the picture, exposure of frames, with σ.
 
-A lit pixel is  black + gain(frame) · exp(f(θ) + pattern(φ)) · E · ρ,  E the irradiance of evenly shining
-LEDs and ρ the wall's reflectance; f is the LEDs' lobe times the lens' vignetting, which pictures alone cannot
-tell apart. Exposure and vignette are separated as in direct visual odometry (J. Engel et al., "A
+A lit pixel is  black + gain(frame) · exp(f(θ) + pattern(φ)) · E · ρ,  with E the irradiance by LEDs that emit
+uniformly and ρ the wall's reflectance; f is the LEDs' lobe times the lens's vignetting, which pictures alone
+cannot separate. Exposure and vignetting are separated as in direct visual odometry (J. Engel et al., "A
 photometrically calibrated benchmark for monocular visual odometry", 2016); for the response see
 `stages.twin.noise`.
 """
@@ -19,11 +19,11 @@ from pipeline.arrays import Float, Float32, Int
 from stages.twin.scene import LitSight, Scene
 
 _THETA_KNOTS, _HARMONICS = 24, 2
-# Least grey level above black that tells of the light.
+# Fewest grey levels above black at which a pixel is used to estimate the light.
 DARK = 4.0
 _ITERATIONS = 4
 _WEAK = 1e-3
-"""Weight with which unknowns that no sample touches are drawn to zero."""
+"""Weight that draws unknowns without samples to zero."""
 _SAMPLES = 2500
 
 
@@ -37,7 +37,7 @@ class Figure:
 
 @dataclass(frozen=True)
 class Course:
-    """A number of every frame, known in some of them.
+    """A quantity of every frame, measured in some of them.
 
     Attributes
     ----------
@@ -51,27 +51,27 @@ class Course:
     sd: Float
 
     def at(self, frame: int) -> float:
-        """Return the logarithm at a frame, linear between those in which it is known."""
+        """Return the logarithm at a frame, interpolated linearly between measured frames."""
         return float(np.interp(frame, self.frame, self.log_value)) if len(self.frame) else 0.0
 
     @property
     def spread(self) -> float:
-        """Robust 1 σ of steps between samples about their median, over √2: an even drift does not count."""
+        """Robust 1 σ of steps between samples about their median, over √2: a steady drift does not count."""
         return spread_about_median(np.diff(self.log_value)) / np.sqrt(2) if len(self.frame) > 2 else 0.0
 
 
 @dataclass(frozen=True)
 class LampLight:
-    """What the LEDs and the lens do.
+    """Light of the LEDs as the lens shows it.
 
     Attributes
     ----------
     level : float
         Grey levels of white wall at the ring.
     theta_rad, log_falloff, falloff_sd : (K,)
-        LEDs' lobe times vignetting over polar angle, 0 at the ring.
+        Logarithm of the LEDs' lobe times vignetting over polar angle, 0 at the ring, and its 1 σ.
     pattern : (4,)
-        cos and sin of the first and second harmonic around the image, and their 1 σ in ``pattern_sd``.
+        cos and sin of the first and second harmonic around the image; their 1 σ is ``pattern_sd``.
     gain : Course
         Exposure.
     """
@@ -85,7 +85,7 @@ class LampLight:
     gain: Course
 
     def factor(self, theta_rad: Float32, phi_rad: Float32) -> Float32:
-        """Return the grey levels (H, W) of even light on the wall, per unit of the photo."""
+        """Return the grey levels (H, W) that even light gives to wall, per unit of the photo."""
         first, step = self.theta_rad[0], self.theta_rad[1] - self.theta_rad[0]
         index = np.clip((theta_rad - np.float32(first)) / np.float32(step), 0, len(self.theta_rad) - 1)
         log = map_coordinates(self.log_falloff.astype(np.float32), [np.nan_to_num(index)], order=1)
@@ -93,7 +93,7 @@ class LampLight:
         return np.asarray(np.float32(self.level) * np.exp(log), np.float32)
 
     def around(self, phi_rad: Float32) -> Float32:
-        """Return the logarithm (...) of light at image azimuths over its mean around the picture."""
+        """Return the logarithm (...) of the light at image azimuths over its mean around the picture."""
         log = np.zeros_like(phi_rad)
         for k, (basis, m) in enumerate(_around(_HARMONICS)):
             log += np.float32(self.pattern[k]) * basis(np.float32(m) * phi_rad)
@@ -105,7 +105,7 @@ def _around(harmonics: int) -> list[tuple[np.ufunc, int]]:
 
 
 class LampSamples:
-    """Ratios of recorded brightness to reflectance under even light, taken frame by frame."""
+    """Collects ratios of recorded brightness to reflectance under even light, frame by frame."""
 
     def __init__(self, scene: Scene, black: float, white: float) -> None:
         self._scene, self._black, self._white = scene, black, white
@@ -127,7 +127,7 @@ class LampSamples:
         )
 
     def solve(self) -> LampLight | None:
-        """Return the light that explains the samples; None where there are none."""
+        """Return the light that fits the samples; None without samples."""
         if not self._parts:
             return None
         theta, phi, ratio = (np.concatenate([p[k] for p in self._parts]).astype(float) for k in range(3))
@@ -154,7 +154,7 @@ def _hats(value: Float, knots: Float) -> Float:
 
 
 def _robust_least_squares(design: Float, value: Float) -> tuple[Float, Float]:
-    """Return solution and 1 σ (U,) with Huber weights, samples counting as independent."""
+    """Return solution and 1 σ (U,) with Huber weights; samples count as independent."""
     weight = np.ones(len(value))
     ridge = _WEAK * np.eye(design.shape[1])
     for _ in range(_ITERATIONS):

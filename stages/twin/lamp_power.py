@@ -1,11 +1,11 @@
-"""Fit of brightness = light^p over frames: a response that is no straight line, or light that bounces.
+"""Fit brightness = light^p over frames: p differs from 1 for a nonlinear response or for bounced light.
 
-Lamps that come nearer to a side of the bore brighten it as the inverse square of their distance says. Frames
-in which the same wall, and the same place of the image, is lit more or less strongly tell the power p to
-which brightness follows that light: 1 for a linear camera and direct light. A response grey = light^p gives p
+Lamps that come nearer to one side of the bore brighten it by the inverse square of their distance. Frames in
+which the same wall, and the same place of the image, is lit more or less strongly show the power p by which
+brightness follows that light: 1 for a linear camera and direct light. A response grey = light^p gives p
 itself, whatever the photo was made with. Light that bounces about the bore hardly changes when the lamps
-move, so that a share q of it gives 1 − q. The lamps' lobe depends mostly on the place in the image alone, and
-takes little part; it is taken to be even, which is part of σ.
+move: a share q of it gives 1 − q. The lamps' lobe depends mostly on the place in the image and has little
+influence; it is taken to be uniform, and that error is part of σ.
 """
 
 from __future__ import annotations
@@ -26,22 +26,24 @@ from stages.twin.scene import Ring
 from stages.twin.switched import Pair, Shown
 
 _LEAST, _SURE = 0.25, 3.0
-"""Least departure of the power from 1, also by three of its σ: a pale bore throws back some tenths of its
-light, and what the lamps' lobe and the wall's gloss change is below a tenth."""
+"""Smallest reported departure of the power from 1, and the number of its σ: a pale bore throws back some
+tenths of its light, and the effect of the lamps' lobe and of gloss is below a tenth."""
 _OF_LIGHT, _BY_COSINE, _FEWEST_FRAMES = 0.02, 0.04, 6
-"""1 σ of a power for want of knowing the black level: one grey level of fifty changes it by so much. By how
-much LEDs that shine as the cosine raise it, held against LEDs that shine alike in all directions: five drawn
-recordings in bores of 76 and 102 mm by .032 to .051, and ten rings of LEDs, 11 and 16 mm wide, 8 mm behind to
-5 mm ahead of the camera, by .052, r.m.s. It is 1 σ: which lobe the LEDs of a probe have is not known. Fewest
-lit frames. Light that bounces is no part of it."""
+"""1 σ of a power because the black level is uncertain: one grey level in fifty changes it by this much. By
+how much LEDs that emit as the cosine raise it compared with uniform ones: by .032 to .051 in five simulated
+recordings in bores of 76 and 102 mm, and by .052 RMS for ten rings of LEDs, 11 and 16 mm wide, 8 mm behind to
+5 mm ahead of the camera. It counts as 1 σ, since the lobe of a probe's LEDs is unknown; bounced light is not
+part of it. Fewest lit frames."""
 _SLOWLY = 3
-"""Degree of the polynomial in row and column that slow light is: of lamps aside, most is linear."""
+"""Degree of the polynomial in row and column that describes slowly varying light: for lamps aside it is
+mostly linear."""
 _LEAST_WANDER = 1e-3
-"""Least change of light, r.m.s., by which a probe that keeps to its place tells anything; chosen."""
+"""Smallest change of light, RMS, from which a power can be measured: a probe that stays centred shows less.
+Chosen."""
 
 
 def lamp_power(samples: BlockSamples | None) -> tuple[NamedFigure, ...]:
-    """Return the power to which brightness follows the lamps' light; nothing where frames are too few."""
+    """Return the power by which brightness follows the lamps' light; nothing with too few frames."""
     if samples is None or samples.frame.max() + 1 < _FEWEST_FRAMES:
         return ()
     told = _products(samples)
@@ -54,12 +56,12 @@ def lamp_power(samples: BlockSamples | None) -> tuple[NamedFigure, ...]:
 
 
 def _power(sums: Float) -> Float:
-    """Return the power (1,) from the sums (2,) of `_products`: as it is told, and as it is judged."""
+    """Return the power (1,) from the sums (2,) of `_products`, for use as ``size_of``."""
     return np.array([1 + sums[0] / sums[1]])
 
 
 def power_of_lamps(samples: BlockSamples | None, ring: Ring) -> tuple[Suspected, ...]:
-    """Return that brightness follows the lamps' light to another power than 1, if it does."""
+    """Return the finding that brightness follows the lamps' light by a power other than 1, if it does."""
     figure = lamp_power(samples)
     if samples is None or not figure:
         return ()
@@ -69,7 +71,7 @@ def power_of_lamps(samples: BlockSamples | None, ring: Ring) -> tuple[Suspected,
         return ()
     nan, name = float("nan"), "response" if power > 1 else "response or interreflection"
     said = (
-        f"Where the lamps come nearer, the wall brightens as their light to the power {power:.2f} ± {sd:.2f}:"
+        f"Where the lamps come nearer, the wall brightens by their light to the power {power:.2f} ± {sd:.2f}:"
         f" the camera's response is grey = light^{power:.2f}"
     )
     said += "." if power > 1 else f", or {100 * (1 - power):.0f} % of the light has bounced about the bore."
@@ -82,14 +84,14 @@ def power_of_lamps(samples: BlockSamples | None, ring: Ring) -> tuple[Suspected,
 
 
 def _products(samples: BlockSamples) -> Float:
-    """Return of each frame (F, 2) the sums of slow light times brightness, and of its square."""
+    """Return for each frame (F, 2) the sums of slow light × brightness and of slow light²."""
     light, bright = _slowly(samples), samples.light_and_brightness[1]
     frames = samples.frame.max() + 1
     return np.stack([np.bincount(samples.frame, light * a, frames) for a in (bright, light)], 1)
 
 
 def _slowly(samples: BlockSamples) -> Float:
-    """Return the light (N,) of blocks over that of their photo, what changes slowly over a picture alone."""
+    """Return the slowly varying part of the blocks' light (N,) over that in their photo."""
     light, out = samples.light_and_brightness[0], np.zeros(len(samples.frame))
     x, y = (2 * a / max(int(a.max()), 1) - 1 for a in (samples.column, samples.row))
     order = np.add.outer(range(_SLOWLY + 1), range(_SLOWLY + 1)).ravel()
@@ -108,17 +110,17 @@ def by_block(samples: BlockSamples, values: Float) -> Float32:
 
 
 def to_power(number: Int, log_light: Float32, shown: Shown, told: Float) -> Pair:
-    """Return a frame in other light than its photo was made in, to a power.
+    """Return a frame whose light, relative to that in its photo, is raised to a power.
 
     Parameters
     ----------
     number : (F,)
-        Of the frames.
+        Frame numbers.
     log_light : (F, rows, columns)
-        Logarithm of the light over that of the photo, of blocks.
+        Logarithm of the blocks' light over that in the photo.
     shown : Shown
     told : (1,)
-        1 more than the power: 1 leaves the frame as it is.
+        1 plus the power: 1 leaves the frame as it is.
     """
     level, own = shown.twin.level, int(np.searchsorted(number, shown.number))
     more = full_size(log_light[own], level.shape, 0.0)

@@ -1,7 +1,7 @@
-"""Lamps that shine unevenly, around the picture or from frame to frame, in frames that were measured.
+"""Lamps that shine unevenly, around the picture or from frame to frame, in frames used by the measurement.
 
-The lamps' pattern around the picture is described by two harmonics. A single LED that is dim gives both, in a
-ratio and at angles that its place and the bore foretell; what gives others has no name.
+The lamps' pattern around the picture is described by two harmonics. A single dim LED gives both, in a ratio
+and at angles that follow from its place and the bore; another pattern gets no name.
 """
 
 from __future__ import annotations
@@ -25,27 +25,27 @@ from stages.twin.state import PhotometricState
 from stages.twin.switched import dim_led, lamp_pattern, share_at
 
 _LEAST, _LEFT, _SURE = 0.012, 0.003, 5.0
-"""Least amplitude of the first harmonic, relative; what a sound photo leaves of any; least in σ. Recordings
-with even lamps leave 0.002."""
+"""Smallest relative amplitude of the first harmonic that is reported; largest that a sound photo leaves;
+significance in σ. Recordings with even lamps leave 0.002."""
 _LOSSES = np.linspace(0.1, 1.0, 19)
-"""Losses at which the pattern is worked out; between them it is nearly straight."""
+"""Losses for which the pattern is computed; it is nearly linear between them."""
 _OF_SECOND = 2.0
-"""Relative σ of the first harmonic, for want of the lobe, by which the second may be another: order two."""
+"""Relative σ of the first harmonic, since the lobe is unknown; for the second harmonic it is twice that."""
 _VARIES, _FEWEST_FRAMES = {"flicker": 0.02, "laser_flicker": 0.08}, 8
-"""Spread of brightness from frame to frame that is named, twice what the compared frames need: the photo
-is made from the measured ones. Fewest of them."""
+"""Spread of brightness from frame to frame above which flicker is named, twice the limit for compared frames,
+since the photo is made from the measured ones; fewest frames."""
 _MOSTLY, _SURE_OF_WALL, _PARTS, _OVER_CELLS = 0.5, 3.0, 6, 4.0
-"""Share of an uneven pattern that the same wall must show at several places of the image, more than half;
-that in σ; parts of the frames of which each is left out once for that σ. By which the variance of the pattern
-on the same wall must exceed that within a cell, where wall that is paler on one side varies alike: the share
-is then too large by a quarter at most."""
+"""Least share of an uneven pattern that the same wall must show at several places of the image; its
+significance in σ; parts of the frames, each left out once for that σ. Least ratio of the pattern's variance
+on the same wall to that within a cell, where wall that is paler on one side varies alike: below it the share
+would be too large by more than a quarter."""
 _WIDER = 1.8
-"""1 σ of a spread by the median size of steps over that of a standard deviation: drawn, 20,000 times for each
-of 6 to 40 normal samples."""
+"""1 σ of a spread estimated from the median size of steps over that of a standard deviation: from 20,000
+draws for each of 6 to 40 normal samples."""
 
 
 def uneven_lamps(lamp: LampLight | None, scene: Scene, frame: Int) -> tuple[Suspected, ...]:
-    """Return what makes the lamps' pattern in lit frames (F,) uneven; nothing where it is even."""
+    """Return the cause of an uneven pattern of the lamps in lit frames (F,); nothing where it is even."""
     if lamp is None:
         return ()
     first, second = (complex(*lamp.pattern[k : k + 2]) for k in (0, 2))
@@ -65,7 +65,7 @@ def uneven_lamps(lamp: LampLight | None, scene: Scene, frame: Int) -> tuple[Susp
         size = NamedFigure(
             "lost", lost, float(np.hypot(spread, sd / abs(first))) * lost, "share of the light"
         )
-        said = f"In all frames the LED at image azimuth {at.value:.0f}° sends {100 * lost:.0f} % less light"
+        said = f"In all frames, the LED at image azimuth {at.value:.0f}° sends {100 * lost:.0f} % less light"
         name = "led_dead"
         if abs(foretold) < allowed:  # lamps that lean give the first harmonic alone
             name, said = "led_dead or uneven_lamps", said + ", or the lamps lean or shine unevenly"
@@ -73,7 +73,7 @@ def uneven_lamps(lamp: LampLight | None, scene: Scene, frame: Int) -> tuple[Susp
         return (Suspected(found, dim_led, frame, told),)
     size = NamedFigure("amplitude", abs(first), sd, "relative")
     said = (
-        f"In all frames the side at image azimuth {np.degrees(np.angle(first)):.0f}° is "
+        f"In all frames, the side at image azimuth {np.degrees(np.angle(first)):.0f}° is "
         f"{100 * abs(first):.0f} % brighter than the mean, which no single dim LED explains: the lamps stand "
         "or shine unevenly."
     )
@@ -84,11 +84,12 @@ def uneven_lamps(lamp: LampLight | None, scene: Scene, frame: Int) -> tuple[Susp
 def parted_from_wall(
     uneven: Sequence[Suspected], lamp: LampLight | None, scene: Scene, samples: BlockSamples | None
 ) -> tuple[tuple[Suspected, ...], tuple[Mismatch, ...]]:
-    """Return uneven lamps that wall seen at several places of the image bears out, and those withdrawn.
+    """Return uneven lamps confirmed by wall that is seen at several places of the image, and those withdrawn.
 
-    The wall's photo was made in the same light. A wall that is paler on one side and lamps that are brighter
-    there are told apart only where the same wall is seen at another azimuth, as when the probe rolls, or at
-    another polar angle, to which an LED sends another share: brightness that stays on the wall is granted.
+    The wall's photo was made in the same light. Wall that is paler on one side and lamps that are brighter
+    there can be separated only where the same wall is seen at another azimuth, as when the probe rolls, or at
+    another polar angle, where an LED's share of the light differs. Brightness that stays on the wall is
+    fitted freely.
     """
     if lamp is None or samples is None:
         return (), tuple(_of_wall(one.mismatch, np.nan, np.inf) for one in uneven)
@@ -103,7 +104,7 @@ def parted_from_wall(
 
 
 def _of_wall(found: Mismatch, size: float, sd: float) -> Mismatch:
-    """Return uneven lamps that are withdrawn: wall seen twice denies them, or tells nothing."""
+    """Return uneven lamps as withdrawn: wall seen at several places contradicts them or does not decide."""
     if size + _SURE_OF_WALL * sd < _MOSTLY:
         said = (
             "The wall's photo makes the lamps look uneven around the picture, but wall that is seen at "
@@ -111,24 +112,24 @@ def _of_wall(found: Mismatch, size: float, sd: float) -> Mismatch:
         )
     else:
         said = (
-            "The lamps look uneven around the picture, but a wall that is paler on one side looks alike "
-            "while the probe hardly rolls: it cannot be told. What to do: record once more with the probe "
-            "rolled."
+            "The lamps look uneven around the picture, but wall that is paler on one side would look the "
+            "same while the probe hardly rolls. What to do: record once more with the probe rolled."
         )
     return replace(found, statement=said)
 
 
 def _beside_wall(one: Suspected, lamp: LampLight, scene: Scene, samples: BlockSamples) -> tuple[float, float]:
-    """Return which share of uneven lamps the same wall shows at several places of the image, and its 1 σ."""
+    """Return which share of uneven lamps wall seen at several places of the image shows, and its 1 σ."""
     theta, phi = seen_from(samples, scene)
     pattern = law = lamp.around(phi)
-    if one.mismatch.name == "led_dead":  # and nothing that sends the same share to every polar angle
+    if one.mismatch.name == "led_dead":  # without any pattern that is the same at every polar angle
         lost, azimuth = one.told[0]
         law = np.log1p(-np.float32(min(lost, 0.999)) * share_at(scene, float(azimuth), theta, phi))
     groups = samples.orders["wall"], samples.frame
     light = centred(samples.log_light, *groups)
     values = (centred(np.asarray(a, float), *groups) for a in (law, samples.log_change + pattern))
-    # What follows light that is uneven in the image, or as the probe wanders, to another power is no pattern.
+    # A power by which brightness follows uneven light, or the light of a moving probe, is not part of the
+    # pattern.
     made, bright = (a - (a @ light) / max(float(light @ light), 1e-12) * light for a in values)
     step = np.float32(2 * np.pi / WALL_COLUMNS)
     within = float(np.mean((lamp.around(phi + step) - pattern) ** 2)) / 12
@@ -142,17 +143,17 @@ def _beside_wall(one: Suspected, lamp: LampLight, scene: Scene, samples: BlockSa
 
 
 def _harmonics(lamp: LampLight, scene: Scene) -> tuple[Float, float]:
-    """Return both harmonics (L, 2) of the logarithm of light around the picture for an LED that loses L.
+    """Return both harmonics (L, 2) of the log light around the picture for an LED that loses the shares L.
 
-    They are the mean over the picture, as the lamps' pattern is. No probe states the LEDs' lobe: they are
-    the mean of LEDs that shine evenly and as the cosine, too; half of by what these differ is the relative
-    1 σ, returned beside them.
+    They are averaged over the picture, as the lamps' pattern is. A probe file does not state the LEDs' lobe:
+    the result is the mean of uniform emission and emission as the cosine. The second result is the relative 1
+    σ, half of the difference between the two.
     """
     theta = np.linspace(lamp.theta_rad[0], min(float(lamp.theta_rad[-1]), np.pi / 2), len(lamp.theta_rad))
     share, around = dim_share(scene.probe.lighting, 0.0, scene.ring.radius_mm, theta), sector_azimuth_rad()
     waves = np.cos(np.arange(1, 3) * around[:, None]) * 2 / SECTORS
     each = np.array([np.log1p(-0.999 * lost * share) @ waves for lost in _LOSSES])
-    # An equidistant lens shows as many pixels at a polar angle as the angle is wide.
+    # An equidistant lens has a number of pixels at a polar angle that is proportional to the angle.
     each = np.average(each, axis=2, weights=theta)
     first = each[-1, :, 0]
     return each.mean(1), float(np.ptp(first) / 2 / abs(first.mean()))
@@ -161,11 +162,11 @@ def _harmonics(lamp: LampLight, scene: Scene) -> tuple[Float, float]:
 def flicker_of_measured(
     state: PhotometricState, found: Sequence[Mismatch], ring: Ring
 ) -> tuple[Mismatch, ...]:
-    """Return flicker that measured frames show; ``found`` is what the compared ones, told first, show.
+    """Return flicker that frames used by the measurement show; ``found`` is what the compared frames showed.
 
-    Compared frames lie at regular steps, and lights that flicker in step with them look steady.
+    Compared frames lie at regular steps: lights that flicker in step with them look steady.
     """
-    clipped = state.line_is_clipped  # tells hardly anything of the laser's power
+    clipped = state.line_is_clipped  # a clipped line hardly shows the laser's power
     courses = (
         ("flicker", "LEDs", "intensity", None if state.lamp is None else state.lamp.gain),
         ("laser_flicker", "laser", "line", None if clipped or state.line is None else state.line.course),

@@ -1,4 +1,4 @@
-"""Laws of what changes brightness over time and around the image, as columns over frames and sectors."""
+"""Laws of changes of brightness over time and around the image, as columns over frames and sectors."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from stages.twin.scene import Ring
 LED_AZIMUTHS, _FINE = 24, 5
 _SECTOR_WIDTHS_DEG, _SECTOR_LOSSES = (10, 13, 16, 20, 25, 32, 40, 50, 65, 80, 100, 120), (0.3, 0.7, 0.95)
 SECTOR_STEP_DEG = 180 / SECTORS
-"""Between azimuths at which a dim sector is tried: half a cell of the picture, as finely as cells tell."""
+"""Step, degrees, between azimuths at which a dim sector is tried: half a sector of the cells."""
 _LEAST_AHEAD = 0.05
-"""Least distance ahead of the LEDs, in radii, at which they are taken to light the wall."""
+"""Least distance ahead of the LEDs, in radii, from which they are taken to light the wall."""
 
 
 def lit_laws(cells: Cells, lighting: Lighting, ring: Ring) -> tuple[Float, list[Law]]:
-    """Return base columns (K, F, S) of lit frames, and laws of a step and of an LED that fails."""
+    """Return base columns (K, F, S) for lit frames, and the laws of a step and of an LED that fails."""
     frames = len(cells.frame)
     base = np.concatenate([of_sectors(frames, np.eye(SECTORS)), drift(frames)])
     azimuth = 2 * np.pi * np.arange(LED_AZIMUTHS) / LED_AZIMUTHS
@@ -38,7 +38,7 @@ def lit_laws(cells: Cells, lighting: Lighting, ring: Ring) -> tuple[Float, list[
 
 
 def line_laws(cells: Cells) -> tuple[Float, list[Law]]:
-    """Return base columns (K, F, S) of the line, and laws of a step and of a dim sector."""
+    """Return base columns (K, F, S) for the line, and the laws of a step and of a dim sector."""
     frames, azimuth = len(cells.frame), sector_azimuth_rad()
     around = [np.ones(SECTORS), *(f(m * azimuth) for m in (1, 2) for f in (np.cos, np.sin))]
     base = np.concatenate([of_sectors(frames, np.array(around)), drift(frames)])
@@ -51,14 +51,14 @@ def line_laws(cells: Cells) -> tuple[Float, list[Law]]:
 
 
 def steps_of(frames: int) -> tuple[Float, Float]:
-    """Return columns (C, F, S) of steps, two frames or more on each side, and the first frames after (C,)."""
+    """Return columns (C, F, S) of steps, two frames or more on each side, and their first frames (C,)."""
     first = np.arange(2, frames - 1)
     after = (np.arange(frames)[None] >= first[:, None]).astype(float)
     return np.repeat(after[..., None], SECTORS, 2), first.astype(float)
 
 
 def led_share(lighting: Lighting, azimuth_rad: Float, ring: Ring) -> Float:
-    """Return which share (L, S) of the light in each sector comes from an LED at azimuths (L,)."""
+    """Return the share (L, S) of each sector's light that comes from an LED at azimuths (L,)."""
     around = sector_azimuth_rad()
     point = np.stack(
         [*(ring.radius_mm * f(around) for f in (np.cos, np.sin)), np.full(SECTORS, ring.ahead_mm)], 1
@@ -72,9 +72,9 @@ def led_share(lighting: Lighting, azimuth_rad: Float, ring: Ring) -> Float:
 
 
 def dim_share(lighting: Lighting, azimuth_rad: float, radius_mm: float, theta_rad: Float) -> Float:
-    """Return the share (2, T, S) of the light from an LED at an azimuth, at polar angles (T,) of a bore.
+    """Return the share (2, T, S) of an LED in the light at polar angles (T,) of a bore and in sectors (S,).
 
-    First of LEDs that shine alike in every direction, then of those that shine as the cosine.
+    First for LEDs that emit uniformly, then for LEDs that emit as the cosine.
     """
     turn = azimuth_rad + 2 * np.pi * np.arange(lighting.leds) / lighting.leds
     around, share = sector_azimuth_rad(), []
@@ -94,7 +94,7 @@ def _turned(vector: Float, angle: float) -> Float:
 
 
 def _sector_patterns() -> tuple[Float, Float]:
-    """Return log brightness (C, S) of dim sectors, and middle, width and loss of each (C, 3)."""
+    """Return log brightness (C, S) of dim sectors, and middle, width (degrees) and loss of each (C, 3)."""
     fine = (np.arange(SECTORS * _FINE) + 0.5) / _FINE * 360 / SECTORS - 180
     patterns, places = [], []
     for middle in np.arange(-180.0, 180.0, SECTOR_STEP_DEG):

@@ -1,4 +1,4 @@
-"""Light that a ring of LEDs throws on the wall."""
+"""Light of a ring of LEDs on the wall."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from pipeline.instrument.probe import Lighting
 
 
 def even_light(lighting: Lighting, xyz_c: Float, normal_c: Float) -> Float:
-    """Return the irradiance (...), 1/mm², of wall points (..., 3) by LEDs that shine alike in all directions.
+    """Return the irradiance (...), 1/mm², at wall points (..., 3) by LEDs that emit uniformly.
 
-    cos(at wall) / distance², mean over the LEDs. Their own lobe is estimated from the frames.
+    cos(angle at the wall) / distance², averaged over the LEDs. Their real lobe is estimated from the frames.
     """
     turn = 2 * np.pi * np.arange(lighting.leds) / lighting.leds
     lamp = np.stack([lighting.radius_mm * np.cos(turn), lighting.radius_mm * np.sin(turn)], 1)
@@ -22,7 +22,7 @@ def even_light(lighting: Lighting, xyz_c: Float, normal_c: Float) -> Float:
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
 def _even_light(lamp, z_mm, point, normal):  # type: ignore[no-untyped-def]
-    """Return the irradiance (N,) at points (N, 3) with unit normals (N, 3) by lamps (L, 2) at a height."""
+    """Return the irradiance (N,) at points and unit normals (N, 3) by lamps (L, 2) at ``z_mm``."""
     out = np.zeros(len(point))
     for n in range(len(point)):
         z = point[n, 2] - z_mm

@@ -1,4 +1,4 @@
-"""Pixels about the recorded line of a gauge run in blocks of azimuth, and the line's light in them."""
+"""Pixels about the recorded line of a gauge run, in blocks of azimuth, and the line's light in them."""
 
 from __future__ import annotations
 
@@ -14,33 +14,34 @@ from stages.calibrate.gauge import MeasuredRun
 from stages.twin.noise import black_and_white
 
 RING_BINS = 240
-"""Blocks around the ring: those into which the calibration condenses it (`GaugeParameters.ring_bins`)."""
+"""Blocks around the ring, as in the calibration (`GaugeParameters.ring_bins`)."""
 _HALF_PX = 12.0
-"""Half width of the compared band about the recorded line. It holds the line where it is predicted, too, for
-errors that matter; a line predicted outside the band leaves the recorded one wholly unexplained."""
+"""Half width of the compared band about the recorded line, px. For relevant errors, the predicted line also
+lies inside it; a line predicted outside the band leaves the recorded one entirely unexplained."""
 _PROFILE_WIDTHS, _CELLS, _CLASSES, _ROUNDS = 6.0, 73, 4, 3
 _NEAR = 2
-"""Frames are compared that have fiducials so near in time: farther off a pose is a guess."""
+"""A frame is compared if one with fiducials is at most this many frames away: farther off, its pose is a
+guess."""
 _FEWEST_FRAMES = 4
 _LEAST_VARIANCE = 1.0 / 12
-"""Of rounding to whole grey levels."""
+"""Variance of rounding to whole grey levels."""
 
 
 @dataclass(frozen=True)
 class LineBlocks:
-    """Pixels about the recorded line in the compared frames, in the blocks of azimuth of the calibration.
+    """Pixels about the recorded line in the compared frames, in the calibration's blocks of azimuth.
 
     Attributes
     ----------
     frame : (F,) int
-        Places in the recording.
+        Frame numbers in the recording.
     of_frame, azimuth_rad, measured_px, width_px : (B,)
-        Of each block: place of its frame in ``frame``, image azimuth, radius at which the ring was measured,
-        and the line's width in that frame.
+        Of each block: index of its frame in ``frame``, image azimuth, measured radius of the ring, and the
+        line's width in that frame.
     block : (N,) int
-        Of each pixel.
+        Block of each pixel.
     offset_px, grey : (N,)
-        Of each pixel: how far beyond the measured ring it lies, and its grey level.
+        Distance of each pixel beyond the measured ring, and its grey level.
     centre_px : (2,)
     white : float
         Grey level at which pixels clip; infinite where none do.
@@ -59,7 +60,7 @@ class LineBlocks:
 
     @property
     def clipped(self) -> Bool:
-        """(N,) pixels that say only that they are bright."""
+        """(N,) pixels that are clipped."""
         return self.grey >= self.white
 
     def total(self, values: Float) -> Float:
@@ -69,7 +70,7 @@ class LineBlocks:
 
 @dataclass(frozen=True)
 class BlockLight:
-    """Profile (C,) of the line over its width at ``x`` (C,), and the variance (N,) of each pixel about it."""
+    """Profile (C,) of the line at ``x`` = offset / width (C,), and variance (N,) of each pixel about it."""
 
     x: Float
     profile: Float
@@ -77,12 +78,12 @@ class BlockLight:
 
 
 def blocks_of(recording: Recording, rings: RingSamples, run: MeasuredRun, most: int) -> LineBlocks:
-    """Return the pixels about the rings' bins on plain bore, in frames that fiducials place; ``most`` frames.
+    """Return the pixels about the rings' bins on plain bore, in at most ``most`` frames near fiducials.
 
     Raises
     ------
     UnusableError
-        When too few laser frames lie near frames with fiducials.
+        When too few laser frames are near frames with fiducials.
     """
     on_bore = run.measured.rings
     near = np.unique(on_bore.frame)
@@ -144,10 +145,10 @@ def _width(rings: RingSamples, frame: int) -> float:
 
 
 def light_of(blocks: LineBlocks) -> BlockLight:
-    """Return the profile and the spread of the pixels where the line was measured.
+    """Return the line's profile and the scatter of pixels about it, where the line was measured.
 
-    The spread is that of pixels alike in place across the line and in the line's brightness: noise, speckle,
-    reflectance that changes within a block, and the codec.
+    The scatter is that of pixels at the same offset and with the same brightness of the line. It includes
+    noise, speckle, reflectance that varies within a block, and the codec.
     """
     x = np.linspace(-_PROFILE_WIDTHS, _PROFILE_WIDTHS, _CELLS)
     across = blocks.offset_px / blocks.width_px[blocks.block]
@@ -170,20 +171,21 @@ def light_of(blocks: LineBlocks) -> BlockLight:
             size
         )
         mean = total / np.maximum(count, 1)
-        # Where all pixels clip they show no noise: it is at least that of the brightest that do not.
+        # Where all pixels clip, no noise is visible: it is at least that of the brightest ones that do not
+        # clip.
         mean = np.maximum(np.where(count > 0, mean, mean.max(1, keepdims=True)), _LEAST_VARIANCE)
         light = replace(light, variance=mean.ravel()[kind])
     return light
 
 
 def _shape(blocks: LineBlocks, light: BlockLight, displacement_px: Float) -> Float:
-    """Return the profile (N,) at pixels of lines displaced (B,); 0 where a block has no line."""
+    """Return the profile (N,) at the pixels for lines displaced by (B,), px; 0 where a block has no line."""
     across = (blocks.offset_px - displacement_px[blocks.block]) / blocks.width_px[blocks.block]
     return np.interp(np.nan_to_num(across, nan=np.inf), light.x, light.profile, left=0.0, right=0.0)
 
 
 def _brightness(blocks: LineBlocks, light: BlockLight, displacement_px: Float) -> tuple[Float, Float]:
-    """Return background and height (B,) of the line that suit each block best; no line is negative."""
+    """Return background and height (B,) of the line that fit each block best; the height is not negative."""
     shape, weight = _shape(blocks, light, displacement_px), np.where(blocks.clipped, 0.0, 1 / light.variance)
     w, wp, wpp = (blocks.total(weight * shape**k) for k in range(3))
     wg, wpg = (blocks.total(weight * shape**k * blocks.grey) for k in range(2))
@@ -194,7 +196,7 @@ def _brightness(blocks: LineBlocks, light: BlockLight, displacement_px: Float) -
 
 
 def squares(blocks: LineBlocks, light: BlockLight, displacement_px: Float) -> Float:
-    """Return the squares (N,) of recorded less re-rendered grey levels."""
+    """Return (recorded − re-rendered)² (N,), grey levels squared."""
     ground, height = _brightness(blocks, light, displacement_px)
     level = ground[blocks.block] + height[blocks.block] * _shape(blocks, light, displacement_px)
     return (blocks.grey - np.minimum(level, blocks.white)) ** 2

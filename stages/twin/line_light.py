@@ -1,8 +1,9 @@
 """Light of the laser line: power around and over time, profile across it and speckle, each with its σ.
 
-Next to the line a pixel is  black + power(frame) · p(φ) · ρ · s/w · profile(x/w),  x the distance across the
-line, s the sheet's own thickness and w its width after the lens, both in px, ρ the wall's reflectance: what
-its photo has of blue, green and red, in the shares in which the line's brightness follows them.
+Near the line a pixel is  black + power(frame) · p(φ) · ρ · s/w · profile(x/w),  with x the distance across
+the line, s the sheet's own thickness and w the line's width after the lens, all in px, and ρ the wall's
+reflectance: a weighted sum of blue, green and red of its photo, with the weights by which the line's
+brightness follows them.
 """
 
 from __future__ import annotations
@@ -19,35 +20,36 @@ from pipeline.arrays import Float, Float32, Int
 from stages.twin.lamp_light import DARK, Course, Figure
 from stages.twin.scene import LineSight, Scene
 
-# Within so many widths lies the line's own bell (99.7 % of a Gaussian); what is beyond is its halo.
+# The line's bell lies within this many widths (99.7 % of a Gaussian); light beyond it is the halo.
 _BELL_WIDTHS = 3.0
 _SECTORS = 36
 PROFILE_WIDTHS = 6.0
-"""The line's profile is described so many widths to each side; the halo beyond is left to the residual."""
+"""The line's profile is described over this many widths to each side; light farther out is not modelled."""
 _CORE_WIDTHS, _MIDDLE_WIDTHS = 1.0, 0.4
 
 _COLOUR_ROUNDS = 4
-"""Times that colour and power are estimated in turn; a fifth changes shares by less than their σ."""
+"""Times that colour and power are estimated in turn; a fifth round changes the shares by less than their
+σ."""
 
 PixelNoise = Callable[[Float32], Float32]
 
 
 @dataclass(frozen=True)
 class LineLight:
-    """What the laser and the lens do.
+    """Light of the laser line as the lens shows it.
 
     Attributes
     ----------
     level : float
-        Grey levels of the middle of a line as wide as its sheet on white wall.
+        Grey levels of the middle of a line on white wall if the line were as wide as its sheet.
     colour, colour_sd : (3,)
-        Shares of blue, green and red in the grey of the line, and their 1 σ.
+        Weights of blue, green and red in the grey of the line, and their 1 σ.
     log_power : (36,)
-        Logarithm of the power over image azimuth, sectors uniform from −π, mean 0.
+        Logarithm of the power over image azimuth, uniform sectors from −π, mean 0.
     course : Course
         Power over time.
     sheet_mm, blur_px : Figure
-        1 σ of the sheet's thickness along the pipe, and of lens and pixel.
+        1 σ of the sheet's thickness along the pipe, and of the blur by lens and pixel.
     profile_x, profile : (X,)
         Mean profile over x/w, 1 in the middle.
     halo, skewness : Figure
@@ -56,8 +58,8 @@ class LineLight:
         Relative 1 σ of a pixel's brightness in the line's middle that neither reflectance nor power explains:
         the laser's speckle, and reflectance finer than the photo shows.
     spread : (X,)
-        Variance of single pixels over the square of the peak, over x/w: speckle, relief finer than the
-        radius map, and the codec's ringing about the line.
+        Variance of single pixels over the square of the peak, over x/w: speckle, relief finer than the radius
+        map, and the codec's ringing about the line.
     """
 
     level: float
@@ -75,7 +77,7 @@ class LineLight:
     spread: Float
 
     def peak(self, sight: LineSight) -> tuple[Float32, Float32]:
-        """Return the grey level (N,) at the middle of the line next to each pixel, and its width in px."""
+        """Return the grey level (N,) of the line's middle next to each pixel, and the line's width, px."""
         sheet_px = self.sheet_mm.value / sight.mm_per_px
         width = np.sqrt(sheet_px**2 + self.blur_px.value**2)
         column = (sight.phi_rad + np.pi) / (2 * np.pi) * len(self.log_power) - 0.5
@@ -100,7 +102,7 @@ class LineLight:
 
 
 class LineSamples:
-    """Brightness of the line in sectors of frames, and its profile."""
+    """Collects the brightness of the line in sectors of frames, and its profile."""
 
     def __init__(self, scene: Scene, black: float, white: float, sheet_mm: float, width_px: float) -> None:
         self._scene, self._black, self._white = scene, black, white
@@ -108,11 +110,11 @@ class LineSamples:
         self._kept: list[tuple[int, LineSight, Float32]] = []
 
     def add(self, frame: int, image: Float32, sight: LineSight) -> None:
-        """Take the pixels near the line of a frame (H, W)."""
+        """Add the pixels near the line of a frame (H, W)."""
         self._kept.append((frame, sight, image[sight.row, sight.column] - np.float32(self._black)))
 
     def solve(self) -> LineLight | None:
-        """Return the light that explains the samples; None where there are none."""
+        """Return the light that fits the samples; None without samples."""
         if not self._kept:
             return None
         sheet_px = np.median(np.concatenate([self._sheet_mm / s.mm_per_px for _, s, _ in self._kept]))
@@ -132,7 +134,7 @@ class LineSamples:
         return replace(light, level=float(np.exp(level)), log_power=power, course=known)
 
     def _with_colour(self, light: LineLight) -> LineLight:
-        """Return the light with the shares of the photo's colours that the line's brightness follows."""
+        """Return the light with the weights of the photo's colours that the line's brightness follows."""
         each = np.array([self._colour_in(light, *kept) for kept in self._kept])
         design, value = np.concatenate(each[:, :, :3]), np.concatenate(each[:, :, 3])
         share = nnls(design, value)[0]
@@ -142,7 +144,7 @@ class LineSamples:
         return light if share.sum() <= 0 else replace(light, colour=share / total, colour_sd=sd / total)
 
     def _colour_in(self, light: LineLight, frame: int, sight: LineSight, grey: Float32) -> Float:
-        """Return what each colour foretells of the line in single degrees of azimuth, and its brightness."""
+        """Return the line's brightness by each colour, per degree of azimuth, and the recorded one."""
         line, _ = light.line_and_slope(sight, light.course.at(frame))
         _, width = light.peak(sight)
         use = np.isfinite(line) & (np.abs(sight.offset_px) < _CORE_WIDTHS * width)
@@ -154,7 +156,7 @@ class LineSamples:
         return np.asarray(sums / np.maximum(np.sqrt(np.abs(sums[:, 3:])), 1.0), float)
 
     def with_speckle(self, light: LineLight, noise: PixelNoise) -> LineLight:
-        """Return the light with how much single pixels vary across the line, beyond the camera's noise.
+        """Return the light with the variation of single pixels across the line beyond the camera's noise.
 
         Brightness and place of the line are first fitted in every sector of every frame, so that a line that
         is displaced or dim over more than a sector does not count as speckle.
@@ -191,7 +193,7 @@ class LineSamples:
         _, width = light.peak(sight)
         core = (np.abs(sight.offset_px) < _CORE_WIDTHS * width) & np.isfinite(predicted)
         clipped = core & (grey + self._black >= self._white)
-        # A sector's brightness is fitted to its core: one clipped pixel in twenty spoils it (chosen).
+        # A sector's brightness is fitted to its core: one clipped pixel in twenty would spoil it (chosen).
         spoiled = np.bincount(sector[clipped], minlength=_SECTORS) > 0.05 * np.bincount(
             sector[core], minlength=_SECTORS
         )
@@ -264,7 +266,7 @@ def _two_way(table: Float) -> tuple[float, Float, Float, Float]:
 
 
 def _median(table: Float, axis: int) -> Float:
-    """Return medians without the gaps; 0 where there is nothing else."""
+    """Return medians that ignore gaps; 0 where all values are missing."""
     known = np.isfinite(table).any(axis)
     filled = np.where(np.expand_dims(known, axis), table, 0.0)
     return np.asarray(np.nanmedian(filled, axis))

@@ -1,11 +1,11 @@
-"""Differences that stay in one place of the image: dirt on the window, dust, a droplet.
+"""Find differences that stay at one place of the image: dirt on the window, dust, a droplet.
 
-The ratio of recorded to re-rendered brightness of blocks, its median over frames and freed of what is broad,
-is 1 but for noise. Its spread is read off the blocks as far from the image's middle, robustly: whatever
-makes them vary, alike neighbours and a photo that is poor far ahead included, is in it. Where a block differs
-more from frame to frame than that explains, as steep or glossy wall that passes by does, its own standard
-error counts. The bound is that which the largest of so many normal numbers passes with the stated
-probability.
+The ratio of recorded to re-rendered brightness of a block, its median over frames, divided by its broad
+surroundings, is 1 up to noise. Its spread is estimated robustly from the blocks at the same distance from the
+image's middle: that includes whatever makes them vary, also similar neighbours and a photo that is poor far
+ahead. Where a block varies more from frame to frame than that explains, as steep or glossy wall does, its own
+standard error is used. The limit is the one that the largest of as many normal numbers exceeds with the
+stated probability.
 """
 
 from __future__ import annotations
@@ -24,40 +24,39 @@ from stages.twin.compare import BLOCK_PX
 from stages.twin.discs import Disc, meet
 
 _FEWEST_OF_RING, _HALF_WIDTHS = 100, (0.5, 1.0, 2.0, 4.0)
-"""Half the width of rings, blocks: the first that holds enough of them, of which a speck is a small part.
-Where the lamps' light ends, beyond 90°, light that no twin has, as from wall to wall, makes one ring brighter
-by a third and leaves the next as it is: wide rings do not show it. Chosen."""
+"""Half the width of rings, blocks: the narrowest one with enough blocks is used, so that a speck is a small
+part of it. Where the lamps' light ends, beyond 90°, light that no twin contains, for example from wall to
+wall, makes one ring brighter by a third and leaves the next as it is: wide rings would hide that. Chosen."""
 FALSE_ALARM = 0.01
-"""Probability that a recording without dirt shows a place of dirt anywhere. Chosen."""
+"""Probability that a recording without dirt shows dirt at any place. Chosen."""
 _BROAD_BLOCKS, _FEWEST_FRAMES, _FEWEST_BLOCKS = 25, 3, 2
-"""What is broader than 25 blocks is light, not dirt. A place is seen in three frames and two blocks or
-more."""
+"""What is broader than 25 blocks is light, not dirt. A place must be seen in three frames and cover two
+blocks."""
 LEAST_CHANGE = 0.03
-"""Smallest relative change that counts as dirt: what the photo leaves over on clean
-recordings stays below it."""
+"""Smallest relative change that counts as dirt: what the photo leaves on clean recordings is smaller."""
 
 
 LEAST_CONTRAST = 0.25
-"""Smallest relative change of texture that counts: poses and radii that err blur it by a tenth or two."""
+"""Smallest relative change of texture that counts: errors of poses and radii blur it by a tenth or two."""
 _APART_PX = 2.0 * BLOCK_PX
 """Places nearer to each other than two blocks are one."""
 LEAST_ASIDE_PX, _OF_PX = 0.3, 0.1
-"""Least displacement of texture that counts, px: a map of the wall and a lens errs by a tenth or two; chosen.
-Relative change that stands for a pixel of it."""
+"""Smallest displacement of texture that counts, px: a map of the wall and a lens err by a tenth or two;
+chosen. Relative change that stands for a displacement of one pixel."""
 
 
 @dataclass(frozen=True)
 class ImagePlace:
-    """A place of the image that is darker or brighter than it should be.
+    """A place of the image that is darker or brighter than predicted.
 
     Attributes
     ----------
     u_px, v_px, radius_px : float
-        Middle, and radius of a circle of its area.
+        Middle, and radius of a circle of the same area.
     change, sd : float
         Largest relative change of brightness, negative where darker, and its 1 σ.
     probability : float
-        That chance shows as much anywhere.
+        Probability that chance makes as large a change anywhere.
     """
 
     u_px: float
@@ -73,7 +72,7 @@ class ImagePlace:
         return Disc(self.u_px, self.v_px, self.radius_px)
 
     def most_of(self, aside: Float32 | None) -> float:
-        """Return how far, px, texture is drawn aside at most, where (2, H, W) say by how much."""
+        """Return the largest displacement of texture here, px, from a map (2, H, W) of displacements."""
         if aside is None:
             return 0.0
         v, u = np.mgrid[0 : aside.shape[1], 0 : aside.shape[2]]
@@ -104,9 +103,9 @@ def places_in_image(
 
 
 def places_displaced(shifts: list[Float32]) -> tuple[tuple[ImagePlace, ...], Float32 | None]:
-    """Return where texture lies aside in all frames, each of which gives shifts (2, rows, columns), px.
+    """Return where texture is displaced in all frames, from shifts (2, rows, columns), px, of each frame.
 
-    Then by how much, in the same form, 0 elsewhere; None without any.
+    Second, return a map of these displacements of the same shape, 0 elsewhere; None without any.
     """
     if len(shifts) < _FEWEST_FRAMES:
         return (), None
@@ -116,11 +115,11 @@ def places_displaced(shifts: list[Float32]) -> tuple[tuple[ImagePlace, ...], Flo
         return (), None
     strength = np.hypot(*(change / np.maximum(spread, 1e-9) for change, spread, _ in ways))
     size = np.hypot(ways[0][0], ways[1][0]).astype(np.float32)
-    # The chance that both ways together are as large: of two normal numbers exp(−s²/2).
+    # The chance that both components together are as large: for two normal numbers exp(−s²/2).
     far = (
         known & (strength > np.sqrt(2 * np.log(known.sum() / FALSE_ALARM))) & (size > _OF_PX * LEAST_ASIDE_PX)
     )
-    # Amid a drop nothing is displaced: its rim is closed.
+    # Inside a drop nothing seems displaced: close its rim.
     whole = cv2.morphologyEx(far.astype(np.uint8), cv2.MORPH_CLOSE, np.ones((5, 5), np.uint8)) > 0
     spread = np.where(strength > 0, size / np.maximum(strength, 1e-9), 1).astype(np.float32)
     found = _joined(whole)
@@ -131,7 +130,7 @@ def places_displaced(shifts: list[Float32]) -> tuple[tuple[ImagePlace, ...], Flo
 
 
 def _stays(stack: Float32) -> tuple[Float32, Float32, Bool]:
-    """Return by how much blocks of frames (F, rows, columns) differ from those about, 1 σ, which count."""
+    """Return relative differences of blocks (rows, columns) from their surroundings, 1 σ, and which count."""
     known = np.isfinite(stack).sum(0) >= _FEWEST_FRAMES
     middle = np.ones(known.shape, np.float32)
     if not known.any():
@@ -142,25 +141,25 @@ def _stays(stack: Float32) -> tuple[Float32, Float32, Bool]:
 
 
 def _error_of_median(stack: Float32, known: Bool) -> Float32:
-    """Return the standard error (rows, columns) of the medians of frames (F, rows, columns), if normal."""
+    """Return the standard error (rows, columns) of medians over frames (F, rows, columns), if normal."""
     error, values = np.zeros(known.shape, np.float32), stack[:, known]
     error[known] = np.sqrt(np.pi / 2 * np.nanvar(values, axis=0, ddof=1) / np.isfinite(values).sum(0))
     return error
 
 
 def _joined(beyond: Bool) -> list[Bool]:
-    """Return the parts of blocks that touch, those of few blocks left out."""
+    """Return the connected groups of blocks, without those of too few blocks."""
     count, label = cv2.connectedComponents(beyond.astype(np.uint8))
     return [label == k for k in range(1, count) if (label == k).sum() >= _FEWEST_BLOCKS]
 
 
 def beside(places: tuple[ImagePlace, ...], others: tuple[ImagePlace, ...]) -> tuple[ImagePlace, ...]:
-    """Return the places that do not touch any of others."""
+    """Return the places that do not touch any of ``others``."""
     return tuple(p for p in places if not any(p.disc.touches(o.disc, _APART_PX) for o in others))
 
 
 def told_once(found: list[Mismatch]) -> tuple[Mismatch, ...]:
-    """Return what is on the window without what names the same spot a second time, and less well."""
+    """Return what is on the window, without mismatches that name the same spot again with a worse fit."""
     kept: list[Mismatch] = []
     for one in sorted(found, key=lambda m: m.chi2_after - m.chi2_before):
         if not any(m.name == one.name and meet(m, one, _APART_PX) for m in kept):
@@ -182,17 +181,18 @@ def _spread_of_rings(change: Float32, known: Bool) -> Float32:
 
 
 def _broad(values: Float32, known: Bool) -> Float32:
-    """Return the local level about every block, dirt left out by a median of medians."""
+    """Return the local level about every block, with dirt excluded by a median of medians."""
     filled = np.where(known, values, np.float32(1))
     scaled = np.clip((filled - 0.5) * 255, 0, 255).astype(np.uint8)
     coarse = cv2.medianBlur(scaled, _BROAD_BLOCKS).astype(np.float32) / 255 + 0.5
     weight = cv2.GaussianBlur(known.astype(np.float32), (0, 0), _BROAD_BLOCKS / 4)
-    # Blocks off their surroundings by 5 % (chosen) may be dirt, and have no part in the level about them.
+    # Blocks that differ from their surroundings by 5 % (chosen) may be dirt and are excluded from the local
+    # level.
     near = np.abs(filled - coarse) < 0.05
     use = (known & near).astype(np.float32)
     total = cv2.GaussianBlur(filled * use, (0, 0), _BROAD_BLOCKS / 4)
     share = cv2.GaussianBlur(use, (0, 0), _BROAD_BLOCKS / 4)
-    # Where less than a twentieth (chosen) was left in, the median stands for the level.
+    # Where less than a twentieth (chosen) of the blocks is left, the median is the level.
     return np.where((share > 0.05 * weight) & (share > 1e-6), total / np.maximum(share, 1e-6), coarse)
 
 
@@ -206,7 +206,7 @@ def _place(inside: Bool, change: Float32, spread: Float32, blocks: int) -> Image
 
 
 def full_size(values: Float32, shape: tuple[int, ...], beyond: float = 1.0) -> Float32:
-    """Return the values of blocks at all pixels (H, W); ``beyond`` the last whole block is another."""
+    """Return the values of blocks at all pixels (H, W); ``beyond`` is the value outside whole blocks."""
     out = np.full(shape, beyond, np.float32)
     big = cv2.resize(values, None, fx=BLOCK_PX, fy=BLOCK_PX, interpolation=cv2.INTER_LINEAR)
     out[: big.shape[0], : big.shape[1]] = big

@@ -1,4 +1,4 @@
-"""What is counted or read off the photometric state, and what cannot be told."""
+"""Findings that are counted or read off the photometric state, and what these frames cannot decide."""
 
 from __future__ import annotations
 
@@ -21,22 +21,22 @@ from stages.twin.state import PhotometricState
 from stages.twin.switched import IN_FOCUS_PX, defocus, response, wide_line
 
 _CLIPPED, _CLIPPED_WALL = 0.05, 0.01
-"""Share of ring samples, and of pixels of lit wall, from which clipping is told."""
+"""Share of ring samples, and of pixels of lit wall, above which clipping is reported."""
 _LEAST_POWER, _SURE_OF_POWER, _ALIKE = 0.06, 3.0, 0.3
-"""Least departure of an exponent from 1: a photo a little blurred loses as much contrast; and in σ. By which
-share of it fine and coarse texture may differ."""
+"""Smallest reported departure of an exponent from 1 (a slightly blurred photo loses as much contrast), and
+its significance in σ. Share of the departure by which fine and coarse texture may differ."""
 _OF_BLOCKS = 0.005
-"""1 σ of an exponent since the mean of powers over a block is not the power of its mean."""
+"""1 σ of an exponent because the mean of powers over a block is not the power of its mean."""
 _MAP_BLOCKS, _USUAL_GAIN, _USUAL_OFFSET, _MEDIAN_OF_SQUARE = 4, 0.02, 1.0, 0.455
-"""Blocks to a cell of the map of gain and offset; what a cell usually has: as much as no law names; median of
+"""Blocks per cell side in the map of gain and offset; usual gain and offset of a cell, as prior; median of
 the square of a normal number."""
 
 
 def clipped(rings: RingSamples, line_share: float, wall_share: float) -> tuple[Mismatch, ...]:
-    """Return a clipped line and clipped lit wall, which are counted, not inferred: χ² stays as it was.
+    """Return a clipped line and clipped lit wall; these are counted, not inferred, and χ² stays as it was.
 
-    ``line_share`` is that of pixels in the line's middle whose strongest channel is at full scale, and
-    ``wall_share`` that of pixels of lit wall at the level where grey levels pile up.
+    ``line_share`` is the share of pixels in the line's middle whose strongest channel is at full scale, and
+    ``wall_share`` that of pixels of lit wall at the level where grey levels clip.
     """
     lost = float(np.mean(rings.validity == RingValidity.SATURATED)) if rings.validity.size else 0.0
     nan, found = float("nan"), []
@@ -55,10 +55,10 @@ def clipped(rings: RingSamples, line_share: float, wall_share: float) -> tuple[M
 
 
 def response_of(samples: BlockSamples | None, ring: Ring) -> tuple[Suspected, ...]:
-    """Return a response whose contrast differs from the photo's, from the blocks of lit frames.
+    """Return a response by which wall has another contrast than in its photo, from the blocks of lit frames.
 
-    Blocks and the means of sixteen must tell the same: a photo that is displaced or blurred loses contrast in
-    fine texture alone.
+    Blocks and means over sixteen blocks must agree: a displaced or blurred photo loses contrast in fine
+    texture only.
     """
     if samples is None or samples.frame.max() + 1 < FEWEST_FRAMES:
         return ()
@@ -73,8 +73,8 @@ def response_of(samples: BlockSamples | None, ring: Ring) -> tuple[Suspected, ..
     nan = float("nan")
     found = Mismatch(
         "response", "intensity", "image", (), (NamedFigure("exponent", power, sd),), chance, nan, nan,
-        f"Recorded wall has the contrast of its photo to the power {power:.2f}: the response is another "
-        "than the photo's.", ring.whole(int(samples.number[0])),
+        f"Recorded wall has the contrast of its photo raised to the power {power:.2f}: the response differs "
+        "from that of the photo.", ring.whole(int(samples.number[0])),
     )  # fmt: skip
     return (Suspected(found, response, samples.number[frame], each[:, None]),)
 
@@ -82,9 +82,9 @@ def response_of(samples: BlockSamples | None, ring: Ring) -> tuple[Suspected, ..
 def focus_of(
     state: PhotometricState, whole: WholePictures, named: Sequence[Mismatch]
 ) -> tuple[Suspected, ...]:
-    """Return a blur of lit frames, or else of the line; ``named`` are laws of whole pictures that stand.
+    """Return a blur of lit frames, or else of the line; ``named`` are confirmed laws of whole pictures.
 
-    Where contrast follows another power than the photo's, its curvature tells nothing of blur.
+    If contrast follows another power than the photo's, curvature says nothing about blur.
     """
     if any(m.name == "response" for m in named):
         return ()
@@ -94,7 +94,7 @@ def focus_of(
 
 
 def _defocus(whole: WholePictures, half_variance: Float) -> tuple[Suspected, ...]:
-    """Return a blur beyond that of the photo and of motion, by half its variance (F,), px²."""
+    """Return a blur beyond that of photo and motion, from half its variance (F,), px²."""
     few = len(half_variance) < FEWEST_FRAMES
     if few or not whole.loses_texture or half_variance.mean() < LEAST_BLUR_PX**2 / 2:
         return ()
@@ -110,9 +110,9 @@ def _defocus(whole: WholePictures, half_variance: Float) -> tuple[Suspected, ...
 
 
 def _not_sharp(line: LineLight | None, whole: WholePictures) -> tuple[Suspected, ...]:
-    """Return a line that is wider than its sheet and a lens in focus make it.
+    """Return a line that is wider than its sheet and a lens in focus would make it.
 
-    Its width is held against a fixed limit: the run's photo is as blurred as its frames.
+    Its width is compared with a fixed limit, because the run's photo is as blurred as its frames.
     """
     if line is None or line.blur_px.value - 3 * line.blur_px.sd < IN_FOCUS_PX:
         return ()
@@ -121,17 +121,16 @@ def _not_sharp(line: LineLight | None, whole: WholePictures) -> tuple[Suspected,
         "defocus or thick_sheet", "line", "line", (), (NamedFigure("blur", blur.value, blur.sd, "px"),),
         nan, nan, nan,
         f"The line is blurred by {blur.value:.1f} px (1 σ) beyond its sheet's stated thickness: the lens "
-        "is out of focus, or the sheet is thicker than stated. In one diameter the two look alike.",
+        "is out of focus, or the sheet is thicker than stated. In a pipe of one diameter both look alike.",
     )  # fmt: skip
     return (Suspected(found, wide_line, frame, np.full((len(frame), 1), blur.value)),)
 
 
 def _exponents(samples: BlockSamples, side: int) -> tuple[Int, Float]:
-    """Return frames (F,) and their exponents (F,) between recorded and foretold brightness.
+    """Return frames (F,) and the exponents (F,) between their recorded and predicted brightness.
 
-    Cells have so many blocks a side.
-
-    What stays at one place of the image is taken off: light, vignette and dirt are no response.
+    Cells have ``side`` blocks a side. What stays at one place of the image is removed: light, vignetting and
+    dirt are no response.
     """
     place = (samples.row // side) * 10_000 + samples.column // side
     cell, of, count = np.unique(place + samples.frame * 10_000_000, return_inverse=True, return_counts=True)
@@ -145,10 +144,11 @@ def _exponents(samples: BlockSamples, side: int) -> tuple[Int, Float]:
 
 
 def left_over(samples: BlockSamples | None) -> tuple[float, tuple[NamedFigure, ...]]:
-    """Return by how much χ² falls with a map of gain and offset that stays in the image, and its size.
+    """Return by how much a map of gain and offset that stays in the image lowers χ², and its size.
 
-    The map stands for what nobody named. That of every other frame is tried on those between; where they fit
-    no better, there is none. Blocks of the map are drawn to 0 by their usual size and the blocks' own spread.
+    The map stands for whatever got no name. The map from every second frame is tested on the others; where
+    they fit no better, there is none. A cell's gain and offset are shrunk to 0 by their usual size and the
+    blocks' scatter.
     """
     if samples is None or samples.frame.max() + 1 < FEWEST_FRAMES:
         return 0.0, ()
@@ -173,7 +173,7 @@ def left_over(samples: BlockSamples | None) -> tuple[float, tuple[NamedFigure, .
 
 
 def _gain_and_offset(x: Float, y: Float, weight: Float, cell: Int) -> tuple[Float, Float]:
-    """Return gain and offset of cells that make y (N,) of x (N,) best."""
+    """Return gain and offset of each cell that fit y (N,) to x (N,) best."""
     sums = (weight * x * x, weight * x, weight, weight * x * y, weight * y)
     xx, x1, one, xy, y1 = (np.asarray(np.bincount(cell, v), float) for v in sums)
     xx, one = xx + 1 / _USUAL_GAIN**2, one + 1 / _USUAL_OFFSET**2
@@ -182,7 +182,7 @@ def _gain_and_offset(x: Float, y: Float, weight: Float, cell: Int) -> tuple[Floa
 
 
 def noise_figures(noise: CameraNoise) -> tuple[NamedFigure, ...]:
-    """Return the camera's noise as EMVA 1288 has it."""
+    """Return the camera's noise in the terms of EMVA 1288."""
     e, read = noise.electrons_per_level, noise.read_electrons
     return (
         NamedFigure("black_dn", noise.black.value, noise.black.sd, "grey levels"),
@@ -195,7 +195,7 @@ def noise_figures(noise: CameraNoise) -> tuple[NamedFigure, ...]:
 
 
 def state_figures(state: PhotometricState) -> tuple[NamedFigure, ...]:
-    """Return what lamps, laser and lens do, in few numbers."""
+    """Return the main figures of lamps, laser and lens."""
     found: list[NamedFigure] = []
     if state.lamp is not None:
         place, gain = state.place_px, state.lamp.gain
@@ -226,47 +226,47 @@ def state_figures(state: PhotometricState) -> tuple[NamedFigure, ...]:
 
 
 def cannot_tell(state: PhotometricState, silent: bool = False) -> tuple[str, ...]:
-    """Return what such recordings do not tell, as sentences; ``silent`` dark pixels show no noise."""
+    """Return sentences on what such recordings cannot decide; ``silent``: dark pixels show no noise."""
     said = [
-        "Vignetting cannot be told from the LEDs' lobe: both change brightness with the polar angle alone.",
-        "A power response cannot be told from the wall's contrast: the photo has it, too; gamma is read "
-        "off the noise, which a video codec changes: it is no proof of a response that is not linear.",
-        "Lamps that are uneven in all frames, otherwise than by one dim LED, are told from wall that is "
-        "paler on one side only as far as the probe rolls.",
-        "Frames that all move alike while they are exposed leave their blur in the wall's photo, too: motion "
-        "blur is told only of frames that are more blurred than the others.",
+        "Vignetting cannot be separated from the LEDs' lobe: both act by the polar angle alone.",
+        "A power response cannot be separated from the wall's contrast, since the photo has it, too. Gamma "
+        "is estimated from the noise, which a video codec changes: it does not prove a nonlinear response.",
+        "Lamps that are uneven in all frames, other than by one dim LED, can be distinguished from wall that "
+        "is paler on one side only as far as the probe rolls.",
+        "If all frames move alike during their exposure, their blur is also in the wall's photo: motion blur "
+        "is found only in frames that are more blurred than the others.",
     ]
     if silent:
         said.append(
-            "Nearly all dark pixels are at black to the grey level, or cut off there: light fainter than "
-            "half a level is rounded away, as most of what a wall throws back of the line is."
+            "Nearly all dark pixels are at the black level, or clipped there: light fainter than half "
+            "a grey level is rounded away, as is most of the line's light that the wall reflects."
         )
     if np.isnan(state.photo_black):
         said.append(
-            "Whether the black level is in the wall's photo is not known, for want of a frame of the laser "
-            "alone in colour: the photo's contrast does not tell the response."
+            "Whether the wall's photo includes the black level is unknown, since there is no colour frame of "
+            "the laser alone: the photo's contrast says nothing about the response."
         )
     elif state.black_in_photo:
         said.append(
-            f"The black level of {state.photo_black:.0f} grey levels is in the wall's photo, too: its "
-            "contrast does not tell the response."
+            f"The black level of {state.photo_black:.0f} grey levels is also in the wall's photo: its "
+            "contrast says nothing about the response."
         )
     if state.line_is_clipped:
         said.append(
             f"The line is clipped in {100 * state.line_clipped:.0f} % of its middle: whether the laser's "
-            "power changes over time or around the sheet cannot be told."
+            "power changes over time or around the sheet is not visible."
         )
     if state.lamp is None:
-        said.append("No lit frame could be used: nothing is known of lamps, vignetting and photon transfer.")
+        said.append("No lit frame could be used: lamps, vignetting and photon transfer are unknown.")
     if state.line is None:
         said.append(
-            "No frame of the laser alone could be used: nothing is known of the line's profile, and pixels "
+            "No frame of the laser alone could be used: the line's profile is unknown, and pixels "
             "near the line are not compared."
         )
     else:
         said += [
-            "The sheet's thickness is the stated one: in one diameter it cannot be told from the lens' blur.",
-            "A second line is looked for at one ratio of radii all round: one that the wall mirrors farther "
-            "ahead lies at another in each direction where the probe is askew, and may not be seen.",
+            "The sheet's thickness is the stated one: in one diameter it looks like the lens's blur.",
+            "A second line is searched for at one ratio of radii all round. A mirror image of the line on "
+            "wall farther ahead has another ratio in each direction if the probe is askew: it may be missed.",
         ]
     return tuple(said)

@@ -1,9 +1,9 @@
-"""The camera's noise from the frames themselves, by EMVA 1288's model of the photon transfer.
+"""The camera's noise from the frames themselves, by the photon transfer model of EMVA 1288.
 
-Variance over level of what the twin leaves over in small windows, less what it leaves over alike in the next
-frame at the same places of the wall: errors of wall and photo come back, noise does not. With an even
-response variance = read² + level / (electrons per grey level) + (non-uniformity · level)². A power response
-I^(1/γ) makes the shot noise's variance go with level^(2 − γ) instead, which gives γ.
+The variance of the residual recorded − predicted in small windows is plotted over level, less its covariance
+with the next frame's residual at the same places of the wall: errors of wall and photo recur there, noise
+does not. With a linear response, variance = read² + level / (electrons per grey level) + (non-uniformity ·
+level)². A power response I^(1/γ) changes the shot noise's variance to level^(2 − γ), which gives γ.
 """
 
 from __future__ import annotations
@@ -18,27 +18,27 @@ from pipeline.arrays import Bool, Float, Float32, Image, Int
 from stages.twin.lamp_light import Figure
 
 _WINDOW_PX = 12
-"""Side of a window: the variance of 144 pixels is known to some 12 %, also where neighbours are alike."""
+"""Side of a window, px: the variance of 144 pixels is known to some 12 %, also with correlated neighbours."""
 _MOST_ALIKE = 0.5
-"""Share of a window's variance that may come back in the next frame: noise alone gives 0 ± 0.08."""
+"""Share of a window's variance that may recur in the next frame: for noise alone it is 0 ± 0.08."""
 _LEVELS, _FEWEST, _FEWEST_CELLS = 14, 40, 3
-"""Most cells of grey level, windows that each has, and fewest cells: noise has three figures."""
+"""Most cells of grey level, windows in each, and fewest cells: the noise has three parts."""
 _LEAST_VARIANCE = 1 / 12
-"""Of rounding to whole grey levels."""
+"""Variance of rounding to whole grey levels."""
 _RANGE_FOR_PARTS = 1.5
-"""Ratio of brightest to darkest level needed to tell the noise's parts from each other; chosen."""
+"""Ratio of brightest to darkest level needed to separate the noise's parts; chosen."""
 _PILE = 16
-"""Grey levels within which a lossy codec leaves clipped pixels: H.264 leaves them within eight. Chosen."""
+"""Grey levels over which a lossy codec scatters clipped pixels: H.264 stays within eight. Chosen."""
 _RANGE_FOR_GAMMA = 3.0
-"""Ratio of brightest to darkest level needed to tell the response's exponent."""
+"""Ratio of brightest to darkest level needed to estimate the response's exponent."""
 
 
 @dataclass(frozen=True)
 class CameraNoise:
     """Noise of one pixel of the grey picture.
 
-    Where grey is made of three colours whose noise is apart, it has less noise than each of them, and its
-    electrons are those of all three together.
+    Where grey is computed from three colours with independent noise, it has less noise than each of them, and
+    its electrons are those of all three together.
 
     Attributes
     ----------
@@ -47,9 +47,10 @@ class CameraNoise:
     white : float
         Grey level from which pixels are clipped.
     read_variance, variance_per_level, uneven : Figure
-        Of EMVA 1288's model, in grey levels squared, grey levels, and relative.
+        Read noise² (grey levels²), variance per level (grey levels), and relative non-uniformity, as in EMVA
+        1288.
     gamma : Figure
-        Exponent γ of the response; σ is infinite where the frames cannot tell.
+        Exponent γ of the response; σ is infinite where the frames cannot determine it.
     """
 
     black: Figure
@@ -60,7 +61,7 @@ class CameraNoise:
     gamma: Figure
 
     def variance(self, above_black: Float32) -> Float32:
-        """Return the variance (...) of pixels so many grey levels above black."""
+        """Return the variance (...), grey levels², of pixels at such grey levels above black."""
         dark, shot, square = (np.float32(c) for c in self.polynomial)
         level = np.maximum(above_black, np.float32(0))
         out = np.multiply(level, square)
@@ -75,36 +76,36 @@ class CameraNoise:
         return self.white - self.black.value
 
     def above_black(self, image: Image | Float32) -> Float32:
-        """Return grey levels (H, W) above black.
+        """Return grey levels (H, W) above black, at most full scale.
 
-        A codec leaves clipped pixels a little above full scale, where no twin can be.
+        A codec leaves some clipped pixels a little above full scale, which no twin reaches.
         """
         above = image.astype(np.float32) - np.float32(self.black.value)
         return np.asarray(np.minimum(above, np.float32(self.full_scale)), np.float32)
 
     @property
     def polynomial(self) -> tuple[float, float, float]:
-        """Coefficients of the variance over the level, from the constant on."""
+        """Coefficients of the variance as a polynomial of the level, constant first."""
         dark = max(self.read_variance.value, _LEAST_VARIANCE)
         return dark, self.variance_per_level.value, self.uneven.value**2
 
     @property
     def clips_black(self) -> bool:
-        """Whether black lies within three σ of the read noise of grey level 0."""
+        """Whether black lies within three σ of the read noise from grey level 0."""
         return self.black.value < 3 * float(np.sqrt(max(self.read_variance.value, _LEAST_VARIANCE)))
 
     @property
     def electrons_per_level(self) -> Figure:
-        """Conversion of the photon transfer; infinite where no shot noise shows."""
+        """Electrons per grey level from the photon transfer; infinite where no shot noise is visible."""
         k = self.variance_per_level
         return Figure(np.inf, np.inf) if k.value <= 0 else Figure(1 / k.value, k.sd / k.value**2)
 
     @property
     def read_electrons(self) -> Figure:
-        """Read noise, 1 σ, in electrons of the conversion above, rounding taken off; infinite as that is.
+        """Read noise, 1 σ, in electrons, without rounding; infinite where the conversion is.
 
-        One fit gives read noise and conversion: what one gains the other loses, so that their σ add. Of
-        noise below a grey level rounding may show none, or as much again as its own.
+        Read noise and conversion come from one fit, in which one gains what the other loses: their σ are
+        added. Of noise below one grey level, rounding may hide all or add as much again.
         """
         e, variance = self.electrons_per_level, max(self.read_variance.value - _LEAST_VARIANCE, 0.0)
         if not np.isfinite(e.value):
@@ -124,17 +125,17 @@ class NoiseWindows:
 
 
 def windows_of(left_over: Float32, again: Float32, level: Float32, use: Bool) -> NoiseWindows:
-    """Return the windows of a frame in which all pixels may be used, slopes taken out of each.
+    """Return the windows of a frame in which all pixels may be used, each without its mean slope.
 
-    What the next frame shows alike at the same places of the wall is no noise, and is taken off. Of the
-    windows, the half with the faintest texture counts: there poses that err leave least.
+    What recurs in the next frame at the same places of the wall is subtracted, since it is no noise. The half
+    of the windows with the faintest texture is used, because errors of the poses matter least there.
 
     Parameters
     ----------
     left_over, level, use : (H, W)
-        Recorded less predicted, predicted above black, and which pixels count.
+        Recorded minus predicted, predicted above black, and which pixels may be used.
     again : (H, W)
-        Recorded less predicted of the next frame, where that shows the wall of each pixel.
+        Recorded minus predicted in the next frame, at the wall place that each pixel shows.
     """
     rows, columns = (n // _WINDOW_PX for n in left_over.shape)
 
@@ -158,11 +159,11 @@ def windows_of(left_over: Float32, again: Float32, level: Float32, use: Bool) ->
 
 
 def photon_transfer(windows: list[NoiseWindows], black: Figure, white: float) -> CameraNoise:
-    """Return the noise that windows of several frames show; σ from leaving out one frame at a time.
+    """Return the noise from windows of several frames; σ from leaving out one frame at a time.
 
-    Each part of the noise is 0 at least, but not where σ is told: it would be 0 for parts that are 0 in every
-    fit. Windows of one grey level show the sum of the parts alone, which is then read noise; of few levels,
-    or where all frames but one have few, every σ is infinite.
+    Each part of the noise is at least 0, except in the estimate of σ: parts clipped at 0 in every fit would
+    have σ 0. Windows of one grey level determine only the sum of the parts, which is then read noise; with
+    few levels, or where all frames but one have few, every σ is infinite.
     """
     value, others = _fitted(_Cells.of(windows)), (windows[:k] + windows[k + 1 :] for k in range(len(windows)))
     each = [_Cells.of(some) for some in (windows, *others)]
@@ -175,7 +176,7 @@ def photon_transfer(windows: list[NoiseWindows], black: Figure, white: float) ->
 
 
 def _of_root(root: float, sd: float) -> float:
-    """Return the 1 σ of a root whose square has a σ: half the way, by two of these, to the farther end."""
+    """Return the 1 σ of a root from that of its square: half of the distance to the farther end of ±2 σ."""
     ends = np.sqrt(max(root**2 - 2 * sd, 0.0)), np.sqrt(root**2 + 2 * sd)
     return float(max(root - ends[0], ends[1] - root)) / 2
 
@@ -189,14 +190,14 @@ def _camera_noise(value: Float, sd: Float, black: Figure, white: float) -> Camer
 
 @dataclass(frozen=True)
 class _Cells:
-    """Mean level and variance (C,) of cells of windows that are alike bright."""
+    """Mean level and variance (C,) over windows of similar brightness."""
 
     level: Float
     variance: Float
 
     @classmethod
     def of(cls, windows: list[NoiseWindows]) -> _Cells | None:
-        """Return the cells; None where windows are too few."""
+        """Return the cells; None with too few windows."""
         level = np.concatenate([np.zeros(0), *(w.level for w in windows)])
         variance = np.concatenate([np.zeros(0), *(w.variance for w in windows)])
         cells = min(_LEVELS, len(level) // _FEWEST)
@@ -205,35 +206,35 @@ class _Cells:
         edges = np.quantile(level, np.linspace(0, 1, cells + 1))
         cell = np.clip(np.searchsorted(edges, level) - 1, 0, cells - 1)
         used = [k for k in range(cells) if (cell == k).sum() >= _FEWEST // 2]
-        # Where black cuts noise off, windows show none at all.
+        # Where black clips the noise, windows show none.
         floored = [max(float(variance[cell == k].mean()), _LEAST_VARIANCE) for k in used]
         return cls(np.array([level[cell == k].mean() for k in used]), np.array(floored))
 
     @property
     def of_one_level(self) -> bool:
-        """Whether levels differ too little to part the noise."""
+        """Whether levels differ too little to separate the parts of the noise."""
         return bool(self.level.max() < _RANGE_FOR_PARTS * max(self.level.min(), 1.0))
 
     @property
     def part_the_noise(self) -> bool:
-        """Whether levels tell the noise's parts from each other; equal levels leave fewer cells than made."""
+        """Whether levels separate the parts of the noise; equal levels leave fewer cells than planned."""
         return len(self.level) >= _FEWEST_CELLS and not self.of_one_level
 
     @property
     def design(self) -> Float:
-        """(C, 3) parts of the noise over each cell's variance."""
+        """(C, 3) parts of the noise relative to each cell's variance."""
         x = self.level
         return np.asarray(np.stack([np.ones_like(x), x, x**2], 1) / self.variance[:, None])
 
     @property
     def free(self) -> Float:
-        """Read variance, variance per level and square of unevenness, below 0 if need be, and γ."""
+        """Return read variance, variance per level, squared non-uniformity (all unclipped), and γ."""
         size = np.linalg.lstsq(self.design, np.ones_like(self.level), rcond=None)[0]
         return np.array([*size, self.gamma])
 
     @property
     def gamma(self) -> float:
-        """Exponent of the response; NaN where cells cannot tell."""
+        """Exponent of the response; NaN where the cells cannot determine it."""
         x, shot = self.level, self.variance - _LEAST_VARIANCE
         if len(x) <= 3 or x.max() <= _RANGE_FOR_GAMMA * max(x.min(), 1.0) or not (shot > 0).all():
             return float("nan")
@@ -241,7 +242,7 @@ class _Cells:
 
 
 def _fitted(cells: _Cells | None) -> Float:
-    """Return read variance, variance per level, unevenness and γ."""
+    """Return read variance, variance per level, non-uniformity and γ."""
     if cells is None:
         return np.array([_LEAST_VARIANCE, 0.0, 0.0, np.nan])
     if cells.of_one_level:
@@ -251,8 +252,8 @@ def _fitted(cells: _Cells | None) -> Float:
 
 
 def black_and_white(images: list[Float32]) -> tuple[Figure, float]:
-    """Return the level of the darkest tenth of the pixels, and the level at which pixels pile up, if any."""
-    # The darkest tenth: in pictures of the laser alone nine tenths see no line.
+    """Return the level of the darkest tenth of the pixels, and the level at which pixels clip, if any."""
+    # The darkest tenth: in frames of the laser alone, nine tenths of the pixels see no line.
     dark = [float(np.median(i[i <= np.quantile(i, 0.1)])) for i in images]
     sd = float(np.sqrt(np.var(dark) / len(dark) + _LEAST_VARIANCE))
     black = Figure(float(np.median(dark)), sd)
@@ -261,9 +262,10 @@ def black_and_white(images: list[Float32]) -> tuple[Figure, float]:
 
 
 def _full_scale(count: Int) -> float:
-    """Return the level from which pixels, counted by level (256,), are clipped; infinite where none pile up.
+    """Return the level from which pixels, counted by level (256,), are clipped; infinite where none are.
 
-    A lossy codec spreads the pile over some levels to both sides: its peak and its upper side tell it.
+    A lossy codec spreads clipped pixels over some levels on both sides: the peak and its upper side reveal
+    them.
     """
     top = int(np.flatnonzero(count)[-1])
     first = max(top - _PILE, 1)

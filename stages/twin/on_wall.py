@@ -1,7 +1,7 @@
 """Differences that are fixed to the wall, or to rows of single frames.
 
-A region of the wall is darker or brighter than its photo, or it shines: it is the brighter, the more it is
-seen from the side, as wet or polished wall is, whose mirrored light falls off fast with the angle.
+A region of the wall is darker or brighter than in its photo, or it shines: it gets brighter the more
+obliquely it is seen, as wet or polished wall does, whose mirror reflection falls off steeply with the angle.
 """
 
 from __future__ import annotations
@@ -24,17 +24,18 @@ from stages.twin.reference import FEWEST_FRAMES, SHOWN_PX, WALL_COLUMNS, BlockSa
 from stages.twin.scene import SHADING_MM
 
 _SURE, _FEWEST_CELLS = 3.0, 2
-"""σ from frame to frame by which other frames must bear a region out, and how many of its cells touch."""
+"""σ, from frame to frame, by which other frames must confirm a region; and its fewest touching cells."""
 _LEAST_ON_WALL, _LEAST_OF_ROWS = 0.05, 0.01
-"""Relative changes that count: at steps of the wall the photo itself errs by a few per cent."""
+"""Smallest reported relative changes, on the wall and of rows: at steps of the wall the photo itself errs by
+a few per cent."""
 _LEAST_SHINE, _LEAST_LEAN = 0.25, 0.03
-"""Least relative brightening over a line's radius that counts as gloss, and least spread of the places, in
-radii of the line, from which it is told. Chosen."""
+"""Smallest relative brightening over one radius of the line that counts as gloss, and smallest spread of the
+places, in radii of the line, over which it is measured. Chosen."""
 
 _NEAREST_RAD = 0.2
-"""Least polar angle at which wall is taken to be seen: nearer the axis there are no whole blocks of it."""
+"""Least polar angle at which wall is seen: nearer to the axis no block is all wall."""
 _NOISY = 3.0
-"""Medians of the size of two normal errors that the largest of some hundred reaches: 2.8, rounded up."""
+"""Largest among some hundred sums of two normal errors, in medians of their size: 2.8, rounded up."""
 
 
 def unnamed(
@@ -42,7 +43,7 @@ def unnamed(
 ) -> tuple[Mismatch, ...]:
     """Return what is fixed to the wall, or to rows of single frames.
 
-    ``surface`` is the wall's shape by rings ``ring_step_mm`` apart; the line is seen at the polar angle
+    ``surface`` is the wall's shape from rings ``ring_step_mm`` apart; the line is seen at the polar angle
     ``line_rad``.
     """
     if samples is None:
@@ -51,7 +52,7 @@ def unnamed(
 
 
 def ring_step_mm(rings: RingSamples, trajectory: Trajectory) -> float:
-    """Return how far apart rings measure the wall: the median; 0 without two rings that have a pose."""
+    """Return the median distance between rings, mm; 0 without two rings of known pose."""
     place = trajectory.T_pc[np.isin(trajectory.frame, rings.frame), :3, 3]
     return float(np.median(np.linalg.norm(np.diff(place, axis=0), axis=1))) if len(place) > 1 else 0.0
 
@@ -59,9 +60,9 @@ def ring_step_mm(rings: RingSamples, trajectory: Trajectory) -> float:
 def _regions_of_wall(
     samples: BlockSamples, surface: WallSurface, ring_step_mm: float, line_rad: float
 ) -> tuple[Mismatch, ...]:
-    """Return regions of the wall that differ from their photo, if frames bear it out.
+    """Return regions of the wall that differ from their photo, if other frames confirm them.
 
-    Steep wall errs in brightness as its smoothed slope does: that counts to the σ of a region.
+    Steep wall errs in brightness as its smoothed slope does, which is part of a region's σ.
     """
     shape = (int(samples.along.max()) + 1, WALL_COLUMNS)
     mean, sd = map_of(samples, "wall", shape)
@@ -72,7 +73,7 @@ def _regions_of_wall(
         beyond = (np.abs(mean) > np.maximum(tail * sd, _LEAST_ON_WALL)) | (
             shine > np.maximum(tail * shine_sd, _LEAST_SHINE)
         )
-    # Cells that touch but for a few belong together: noise cuts a faint region in parts.
+    # Cells separated by a small gap belong together: noise splits a faint region.
     count, label = cv2.connectedComponents(cv2.dilate(beyond.astype(np.uint8), np.ones((5, 5), np.uint8)))
     label, together, found = label * beyond, touching(beyond), []
     for k in range(1, count):
@@ -95,10 +96,10 @@ def _regions_of_wall(
 
 
 def _beside_image(samples: BlockSamples, use: Bool) -> tuple[BlockSamples, Bool]:
-    """Return blocks less what other wall shows there in the image, and which of ``use`` (N,) count.
+    """Return blocks minus what other wall shows at that place of the image, and which of ``use`` remain.
 
-    What stays in the image brightens all wall that passes by. Places at which no other wall was seen do not
-    tell it from wall that shines.
+    What stays in the image brightens all wall that passes by. Places of the image where no other wall was
+    seen cannot separate this from wall that shines.
     """
     cell, other = samples.orders["image"], ~use
     count = np.bincount(cell[other], minlength=cell.max() + 1)
@@ -112,17 +113,17 @@ def _sureness(told: tuple[float, float]) -> float:
 
 
 def _most(values: Float, cells: Int) -> float:
-    """Return the largest size of a map's values in cells (N, 2)."""
+    """Return the largest absolute value of a map in cells (N, 2)."""
     return float(np.nanmax(np.abs(values[tuple(cells.T)])))
 
 
 def slope_error(surface: WallSurface, samples: BlockSamples, cells: Int, ring_step_mm: float) -> float:
-    """Return the 1 σ of the relative brightness of cells (N, 2) of the wall for want of its exact slope.
+    """Return the 1 σ of the relative brightness of cells (N, 2) of the wall from errors of its slope.
 
-    What smoothing the slopes once more takes off is what the first smoothing took (J. W. Tukey's twicing,
-    1977); light at 45°, as lamps give about the ring, changes by as much as the slope. Along the pipe the map
-    is smoothed by its rings as well: straight lines between rings h apart are a running mean by a triangle,
-    whose variance is h² / 6. Noise of the radius map is taken off: it does not keep one sign over a cell.
+    What a second smoothing of the slopes removes is an estimate of what the first one removed (J. W. Tukey's
+    twicing, 1977); light at 45°, as from lamps near the ring, changes by as much as the slope. Along the pipe
+    the map is also smoothed by its rings: linear interpolation between rings h apart is a running mean with a
+    triangle, whose variance is h² / 6. Noise of the radius map is subtracted: its sign changes within a cell.
     """
     step = float(surface.distance_mm[1] - surface.distance_mm[0])
     around_mm = 2 * np.pi * surface.mean_radius_mm / surface.radius_mm.shape[1]
@@ -145,16 +146,16 @@ def slope_error(surface: WallSurface, samples: BlockSamples, cells: Int, ring_st
 
 
 def touching(beyond: Bool) -> Int:
-    """Return for each cell of a map (H, W) how many cells touch it or each other in a row, itself included.
+    """Return for each marked cell of a map (H, W) the number of cells connected to it, itself included.
 
-    Single cells of noise that merely lie near each other are no region.
+    Single cells of noise that are only close to each other do not form a region.
     """
     _, label = cv2.connectedComponents(beyond.astype(np.uint8))
     return np.asarray(np.bincount(label.ravel())[label] * beyond)
 
 
 def _shine(samples: BlockSamples, shape: tuple[int, int]) -> tuple[Float, Float]:
-    """Return by how much cells (a shape) brighten over a line's radius toward the image's border, and 1 σ."""
+    """Return by how much cells of a map brighten over a line's radius toward the border, and 1 σ."""
     cell, cells = samples.orders["wall"], shape[0] * shape[1]
     lean, change = centred(samples.away, cell), centred(samples.change, cell)
     count, square, cross = (
@@ -168,10 +169,10 @@ def _shine(samples: BlockSamples, shape: tuple[int, int]) -> tuple[Float, Float]
 
 
 def _gloss_of(samples: BlockSamples, use: Bool) -> tuple[float, float]:
-    """Return by how much blocks in ``use`` (N,) brighten toward the border, and by how many σ of frames.
+    """Return by how much blocks in ``use`` (N,) brighten toward the border, and its significance, σ.
 
-    A brightness of each cell that stays is granted. σ is 0 where halves of the frames contradict each other,
-    or frames are too few.
+    A constant brightness of each cell is fitted first. σ is 0 where halves of the frames contradict each
+    other, or with too few frames.
     """
     cell, frame = samples.orders["wall"][use], samples.frame[use]
     lean, change = centred(samples.away[use], cell), centred(samples.change[use], cell)
@@ -191,9 +192,9 @@ def _gloss_of(samples: BlockSamples, use: Bool) -> tuple[float, float]:
 def _shine_of_slope(samples: BlockSamples, use: Bool, line_rad: float) -> float:
     """Return by how much blocks in ``use`` (N,) seem to brighten over a line's radius, per error of a slope.
 
-    Wall that leans toward the lamps by a small angle e more than foretold is brighter by e cot θ where it is
-    seen at θ, the lamps being next to the camera: much far ahead, and hardly beside them. As in an
-    equidistant lens, θ goes with the distance from the image's middle.
+    With lamps next to the camera, wall that leans toward them by a small angle e more than assumed is
+    brighter by e cot θ where it is seen at θ: much far ahead, and hardly beside the lamps. As in an
+    equidistant lens, θ is proportional to the distance from the image's middle.
     """
     cell, theta = samples.orders["wall"][use], np.maximum(samples.away[use] * line_rad, _NEAREST_RAD)
     lean, change = centred(samples.away[use], cell), centred(1 / np.tan(theta), cell)
@@ -203,7 +204,7 @@ def _shine_of_slope(samples: BlockSamples, use: Bool, line_rad: float) -> float:
 def _on_wall(
     cells: Int, mean: Float, sd: Float, known: int, samples: BlockSamples, use: Bool, gloss_sd: float = 0.0
 ) -> Mismatch:
-    """Return a region of the wall; with ``gloss_sd`` one that shines, ``mean`` being its shine."""
+    """Return a region of the wall; with ``gloss_sd``, one that shines, where ``mean`` is its shine."""
     cell_mm = samples.cell_mm
     value, spread = (a[tuple(cells.T)] for a in (mean, sd))
     most = int(np.nanargmax(np.abs(value)))
@@ -222,9 +223,9 @@ def _on_wall(
         size = NamedFigure("shine", float(np.nanmean(value)), gloss_sd, "relative")
         return Mismatch(
             "", "intensity", "wall", place, (size,), chance, nan, nan,
-            f"{at} the wall is the brighter, the more it is seen from the side, as wet or polished wall is. "
-            "It has no name, since noise of a dim picture can look the same. Record next: the same place "
-            "with more light, or dried.",
+            f"{at} the wall is brighter the more obliquely it is seen, as wet or polished wall is. It has no "
+            "name, because noise of a dim picture can look the same. Record next: the same place with more "
+            "light, or dried.",
             look,
         )  # fmt: skip
     way = "brighter" if value[most] > 0 else "darker"
@@ -232,7 +233,7 @@ def _on_wall(
     return Mismatch(
         "", "intensity", "wall", place, (size,), chance, nan, nan,
         f"{at} the wall is {100 * abs(value[most]):.0f} % {way} "
-        "than its photo: it shines differently from each side, or lies elsewhere than the radius map says.",
+        "than its photo: it shines differently from each side, or the radius map is wrong there.",
         look,
     )  # fmt: skip
 
@@ -259,8 +260,8 @@ def _banding(samples: BlockSamples) -> tuple[Mismatch, ...]:
         Mismatch(
             "banding", "intensity", "rows", (), (NamedFigure("change", size, sd, "relative"),), chance,
             nan, nan,
-            f"Rows of single frames are brighter or darker by {100 * size:.1f} % (1 σ): banding, as of lamps "
-            "that flicker within a frame of a rolling shutter.",
+            f"Rows of single frames are brighter or darker by {100 * size:.1f} % (1 σ): banding, as by lamps "
+            "that flicker within the exposure of a rolling shutter.",
             samples.look(everywhere, 2 * SHOWN_PX),
         ),
     )  # fmt: skip

@@ -1,9 +1,9 @@
-"""Laws of whole pictures: blur by motion, stray light, bloom. A second line: `stages.twin.second_ring`.
+"""Effects on the whole picture: motion blur, stray light, bloom. A second line: `stages.twin.second_ring`.
 
-Every frame gives the size of each law by itself, from least squares over its pixels or blocks; a law on whose
-size frames agree beyond chance is suspected, and judged by `stages.twin.gate`. Laws that act on texture are
-columns beside those of exposure and of a displaced photo, which they must not be taken for. A change of σ² of
-the blur along a direction α changes the picture by σ²/2 · d²L/dα².
+Every frame gives its own estimate of the size of each effect, by least squares over its pixels or blocks. An
+effect on whose size frames agree beyond chance is suspected, and then judged by `stages.twin.gate`. Effects
+on texture are fitted together with exposure and a displaced photo, so as not to be confused with these. A
+change σ² of the blur's variance along a direction α changes the picture L by σ²/2 · d²L/dα².
 """
 
 from __future__ import annotations
@@ -28,42 +28,45 @@ from stages.twin.second_ring import ring_profile, second_ring
 from stages.twin.switched import STEP, STRAY_NAMES, TILE, bloom, leaked, motion_blur, stray, stray_lights
 
 _SURE, FEWEST_FRAMES = 3.0, 6
-"""σ by which laws are told apart; frames."""
+"""σ by which effects are distinguished; fewest frames."""
 LEAST_BLUR_PX = 0.7
-"""Least motion blur that is named, 1 σ: as much as a sharp lens and a pixel blur by themselves."""
+"""Smallest motion blur that is named, 1 σ, px: a sharp lens and a pixel blur as much by themselves."""
 _ONE_WAY = 0.6
-"""Least share of a blur that has a direction: 1 for motion alone; of defocus a quarter seems to have one."""
+"""Least directional share of a blur: 1 for motion alone; a quarter of a defocus seems to have a direction."""
 OF_LAW = 0.2
-"""Relative 1 σ of a blur for want of its shape: texture as fine as the blur is long bends more than by its
-second derivative."""
+"""Relative 1 σ of a blur because its shape is simplified: texture as fine as the blur bends more than its
+second derivative says."""
 _LEAST_LEVEL = 1.0
-"""Least stray light that is named, grey levels: what rounding alone cannot make."""
+"""Smallest stray light that is named, grey levels: rounding alone cannot make as much."""
 _OF_MEAN = (0.3, 0.6, 0.3)
-"""Share by which the wall's mean brightness may miss what each of the `stray_lights` foretells from the
-wall's pattern. Chosen: drawn light that is even, or the lamps' own, misses .00 to .08 of it, a glow that is
-not quite that of light bounced once .03 to .25; a pattern without light, as a codec leaves it, misses all."""
+"""Share by which the wall's mean brightness may differ from what each of the `stray_lights` predicts from its
+pattern. Chosen: simulated light that is even, or the lamps' own, differs by .00 to .08, a glow that is not
+exactly light bounced once by .03 to .25; a pattern without light, as a codec leaves it, by all of it."""
 _FINE_PX, _KEPT = 9, 1.0
-"""Window that fine texture is held against, and share of its energy above which nothing is blurred."""
+"""Window, px, against which fine texture is compared, and share of its energy above which nothing is
+blurred."""
 _DIRECTIONS = ("even", "across", "slanted", "radial")
 _TRIMMED, _LEAST_SPREAD = 4, 0.1
-"""Rounds of leaving out blocks that differ, and least spread of blocks, grey levels."""
+"""Rounds of excluding blocks that differ, and least scatter of blocks, grey levels."""
 _CLIPPED, _LEAST_BLOOM, _NEAR = 200, 0.01, 0.02
-"""Pixels that must clip, least leak and spread."""
+"""Fewest clipped pixels, smallest leak, and smallest spread."""
 _ALONG = "along the pipe"
 
 
 @dataclass
 class WholePictures:
-    """Collects what single frames say of laws of the whole picture; see `found`.
+    """Collects the estimates of effects on the whole picture from single frames; see `suspected`.
 
     Attributes
     ----------
     scene : Scene
     blur, kept, stray, bloom, ghost : list
-        Of each frame: own and cross sums of both halves; share of the fine texture's energy; sizes of the
-        `stray_lights`, their levels, falls and means, and by how much the wall's mean above what sees no wall
-        is more; leak along columns and rows; brightness over ln of the ratio of radii in four quadrants.
+        For each frame: own and cross sums of both halves of the picture; share of the fine texture's energy;
+        sizes of the `stray_lights`, their levels, falls of χ² and means, and by how much the wall's mean
+        above what sees no wall exceeds them; leak along columns and rows; brightness over ln of the ratio of
+        radii in four quadrants.
     frame : dict of str to list of int
+        Frames used for each effect.
     """
 
     scene: Scene
@@ -82,7 +85,7 @@ class WholePictures:
         return Mismatch(name, channel, fixed_to, (), (size,), chance, np.nan, np.nan, said, look)
 
     def add_lit(self, frame: int, above: Float32, twin: TwinFrame, free: Bool) -> None:
-        """Take a lit frame (H, W) whose twin has its exposure; pixels in ``free`` are not clipped."""
+        """Add a lit frame (H, W) whose twin has its exposure; ``free`` marks pixels that are not clipped."""
         inner = (slice(STEP, -STEP, STEP),) * 2
         use = cv2.erode((free & (twin.region == Region.WALL)).astype(np.uint8), np.ones((5, 5), np.uint8))
         at = np.flatnonzero(use[inner])
@@ -100,7 +103,7 @@ class WholePictures:
         self.frame["blur"].append(frame)
 
     def _columns(self, level: Float32, inner: tuple[slice, slice]) -> Float32:
-        """Return exposure and displacements, then blurs in `_DIRECTIONS`."""
+        """Return columns for exposure and displacements, then for blurs in `_DIRECTIONS`."""
 
         def at(down: int, right: int) -> Float32:
             both = zip((down, right), level.shape, strict=True)
@@ -116,13 +119,13 @@ class WholePictures:
         return np.stack([here, du, dv, c * du + s * dv, c * dv - s * du, even, across, uv, radial])
 
     def add_laser(self, frame: int, above: Float32, twin: TwinFrame, free: Bool, lit: TwinFrame) -> None:
-        """Take a frame of the laser alone, and the twin that the LEDs would show from the same place."""
+        """Add a frame of the laser alone, with the twin of a lit frame from the same pose."""
         line = (twin.region == Region.LINE_CORE) | (twin.region == Region.LINE_FLANK)
         away = cv2.dilate(line.astype(np.uint8), np.ones((9, 9), np.uint8)) == 0
         known = away & (lit.region == Region.WALL) & free
         lights = stray_lights(self.scene, twin, lit)
         small = [of_blocks(np.where(known, a, 0)) for a in (np.ones_like(above), above, *lights)]
-        # Whole blocks alone, up to rounding.
+        # 0.99: whole blocks only, up to rounding.
         whole = small[0] > 0.99
         if whole.sum() < TILE**2:
             return
@@ -140,7 +143,7 @@ class WholePictures:
             self.frame["ghost"].append(frame)
 
     def add_clipped(self, frame: int, above: Float32, twin: TwinFrame, free: Bool) -> None:
-        """Take any frame: what leaks from clipped pixels along columns, and along rows for comparison."""
+        """Add any frame: what leaks from clipped pixels along columns, and along rows for comparison."""
         if (~free).sum() < _CLIPPED:
             return
         spread = leaked(free)
@@ -153,7 +156,7 @@ class WholePictures:
         self.frame["bloom"].append(frame)
 
     def suspected(self, sharpness: Float) -> tuple[Suspected, ...]:
-        """Return what frames agree on; ``sharpness`` (Z,) is half the variance by which they are blurrier."""
+        """Return effects on which frames agree; ``sharpness`` (Z,) is their blur beyond the photo's."""
         made = (
             self._motion_blur(sharpness),
             self._stray(),
@@ -163,28 +166,28 @@ class WholePictures:
         return tuple(m for m in made if m is not None)
 
     def frames_of(self, law: str) -> Int:
-        """Return the frames (F,) that told of a law."""
+        """Return the frames (F,) in which an effect was estimated."""
         return np.array(self.frame[law], np.int64)
 
     def direction(self, frame: int) -> Float:
-        """Return cosine and sine of twice the angle of a frame's blur, as each half (2, 2) tells it."""
+        """Return cosine and sine of twice the direction of a frame's blur, from each half (2, 2)."""
         if frame not in self.frame["blur"]:
             return np.tile([1.0, 0.0], (2, 1))
         own, cross = self.blur[self.frame["blur"].index(frame)]
         return np.array([_blur_of(o, c)[1:3] for o, c in zip(own, cross, strict=True)])
 
     def _blurs(self) -> Float:
-        """Half the variances (F, 2, 4) that frames are blurred by, of both halves."""
+        """Half the variances (F, 2, 4), px², of the frames' blur, from both halves of the picture."""
         each = [[_blur_of(o, c) for o, c in zip(*frame, strict=True)] for frame in self.blur]
         return np.array(each).reshape(-1, 2, len(_DIRECTIONS))
 
     @property
     def loses_texture(self) -> bool:
-        """Whether fine texture is fainter than the photo's: a photo displaced in itself only moves it."""
+        """Whether fine texture is fainter than in the photo: a displaced photo only moves it."""
         return bool(self.kept) and float(np.mean(self.kept)) < _KEPT
 
     def even_blur(self, sharpness: Float) -> Float:
-        """Return half the variance (F,), px², by which lit frames are blurrier than the photo all round."""
+        """Return half the variance (F,), px², of lit frames' isotropic blur beyond that of the photo."""
         return np.asarray(self._blurs()[:, :, 0].mean(1) + np.mean(sharpness))
 
     def _motion_blur(self, sharpness: Float) -> Suspected | None:
@@ -198,14 +201,14 @@ class WholePictures:
         size = _blur_px(product.mean())
         chance = chance_of(product)
         if size**2 / 2 < _ONE_WAY * self.even_blur(sharpness).mean():
-            return None  # blur in all directions, which fine texture of one direction shows more
+            return None  # isotropic blur, on texture that is finer in one direction
         if not self.loses_texture or size < LEAST_BLUR_PX or chance > FALSE_ALARM or sigmas(product) < _SURE:
             return None
         spread = float(product.std() / np.sqrt(len(product))) / max(float(product.mean()), 1e-12) / 4
         sd = size * float(np.hypot(spread, OF_LAW))
         found = self._mismatch(
             "motion_blur", "time", NamedFigure("blur", size, sd, "px"), chance, "blur",
-            f"Frames are blurred by {size:.1f} px (1 σ) {way}, and less across: they move while exposed.",
+            f"Frames are blurred by {size:.1f} px (1 σ) {way}, and less across: they move during exposure.",
         )  # fmt: skip
         told, along = product[:, None], float(way == _ALONG)
         return Suspected(
@@ -217,7 +220,7 @@ class WholePictures:
             return None
         size, level, fall, mean, more = np.moveaxis(np.stack(self.stray), -1, 0)
         k = int(np.argmax(fall.sum(0)))
-        # The best of several laws is surer by chance than one alone.
+        # The best of several laws looks more significant by chance than a single one.
         chance, share = min(len(STRAY_NAMES) * chance_of(size[:, k]), 1.0), float(size[:, k].mean())
         if chance > FALSE_ALARM or share * level[:, k].mean() < _LEAST_LEVEL:
             return None
@@ -229,8 +232,8 @@ class WholePictures:
         sd = float(np.std(size[:, k])) / np.sqrt(len(size)) * float(level[:, k].mean())
         found = self._mismatch(
             name, "wall", NamedFigure("level", float(grey.mean()), sd, "grey levels"), chance, "stray",
-            f"With the LEDs off the wall away from the line is up to {grey.mean():.1f} grey levels bright: "
-            "other light, the line's own from wall to wall, or what a codec keeps of the frame before.",
+            f"With the LEDs off, wall away from the line has up to {grey.mean():.1f} grey levels: "
+            "other light, light of the line from wall to wall, or what a codec retains of the frame before.",
         )  # fmt: skip
         return Suspected(found, stray(k), self.frames_of("stray"), size)
 
@@ -252,12 +255,12 @@ class WholePictures:
 
 
 def _blur_px(product: float) -> float:
-    """Return the blur, 1 σ, from the product of half its variance in two halves of a picture."""
+    """Return the blur, 1 σ, px, from the product of its half variances in two halves of a picture."""
     return float(np.sqrt(2 * np.sqrt(max(product, 0.0))))
 
 
 def _blur_of(own: Float, cross: Float) -> Float:
-    """Return half the variances (4,) that a frame is blurred by, without what a displaced photo makes."""
+    """Return half the variances (4,), px², of a frame's blur, corrected for a displaced photo."""
     size = np.linalg.solve(own + 1e-9 * np.trace(own) * np.eye(len(own)), cross)
     (du, dv, dr, dt), blur = size[1:5], size[5:]
     moved = np.array([du**2 + dv**2 + dr**2 + dt**2, du**2 - dv**2, 2 * du * dv, dr**2 - dt**2]) / 2
@@ -265,10 +268,10 @@ def _blur_of(own: Float, cross: Float) -> Float:
 
 
 def _brings_light(law: int, mean: Float, more: Float) -> bool:
-    """Return whether the wall is surely as bright as a law's pattern on it foretells.
+    """Return whether the wall is as bright as an effect's pattern on it predicts.
 
-    ``mean`` (F,) is foretold, ``more`` by how much the wall is brighter than that: NaN in frames without a
-    place that sees no wall, from which black is known. A pattern alone is none of light: a codec leaves some.
+    ``mean`` (F,) is predicted, ``more`` the wall's brightness beyond that; NaN in frames that see no place
+    without wall, from which black is known. A pattern without light does not count: a codec leaves some.
     """
     told = np.isfinite(more)
     if told.sum() < 2:
@@ -278,12 +281,12 @@ def _brings_light(law: int, mean: Float, more: Float) -> bool:
 
 
 def _size_beside_one(value: Float, column: Float) -> Float:
-    """Return the size of a column (N,) beside a constant, its level where it is brightest, and χ²'s fall.
+    """Return the size of a column (N,) fitted beside a constant, its 95 % quantile, and the fall of squares.
 
-    Last are the mean level that it makes, and what is brighter beside it.
+    Then its mean level, and the brightness that remains beside it.
     """
     use, size, c = np.ones(len(value), bool), 0.0, column
-    for _ in range(_TRIMMED):  # a second line or a glint is no light on the wall
+    for _ in range(_TRIMMED):  # a second line or a glint is not light on the wall
         c = (column - column[use].mean()) * use
         size = float(c @ (value - value[use].mean())) / max(float(c @ c), 1e-9)
         rest = value - size * column

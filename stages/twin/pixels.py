@@ -1,4 +1,4 @@
-"""Pixels of the sensor that are bright without light, or dark in any light."""
+"""Defective pixels of the sensor: bright without light, or dark in any light."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from pipeline.arrays import Bool, Byte, Int
 from pipeline.artefacts.twin import Look, Mismatch, NamedFigure
 
 _LEAST_GREY, _AROUND_PX, _MOST_PIXELS, _FEWEST_FRAMES = 12, 5, 3, 6
-"""Grey levels by which a pixel differs from the median of five by five about it, in every frame: wall moves
-and noise changes. More pixels side by side are no defect of single ones, but dirt, a scratch or text. Fewest
-lit frames. Chosen."""
+"""Grey levels by which a pixel must differ from the median of five by five around it, in every frame: wall
+moves and noise changes. Most adjacent pixels of a defect; more are dirt, a scratch or text. Fewest lit
+frames. Chosen."""
 _BEYOND = 6.0
-"""Spreads of what pixels keep over all frames by which a defective one stands out: of a pattern of normal
-offsets, which is no defect, one pixel in 10⁹ does."""
+"""By how many spreads of the pixels' constant offsets a defective one must stand out: of normal offsets,
+which are no defect, one pixel in 10⁹ does."""
 
 
 def defective_pixels(images: Sequence[Byte], lit: Sequence[bool], seen: Bool) -> tuple[Mismatch, ...]:
-    """Return which pixels, of those ``seen`` (H, W), are bright in all frames (H, W), or dark in all lit."""
+    """Return pixels among those ``seen`` (H, W) that are bright in all frames, or dark in all lit ones."""
     if sum(lit) < _FEWEST_FRAMES:
         return ()
     most = np.iinfo(np.int16).max
@@ -46,7 +46,7 @@ def defective_pixels(images: Sequence[Byte], lit: Sequence[bool], seen: Bool) ->
 
 
 def _single(differs: Bool) -> Int:
-    """Return row and column (N, 2) of what differs in a few pixels, not more, side by side."""
+    """Return row and column (N, 2) of marked pixels that form groups of a few pixels at most."""
     count, _, stats, centre = cv2.connectedComponentsWithStats(differs.astype(np.uint8))
     small = [k for k in range(1, count) if stats[k, cv2.CC_STAT_AREA] <= _MOST_PIXELS]
     return np.asarray(np.round(centre[small])[:, ::-1], int).reshape(-1, 2)

@@ -1,4 +1,4 @@
-"""Rays met with the wall of a run."""
+"""Intersection of rays with the wall of a run."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from pipeline.geometry.axis_kernels import section_frame
 from stages.texture.surface import WallSurface
 
 _STEPS, _CLOSE_MM = 12, 2e-3
-"""Newton steps of a ray toward the wall, and the gap at which they end: 2 µm is 0.01 px at the ring."""
+"""Newton steps of a ray toward the wall, and the gap, mm, at which they end: 2 µm is 0.01 px at the ring."""
 _MET = 20
-"""Gaps, in units of the above, up to which a ray that did not settle still counts as having met the wall."""
+"""A ray that did not converge still counts as meeting the wall up to this many times that gap."""
 _FAR_RADII = 12.0
-"""A ray that meets no wall within so many radii sees none: it leaves through the pipe's open end."""
+"""A ray that meets no wall within so many radii leaves through the pipe's open end."""
 _LEAST_APPROACH = 1e-3
-"""Sine of the angle to the axis below which a ray is taken to run along the pipe."""
+"""Sine of the angle to the axis below which a ray is treated as parallel to the pipe."""
 
 
 @dataclass(frozen=True)
@@ -28,7 +28,7 @@ class WallSight:
     Attributes
     ----------
     distance_mm, azimuth_rad : (N,) float32
-        In the pipe.
+        Position in the pipe.
     xyz_c, normal_c : (N, 3)
         Point, mm, and inward unit normal in C.
     """
@@ -45,7 +45,7 @@ class WallSight:
 
 
 def wall_seen(surface: WallSurface, T_pc: Float, ray_c: Float) -> WallSight:
-    """Return what unit rays (N, 3) in C meet from a camera's pose (4, 4); NaN rays meet nothing."""
+    """Return where unit rays (N, 3) in C from a camera pose T_pc (4, 4) meet the wall; NaN for none."""
     count = len(ray_c)
     place, point, normal = np.full((count, 2), np.nan), np.full((count, 3), np.nan), np.zeros((count, 3))
     axis, step = surface.axis, float(surface.distance_mm[1] - surface.distance_mm[0])
@@ -74,7 +74,7 @@ def _bilinear(values, row, column):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
 def _section_of(axis_at, axis_origin, axis_frame, p, s, o, m, at):  # type: ignore[no-untyped-def]
-    """Return the distance of a point (3,) from a guess; ``o``, ``m``: its section, ``at``: x and y there."""
+    """Return a point's (3,) distance along the axis from a guess; writes its section and x, y there."""
     section_frame(axis_at, axis_origin, axis_frame, s, o, m)
     s += m[0, 2] * (p[0] - o[0]) + m[1, 2] * (p[1] - o[1]) + m[2, 2] * (p[2] - o[2])
     for k in range(2):
@@ -84,13 +84,13 @@ def _section_of(axis_at, axis_origin, axis_frame, p, s, o, m, at):  # type: igno
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
 def _step(at, r, d, m, slope, gap, way, mean):  # type: ignore[no-untyped-def]
-    """Return how far to go on along a ray ``d`` (3,) for its radius to become the wall's."""
+    """Return how far to go along a ray ``d`` (3,) for its radius to equal the wall's."""
     ax = m[0, 0] * d[0] + m[1, 0] * d[1] + m[2, 0] * d[2]
     ay = m[0, 1] * d[0] + m[1, 1] * d[1] + m[2, 1] * d[2]
     az = m[0, 2] * d[0] + m[1, 2] * d[1] + m[2, 2] * d[2]
     outward = (at[0] * ax + at[1] * ay) / r if r > 0 else np.sqrt(ax * ax + ay * ay)
     if outward < _LEAST_APPROACH and gap > 0:
-        return mean  # inside and moving toward the axis: the far wall is met beyond it
+        return mean  # inside and moving toward the axis: the ray meets the wall on the far side
     rate = max(outward - slope * az, 0.3 * outward)
     return min(max(gap / rate, -0.5 * way), 2.0 * mean)
 
@@ -110,9 +110,10 @@ def _meet(  # type: ignore[no-untyped-def]
     axis_at, axis_origin, axis_frame, radius, along, around, s_from, s_step, mean, T_pc, rays, place, point,
     normal,
 ):  # fmt: skip
-    """Follow every ray by Newton steps to where its radius is the wall's; neighbours start from each other.
+    """Follow every ray by Newton steps to where its radius is the wall's, from its neighbour's result.
 
-    ``place`` (N, 2) gets distance and azimuth, ``point`` and ``normal`` (N, 3) are in C, as ``rays`` are.
+    ``place`` (N, 2) gets distance, mm, and azimuth, rad; ``point`` and ``normal`` (N, 3) are in C, as
+    ``rays`` are.
     """
     o, m, at, p = np.empty(3), np.empty((3, 3)), np.empty(2), np.empty(3)
     d, inward, start = np.empty(3), np.empty(3), T_pc[:3, 3].copy()

@@ -1,9 +1,9 @@
-"""To what a difference is fixed: to the image, to the wall, or to rows of single frames.
+"""Decide to what a difference is fixed: to the image, to the wall, or to rows of single frames.
 
-Blocks of compared lit frames are sorted by place in the image, by place on the wall, and by frame and row.
-In each order the mean of a cell, taken from half of its blocks, predicts the other half; neighbouring blocks
-go to the same half. What a difference is fixed to is the order in which it is predicted best. Two orders
-between which frames do not decide cannot be told apart.
+Blocks of compared lit frames are grouped by place in the image, by place on the wall, and by frame and row.
+For each grouping, the mean of a cell over half of its blocks predicts the other half; neighbouring blocks are
+in the same half. A difference is fixed to whatever grouping predicts it best. Two groupings between which
+frames do not decide are both reported.
 """
 
 from __future__ import annotations
@@ -25,13 +25,14 @@ from stages.twin.render import TwinFrame
 from stages.twin.scene import Ring
 
 _SURE, FEWEST_FRAMES = 3.0, 4
-"""σ from frame to frame by which an order must predict better, and frames for that."""
+"""σ, from frame to frame, by which a grouping must predict better, and fewest frames for that."""
 WALL_COLUMNS = 128
-"""Cells of the wall around the pipe; they are as long as wide: about two blocks at the laser ring."""
+"""Cells of the wall around the pipe; they are square: about two blocks at the laser ring."""
 _RING_BLOCKS, _LEAST_SPREAD, _NEAR_BLOCKS = 4, 1e-3, 3
-"""Width of the rings in which blocks are alike, their least relative spread, and what is next to a block."""
+"""Width of the rings of blocks that are taken to scatter alike; their least relative spread; distance of
+neighbouring blocks."""
 SHOWN_PX = 60.0
-"""Half the side of the thumbnail of a place."""
+"""Half the side of the thumbnail of a place, px."""
 
 
 @dataclass(frozen=True)
@@ -41,25 +42,25 @@ class BlockSamples:
     Attributes
     ----------
     change : float
-        Recorded over re-rendered brightness less 1, the median of the frame taken off.
+        Recorded over re-rendered brightness minus 1, minus its median over the frame.
     log_level : float
         Logarithm of the re-rendered brightness, grey levels above black.
     weight : float
         Pixels of a block over their variance.
     frame : int
-        Counted from 0.
+        Index of the frame, from 0.
     row, column : int
         Of the block in the image.
     along, around : int
         Of its cell on the wall.
     away : float
-        How far from the image's middle, in radii of the line: the wall is seen the more from the side.
+        Distance from the image's middle, in radii of the line: farther out, wall is seen more obliquely.
     log_light : float
-        Logarithm of the light that even lamps throw there, as in `LitSight`.
+        Logarithm of the irradiance by uniform lamps, as in `LitSight`.
     first_mm, cell_mm : float
         Distance at which the first cell begins, and the side of a cell.
     number : (F,) int
-        Numbers of the frames.
+        Frame numbers.
     """
 
     change: Float
@@ -78,7 +79,7 @@ class BlockSamples:
 
     @cached_property
     def orders(self) -> dict[str, Int]:
-        """Number (N,) of the cell that each block is in, by what is then fixed."""
+        """Index (N,) of each block's cell, by name of the grouping (what it would be fixed to)."""
         image = self.row * (self.column.max() + 1) + self.column
         wall = self.along * WALL_COLUMNS + self.around
         return {"image": image, "wall": wall, "rows": self.frame * (self.row.max() + 1) + self.row}
@@ -90,16 +91,16 @@ class BlockSamples:
 
     @cached_property
     def light_and_brightness(self) -> tuple[Float, Float]:
-        """Logarithms (N,) of light and of brightness less their means over image, wall and frames.
+        """Logarithms (N,) of light and of brightness, minus their means over image, wall and frames.
 
-        What is left of the light is by how much a place is lit otherwise than its photo was.
+        What remains of the light is how a place is lit differently from its photo.
         """
         groups = self.orders["image"], self.orders["wall"], self.frame
         return centred(self.log_light, *groups), centred(self.log_change, *groups)
 
     @cached_property
     def _half(self) -> Int:
-        """Which half (N,) a block belongs to, drawn for two by two blocks of a frame.
+        """Half (N,), 0 or 1, of each block: drawn at random for two by two blocks of a frame.
 
         A regular pattern could be in step with the camera's motion.
         """
@@ -108,7 +109,7 @@ class BlockSamples:
         return np.asarray(drawn[self.frame, self.row // 2, self.column // 2])
 
     def explained(self, order: str, use: Bool) -> Float:
-        """Return by how much (F,) squares of blocks in ``use`` (N,) fall when other blocks predict them."""
+        """Return by how much (F,) squares of blocks in ``use`` (N,) fall if other blocks predict them."""
         cell = self.orders[order]
         half = self._half
         count = np.bincount(2 * cell + half, minlength=2 * cell.max() + 2)
@@ -119,14 +120,14 @@ class BlockSamples:
         return np.asarray(np.bincount(self.frame[use], fall, self.frame.max() + 1), float)
 
     def seen_through(self, gain: Float32 | None) -> BlockSamples:
-        """Return the blocks against a twin that is seen through a window which lets ``gain`` (H, W) pass."""
+        """Return the blocks compared with a twin seen through a window of transmission ``gain`` (H, W)."""
         if gain is None:
             return self
         passed = of_blocks(gain)[self.row, self.column].astype(float)
         return replace(self, change=(1 + self.change) / passed - 1, log_level=self.log_level + np.log(passed))
 
     def clear_of(self, found: Sequence[Mismatch]) -> BlockSamples:
-        """Return the blocks that lie beside what was found at places of the image."""
+        """Return the blocks outside of what was found at places of the image."""
         keep = np.ones(len(self.change), bool)
         u, v = ((a + 0.5) * BLOCK_PX for a in (self.column, self.row))
         for place in filter(None, map(disc_of, found)):
@@ -140,7 +141,7 @@ class BlockSamples:
 
     @cached_property
     def strength(self) -> Float:
-        """(N,) change over the robust spread of the blocks as far from the image's middle."""
+        """(N,) change over the robust spread of the blocks at the same distance from the image's middle."""
         row, column = (a - a.max() / 2 for a in (self.row, self.column))
         ring = (np.hypot(row, column) / _RING_BLOCKS).astype(int)
         spread = np.ones(ring.max() + 1)
@@ -149,22 +150,22 @@ class BlockSamples:
         return np.asarray(self.change / spread[ring])
 
     def near(self, k: int) -> tuple[Bool, Bool]:
-        """Return which blocks (N,) lie next to one in the image, and which next to it on the wall."""
+        """Return which blocks (N,) are next to block ``k`` in the image, and which on the wall."""
         image = np.hypot(self.row - self.row[k], self.column - self.column[k]) < _NEAR_BLOCKS
         turn = np.abs(self.around - self.around[k])
         turn = np.minimum(turn, WALL_COLUMNS - turn)
         return image, np.hypot(self.along - self.along[k], turn) < _NEAR_BLOCKS
 
     def look(self, use: Bool, half_px: float) -> Look:
-        """Return where the strongest of blocks (N,) is to be looked at."""
+        """Return the view of the strongest of the blocks in ``use`` (N,)."""
         k = int(np.argmax(np.where(use, np.abs(self.strength), -1.0)))
         u, v = ((float(a[k]) + 0.5) * BLOCK_PX for a in (self.column, self.row))
         return Look(int(self.number[self.frame[k]]), u, v, half_px)
 
     def fixed_to(self, use: Bool, orders: Sequence[str] = ("image", "wall", "rows")) -> str:
-        """Return to which of orders the blocks in ``use`` (N,) are fixed; empty where none predicts them.
+        """Return to which of ``orders`` the blocks in ``use`` (N,) are fixed; empty where none predicts them.
 
-        ``image or wall`` stands for two orders that cannot be told apart.
+        ``image or wall`` names two groupings that the frames do not separate.
         """
         frames = np.unique(self.frame[use])
         if len(frames) < FEWEST_FRAMES:
@@ -185,7 +186,7 @@ class BlocksOfFrames:
     number: list[int] = field(default_factory=list)
 
     def add(self, frame: int, above: Float32, twin: TwinFrame, white: float) -> None:
-        """Take a frame whose exposure is its own."""
+        """Add a frame (H, W), grey levels above black, whose twin has its exposure."""
         ratio = block_ratios(above, twin, white)
         middle = (slice(BLOCK_PX // 2, None, BLOCK_PX),) * 2
         rows, columns = ratio.shape
@@ -196,7 +197,7 @@ class BlocksOfFrames:
         self.number.append(frame)
 
     def samples(self) -> BlockSamples | None:
-        """Return all blocks; None where there are none."""
+        """Return all blocks; None without any."""
         found, cell_mm = [], 2 * np.pi * self.ring.radius_mm / WALL_COLUMNS
         for k, (ratio, level, variance, distance, azimuth, light) in enumerate(self.parts):
             row, column = np.nonzero(np.isfinite(ratio) & np.isfinite(distance))
@@ -238,10 +239,10 @@ class BlocksOfFrames:
 
 
 def in_image(samples: BlockSamples | None, places: tuple[ImagePlace, ...]) -> tuple[str, ...]:
-    """Return what each place of the image is fixed to; the image itself where frames are too few to tell.
+    """Return what each place of the image is fixed to; "image" where frames are too few to decide.
 
-    Rows of single frames make no place of the image: their means predict the fragments of texture in a drop,
-    which change from frame to frame, no worse than the drop's own place does.
+    Rows of single frames are not tested: their means predict the fragments of texture in a drop, which change
+    from frame to frame, no worse than the drop's place does.
     """
     if samples is None or samples.frame.max() + 1 < FEWEST_FRAMES:
         return ("image",) * len(places)
@@ -256,12 +257,12 @@ def _fixed_in_image(samples: BlockSamples, place: ImagePlace) -> str:
 
 
 def map_of(samples: BlockSamples, order: str, shape: tuple[int, int]) -> tuple[Float, Float]:
-    """Return the mean of the cells of an order and its 1 σ, each of a shape; NaN where few blocks are."""
+    """Return the mean over a grouping's cells and its 1 σ, as maps of ``shape``; NaN with few blocks."""
     cell, cells = samples.orders[order], shape[0] * shape[1]
     count = np.bincount(cell, minlength=cells)[:cells]
     mean = np.bincount(cell, samples.change, cells)[:cells] / np.maximum(count, 1)
     scale = np.sqrt(np.maximum(count, 1))
     known = count >= FEWEST_FRAMES
-    # The spread of the means themselves holds whatever makes neighbours and frames alike.
+    # The scatter of the means themselves includes whatever makes neighbours and frames alike.
     sd = spread_about_median((mean * scale)[known]) / scale if known.any() else np.full(cells, np.nan)
     return np.where(known, mean, np.nan).reshape(shape), np.reshape(sd, shape)

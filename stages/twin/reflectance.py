@@ -1,4 +1,4 @@
-"""The photo of the wall, as each viewing angle blurs it."""
+"""The photo of the wall, blurred as each viewing angle sees it."""
 
 from __future__ import annotations
 
@@ -14,10 +14,11 @@ from pipeline.instrument.probe import Probe
 from stages.texture.grid import footprint_mm
 
 LUMA_BGR = np.array([0.114, 0.587, 0.299])
-"""Shares of blue, green and red in the grey of a video (ITU-R BT.601)."""
+"""Weights of blue, green and red in the grey of a video (ITU-R BT.601)."""
 _LEVELS = 8
 _KNOWN = 0.98
-"""A place counts as photographed where so much of what is blurred into it was: less would mix in black."""
+"""A blurred pixel is known if at least this share of its neighbourhood was photographed: less would mix in
+black."""
 
 
 @dataclass(frozen=True)
@@ -33,7 +34,7 @@ class Reflectance:
     colours : (3, H, W) float32
         Reflectance × 255 in blue, green and red.
     distance_from_mm, mm_per_px, azimuth_from_rad, rad_per_px : float
-        As `WallTexture` has them.
+        As in `WallTexture`.
     """
 
     levels: Float32
@@ -45,40 +46,40 @@ class Reflectance:
     rad_per_px: float
 
     def level_of(self, theta_rad: Float32) -> Float32:
-        """Return which of the levels, counted from 0 and between them, polar angles (H, W) are seen at."""
+        """Return the fractional index of the level at which polar angles (H, W) are seen."""
         first, step = float(self.theta_rad[0]), float(self.theta_rad[1] - self.theta_rad[0])
         level = np.clip((theta_rad - first) / step, 0, len(self.theta_rad) - 1)
         return np.asarray(level, np.float32)
 
     def seen(self, nodes: Float32, step_px: int, phi_rad: Float32, level: Float32) -> Float32:
-        """Return what pixels between nodes look at.
+        """Return what pixels see, interpolated between nodes.
 
         Parameters
         ----------
         nodes : (3, h, w)
-            Every ``step_px`` pixels: distance on the wall, mm, azimuth beyond the pixel's own, rad, and
-            irradiance; NaN where no wall is seen.
+            At every ``step_px``-th pixel: distance on the wall, mm, azimuth relative to the pixel's own, rad,
+            and irradiance; NaN where no wall is seen.
         phi_rad, level : (H, W)
-            The pixels' own azimuth, and the photo's level.
+            The pixels' own image azimuth, and the photo's level.
 
         Returns
         -------
         (4, H, W)
-            Grey of the photo, irradiance, distance and azimuth.
+            Grey of the photo, irradiance, distance, mm, and azimuth, rad.
         """
         out = np.empty((4, *level.shape), np.float32)
         _see(self.levels, nodes, step_px, phi_rad, level, self._place, out)
         return out
 
     def coloured(self, distance_mm: Float32, azimuth_rad: Float32) -> Float32:
-        """Return blue, green and red (3, N) of wall places (N,)."""
+        """Return blue, green and red (3, N) at wall places (N,), mm and rad."""
         out = np.empty((len(self.colours), len(distance_mm)), np.float32)
         _sample(self.colours, distance_mm, azimuth_rad, self._place, out)
         return out
 
     @property
     def _place(self) -> Float32:
-        """From where, and by what, distance and azimuth go over into rows and columns."""
+        """Offsets and factors that convert distance and azimuth to rows and columns."""
         along, around = (
             (self.distance_from_mm, 1 / self.mm_per_px),
             (self.azimuth_from_rad, 1 / self.rad_per_px),
@@ -90,7 +91,7 @@ def reflectance_of(texture: WallTexture, probe: Probe, radius_mm: float, blur_px
     """Return the photo prepared for rendering.
 
     The photo is as sharp as a frame at the laser ring. Farther ahead a pixel covers more wall: there the
-    photo is blurred by what the pixel's wider footprint and the lens (``blur_px``, 1 σ) ask beyond that.
+    photo is blurred by the wider footprint and the lens (``blur_px``) as far as they exceed its own blur.
 
     Parameters
     ----------
@@ -121,7 +122,7 @@ def reflectance_of(texture: WallTexture, probe: Probe, radius_mm: float, blur_px
 def _extra_blur(
     probe: Probe, radius_mm: float, theta: float, px_mm: float, blur_px: float, texture: WallTexture
 ) -> tuple[float, float]:
-    """Return the blur, 1 σ in px of the photo along and around, that a view at ``theta`` needs beyond it."""
+    """Return the additional blur, 1 σ in px of the photo along and around, of a view at ``theta``, rad."""
     point = radius_mm * np.array([1.0, 0.0, 1 / np.tan(theta)])
     by_point = probe.camera.project_jacobian(point).by_point
     along = 1 / max(float(np.linalg.norm(by_point[:, 2])), 1e-9)
@@ -132,8 +133,8 @@ def _extra_blur(
 
 
 def _blurred(grey: Float32, known: Float32, along_px: float, around_px: float) -> Float32:
-    """Return the photo blurred about the pipe, NaN where too little was photographed."""
-    # A blur of 0.2 px changes no pixel by more than a grey level.
+    """Return the blurred photo, periodic around the pipe; NaN where too little was photographed."""
+    # A blur below 0.2 px changes no pixel by more than one grey level.
     if max(along_px, around_px) < 0.2:
         return np.where(known > 0, grey, np.float32(np.nan))
     margin = int(4 * around_px) + 1
@@ -150,7 +151,7 @@ _FAST = {"contract", "reassoc"}
 
 @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=_FAST, inline="always")
 def _cell(place, distance, azimuth, rows, columns):  # type: ignore[no-untyped-def]
-    """Return row, column and next column of a place, and how far it is beyond them; row -1 off the photo."""
+    """Return row, column, next column and the fractions beyond them at a place; row −1 outside the photo."""
     row = (distance - place[0]) * place[1]
     if not (0.0 <= row <= rows - 1):
         return -1, 0, 0, np.float32(0), np.float32(0)
@@ -170,7 +171,7 @@ def _between(a, i, j, k, u, v):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=_FAST)
 def _sample(maps, distance, azimuth, place, out):  # type: ignore[no-untyped-def]
-    """Write what maps (C, H, W) show at places (N,) to (C, N)."""
+    """Write the values of maps (C, H, W) at places (N,) to ``out`` (C, N)."""
     count, rows, columns = maps.shape
     for n in range(len(distance)):
         i, j, k, u, v = _cell(place, distance[n], azimuth[n], rows, columns)
@@ -209,7 +210,7 @@ def _see(levels, nodes, step, phi, level, place, out):  # type: ignore[no-untype
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
 def _nodes_beside(pixels, nodes, step):  # type: ignore[no-untyped-def]
-    """Return the node before each pixel along a side, and how far toward the next one the pixel lies."""
+    """Return the node before each pixel along a side, and the pixel's fraction of the way to the next one."""
     first, share = np.empty(pixels, np.int64), np.empty(pixels, np.float32)
     for x in range(pixels):
         at = min(max((x + 0.5) / step - 0.5, 0.0), nodes - 1.0)

@@ -1,4 +1,4 @@
-"""Frames re-rendered with a photometric state."""
+"""Re-render frames with a photometric state."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ from stages.twin.scene import Scene
 from stages.twin.state import PhotometricState
 
 _DARK_LEVEL = 3.0
-"""Grey levels above black below which lit wall counts as dark."""
+"""Lit wall with fewer grey levels above black counts as dark."""
 _CORE_WIDTHS, _MIDDLE_GREY = 1.0, 100.0
-"""Widths of the line's core, and the grey of a photo that another response leaves as it is: any other is made
-up for by the exposure."""
+"""Widths of the line's core; grey of the photo that a power response leaves unchanged, since any other scale
+is absorbed by the exposure."""
 
 
 class Region(IntEnum):
@@ -43,11 +43,11 @@ class TwinFrame:
     level : float32
         Grey levels above black; 0 where the region is UNSEEN.
     variance : float32
-        Of camera noise, speckle, and the error of the photo's place.
+        Variance from camera noise, speckle and errors of the photo's place, grey levels².
     region : uint8
         `Region`.
     distance_mm, azimuth_rad : float32
-        Place on the wall; NaN where none is known.
+        Place on the wall; NaN where unknown.
     irradiance : float32 or None
         As in `LitSight`; None in frames of the laser alone.
     """
@@ -60,14 +60,14 @@ class TwinFrame:
     irradiance: Float32 | None = None
 
     def brighter(self, factor: float | Float32, noise: CameraNoise) -> TwinFrame:
-        """Return the frame with another exposure, or seen through a window that lets pass (H, W)."""
+        """Return the frame with its light multiplied by a factor, or by a window's transmission (H, W)."""
         scale = np.full((1, 1), factor, np.float32) if isinstance(factor, float) else factor
         white = np.float32(noise.full_scale)
         level, variance = _brighter(self.level, self.variance, scale, white, *noise.polynomial)
         return replace(self, level=level, variance=variance)
 
     def drawn_aside(self, aside: Float32 | None) -> TwinFrame:
-        """Return the frame through a window that draws lit wall aside by (2, H, W), px right and down."""
+        """Return the frame through a window that displaces lit wall by (2, H, W), px right and down."""
         if aside is None:
             return self
         v, u = np.mgrid[0 : self.level.shape[0], 0 : self.level.shape[1]].astype(np.float32)
@@ -76,41 +76,38 @@ class TwinFrame:
             np.asarray(cv2.remap(a, u - aside[0], v - aside[1], cv2.INTER_LINEAR), np.float32)
             for a in (self.level, wall.astype(np.float32))
         )
-        # 0.999: amid wall alone, up to rounding.
+        # 0.999: surrounded by wall only, up to rounding.
         return replace(self, level=np.where(wall & (whole > 0.999), level, self.level))
 
 
 @dataclass(frozen=True)
 class Renderer:
-    """A scene in the light of a photometric state.
-
-    What is alike in all frames is worked out once.
-    """
+    """Renders a scene in the light of a photometric state; what all frames share is computed once."""
 
     scene: Scene
     state: PhotometricState
 
     @cached_property
     def _white_wall(self) -> Float32:
-        """Grey levels (H, W) of white wall in even light."""
+        """Grey levels (H, W) of white wall in uniform light."""
         assert self.state.lamp is not None
         return self.state.lamp.factor(*self.scene.polar[:2])
 
     @cached_property
     def _sharp(self) -> Float32:
-        """By how much (H, W) frames are blurrier than the photo: half the blurs' difference, px²."""
+        """Half of the difference (H, W) of blur variances between frames and photo, px²."""
         return self._over_view(self.state.sharpness)
 
     @cached_property
     def _place_variance(self) -> Float32:
-        """Squared error (H, W) of the photo's place, px²."""
+        """Variance (H, W) of the photo's place, px²."""
         return self._over_view(self.state.place_px) ** 2
 
     def _over_view(self, of_zone: Float) -> Float32:
         return np.interp(self.scene.polar[0], self.state.sharpness_theta, of_zone).astype(np.float32)
 
     def frame(self, frame: int, light: Illumination) -> TwinFrame:
-        """Return the twin of a frame; number and light give pose and exposure, as sampled frames near it."""
+        """Return the twin of a frame; exposure is interpolated between sampled frames of its light."""
         state, shape = self.state, self.state.outside.shape
         made = _Canvas.dark(shape)
         if light != Illumination.LASER and state.lamp is not None:
@@ -128,7 +125,7 @@ class Renderer:
         return TwinFrame(made.level, made.variance, made.region, *place, made.irradiance)
 
     def _light_wall(self, made: _Canvas, frame: int) -> None:
-        """Put lit wall into a dark frame."""
+        """Add lit wall to a dark frame."""
         assert self.state.lamp is not None
         sight = self.scene.lit(self.scene.pose(frame))
         exposure = np.float32(np.exp(self.state.lamp.gain.at(frame)))
@@ -139,7 +136,7 @@ class Renderer:
         made.irradiance = sight.irradiance
 
     def _draw_line(self, made: _Canvas, frame: int) -> None:
-        """Put the laser line into a frame."""
+        """Add the laser line to a frame."""
         assert self.state.line is not None
         near, light = self.scene.line(self.scene.pose(frame)), self.state.line
         power = light.course.at(frame)
@@ -157,7 +154,7 @@ class Renderer:
 
 @dataclass
 class _Canvas:
-    """A frame while it is rendered, each (H, W); ``variance`` is what comes on top of the camera's noise."""
+    """A frame while it is rendered, each (H, W); ``variance`` is in addition to the camera's noise."""
 
     level: Float32
     variance: Float32
@@ -179,7 +176,7 @@ _UNSEEN, _WALL, _DARK, _EDGE = (int(r) for r in (Region.UNSEEN, Region.WALL, Reg
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
 def _lit(white, reflectance, irradiance, exposure, power, region):  # type: ignore[no-untyped-def]
-    """Return the grey levels (H, W) of lit wall, 0 where it is unknown; ``region`` is written."""
+    """Return the grey levels (H, W) of lit wall, 0 where it is unknown; writes ``region``."""
     out = np.zeros_like(white)
     for i in range(white.shape[0]):
         for j in range(white.shape[1]):
@@ -196,7 +193,7 @@ def _lit(white, reflectance, irradiance, exposure, power, region):  # type: igno
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
 def _sharpened(even, region, sharp, place, level, variance):  # type: ignore[no-untyped-def]
-    """Write levels blurred by ``sharp``, px², and the variance that a photo off by ``place``, px², makes."""
+    """Write levels blurred by ``sharp``, px², and the variance from a photo displaced by ``place``, px²."""
     rows, columns = even.shape
     for i in range(rows):
         for j in range(columns):
@@ -217,7 +214,7 @@ def _sharpened(even, region, sharp, place, level, variance):  # type: ignore[no-
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
 def _finish(level, variance, region, outside, edge, white, dark, shot, square):  # type: ignore[no-untyped-def]
-    """Take off what lies outside the view, add the camera's noise, and clip; all (H, W), in place."""
+    """Clear what is outside the view, add the camera's noise, and clip; all (H, W), in place."""
     for i in range(level.shape[0]):
         for j in range(level.shape[1]):
             if outside[i, j]:
@@ -231,7 +228,7 @@ def _finish(level, variance, region, outside, edge, white, dark, shot, square): 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
 def _brighter(level, variance, factor, white, dark, shot, square):  # type: ignore[no-untyped-def]
-    """Return level and variance (H, W) with factors (H, W) or (1, 1) on the light."""
+    """Return level and variance (H, W) after multiplying the light by factors (H, W) or (1, 1)."""
     out, spread, one = np.empty_like(level), np.empty_like(level), factor.shape == (1, 1)
     scale = factor[0, 0]
     for i in range(level.shape[0]):

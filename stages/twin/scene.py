@@ -1,4 +1,4 @@
-"""The scene of a run: what each pixel of a frame looks at, before any light is put on it."""
+"""The scene of a run: what each pixel of a frame sees, before any light is added."""
 
 from __future__ import annotations
 
@@ -20,29 +20,30 @@ from stages.twin.rays import wall_seen
 from stages.twin.reflectance import Reflectance, reflectance_of
 
 _STEP_PX = 4
-"""Spacing of the pixels whose rays are met with the wall; between them places are interpolated."""
+"""Spacing, px, of the nodes whose rays are intersected with the wall; between them places are
+interpolated."""
 _FEW = 17
-"""Of so many nodes one tells by how much, on the whole, the image is turned: some thousand do."""
+"""Every 17th node suffices to measure how the image is turned on average; there are thousands of nodes."""
 _BAND_PX = 14.0
-"""Half width of the band about the line that is rendered exactly, pixel by pixel: four line widths and the
-wander of the ring within four pixels."""
+"""Half width, px, of the band about the line that is rendered pixel by pixel: four line widths plus the
+variation of the ring's radius between nodes."""
 _ASIDE = 0.15
-"""Share of the radius by which a ray may meet the sheet nearer or farther than any wall and be looked at: the
-band and bends of the axis within a baseline have room in it."""
+"""A ray is followed if it meets the sheet at most this share of the radius away from any wall: the band and
+the bends of the axis within a baseline fit in."""
 SMOOTHING_MM, SHADING_MM = 0.2, 0.4
-"""1 σ of the smoothing of radii and slopes: the defaults of the stage texture, whose photo is used."""
+"""1 σ of the smoothing of radii and of slopes: the defaults of the stage texture, whose photo is used."""
 
 
 @dataclass(frozen=True)
 class LitSight:
-    """What the pixels of a lit frame look at, all (H, W) float32; NaN where the wall is unknown.
+    """What the pixels of a lit frame see, all (H, W) float32; NaN where the wall is unknown.
 
     Attributes
     ----------
     reflectance
         Grey of the wall's photo, × 255.
     irradiance
-        Of lamps that shine alike in every direction, relative to the ring of a centred probe.
+        By lamps that emit uniformly, relative to that at the ring of a centred probe.
     distance_mm, azimuth_rad
         Place on the wall.
     """
@@ -61,14 +62,14 @@ class LineSight:
     ----------
     row, column : int
     offset_px
-        Distance from the sheet's middle, px across the line, positive away from the camera.
+        Distance from the sheet's middle across the line, px, positive away from the camera.
     mm_per_px
-        Of the sheet's own coordinate across the line.
+        Millimetres of the sheet's coordinate per pixel across the line.
     reflectance : (3, N)
         Blue, green and red of the wall where the sheet meets it next to the pixel, × 255, times mean radius
-        over the distance from the laser's axis.
+        over distance from the laser's axis.
     theta_rad, phi_rad
-        Where in the image.
+        Polar angle and image azimuth of the pixel.
     distance_mm, azimuth_rad
         Place on the wall.
     """
@@ -86,7 +87,7 @@ class LineSight:
 
 @dataclass(frozen=True)
 class Ring:
-    """Where the image shows the laser's plane: middle and radius, px; radius and distance ahead, mm."""
+    """Image of the laser line: middle and radius, px; and the line's wall radius and distance ahead, mm."""
 
     centre_px: tuple[float, float]
     radius_px: float
@@ -94,13 +95,13 @@ class Ring:
     ahead_mm: float
 
     def at(self, frame: float, azimuth_rad: float) -> Look:
-        """Return the ring's place at an image azimuth, to look at in a frame."""
+        """Return a view of the ring at an image azimuth in a frame."""
         u, v = self.centre_px
         away = self.radius_px
         return Look(int(frame), u + away * np.cos(azimuth_rad), v + away * np.sin(azimuth_rad), away / 4)
 
     def whole(self, frame: float) -> Look:
-        """Return all of the picture about the ring, to look at in a frame."""
+        """Return a view of the whole picture about the ring in a frame."""
         return Look(int(frame), *self.centre_px, 1.5 * self.radius_px)
 
 
@@ -111,12 +112,12 @@ class Scene:
     Attributes
     ----------
     probe : Probe
-        As the run's motion found it.
+        As corrected by the run's motion.
     surface : WallSurface
     reflectance : Reflectance
     trajectory : Trajectory
     outside : (H, W) bool, optional
-        Pixels that no frame shows: no ray is followed there.
+        Pixels that no frame shows; their rays are not followed.
     """
 
     probe: Probe
@@ -143,7 +144,7 @@ class Scene:
 
     @cached_property
     def ring(self) -> Ring:
-        """Where a centred probe has the laser line."""
+        """The laser line as a centred probe would see it."""
         camera, radius, ahead = self.probe.camera, self.surface.mean_radius_mm, self.probe.laser.baseline_mm
         u, v = camera.centre_px
         at = camera.project(np.array([radius, 0.0, ahead])).uv
@@ -158,11 +159,11 @@ class Scene:
 
     @cached_property
     def _rays(self) -> Float:
-        """Rays (h, w, 3) of the nodes that see wall, and of those beside the view, which lie between."""
+        """Rays (h, w, 3) of nodes that see wall, and of those just outside the view for interpolation."""
         if self.outside is None:
             return self._all_rays
         far = cv2.erode(self.outside.astype(np.uint8), np.ones((4 * _STEP_PX + 1,) * 2, np.uint8)) > 0
-        # The last node of a side may lie beyond it.
+        # The last node of a side may lie outside the image.
         row, column = (
             np.minimum(np.arange(n) * _STEP_PX + _STEP_PX // 2, side - 1)
             for n, side in zip(self._all_rays.shape[:2], far.shape, strict=True)
@@ -175,7 +176,7 @@ class Scene:
         return np.arctan2(self._rays[..., 1], self._rays[..., 0])
 
     def lit(self, T_pc: Float) -> LitSight:
-        """Return what a frame with the LEDs on looks at from a pose (4, 4)."""
+        """Return what a frame with LEDs on sees from a pose T_pc (4, 4)."""
         seen = wall_seen(self.surface, T_pc, self._rays.reshape(-1, 3))
         light = even_light(self.probe.lighting, seen.xyz_c, seen.normal_c) / self._reference
         turn = seen.azimuth_rad - self._phi_nodes.ravel()
@@ -190,14 +191,14 @@ class Scene:
         return self.reflectance.level_of(self.polar[0])
 
     def seen_again(self, T_pc: Float, next_T_pc: Float) -> tuple[Float32, Float32]:
-        """Return column and row (H, W) at which the next frame shows the wall that each pixel shows."""
+        """Return column and row (H, W), px, at which the next frame shows the wall that each pixel sees."""
         seen = wall_seen(self.surface, T_pc, self._rays.reshape(-1, 3))
         at = self.probe.camera.project(transform(inverse(next_T_pc) @ T_pc, seen.xyz_c))
         uv = np.where((at.valid & seen.seen)[:, None], at.uv, -1e6).reshape(*self._rays.shape[:2], 2)
         return self._enlarged(uv[..., 0]), self._enlarged(uv[..., 1])
 
     def line(self, T_pc: Float) -> LineSight:
-        """Return the pixels near the laser line of a frame from a pose (4, 4)."""
+        """Return the pixels near the laser line of a frame from a pose T_pc (4, 4)."""
         row, column = self._near_line(T_pc)
         uv = np.stack([column, row], -1).astype(float)
         rays = self.probe.camera.unproject(uv).ray
@@ -214,7 +215,8 @@ class Scene:
         theta = np.arctan2(np.hypot(rays[keep, 0], rays[keep, 1]), rays[keep, 2])
         phi = np.arctan2(rays[keep, 1], rays[keep, 0])
         reflectance = self.reflectance.coloured((distance - offset).astype(np.float32), azimuth)
-        # The sheet's light spreads over a circle that grows with the distance from the laser's axis.
+        # The sheet's light spreads over a circle whose circumference grows with the distance from the laser's
+        # axis.
         reflectance *= (self.surface.mean_radius_mm / np.hypot(*seen.xyz_c[keep, :2].T)).astype(np.float32)
         return LineSight(
             row, column, (offset / slope).astype(np.float32), slope.astype(np.float32), reflectance,
@@ -222,7 +224,7 @@ class Scene:
         )  # fmt: skip
 
     def _near_line(self, T_pc: Float) -> tuple[Int, Int]:
-        """Return rows and columns of pixels within a band about the line, found on the nodes."""
+        """Return rows and columns of pixels within a band about the line, which is found on the nodes."""
         seen = wall_seen(self.surface, T_pc, self._rays_to_sheet(T_pc))
         offset = sheet_distance_mm(self.probe.laser, seen.xyz_c).reshape(self._rays.shape[:2])
         slope = np.hypot(*np.gradient(offset)) / _STEP_PX
@@ -236,7 +238,7 @@ class Scene:
         return rows[inside], columns[inside]
 
     def _rays_to_sheet(self, T_pc: Float) -> Float:
-        """Return the rays (N, 3) of the nodes, NaN where they meet the sheet far from any wall."""
+        """Return the rays (N, 3) of the nodes; NaN where they meet the sheet far from any wall."""
         axis, on_sheet = self.surface.axis, transform(T_pc, self._on_sheet)
         at = int(np.argmin(np.abs(axis.distance_mm - float(np.nanmedian(on_sheet[:, 2])))))
         away = np.hypot(*((on_sheet - axis.origin_p[at]) @ axis.R_pa[at][:, :2]).T)
@@ -246,7 +248,7 @@ class Scene:
 
     @cached_property
     def _on_sheet(self) -> Float:
-        """Points (N, 3) in C where the rays of the nodes meet the laser's sheet; NaN where they do not."""
+        """Points (N, 3) in C, mm, where the rays of the nodes meet the laser sheet; NaN where they do not."""
         rays = self._rays.reshape(-1, 3)
         met = np.full(rays.shape, np.nan)
         known = np.isfinite(rays[:, 0])
@@ -255,12 +257,12 @@ class Scene:
 
     @cached_property
     def _reference(self) -> float:
-        """Irradiance at the ring of a centred probe."""
+        """Irradiance, 1/mm², at the ring of a centred probe."""
         point = np.array([self.surface.mean_radius_mm, 0.0, self.probe.laser.baseline_mm])
         return float(even_light(self.probe.lighting, point, np.array([-1.0, 0.0, 0.0])))
 
     def _enlarged(self, nodes: Float | Float32) -> Float32:
-        """Return node values (h, w) at all pixels (H, W), linearly between nodes."""
+        """Return node values (h, w) at all pixels (H, W), interpolated linearly."""
         width, height = self.probe.camera.image_size
         big = cv2.resize(nodes.astype(np.float32), None, fx=_STEP_PX, fy=_STEP_PX)
         return np.asarray(big[:height, :width], np.float32)
@@ -272,7 +274,7 @@ def scene_of(probe: Probe, trajectory: Trajectory, wall: Wall, texture: WallText
     Raises
     ------
     UnusableError
-        When the radius map holds hardly any radii.
+        When the radius map contains hardly any radii.
     """
     found = probe.as_found_in(trajectory)
     surface = wall_surface(wall, SMOOTHING_MM, SHADING_MM)
@@ -281,6 +283,6 @@ def scene_of(probe: Probe, trajectory: Trajectory, wall: Wall, texture: WallText
 
 
 def _circular_middle(angle: Float) -> float:
-    """Return the mean direction of angles, those that are NaN left out."""
+    """Return the mean direction of angles, ignoring NaN."""
     known = angle[np.isfinite(angle)]
     return float(np.arctan2(np.sin(known).mean(), np.cos(known).mean())) if len(known) else 0.0

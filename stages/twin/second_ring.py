@@ -1,4 +1,4 @@
-"""A second line beside the first: a ghost of window or lens, or a second sheet."""
+"""A second line beside the first: a ghost of window or lens, or a second laser sheet."""
 
 from __future__ import annotations
 
@@ -18,12 +18,13 @@ from stages.twin.switched import STEP, second_line, share_of_second
 
 _SURE, _FEWEST_FRAMES = 3.0, 6
 _RATIOS, _REACH, _FAR_WIDTHS, _LEAST_LINE, _AROUND, _BESIDE_PEAK = 400, 0.8, 14.0, 0.01, 25, 3
-"""Bins and reach of ln(radius over the line's), px that belong to the line, least share of a second one,
-bins about each that tell what it stands out from, and bins beside a peak that are still its own."""
+"""Number of bins and largest ln(radius over the line's radius); width about the line, px, that belongs to it;
+least share of a second line; bins on each side that give the level it stands out from; bins beside a peak
+that still belong to it."""
 
 
 def ring_profile(ring: Ring, above: Float32, twin: TwinFrame, use: Bool) -> Float | None:
-    """Return grey levels (4, R) over ln of the radius over the line's, by quadrants; None without a line."""
+    """Return grey levels (4, R) over ln(radius / line radius) by quadrants; None without a line."""
     rows, columns = np.nonzero(twin.region == Region.LINE_CORE)
     u, v = ring.centre_px
     degree = np.floor(np.degrees(np.arctan2(rows - v, columns - u)) + 180).astype(int) % 360
@@ -45,12 +46,12 @@ def ring_profile(ring: Ring, above: Float32, twin: TwinFrame, use: Bool) -> Floa
 
 
 def second_ring(ring: Ring, profiles: Sequence[Float], frame: Int) -> Suspected | None:
-    """Return a ring beside the line that profiles of frames (F,) agree on."""
+    """Return a ring beside the line on which the profiles of frames (F,) agree."""
     if len(profiles) < _FEWEST_FRAMES:
         return None
     stack = np.stack(profiles)
     at = (np.arange(_RATIOS) + 0.5) / _RATIOS * 2 * _REACH - _REACH
-    # The line itself stands within 2 % of its radius.
+    # The line itself is within 2 % of its radius.
     line = float(np.where(np.abs(at) < 0.02, np.nan_to_num(stack), 0).max((1, 2)).mean())
     ground = median_filter(np.apply_along_axis(_without_gaps, -1, stack), (1, 1, _AROUND), mode="nearest")
     far = np.abs(at) * ring.radius_px > _FAR_WIDTHS
@@ -59,7 +60,7 @@ def second_ring(ring: Ring, profiles: Sequence[Float], frame: Int) -> Suspected 
     mean = excess.sum(0) / count
     sd = np.sqrt((np.where(known, excess - mean, 0) ** 2).sum(0)) / count
     beyond = (mean > _SURE * sd) & (mean > _LEAST_LINE * line) & (count >= _FEWEST_FRAMES)
-    seen = beyond.sum(0) >= 3  # quadrants: a glint is in one, at most two
+    seen = beyond.sum(0) >= 3  # at least three quadrants: a glint is in one, at most two
     if not seen.any():
         return None
     k = int(np.argmax(np.where(seen, mean.mean(0), -1)))
@@ -82,6 +83,6 @@ def second_ring(ring: Ring, profiles: Sequence[Float], frame: Int) -> Suspected 
 
 
 def _without_gaps(values: Float) -> Float:
-    """Return values (N,), those that are NaN interpolated."""
+    """Return values (N,) with NaN interpolated."""
     known = np.flatnonzero(np.isfinite(values))
     return np.interp(np.arange(len(values)), known, values[known]) if len(known) else np.zeros(len(values))

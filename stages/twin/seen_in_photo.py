@@ -1,7 +1,8 @@
-"""What the wall's photo holds of dirt on the window shows elsewhere in frames, as the opposite of itself.
+"""Dirt on the window that the wall's photo contains appears inverted elsewhere in frames.
 
-The photo was made through the same window. Wall that was seen through dirt is darker in it, and brighter than
-it where frames show that wall beside the dirt: nearer or farther, at the same azimuth of the image.
+The photo was made through the same window. Wall that was photographed through dirt is darker in the photo.
+Where frames show that wall beside the dirt (nearer or farther, at the same azimuth of the image) they are
+brighter than the photo predicts.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ def parted_from_photo(
     """
     dim = [m for m in found if set(m.names) & set(_DIMS)]
     left = [m for m in found if not m.name and any(_may_be_left_by(m, d, ring) for d in dim)]
-    said = "{} But the photo may be darker there, since it was made through what lies at the same azimuth."
+    said = "{} But the photo may be darker there, as it was made through what lies at the same azimuth."
     withdrawn = tuple(replace(m, statement=said.format(m.statement)) for m in left)
     return tuple(m for m in found if m not in left), withdrawn
 

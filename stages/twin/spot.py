@@ -1,4 +1,4 @@
-"""A spot in the image, fitted to what lit frames show about a place, and judged by other frames."""
+"""Fit a spot in the image to what lit frames show about a place, and judge it by other frames."""
 
 from __future__ import annotations
 
@@ -13,27 +13,28 @@ from pipeline.artefacts.twin import NamedFigure
 from stages.twin.falls import over_frames
 
 WIDEST_PX = 48.0
-"""A place is looked at so far about its middle, or over two radii or this far beyond it if that is more. A
-spot is at most twice as wide."""
+"""Half width of the window about a place, px: at least this much, else two radii but at most this much beyond
+the radius. A spot is at most twice as wide."""
 _FLATNESS = (0.7, 5.0)
 """Bounds of a spot's flatness: 1 is Gaussian, 2 has a flat middle and a steep rim, 5 is a disc."""
 _OF_LIGHT = 0.005
-"""1 σ of a share of the light for want of knowing the light about the spot: half of a photo's error."""
+"""1 σ of a share of the light because the light about the spot is uncertain: half of a photo's error."""
 _LEAST_WIDTH_PX, _MIDDLE = 2.0, 0.25
-"""Narrowest spot, 1 σ; the middle of a spot reaches to where a quarter of its depth is gone."""
+"""Width of the narrowest spot, 1 σ, px; the middle of a spot extends to where a quarter of its depth is
+lost."""
 _SETTLED = 1e-6
-"""Share of χ² by whose change a fit has settled: of ten thousand pixels it is .01, of which 1 is 1 σ. Where
-nothing is, a fit that looks further goes astray for hundreds of steps."""
+"""A fit has converged when χ² changes by less than this share: of ten thousand pixels it is .01, where 1 is 1
+σ. Without a real spot, a fit that continues wanders off for hundreds of steps."""
 PARTS = 6
-"""Parts of the frames of which each is left out once, for the σ of a spot: neighbours in time go together."""
+"""Parts of the frames, each left out once for the σ of a spot: consecutive frames are in one part."""
 
 
 @dataclass(frozen=True)
 class FittedLaw:
-    """A law's size, and by how much χ² of frames (F,) falls with the size that other frames tell.
+    """A law's size, and the fall of χ² of each frame (F,) with the size that other frames gave.
 
-    ``shown`` (F,) is which share of the change that the law foretells each frame shows, where that is known:
-    0 but for chance without what the law says, 1 with it.
+    ``shown`` (F,), where known, is the share of the predicted change that each frame shows: 0 up to chance
+    without the effect, 1 with it.
     """
 
     fall: Float
@@ -42,10 +43,10 @@ class FittedLaw:
 
     @property
     def chance(self) -> float:
-        """The probability that chance makes frames bear the law out, neighbours seeing the same wall.
+        """The probability that chance makes frames support the law; consecutive frames see the same wall.
 
         A law that changes some frames ten times as much as others makes their falls as unequal, which looks
-        like chance. The shares that they show are alike.
+        like chance; the shares that they show are alike. The more significant test counts.
         """
         if self.shown is None:
             return over_frames(self.fall)[1]
@@ -53,12 +54,12 @@ class FittedLaw:
 
 
 def fall_of_spot(sums: Float32, start: Float, beyond: float) -> FittedLaw:
-    """Return the spot that fits best, its depth as its size.
+    """Return the spot that fits best, with its depth as its size.
 
-    ``sums`` is (F, 2, h, w); ``start`` (K, 6) holds spots that the search starts from. Beside the spot the
-    law may act by up to ``beyond``, as where the photo has less texture: the spot's depth is relative to it.
-    The σ holds what leaving out parts of the frames changes, and by how much the spot's middle differs from
-    the fitted shape.
+    ``sums`` is (F, 2, h, w); ``start`` (K, 6) holds spots from which the search starts. Outside the spot the
+    law may act by up to ``beyond``, for example where the photo has less texture: the spot's depth is
+    relative to that. The σ includes the changes when parts of the frames are left out, and the difference
+    between the spot's middle and the fitted shape.
     """
     frames, fall = np.arange(len(sums)), np.zeros(len(sums))
     whole = sums.sum(0)
@@ -91,13 +92,13 @@ def _spot_at(place: Float, u: Int, v: Int) -> Float:
 
 
 def _slopes_at(place: Float, u: Int, v: Int) -> Float:
-    """Return the derivatives (N, 6) of a spot by its six numbers, at columns and rows (N,)."""
+    """Return the derivatives (N, 6) of a spot with respect to its six numbers, at columns and rows (N,)."""
     depth, at_u, at_v, width, flat, _ = place
     right, down = u - at_u, v - at_v
     square = np.maximum((right**2 + down**2) / width**2, 1e-12)
     power = square**flat
     height = np.exp(-0.5 * power)
-    by_log = -0.5 * depth * height * flat * power  # by the logarithm of the square
+    by_log = -0.5 * depth * height * flat * power  # derivative with respect to ln(r² / w²)
     by_place = -2 * by_log / (square * width**2)
     by_flat = by_log * np.log(square) / flat
     return np.stack(
@@ -106,7 +107,7 @@ def _slopes_at(place: Float, u: Int, v: Int) -> Float:
 
 
 def _fitted_spot(sums: Float32, start: Float, beyond: float) -> Float:
-    """Return depth, column, row, width, flatness and rest of the spot that fits; ``sums`` is (2, h, w)."""
+    """Return depth, column, row, width, flatness and offset of the spot that fits; ``sums`` is (2, h, w)."""
     rows, columns = np.nonzero(sums[1] > 0)
     weight = np.sqrt(sums[1][rows, columns].astype(float))
     value = sums[0][rows, columns] / weight

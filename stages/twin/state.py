@@ -20,19 +20,21 @@ from stages.twin.noise import CameraNoise, black_and_white, photon_transfer, win
 from stages.twin.scene import LitSight, Scene
 
 _LEAST_LEVEL = 4.0
-"""Grey levels above black below which a lit wall tells nothing."""
+"""Grey levels above black below which lit wall is not used."""
 _USUAL_WIDTH_PX = 1.2
 _ZONES = 4
 _FULL_SCALE = 250
-"""Grey level of 255 from which a channel counts as clipped: coding moves clipped pixels by a few levels."""
+"""Grey level of 255 from which a channel counts as clipped: coding changes clipped pixels by a few levels."""
 _MOST_CLIPPED = 0.25
-"""Share of the line's middle: a quarter that is clipped at half its light takes away an eighth, which is half
-of the smallest loss of a sector that is named."""
+"""Share of the line's middle: if a quarter of it is clipped to half of its light, an eighth is lost, which is
+half of the smallest sector loss that is named."""
 _MOST_BLACK = 2.0
-"""Grey levels: of wall at thirty they change the contrast by .06, the least that is named a response."""
+"""Grey levels: for wall at thirty they change the contrast by .06, the smallest departure that is named a
+response."""
 _NOISE_FRAMES = 6
 _OUTSIDE_LEVEL, _EDGE_PX = 6.0, 8
-"""Pixels that no lit frame shows brighter lie outside the view; the border is what lies this near to it."""
+"""Pixels that no lit frame shows brighter are outside the view; its border is as wide as the second number,
+px."""
 
 
 @dataclass(frozen=True)
@@ -47,25 +49,26 @@ class PhotometricState:
     line : LineLight or None
         None where no laser frame could be used.
     sharpness_theta, sharpness : (Z,)
-        By how much the frames are sharper than the photo at polar angles: half the difference of the two
-        blurs' variances, px²; positive where the frames are more blurred.
+        Polar angles, and half of the difference of blur variances between frames and photo there, px²;
+        positive where the frames are more blurred.
     place_px : (Z,)
-        1 σ of how far the photo lies beside the frames at those angles, from pixel to pixel, per direction.
+        1 σ of the photo's displacement from the frames at those angles, from pixel to pixel, per direction.
     outside, edge : (H, W) bool
         Pixels outside the camera's view, and next to its border.
     line_clipped : float
         Share of the line's middle at which its strongest channel is at full scale.
     photo_black : float
-        Grey level without light in the colours that the wall's photo is made of: it is in the photo, too. NaN
-        where no frame tells.
+        Grey level without light in the colours of the wall's photo, which contains it, too. NaN where no
+        frame shows it.
     power : float
-        Exponent that frames have the photo's contrast to; another than 1 only when tried.
+        Exponent of the frames' contrast relative to the photo's; differs from 1 only when a response is
+        tested.
     gain_map : (H, W) float32 or None
-        What the window lets through, where dirt was found on it.
+        Transmission of the window, where dirt was found on it.
     aside : (2, H, W) float32 or None
-        By how much, px to the right and down, the window draws aside what is behind it.
+        Displacement by the window of what is behind it, px to the right and down.
     pattern : FixedPattern or None
-        The pixels' own offsets and gains; None where too few frames tell.
+        The pixels' own offsets and gains; None with too few frames.
     """
 
     noise: CameraNoise
@@ -85,24 +88,24 @@ class PhotometricState:
 
     @property
     def black_in_photo(self) -> bool:
-        """Whether so much black is, or may be, in the wall's photo that its contrast tells no response."""
+        """Whether the photo may contain so much black that its contrast does not show the response."""
         return not self.photo_black <= _MOST_BLACK
 
     @property
     def line_is_clipped(self) -> bool:
-        """Whether so much of the line is clipped that its brightness tells hardly anything of its power."""
+        """Whether so much of the line is clipped that its brightness hardly shows its power."""
         return self.line_clipped > _MOST_CLIPPED
 
     @property
     def shows_wall(self) -> tuple[Illumination, ...]:
-        """Lights whose frames show the wall and no line, or one whose pixels are left out."""
+        """Lights whose frames show the wall, and no line or a line whose pixels are left out."""
         both = (Illumination.BOTH,) if self.line is None else ()
         return Illumination.LED, *both
 
 
 @dataclass(frozen=True)
 class Sampled:
-    """A frame of the sample: number, light, and picture (H, W); perhaps the next of its light."""
+    """A frame of the sample: number, light, picture (H, W), and for some the next frame of the same light."""
 
     frame: int
     light: Illumination
@@ -111,7 +114,7 @@ class Sampled:
 
 
 def sample_frames(recording: Recording, usable: Int, light: NDArray[np.str_], most: int) -> list[Sampled]:
-    """Read up to ``most`` frames of each light, spread over the recording; after some the next one, too."""
+    """Read up to ``most`` frames of each light, spread over the recording; for some, the next frame, too."""
     numbers, kinds = np.asarray(usable), np.asarray(light)
     after: dict[int, int] = {}
     for kind in np.unique(kinds):
@@ -134,7 +137,7 @@ def sample_frames(recording: Recording, usable: Int, light: NDArray[np.str_], mo
 def estimate_state(
     scene: Scene, sampled: list[Sampled], rings: RingSamples, context: Context
 ) -> PhotometricState:
-    """Return the state that explains the sampled frames best."""
+    """Return the state that fits the sampled frames best."""
     black, white = black_and_white([s.image for s in sampled])
     width = float(np.nanmedian(rings.width_px)) if np.isfinite(rings.width_px).any() else _USUAL_WIDTH_PX
     lamps = LampSamples(scene, black.value, white)
@@ -164,8 +167,8 @@ def estimate_state(
 def clipped_line(scene: Scene, frames: Iterable[tuple[int, Byte | None]]) -> float:
     """Return the share of the line's middle at which its strongest channel is at full scale.
 
-    ``frames`` gives numbers and colour pictures (H, W, 3). Their grey does not tell: it goes on rising with
-    the other channels.
+    ``frames`` yields numbers and colour pictures (H, W, 3). Their grey does not show it, because it continues
+    to rise with the other channels.
     """
     found = []
     for frame, image in frames:
@@ -180,27 +183,28 @@ def clipped_line(scene: Scene, frames: Iterable[tuple[int, Byte | None]]) -> flo
 
 
 def clipped_pixels(frames: Iterable[tuple[int, Byte | None]]) -> dict[int, Bool]:
-    """Return by number which pixels (H, W) of colour pictures (H, W, 3) have a channel at full scale."""
+    """Return, by frame number, the pixels (H, W) of colour pictures that have a channel at full scale."""
     return {n: np.asarray((image >= _FULL_SCALE).any(-1)) for n, image in frames if image is not None}
 
 
 def black_of_photo(frames: Iterable[tuple[int, Byte | None]]) -> float:
-    """Return the grey level of the darkest tenth of laser frames in colour, whose range the photo has.
+    """Return the grey level of the darkest tenth of colour laser frames, which have the photo's range.
 
-    NaN without any such frame: then it is not known.
+    NaN without any such frame.
     """
     grey = [np.asarray(image[::4, ::4].mean(2)) for _, image in frames if image is not None]
-    # A tenth (chosen): the line and its stray light reach far less than nine tenths of a laser frame.
+    # A tenth (chosen): line and stray light cover far less than nine tenths of a laser frame.
     return float(np.median([np.median(g[g <= np.quantile(g, 0.1)]) for g in grey])) if grey else float("nan")
 
 
 def _view(lit: list[Float32], black: float, scene: Scene) -> tuple[Bool, Bool]:
-    """Return which pixels no lit frame shows, and which lie next to those."""
+    """Return pixels that no lit frame shows, and pixels next to those."""
     valid = scene.polar[2]
     if not lit:
         return ~valid, np.zeros_like(valid)
     outside = (np.max(lit, 0) < black + _OUTSIDE_LEVEL) | ~valid
-    # The dark middle of the pipe and dark wall are inside: only what joins the picture's corners is not.
+    # The dark middle of the pipe and dark wall are inside: only what is connected to the picture's corners is
+    # outside.
     count, label = cv2.connectedComponents(outside.astype(np.uint8))
     corners = {int(label[r, c]) for r in (0, -1) for c in (0, -1) if outside[r, c]}
     outside = np.isin(label, list(corners)) if count > 1 and corners else np.zeros_like(outside)
@@ -211,9 +215,9 @@ def _view(lit: list[Float32], black: float, scene: Scene) -> tuple[Bool, Bool]:
 
 @dataclass(frozen=True)
 class _LeftOver:
-    """Of a lit frame, (H, W): recorded less predicted, predicted, zone of the polar angle, what counts.
+    """Of a lit frame, (H, W): recorded − predicted, predicted, zone of polar angle, which pixels count.
 
-    ``again`` is recorded less predicted of the next frame, at the same places of the wall.
+    ``again`` is recorded minus predicted of the next frame, at the same places of the wall.
     """
 
     rest: Float32
@@ -227,7 +231,7 @@ def _sharpness(
     scene: Scene, lamp: LampLight | None, lit: list[tuple[Sampled, LitSight]], black: float, white: float,
     border: Bool,
 ) -> tuple[Float, Float, list[_LeftOver]]:  # fmt: skip
-    """Return polar angles, how much blurrier than the photo the frames are there, and what is left over."""
+    """Return polar angles, the half excess of the frames' blur variance there, px², and residuals."""
     theta, phi, _ = scene.polar
     if lamp is None or not lit:
         return np.arange(_ZONES, dtype=float), np.zeros(_ZONES), []
@@ -253,7 +257,7 @@ def _sharpness(
 def _again(
     scene: Scene, lamp: LampLight, first: Sampled, black: float, white: float, white_wall: Float32
 ) -> Float32 | None:
-    """Return recorded less predicted (H, W) of the next frame, at the places of the wall shown here."""
+    """Return recorded minus predicted (H, W) of the next frame, at the wall places that this frame shows."""
     if first.after is None:
         return None
     here, there = scene.pose(first.frame), scene.pose(first.after.frame)
@@ -268,10 +272,11 @@ def _again(
 
 
 def _place_error(left: list[_LeftOver], noise: CameraNoise) -> Float:
-    """Return by how far (Z,) single places of the photo lie beside the frames, 1 σ per direction, px.
+    """Return the 1 σ (Z,) by which single places of the photo are displaced, px per direction.
 
-    What is left over beyond the camera's noise and grows with the square of the slope: errors of the radius
-    map and of poses, which shift the photo from place to place. Blunders count as four σ.
+    It is the part of the residual beyond the camera's noise that grows with the square of the slope: errors
+    of the radius map and of poses, which shift the photo from place to place. Residuals above four σ count as
+    four.
     """
     above, below = np.zeros(_ZONES), np.zeros(_ZONES)
     for f in left:

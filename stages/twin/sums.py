@@ -1,4 +1,4 @@
-"""What is kept of compared frames, and the same frames rendered again to judge names."""
+"""Sums over the compared frames, and the same frames rendered again to judge suspected effects."""
 
 from __future__ import annotations
 
@@ -30,13 +30,13 @@ from stages.twin.switched import STRAY_NAMES, Shown
 from stages.twin.window import WindowPlace
 
 _MOST_STRAY = 8
-"""Laser frames that are looked at for stray light: each takes as long as a lit frame."""
+"""Most laser frames that are examined for stray light: each takes as long as a lit frame."""
 
 
 class Sums:
-    """What is kept of the compared frames: χ², blocks, places of dirt, and brightness in sectors.
+    """Sums over the compared frames: χ², blocks, places of dirt, and brightness in sectors.
 
-    ``clipped`` holds, by number, which pixels (H, W) of some frames clip in one colour at least.
+    ``clipped`` gives, by frame number, pixels (H, W) that clip in at least one colour.
     """
 
     def __init__(
@@ -90,29 +90,29 @@ class Sums:
         self.comparison.add(frame, kind, above, before, after, noise)
 
     def _free(self, frame: int, above: Float32) -> Bool:
-        """Return which pixels (H, W) of a frame clip neither in grey nor in a colour, where that is known."""
+        """Return pixels (H, W) of a frame that clip neither in grey nor, where known, in a colour."""
         free = np.asarray(above < self._state.noise.full_scale)
         return free & ~self._clipped[frame] if frame in self._clipped else free
 
     def on_window(self, samples: BlockSamples | None) -> tuple[Mismatch, ...]:
-        """Return what is on the window or the lens; places that frames do not bear out are withdrawn."""
+        """Return what is on the window or the lens; places that other frames do not confirm are withdrawn."""
         fixed_to = in_image(samples, tuple(w.place for w in self.window))
         judged = [w.judged(to) for w, to in zip(self.window, fixed_to, strict=True)]
         return told_once([m for m in judged if m is not None])
 
     def glints(self, whole: Sequence[Mismatch], bent: Sequence[Mismatch] = ()) -> tuple[Mismatch, ...]:
-        """Return spots that are far brighter than foretold, beside laws of ``whole`` pictures that stand.
+        """Return spots far brighter than predicted; ``whole`` are confirmed effects on the whole picture.
 
-        Spots of lit frames are none at places where light is ``bent``.
+        Spots of lit frames at places where light is ``bent`` are left out.
         """
         stray = [m.parameters[0].value for m in whole if set(m.names) & set(STRAY_NAMES)]
         lit, laser = self.spots
         return (*lit.found(bent=bent), *laser.found(max(stray, default=0.0)))
 
     def cells(self) -> tuple[Cells | None, Cells | None]:
-        """Return the sectors of lit frames and of the line, for steady lamps and an even, steady laser.
+        """Return the sectors of lit frames and of the line, None for one that may not be tested.
 
-        A line that is clipped hardly tells how strong the laser is, and has none.
+        The line has none where it is clipped, since it then hardly shows the laser's power.
         """
         state = self._state
         lit, line = self.lit.cells(), None if state.line_is_clipped else self.line.cells()
@@ -126,9 +126,10 @@ class Sums:
     def named(
         self, samples: BlockSamples | None, recording: Recording, led_failed: bool = False
     ) -> tuple[tuple[Mismatch, ...], tuple[Mismatch, ...]]:
-        """Return laws of whole pictures that frames rendered again bear out, and those that are withdrawn.
+        """Return effects on the whole picture that frames rendered again confirm, and those withdrawn.
 
-        An LED that failed during the run leaves the lamps' mean pattern uneven, too, and is not told twice.
+        An LED that failed during the run also leaves the lamps' mean pattern uneven, and is not reported
+        twice.
         """
         again = partial(self._shown, recording)
         lamps, of_wall = self._lamps(samples, led_failed)
@@ -145,10 +146,10 @@ class Sums:
     def _lamps(
         self, samples: BlockSamples | None, led_failed: bool
     ) -> tuple[tuple[Suspected, ...], tuple[Mismatch, ...]]:
-        """Return what makes the lamps uneven in all frames, and what wall seen twice does not bear out.
+        """Return the cause of lamps that are uneven in all frames, and what wall seen twice does not confirm.
 
-        The run's own photo holds most of it, which then shows in how it changes over polar angle alone: that
-        cannot be told from other patterns.
+        The run's own photo contains most of an unevenness, which then shows only in its change over polar
+        angle; other patterns look the same.
         """
         if led_failed:
             return (), ()
@@ -160,7 +161,7 @@ class Sums:
         return uneven, (*of_wall, *dead_led(samples, self._scene))
 
     def _shown(self, recording: Recording, frames: Int) -> Iterator[tuple[int, Shown]]:
-        """Yield compared frames anew, with what renders them under other assumptions."""
+        """Yield compared frames again, each with functions that render it under other assumptions."""
         noise, gain = self._state.noise, self._state.gain_map
         for frame, image in recording.read(frames, "grey"):
             if image is None:
@@ -180,9 +181,9 @@ class Sums:
             )  # fmt: skip
 
     def _again(self, frame: int, exposure: float, **changes: Any) -> Float32:
-        """Return the grey levels (H, W) of a frame with attributes of the state changed.
+        """Return the grey levels (H, W) of a frame with some attributes of the state changed.
 
-        ``sharpness=None`` is the photo as it is; ``line`` and ``lamp`` are functions of what they change.
+        ``sharpness=None`` leaves the photo as it is; ``line`` and ``lamp`` are functions of what they change.
         """
         state, noise = self._state, self._state.noise
         if "sharpness" in changes:

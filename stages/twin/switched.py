@@ -1,7 +1,7 @@
-"""Laws of whole pictures, switched on in frames rendered again: grey levels without and with each.
+"""Effects on the whole picture applied to frames rendered again: grey levels without and with each.
 
-Sizes are what other frames told. Where a law needs a nuisance that is each frame's own (the direction of its
-motion), one half of the picture tells it for the other.
+Sizes come from other frames. Where an effect needs a nuisance parameter of the frame itself (the direction of
+its motion), one half of the picture determines it for the other.
 """
 
 from __future__ import annotations
@@ -21,24 +21,24 @@ from stages.twin.render import Region, TwinFrame
 from stages.twin.scene import Scene
 
 TILE, STEP = 16, 2
-"""Side of the tiles that halve a picture, counted in every second pixel."""
+"""Side of the tiles that divide a picture into halves, in units of every second pixel."""
 BLOOM_PX, _NEAR = 6.0, 0.02
-"""Way along a column that leaves 1/e of the bloom, and the least spread that is looked at."""
+"""Distance along a column over which bloom falls to 1/e, px, and the smallest spread that is examined."""
 IN_FOCUS_PX = 1.2
-"""1 σ of lens and pixel that lenses in focus stay below: a pixel's own is 0.29, and a spot two pixels wide at
-half height has 0.85."""
+"""Largest 1 σ of lens and pixel, px, for lenses in focus: a pixel's own is 0.29, and a spot two pixels wide
+at half height has 0.85."""
 _NEAREST_RAD, _THETAS = 0.2, 12
-"""Least polar angle at which the share of an LED is worked out, and number of angles."""
+"""Least polar angle at which the share of an LED is computed, and number of angles."""
 _ANGLE_RAD, _MOST_PALE = 0.05, 3.0
-"""Step of polar angle within which the light changes by a few per cent, and the most that a place may be over
-the mean at its angle: more is no reflectance but an angle that hardly any wall is seen at."""
+"""Step of polar angle within which the light changes by a few per cent, and the largest ratio of a place to
+the mean at its angle: more is not reflectance but an angle at which hardly any wall is seen."""
 _NODES = ((-1.732051, 1 / 6), (0.0, 2 / 3), (1.732051, 1 / 6))
-"""Gauss and Hermite's nodes: three displacements whose mean blurs as a normal curve does, to the fifth power
-of its width. Two rounds of them make nine."""
+"""Gauss-Hermite nodes: three displacements whose mean blurs like a Gaussian, exact to the fifth power of its
+width. Two rounds of them make nine."""
 STRAY_NAMES = ("ambient_light", "interreflection", "ambient_light")
 """Of `stray_lights`."""
 _ON_RING = 0.05
-"""Share of a second ring's peak from which pixels belong to it."""
+"""Share of a second ring's peak above which pixels belong to it."""
 
 
 @dataclass(frozen=True)
@@ -55,13 +55,13 @@ class Shown:
         Pixels that are not clipped.
     scene : Scene
     again : callable
-        Renders the frame with other attributes of the photometric state, and the frame's exposure.
+        Renders the frame, at its exposure, with other attributes of the photometric state.
     lit : callable
         Renders the frame as the LEDs would show it.
     direction : (2, 2) float
-        Cosine and sine of twice the angle of the frame's blur, as each half of the picture tells it.
+        Cosine and sine of twice the direction of the frame's blur, from each half of the picture.
     number : int
-        Of the frame.
+        Frame number.
     """
 
     above: Float32
@@ -81,9 +81,10 @@ class Shown:
 
 @dataclass(frozen=True)
 class Pair:
-    """Grey levels (H, W) without and with an effect, and pixels that count.
+    """Grey levels (H, W) without and with an effect, and the pixels that count.
 
-    ``free_of`` is what each may take up before it is judged: ``scale`` the exposure, ``offset`` a constant.
+    ``free_of`` is what is fitted freely in both before they are judged: ``scale`` the exposure, ``offset`` a
+    constant.
     """
 
     without: Float32
@@ -96,7 +97,7 @@ Law = Callable[[Shown, Float], Pair]
 
 
 def motion_blur(shown: Shown, told: Float) -> Pair:
-    """Return a frame that moved while it was exposed; ``told`` is σ, px, and 1 for motion along the pipe."""
+    """Return a frame that moved during its exposure; ``told`` is σ, px, and 1 for motion along the pipe."""
     sigma, even = float(told[0]), shown.again(sharpness=None)
     phi = shown.scene.polar[1]
     made = np.empty_like(even)
@@ -112,7 +113,7 @@ def motion_blur(shown: Shown, told: Float) -> Pair:
 
 
 def smeared(level: Float32, c: Float32, s: Float32, sigma: float) -> Float32:
-    """Return a picture (H, W) blurred by 1 σ along directions (H, W)."""
+    """Return a picture (H, W) blurred by 1 σ ``sigma``, px, along directions of cosine and sine (H, W)."""
     v, u = np.mgrid[0 : level.shape[0], 0 : level.shape[1]].astype(np.float32)
     step = np.float32(sigma / np.sqrt(2))
     for _ in range(2):
@@ -126,13 +127,13 @@ def smeared(level: Float32, c: Float32, s: Float32, sigma: float) -> Float32:
 
 
 def halves(shape: tuple[int, ...]) -> Float32:
-    """Return to which half, 0 or 1, each pixel of a picture belongs: tiles by turns."""
+    """Return the half, 0 or 1, that each pixel of a picture belongs to: alternating tiles."""
     row, column = ((np.arange(n) - STEP) // (STEP * TILE) for n in shape)
     return np.asarray((row[:, None] + column) % 2)
 
 
 def defocus(shown: Shown, told: Float) -> Pair:
-    """Return a frame blurred all round; ``told`` is half the blur's variance, px²."""
+    """Return a frame blurred in all directions; ``told`` is half the blur's variance, px²."""
     plain = shown.again(sharpness=None)
     sigma = float(np.sqrt(2 * max(told[0], 1e-3)))
     blurred = np.asarray(cv2.GaussianBlur(plain, (0, 0), sigma), np.float32)
@@ -140,12 +141,12 @@ def defocus(shown: Shown, told: Float) -> Pair:
 
 
 def response(shown: Shown, told: Float) -> Pair:
-    """Return a frame whose wall has the photo's contrast to a power ``told``."""
+    """Return a frame whose wall has the photo's contrast raised to the power ``told``."""
     return Pair(shown.twin.level, shown.again(power=float(told[0])), shown.wall, "scale")
 
 
 def stray(which: int) -> Law:
-    """Return the law of one of the `stray_lights`."""
+    """Return the law of the stray light with this index in `stray_lights`."""
 
     def law(shown: Shown, told: Float) -> Pair:
         lit, line = shown.lit(), _dilated(on_line(shown.twin))
@@ -160,7 +161,8 @@ def stray(which: int) -> Law:
 def stray_lights(scene: Scene, twin: TwinFrame, lit: TwinFrame) -> tuple[Float32, Float32, Float32]:
     """Return light (H, W) on the wall while the LEDs are off, up to factors; see `STRAY_NAMES`.
 
-    As the LEDs throw it, as the line does from wall to wall, and even light: brighter on paler wall alone.
+    First light distributed like the LEDs', then light of the line from wall to wall, then uniform light,
+    which is brighter on paler wall only.
     """
     paler = np.minimum(lit.level / _at_angle(scene.polar[0], lit), _MOST_PALE)
     bounced = np.nan_to_num(_once_bounced(scene, twin, lit)) * paler
@@ -168,7 +170,7 @@ def stray_lights(scene: Scene, twin: TwinFrame, lit: TwinFrame) -> tuple[Float32
 
 
 def _once_bounced(scene: Scene, twin: TwinFrame, lit: TwinFrame) -> Float32:
-    """Return light (H, W) of the line bounced once in a round bore of even paleness, up to a factor."""
+    """Return the line's light (H, W) after one reflection in a round bore of uniform reflectance."""
     on = twin.distance_mm[twin.region == Region.LINE_CORE]
     middle = float(np.nanmedian(on)) if len(on) else np.nan
     x = np.abs(lit.distance_mm - np.float32(middle)) / np.float32(2 * scene.surface.mean_radius_mm)
@@ -176,7 +178,7 @@ def _once_bounced(scene: Scene, twin: TwinFrame, lit: TwinFrame) -> Float32:
 
 
 def _at_angle(theta_rad: Float32, lit: TwinFrame) -> Float32:
-    """Return the mean level (H, W) of lit wall at the same polar angle: what lamps and lens make of it."""
+    """Return the mean level (H, W) of lit wall at the same polar angle: the effect of lamps and lens."""
     some = (slice(None, None, 4),) * 2
     wall, theta = lit.region[some] == Region.WALL, np.nan_to_num(theta_rad[some])
     cell = (theta[wall] / _ANGLE_RAD).astype(int)
@@ -187,7 +189,7 @@ def _at_angle(theta_rad: Float32, lit: TwinFrame) -> Float32:
 
 
 def bloom(shown: Shown, told: Float) -> Pair:
-    """Return what leaks from clipped pixels along columns, beside as much glow to all sides.
+    """Return a frame with the leak from clipped pixels along columns, beside as much isotropic glow.
 
     ``told`` is what leaks along columns and along rows, grey levels.
     """
@@ -199,7 +201,7 @@ def bloom(shown: Shown, told: Float) -> Pair:
 
 
 def leaked(free: Bool) -> tuple[Float32, Float32]:
-    """Return how near (H, W) clipped pixels are along columns, and along rows."""
+    """Return exp(−distance / 6 px) (H, W) to clipped pixels along columns, and along rows."""
     reach = np.arange(-int(4 * BLOOM_PX), int(4 * BLOOM_PX) + 1)
     tail, one = np.exp(-np.abs(reach) / BLOOM_PX), np.ones(1)
     full, tail = (~free).astype(np.float32), tail / tail.sum()
@@ -208,7 +210,7 @@ def leaked(free: Bool) -> tuple[Float32, Float32]:
 
 
 def second_line(shown: Shown, told: Float) -> Pair:
-    """Return a frame with the line a second time; ``told`` is its share and its radius over the line's."""
+    """Return a frame with the line repeated; ``told`` is its share and its radius over the line's."""
     level = shown.twin.level
     copy = _copied(shown, float(told[1]))
     use = shown.free & (copy > _ON_RING * copy.max()) & (shown.twin.region == Region.DARK)
@@ -216,9 +218,9 @@ def second_line(shown: Shown, told: Float) -> Pair:
 
 
 def share_of_second(shown: Shown, told: Float) -> float:
-    """Return how bright the second ring is in a frame, its twin's line being as bright as the recorded one.
+    """Return the brightness of the second ring in a frame, relative to the line.
 
-    Both are held against the same profile, each free to lie a little beside its place.
+    Recorded frame and twin are fitted with the same profile, each free to be slightly displaced.
     """
     copy, line = _copied(shown, float(told[1])), shown.twin.level
     dark = shown.free & (shown.twin.region == Region.DARK) & (copy > _ON_RING * copy.max())
@@ -228,7 +230,7 @@ def share_of_second(shown: Shown, told: Float) -> float:
 
 
 def _size_at_place(shown: Shown, basis: Float32, use: Bool) -> float:
-    """Return the size of a ring's picture (H, W), less what a displacement outward makes of it."""
+    """Return the size of a ring's picture (H, W), fitted together with a small radial displacement."""
     phi, weight = shown.scene.polar[1][use], 1 / np.sqrt(shown.twin.variance[use])
     down, right = (np.asarray(np.gradient(basis, axis=k)) for k in (0, 1))
     outward = np.cos(phi) * right[use] + np.sin(phi) * down[use]
@@ -237,7 +239,7 @@ def _size_at_place(shown: Shown, basis: Float32, use: Bool) -> float:
 
 
 def _copied(shown: Shown, ratio: float) -> Float32:
-    """Return the line's light (H, W) as a ring of another radius."""
+    """Return the line's light (H, W) as a ring of ``ratio`` times its radius."""
     (u, v), shape = shown.scene.ring.centre_px, shown.twin.level.shape
     back = 1 / ratio
     move = np.array([[back, 0, u * (1 - back)], [0, back, v * (1 - back)]])
@@ -252,14 +254,14 @@ def lamp_pattern(shown: Shown, told: Float) -> Pair:
 
 
 def dim_led(shown: Shown, told: Float) -> Pair:
-    """Return a frame whose LED at an azimuth sends less, beside even light; ``told``: loss, azimuth."""
+    """Return a frame whose LED at an azimuth sends less light, beside even light; ``told``: loss, azimuth."""
     even, scene = shown.again(lamp=_even), shown.scene
     share = share_at(scene, float(told[1]), *scene.polar[:2])
     return Pair(even, even * (1 - np.float32(told[0]) * share), shown.wall, "scale")
 
 
 def share_at(scene: Scene, azimuth_rad: float, theta_rad: Float32, phi_rad: Float32) -> Float32:
-    """Return the share of the light that an LED at an azimuth sends to polar angles and azimuths, alike."""
+    """Return an LED's share of the light at polar angles and image azimuths, both of one shape."""
     theta = np.linspace(_NEAREST_RAD, np.pi / 2, _THETAS)
     share = dim_share(scene.probe.lighting, azimuth_rad, scene.ring.radius_mm, theta).mean(0)
     wrapped = np.concatenate([share[:, -1:], share, share[:, :1]], 1)
@@ -274,7 +276,7 @@ def _even(lamp: LampLight) -> LampLight:
 
 
 def wide_line(shown: Shown, told: Float) -> Pair:
-    """Return a line as wide as it was found, beside one of a lens in focus."""
+    """Return a frame with the line as wide as measured, beside one with the line of a lens in focus."""
     sharp = shown.again(line=_in_focus)
     return Pair(sharp, shown.twin.level, shown.free & on_line(shown.twin), "scale")
 
@@ -284,7 +286,7 @@ def _in_focus(line: LineLight) -> LineLight:
 
 
 def on_line(twin: TwinFrame) -> Bool:
-    """Return which pixels (H, W) show the line."""
+    """Return pixels (H, W) that show the line."""
     return np.asarray((twin.region == Region.LINE_CORE) | (twin.region == Region.LINE_FLANK))
 
 

@@ -1,7 +1,7 @@
-"""Places of the window or the lens: what is there is named by the law that withheld frames bear out best.
+"""Places of the window or the lens: each is named by the effect that withheld frames support best.
 
-Dirt takes light away, L becomes L (1 − a w); what scatters mixes L with its mean widely around, ⟨L⟩; a drop
-shows at Δ from its middle what is at Δ (1 − p (1 − Δ²/R²)). w is a spot of the place's size.
+Dirt takes light away, L becomes L (1 − a w); scatter mixes L with its mean over a wide neighbourhood, ⟨L⟩; a
+drop shows at Δ from its middle what is at Δ (1 − p (1 − Δ²/R²)). w is a spot of the place's size.
 """
 
 from __future__ import annotations
@@ -21,18 +21,21 @@ from stages.twin.render import Region, TwinFrame
 from stages.twin.spot import PARTS, WIDEST_PX, FittedLaw, fall_of_spot
 
 _POWER_STEP, _ASIDE_PX = 0.4, 0.5
-"""Steps of bending that are tried; 1 σ of a displacement, since blocks of 24 px blunt its peak. Chosen."""
+"""Steps of bending that are tried; 1 σ of a displacement, px, since blocks of 24 px flatten its peak.
+Chosen."""
 _SURELY = 2.0
-"""σ by which a drop's size must be above 0, and by which texture must be drawn aside before that alone makes
-one: radii that err by an unstated tilt of the laser had made two drops of .4 ± .5 px."""
+"""σ by which a drop's size must exceed 0, and by which texture must be displaced before that alone makes a
+drop: radius errors from an unstated tilt of the laser had made two drops of .4 ± .5 px."""
 _DROPS = tuple((power, size) for power in (0.6, 1.0, 1.4, 1.8) for size in (1.0, 1.2, 1.4, 1.7, 2.0))
 """Bending and radius, in radii of the place, of the drops that are tried."""
 _LARGE_PX = 16.0
-"""Of spots twice as large every second pixel is looked at: twenty thousand are enough for five numbers."""
+"""In larger spots only every second pixel is used: twenty thousand are enough for five numbers."""
 _AROUND_PX, _WHOLE, _SURE, _FEWEST_FRAMES = 25.0, 0.7, 3.0, 3
-"""1 σ of the mean around; share of a place that must be lit wall; σ by which laws are told apart; frames."""
+"""1 σ of the wide mean, px; share of a place that must be lit wall; σ by which effects are distinguished;
+fewest frames."""
 _OF_CONTRAST = 0.15
-"""Most by which the photo has more or less texture than frames: half a pixel of blur does as much."""
+"""Largest share by which the photo's texture may differ from the frames': half a pixel of blur makes as
+much."""
 _BLURS, _AT_LINE = ("motion_blur", "defocus"), ("window_dirt", "window_scatter")
 _STATED = {
     "window_dirt": "dust or dirt on the window or the lens takes away",
@@ -43,22 +46,22 @@ _STATED = {
 
 @dataclass
 class WindowPlace:
-    """Sums over compared lit frames at one place: χ² of every law with any size follows from them.
+    """Sums over compared lit frames at one place, from which χ² of every effect of any size follows.
 
     Attributes
     ----------
     place : ImagePlace
     spots : list of (2, 2, h, w)
-        Of each frame and pixel (recorded − twin)(law − twin)/σ² and (law − twin)²/σ² of dirt and of scatter
-        that takes or mixes all light; 0 where a pixel does not count. Of a large place every `_step` pixels.
+        Of each frame and pixel (recorded − twin)(effect − twin)/σ² and (effect − twin)²/σ², for dirt and for
+        scatter of full size; 0 where a pixel does not count. In a large place every `_step` pixels.
     drops : list of (2, L)
-        Of each frame the same of drops, summed over pixels.
+        The same for drops, summed over pixels, of each frame.
     square, pixels, frame : list
-        Of each frame: Σ (recorded − twin)²/σ², pixels, number.
+        Of each frame: Σ (recorded − twin)²/σ², number of pixels, frame number.
     corner : (2,)
         Column and row of the first pixel of ``spots``.
     aside_px : float
-        By how much texture is drawn aside at most, as frames beside the compared ones tell.
+        Largest displacement of texture at the place, from the frames that the run has measured.
     """
 
     place: ImagePlace
@@ -73,9 +76,10 @@ class WindowPlace:
     def add(
         self, frame: int, above: Float32, twin: TwinFrame, free: Bool, drawn: Float32 | None = None
     ) -> None:
-        """Take a lit frame (H, W) whose twin has its exposure; pixels in ``free`` are not clipped.
+        """Add a lit frame (H, W) whose twin has its exposure; ``free`` marks pixels that are not clipped.
 
-        ``drawn`` is the twin's level with texture drawn aside as other frames tell, used where that is sure.
+        ``drawn`` is the twin's level with texture displaced as the measured frames show, used where that is
+        certain.
         """
         box, v, u = self._box(above.shape)
         level, part = twin.level[box], twin.region[box] == Region.WALL
@@ -104,12 +108,12 @@ class WindowPlace:
 
     @property
     def bends(self) -> bool:
-        """Whether frames tell that texture is drawn aside."""
+        """Whether frames show that texture is displaced."""
         return self.aside_px > _SURELY * _ASIDE_PX
 
     @property
     def _step(self) -> int:
-        """Every how many pixels spots are looked at: those of a large place are alike."""
+        """Spacing of the pixels that are used in spots: neighbouring pixels of a large place are alike."""
         return max(1, int(self.place.radius_px / _LARGE_PX))
 
     @property
@@ -126,7 +130,7 @@ class WindowPlace:
         return (rows, columns), v, u
 
     def _drops(self, level: Float32, u: Float32, v: Float32) -> list[Float32]:
-        """Return what each drop makes of grey levels (h, w)."""
+        """Return grey levels (h, w) as each drop shows them."""
         away = np.hypot(u - self.place.u_px, v - self.place.v_px)
         made: list[Float32] = []
         for power, size in _DROPS:
@@ -138,7 +142,7 @@ class WindowPlace:
         return made
 
     def judged(self, fixed_to: str) -> Mismatch | None:
-        """Return what is at the place; None where other frames fit no better with any law."""
+        """Return what is at the place; None where other frames fit no better with any effect."""
         if len(self.frame) < _FEWEST_FRAMES:
             return None
         spots = np.stack(self.spots)
@@ -163,11 +167,12 @@ class WindowPlace:
         return self._mismatch([name, *rivals], law, chance)
 
     def _likeliest(self, tried: Mapping[str, FittedLaw]) -> tuple[str, list[str]]:
-        """Return the law that is likeliest, and those that frames do not part from it.
+        """Return the likeliest effect, and those that frames do not distinguish from it.
 
-        Dirt may lie on a drop, too, but draws nothing aside: a drop that frames bear out is it, if none fits
-        surely better, and alone, if none fits better at all. What is dark may foretell a little of a drop's
-        change, too, and its rim seems to displace texture.
+        Dirt may also lie on a drop, but it displaces nothing: where texture is displaced and frames confirm a
+        drop, it is a drop unless another effect fits significantly better, and has no rivals if none fits
+        better at all. Something dark may predict a little of a drop's change, and its rim seems to displace
+        texture.
         """
         best, drop = max(tried, key=lambda n: tried[n].fall.sum()), tried["droplet"]
         bends = self.bends and drop.chance < FALSE_ALARM
@@ -179,11 +184,11 @@ class WindowPlace:
         return name, [n for n in others if sigmas(tried[name].fall - tried[n].fall) < _SURE]
 
     def _least(self, name: str, sd: float) -> float:
-        """Return the size, whose 1 σ is given, from which it is told.
+        """Return the smallest size that is reported, from the 1 σ of a size.
 
-        That of a spot comes from a few parts of the frames: 2 σ come by chance at one place in twenty, and
-        wall that differs in one part of the run leaves as much. What the photo leaves over stays in all
-        frames: a spot must surely be more.
+        The size of a spot comes from a few parts of the frames: 2 σ occur by chance at one place in twenty,
+        and wall that differs in one part of the run does as much. What the photo leaves stays in all frames:
+        a spot must be significantly larger.
         """
         if name == "droplet":
             return _SURELY * sd
@@ -195,7 +200,7 @@ class WindowPlace:
         numbers = ("u_px", "v_px", "radius_px")
         where = tuple(NamedFigure(n, getattr(place, n), place.radius_px / 2, "px") for n in numbers)
         before = sum(self.square) / sum(self.pixels)
-        # What the photo holds and frames do not is no dirt, and nothing that scatters.
+        # What the photo shows and frames do not is neither dirt nor scatter.
         unlike = names[0] != "droplet" and size.value < 0
         after = before - float(law.fall.sum()) / sum(self.pixels)
         return Mismatch(
@@ -219,23 +224,23 @@ class WindowPlace:
 def beside_blur(
     found: Sequence[Mismatch], whole: Sequence[Mismatch]
 ) -> tuple[tuple[Mismatch, ...], tuple[Mismatch, ...]]:
-    """Return what stands on the window, and what a blur of whole pictures, if one is named, resembles.
+    """Return what remains on the window, and what is withdrawn because whole pictures are blurred.
 
-    Blur makes texture faint everywhere, and more so where it is finest: that looks like scatter in places.
+    Blur makes texture faint everywhere, and most where it is finest: that looks like scatter at some places.
     """
     if not any(m.name in _BLURS for m in whole):
         return tuple(found), ()
     unsure = tuple(m for m in found if "window_scatter" in m.names)
-    said = "{} But whole frames are blurred, which looks alike: it cannot be told."
+    said = "{} But whole frames are blurred, which looks the same here."
     withdrawn = tuple(replace(m, statement=said.format(m.statement)) for m in unsure)
     return tuple(m for m in found if m not in unsure), withdrawn
 
 
 def or_on_window(found: Sequence[Mismatch]) -> tuple[Mismatch, ...]:
-    """Return what was found, a dim sector of the laser being either that or what is on the window there.
+    """Return the findings; a dim sector of the laser may also be dirt or scatter on the window there.
 
-    The wall's photo was made through the same window, mostly where the line is: what lies across the line
-    hides in it, and lit frames need not show it. What scatters takes no light from lit wall at all.
+    The wall's photo was made through the same window, mostly where the line is. What lies across the line is
+    therefore hidden in it, and lit frames need not show it; scatter takes no light from lit wall at all.
     """
     return tuple(_or_window(m) if "laser_sector" in m.names else m for m in found)
 
@@ -249,20 +254,20 @@ def _or_window(sector: Mismatch) -> Mismatch:
 
 
 def _with_photo(share: NamedFigure) -> NamedFigure:
-    """Return the share s of light that dirt takes, with the σ of what of the dirt may be in the wall's photo.
+    """Return the share s of light that dirt takes, with a σ that includes dirt in the wall's photo.
 
-    The photo was made through the same window. Where it is darker by h itself, 1 − t = (1 − s)(1 − h): dirt
-    takes t = s + h (1 − s). Nothing tells h. It is taken to be uniform from 0 to s: the photo holds no more
+    The photo was made through the same window. If it is itself darker by h, then 1 − t = (1 − s)(1 − h): dirt
+    takes t = s + h (1 − s). h is unknown and is taken to be uniform from 0 to s: the photo contains no more
     than frames show beyond it, since it is a mean of views through other places of the window as well. The
-    r.m.s. of t about the s that is told is then s (1 − s) / √3. Where the photo holds more, t is larger than
-    σ says: hence the words "at least".
+    RMS of t about the reported s is then s (1 − s) / √3. If the photo contains more, t is larger than σ says:
+    hence the words "at least".
     """
     known = float(np.clip(share.value, 0.0, 1.0))
     return replace(share, sd=float(np.hypot(share.sd, known * (1 - known) / np.sqrt(3))))
 
 
 def _fall_of_drop(sums: Float, aside_px: float) -> FittedLaw:
-    """Return the drop that fits best; ``sums`` (F, 2, L) are of those tried, then of what frames tell."""
+    """Return the drop that fits best; ``sums`` (F, 2, L): drops tried, then the measured displacement."""
     frames, (cross, own) = np.arange(len(sums)), np.moveaxis(sums, 1, 0)
     gain, half = 2 * cross - own, np.arange(len(sums)) % 2
     by_half = np.array([int(np.argmax(gain[half != h].sum(0))) for h in (0, 1)])

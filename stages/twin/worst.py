@@ -1,4 +1,4 @@
-"""What is shown of lit wall: maps of z, and the places where it differs most."""
+"""What the page shows of lit wall: maps of z, and the places with the largest differences."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from stages.twin.compare import BLOCK_PX
 from stages.twin.reference import SHOWN_PX, WALL_COLUMNS, BlockSamples, map_of
 
 _SHOWN, _WORST = 8.0, 6
-"""Standard deviations that the maps reach, and places that are shown."""
+"""Range of the maps in σ, and number of places that are shown."""
 
 
 def worst_places(samples: BlockSamples | None) -> tuple[Mismatch, ...]:
@@ -40,8 +40,8 @@ def _worst(samples: BlockSamples, k: int, image: Bool, wall: Bool) -> Mismatch:
     return Mismatch(
         "", "intensity", fixed, place, (size,), nan, nan, nan,
         f"In frame {at.frame} at ({at.u_px:.0f}, {at.v_px:.0f}) the wall is {100 * abs(change):.0f} % "
-        f"{'brighter' if change > 0 else 'darker'} than re-rendered, {times:.0f} times what blocks usually "
-        f"differ by there. {why}",
+        f"{'brighter' if change > 0 else 'darker'} than re-rendered, {times:.0f} times the usual difference "
+        f"of blocks there. {why}",
         at,
     )  # fmt: skip
 

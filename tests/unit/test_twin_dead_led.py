@@ -74,7 +74,7 @@ def test_what_looks_like_a_dim_led_is_said_and_never_named(light, monkeypatch):
     frames = SimpleNamespace(whole=WholePictures(SCENE), _state=SimpleNamespace(lamp=None), _scene=SCENE)
     suspected, untold = sums.Sums._lamps(frames, _samples(light), False)
     assert suspected == ()
-    assert all("cannot be told from dirt" in one.statement and not one.parameters for one in untold)
+    assert all("Dirt or shade on the window" in one.statement and not one.parameters for one in untold)
 
 
 def test_where_an_led_may_be_dim_is_said():
