@@ -160,6 +160,9 @@ def test_what_stays_has_no_more_patterns_and_a_swing_has_sine_and_cosine_of_each
     swinging = members_beside(LIBRARY["laser_rocking"], (0.7,))
     beside = [m.model for m in swinging if isinstance(m.model, PatternInCourse)]
     assert {len(p.amplitudes) for p in beside if p.name.startswith("generic_line_1_2")} == {4}
+    points = ring_points(plain_probe(), Bore(50.8), 90, 1.3)
+    sine, cosine = beside[0].factored(points, (0.7,))[0]
+    assert sine**2 + cosine**2 == pytest.approx(np.ones(len(sine)))
     assert beside[0].quantities((0.7,), np.array([3.0, 0.0, 0.0, 4.0])) == {"amplitude": 5.0}
 
 

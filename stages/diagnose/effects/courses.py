@@ -115,13 +115,7 @@ class Coursed(Product):
 
     def factored(self, points: ImagePoints, shape: Shape) -> Factored:
         """Return the course's factor, of a swing its sine's and its cosine's, and the law."""
-        swings = self.kind is CourseKind.SINUSOID
-        courses = [(shape[0], phase) for phase in (0.0, 90.0)] if swings else [shape]
-        speed = points.speed_mm_s
-        if self.kind is CourseKind.REVERSAL:
-            speed = np.where(_stands(points.time_s, np.abs(speed)), 0.0, speed)
-        at = points.time_s, points.camera_distance_mm, speed
-        return tuple(Course(self.kind, c).factor(*at) for c in courses), self.static, self.own
+        return factors(self.kind, points, shape), self.static, self.own
 
     def _swing(self, amplitude: Float) -> tuple[Float, float]:
         """Return the law's amplitudes (Q,) along the longer axis of a swing's ellipse, and the phase, deg."""
@@ -163,6 +157,17 @@ class Coursed(Product):
 def of_own_clock(model: EffectModel) -> bool:
     """Return whether an effect comes at times of its own recording, which no other has to share."""
     return model.kind in _OWN_CLOCK
+
+
+def factors(kind: CourseKind, points: ImagePoints, shape: Shape) -> tuple[Float, ...]:
+    """Return the factor (M,) of a course; of a swing that of its sine, then of its cosine."""
+    swings = kind is CourseKind.SINUSOID
+    courses = [(shape[0], phase) for phase in (0.0, 90.0)] if swings else [shape]
+    speed = points.speed_mm_s
+    if kind is CourseKind.REVERSAL:
+        speed = np.where(_stands(points.time_s, np.abs(speed)), 0.0, speed)
+    at = points.time_s, points.camera_distance_mm, speed
+    return tuple(Course(kind, c).factor(*at) for c in courses)
 
 
 def in_words(kind: CourseKind, shape: Shape) -> str:

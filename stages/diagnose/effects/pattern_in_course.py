@@ -13,7 +13,7 @@ import numpy as np
 from pipeline.arrays import Float
 from pipeline.physics.effect import CourseKind
 from stages.diagnose.effects.base import Amplitude, EffectModel, Factored, ImagePoints, Product, Shape
-from stages.diagnose.effects.courses import in_words
+from stages.diagnose.effects.courses import factors, in_words
 from stages.diagnose.effects.free_profile import FREE_PROFILES
 from stages.diagnose.effects.nameless import GENERIC, STEADY, Moves, Nameless
 
@@ -39,9 +39,7 @@ class PatternInCourse(Nameless, Product):
 
     def factored(self, points: ImagePoints, shape: Shape) -> Factored:
         """Return the effect's course, and the pattern."""
-        of_effect = self.like.factored(points, shape)
-        assert of_effect is not None
-        return of_effect[0], self.steady, STEADY
+        return factors(self.like.kind, points, shape), self.steady, STEADY
 
     def quantities(self, shape: Shape, amplitude: Float) -> dict[str, float]:
         """Return the root sum of squares of all amplitudes."""
