@@ -44,6 +44,14 @@ _TOLD_SIGMAS = 5.0
 """A slip is reported from so many σ on, with the σ over the slip's own way."""
 _TOLD_MM = 3.0
 """Smaller slips are not reported (chosen): rings bridge them, and a wheel at rest has some play."""
+_ONE_SENSE = 2.0
+"""Small slips are reported together where their sum exceeds so many times the root of the sum of their
+squares, as one in twenty sums of random signs does. Those of a probe that jerks cancel."""
+_WHAT_SLIPPED = (
+    ": the wheel slipped or hung, readings stop, or a filter against noise held the texture back. Distances "
+    "there follow laser and texture. What to do: see that the wheel is pressed to the wall and turns, and "
+    "that encoder.csv is whole"
+)
 
 
 def find_events(
@@ -81,26 +89,39 @@ def warn_of_slips(
     """Warn where encoder and texture disagree by more than the encoder's σ and its clock explain.
 
     Each slip is held against the 1 σ of the encoder's scale (1) over the slip's own way, that of two
-    readings, mm, and the way of a usual frame, by which the clocks of encoder and pictures may differ.
+    readings, mm, and the way of a usual frame, by which the clocks of encoder and pictures may differ. So is
+    the sum of all where none of them alone is worth telling.
     """
     z = distance_along(trajectory.axis, trajectory.T_pc)
     frame_mm = float(np.percentile(np.abs(np.diff(z)), _CRUISE_PERCENT)) if len(z) > 1 else 0.0
-    slips = [e for e in events if e.kind == "encoder_slip" and abs(e.size) > _TOLD_MM]
+    slips = [e for e in events if e.kind == "encoder_slip"]
     first = np.searchsorted(trajectory.frame, [e.frame_from for e in slips])
     last = np.searchsorted(trajectory.frame, [e.frame_to for e in slips])
-    size = np.array([abs(e.size) for e in slips])
-    way = np.abs(z[last] - z[first]) + size
+    size = np.array([e.size for e in slips])
+    way = np.abs(z[last] - z[first]) + np.abs(size)
     sigma = np.sqrt((scale_sigma * way) ** 2 + 2 * reading_sigma_mm**2 + frame_mm**2)
-    told = np.flatnonzero(size > _TOLD_SIGMAS * sigma)
+    told = np.flatnonzero(_is_told(np.abs(size), sigma))
+    whole = abs(float(size.sum()))
+    whole_sigma = np.sqrt(
+        scale_sigma**2 * way.sum() ** 2 + 2 * len(slips) * reading_sigma_mm**2 + frame_mm**2
+    )
     if len(told):
-        worst = slips[told[np.argmax(size[told])]]
+        worst = slips[told[np.argmax(np.abs(size[told]))]]
         elsewhere = f", and {len(told) - 1} times more" if len(told) > 1 else ""
         context.warn(
             f"encoder and wall's texture disagree by {abs(worst.size):.1f} mm between frame "
-            f"{worst.frame_from} and {worst.frame_to}{elsewhere}: the wheel slipped or hung, readings stop, "
-            "or a filter against noise held the texture back. Distances there follow laser and texture. What "
-            "to do: see that the wheel is pressed to the wall and turns, and that encoder.csv is whole"
+            f"{worst.frame_from} and {worst.frame_to}{elsewhere}{_WHAT_SLIPPED}"
         )
+    elif _is_told(whole, whole_sigma) and whole > _ONE_SENSE * np.linalg.norm(size):
+        context.warn(
+            f"encoder and wall's texture disagree {len(slips)} times by less than {_TOLD_MM:.0f} mm, and by "
+            f"{whole:.1f} mm in all between frame {slips[0].frame_from} and {slips[-1].frame_to}"
+            f"{_WHAT_SLIPPED}"
+        )
+
+
+def _is_told(size_mm: Float | float, sigma_mm: Float | float) -> Bool:
+    return np.asarray((size_mm > _TOLD_MM) & (size_mm > _TOLD_SIGMAS * sigma_mm))
 
 
 def _ends_of_runs(mask: Bool) -> list[tuple[int, int]]:

@@ -181,3 +181,14 @@ def test_a_coarse_counter_slips_by_no_count() -> None:
 
 def test_few_frames_have_no_events() -> None:
     assert events(np.zeros(4)) == {}
+
+
+@pytest.mark.parametrize(("sense", "words"), [(1, ["disagree 8 times"]), (-1, [])])
+def test_many_small_slips_in_one_sense_are_told_and_jerks_are_not(sense: int, words: list[str]) -> None:
+    """Eight slips of 1.2 mm, each too small to be told, were 10 mm without a word."""
+    slip = np.zeros(FRAMES)
+    for k, at in enumerate(range(10, 114, 13)):
+        slip[at:] += 1.2 * sense**k
+    told = told_of(steady(0.0), slip, 0.002)
+    assert len(told) == len(words)
+    assert all(w in t for w, t in zip(words, told, strict=True))
