@@ -38,17 +38,15 @@ from pipeline.instrument.probe import Probe
 from pipeline.machine.stage import Context, Stage
 from pipeline.recording.base import Recording
 from pipeline.recording.checks import CheckedFrames
-from stages.defects.all_round import bore_beside, goes_round, measure_all_round
 from stages.defects.along import stretches
-from stages.defects.clean import CleanWall, clean_wall
-from stages.defects.corroborate import Witnesses, evidence_for
+from stages.defects.clean import clean_wall
+from stages.defects.corroborate import Evidence, Witnesses, evidence_for
 from stages.defects.dark_lines import dark_lines, lies_beside
-from stages.defects.depth import Depth, measure_depth
 from stages.defects.describe import Scene, describe, describe_line
 from stages.defects.detect import Detection, detect
 from stages.defects.grow import footprint, grown
 from stages.defects.judge import Found, credibility_on, judged
-from stages.defects.neighbours import allowed_by_neighbours, contradicted_frame, reaching
+from stages.defects.measure import Measured, Measurer
 from stages.defects.noise_tail import noise_tail
 from stages.defects.parallax import LitPictures
 from stages.defects.parameters import DefectParameters
@@ -56,15 +54,13 @@ from stages.defects.relief import smooth_shape_removed
 from stages.defects.report import report_found, report_unconfirmed, warn_of_missed, warn_of_short_ones
 from stages.defects.segment import Region, regions_of
 from stages.defects.smear import flattened
-from stages.defects.surface import MeasuredWall, Surface
+from stages.defects.surface import MeasuredWall
 
 __all__ = ["DEFECTS", "DefectParameters", "find_defects"]
 
 # Least wall for a search: 1000 cells, and 8 circles of the map of which half of the cells were measured
 # (chosen).
 _MIN_CELLS, _MIN_CIRCLES, _HALF = 1000, 8, 0.5
-# At most so many rings with a glint on them are left out when a finding is measured (chosen).
-_MOST_LEFT_OUT = 4
 
 
 def find_defects(
@@ -100,13 +96,14 @@ def find_defects(
     )
     cloud = cloud_along(wall.cloud)
     measured = MeasuredWall(relief, cloud, cloud.ring_spacing_mm())
-    clean = clean_wall(measured, regions)
-    found = tuple(_measured(measured, regions, clean, seeds.score, scene, wall.fixed, parameters, context))
+    measurer = Measurer(measured, clean_wall(measured, regions), parameters, context.random)
+    looked_at = (_found_in(region, measurer, seeds.score, scene, wall.fixed) for region in regions)
+    found = [f for f in _with_progress(looked_at, len(regions), context) if f is not None]
     tail = noise_tail(relief, seeds, known)
     credibility = credibility_on(found, tail, measured)
     context.report("peaks of noise expected above the threshold", tail.above(seeds.threshold), "")
     confirmed, unconfirmed = judged(found, credibility, parameters.min_depth_mm)
-    lines = list(_lines(measured, found, clean, scene, parameters, context))
+    lines = list(_lines(measurer, found, scene, context))
     items, alone = _numbered(confirmed, 1), _numbered([*unconfirmed, *lines], len(confirmed) + 1)
     expected = sum(1 - d.probability for d in items)
     report_found(len(items), expected, context)
@@ -123,94 +120,57 @@ def _numbered(found: Sequence[Defect], first: int) -> tuple[Defect, ...]:
     return tuple(replace(defect, id=n) for n, defect in enumerate(found, first))
 
 
-def _measured(
-    wall: MeasuredWall,
-    regions: tuple[Region, ...],
-    clean: CleanWall,
-    score: Float32,
-    scene: Scene,
-    fixed: FixedToProbe | None,
-    parameters: DefectParameters,
-    context: Context,
-) -> Iterator[Found]:
-    """Yield the regions that were measured and reach the smallest depth to be reported."""
-    for done, region in enumerate(regions, 1):
-        # A region without points of usual σ is measured once more with all points.
-        for every_point in (False, True):
-            surface, here = wall.surface_about(region, every_point)
-            if not _is_measured(surface, here):
-                continue
-            whole, uncut = surface, _depth_of(region, here, surface, wall, clean, parameters, context)
-            depth = uncut
-            while (frame := _contradicted(depth, here, surface)) is not None:
-                without, _ = wall.surface_about(region, every_point, (*surface.left_out, frame))
-                if not _is_measured(without, here):
-                    break
-                surface = without
-                depth = _depth_of(region, here, surface, wall, clean, parameters, context)
-            depth = depth if region.all_round else allowed_by_neighbours(depth, here, surface)
-            if region.sign * depth.depth_mm >= parameters.min_depth_mm:
-                top = float(region.cut(score.astype(float))[region.mask].max())
-                evidence = evidence_for(here, depth, surface, scene.seen_by, _fixed_in(region, fixed), top)
-                bead = _chance_of_bead(region, wall, parameters)
-                widened = flattened(depth, here, surface, scene.seen_by.held, wall.ways_mm)
-                lone_mm = uncut.depth_mm if abs(uncut.depth_mm) > abs(depth.depth_mm) else None
-                if lone_mm is not None:
-                    widened = reaching(widened, uncut, here, whole)
-                told = describe(here, widened, surface, scene)
-                by_noise = replace(told, depth_sigma_mm=depth.sigma_mm)
-                yield Found(region, told, by_noise, evidence, bead, lone_mm)
-                break
-        context.progress(len(regions) + done, 2 * len(regions))
+def _with_progress(found: Iterator[Found | None], regions: int, context: Context) -> Iterator[Found | None]:
+    """Pass on what regions show, and tell of the progress; the first half of it was the search for them."""
+    for done, each in enumerate(found, 1):
+        yield each
+        context.progress(regions + done, 2 * regions)
 
 
-def _depth_of(
-    region: Region,
-    here: Region,
-    surface: Surface,
-    wall: MeasuredWall,
-    clean: CleanWall,
-    parameters: DefectParameters,
-    context: Context,
-) -> Depth:
-    """Return the depth of a region; ``here`` is that region with rows counted from the surface's first."""
-    if region.all_round:
-        return measure_all_round(
-            here, surface, clean, bore_beside(region, wall.relief.radius_map, wall.rings_mm)
-        )
-    return measure_depth(here, surface, clean, parameters.draws, context.random)
+def _found_in(
+    region: Region, measurer: Measurer, score: Float32, scene: Scene, fixed: FixedToProbe | None
+) -> Found | None:
+    """Return what a region shows, None where it was not measured or is too shallow to be reported.
+
+    A region without points of usual σ is measured once more with all points.
+    """
+    for every_point in (False, True):
+        whole = measurer.measured(region, every_point)
+        if whole is None:
+            continue
+        kept = measurer.without_contradicted(region, every_point, whole)
+        if region.sign * kept.allowed.depth_mm >= scene.min_depth_mm:
+            top = float(region.cut(score.astype(float))[region.mask].max())
+            seen_by, fixed_mm = scene.seen_by, _fixed_in(region, fixed)
+            evidence = evidence_for(kept.here, kept.allowed, kept.surface, seen_by, fixed_mm, top)
+            return _described(region, measurer, scene, (whole, kept), evidence)
+    return None
 
 
-def _contradicted(depth: Depth, here: Region, surface: Surface) -> int | None:
-    """Return the next frame to be left out when a region is measured, None where there is none."""
-    if here.all_round or len(surface.left_out) >= _MOST_LEFT_OUT:
-        return None
-    return contradicted_frame(depth, here, surface)
+def _described(
+    region: Region, measurer: Measurer, scene: Scene, measured: tuple[Measured, Measured], evidence: Evidence
+) -> Found:
+    """Return a region with its ``evidence``, ``measured`` with all rings and with those kept."""
+    whole, kept = measured
+    here, surface, depth = kept.here, kept.surface, kept.allowed
+    cut = abs(whole.depth.depth_mm) - abs(depth.depth_mm)
+    widened = flattened(depth, here, surface, scene.seen_by.held, measurer.wall.ways_mm)
+    if cut > 0 and whole.rings.may_be_a_pit:
+        widened = replace(widened, sigma_mm=float(np.hypot(widened.sigma_mm, cut)))
+    told = describe(here, widened, surface, scene)
+    by_noise = replace(told, depth_sigma_mm=depth.sigma_mm)
+    lone_mm = whole.depth.depth_mm if cut > 0 else None
+    return Found(region, told, by_noise, evidence, measurer.chance_of_bead(region), lone_mm)
 
 
-def _chance_of_bead(region: Region, wall: MeasuredWall, parameters: DefectParameters) -> float:
-    """Return the probability that a region is not a step of the bore's diameter."""
-    radius_map = wall.relief.radius_map
-    if not goes_round(region, radius_map):
-        return 1.0
-    return bore_beside(region, radius_map, wall.rings_mm).chance_of_bead(parameters.min_depth_mm)
-
-
-def _lines(
-    wall: MeasuredWall,
-    found: Sequence[Found],
-    clean: CleanWall,
-    scene: Scene,
-    parameters: DefectParameters,
-    context: Context,
-) -> Iterator[Defect]:
+def _lines(measurer: Measurer, found: Sequence[Found], scene: Scene, context: Context) -> Iterator[Defect]:
     """Yield dark lines that only the photo shows; one beside a finding of the rings belongs to it."""
-    for region in dark_lines(scene.seen_by.texture, wall.relief, context.scratch):
-        beside = any(lies_beside(region, f.region, wall.relief) for f in found)
-        surface, here = wall.surface_about(region, every_point=True)
-        if not beside and _is_measured(surface, here):
-            depth = measure_depth(here, surface, clean, parameters.draws, context.random)
-            yield describe_line(here, depth, surface, scene)
+    relief = measurer.wall.relief
+    for region in dark_lines(scene.seen_by.texture, relief, context.scratch):
+        beside = any(lies_beside(region, f.region, relief) for f in found)
+        line = None if beside else measurer.measured(region, every_point=True)
+        if line is not None:
+            yield describe_line(line.here, line.depth, line.surface, scene)
 
 
 def _fixed_in(region: Region, fixed: FixedToProbe | None) -> Float:
@@ -219,12 +179,6 @@ def _fixed_in(region: Region, fixed: FixedToProbe | None) -> Float:
         return np.zeros(region.mask.shape)
     rows = fixed.departure_mm[region.row : region.row + len(region.mask)].astype(float)
     return region.counted_from(region.row).cut(rows)
-
-
-def _is_measured(surface: Surface, region: Region) -> bool:
-    """Whether any cell of a region has a measured surface: some regions between distant rings have none."""
-    shown = region.cut(surface.all_mm if region.all_round else surface.local_mm)
-    return bool(np.isfinite(shown[region.mask]).any())
 
 
 def _refuse_unseen(wall: Wall) -> None:

@@ -13,7 +13,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from pipeline.arrays import Bool, Float, Int
-from stages.defects.depth import SHARPENING, Depth, is_small
+from stages.defects.depth import SHARPENING, Depth
 from stages.defects.segment import Region
 from stages.defects.surface import Surface, cells_of, chosen, of_usual_sigma
 
@@ -27,36 +27,6 @@ _MEAN_MM = 1.0
 _NARROW, _HALF = 2.0, 0.5
 
 
-def allowed_by_neighbours(depth: Depth, region: Region, surface: Surface) -> Depth:
-    """Return the depth, limited by what the rings beside the deepest one allow, and then with a larger σ.
-
-    Where no bell is fitted between rings, as in a wide patch, σ also grows by how much the depth falls off to
-    the neighbouring rings: the deepest place of a narrow pit may lie between them.
-    """
-    rings = _rings(depth, region, surface)
-    if not len(rings.frame):
-        return depth
-    if abs(depth.depth_mm) <= rings.allowed_mm:
-        falls = 0.0 if is_small(surface.relief, region, surface.points) else rings.falls_mm
-        return replace(depth, sigma_mm=float(np.hypot(depth.sigma_mm, SHARPENING * falls)))
-    sigma = float(np.hypot(depth.sigma_mm, rings.allowed_mm / 2))
-    return replace(depth, depth_mm=float(np.sign(depth.depth_mm)) * rings.allowed_mm, sigma_mm=sigma)
-
-
-def contradicted_frame(depth: Depth, region: Region, surface: Surface) -> int | None:
-    """Return the frame whose ring alone shows more depth than its neighbours allow; None where there is none.
-
-    Only where rings on both sides show the finding, too, so that it has a depth without that frame.
-    """
-    rings = _rings(depth, region, surface)
-    if not len(rings.frame) or abs(depth.depth_mm) <= rings.allowed_mm:
-        return None
-    shown = rings.top_mm[rings.beside] >= _SHOWN_SIGMAS * surface.relief.typical.sigma_mm
-    side = np.sign(rings.at_mm[rings.beside] - rings.at_mm[rings.deepest])
-    both = bool((side < 0).any() and (side > 0).any())
-    return int(rings.frame[rings.deepest]) if both and shown.all() else None
-
-
 def frames_at_peak(depth: Depth, region: Region, surface: Surface) -> Int:
     """Return the frames (n,) whose rings show half of a depth at its peak, with samples of usual σ.
 
@@ -68,31 +38,18 @@ def frames_at_peak(depth: Depth, region: Region, surface: Surface) -> Int:
     if (1 - _TOP_QUANTILE) * width <= _MEAN_MM:
         return np.zeros(0, np.int64)
     sure = replace(surface, near=chosen(surface.near, of_usual_sigma(surface.near)))
-    rings = _rings(depth, region, sure)
+    rings = rings_at_peak(depth, region, sure)
     limit = max(_HALF * abs(depth.depth_mm), _SHOWN_SIGMAS * surface.relief.typical.sigma_mm)
     return rings.frame[rings.peak_mm > limit]
 
 
-def reaching(depth: Depth, uncut: Depth, region: Region, surface: Surface) -> Depth:
-    """Return a depth whose σ includes what a lone deep ring showed beyond it, if that may be a pit."""
-    cut = max(abs(uncut.depth_mm) - abs(depth.depth_mm), 0.0)
-    if not _may_be_a_pit(uncut, region, surface):
-        return depth
-    return replace(depth, sigma_mm=float(np.hypot(depth.sigma_mm, cut)))
-
-
-def _may_be_a_pit(depth: Depth, region: Region, surface: Surface) -> bool:
-    """Return whether the deepest ring's departure is so narrow that a round pit fits between the others."""
-    rings = _rings(depth, region, surface)
-    return not len(rings.frame) or rings.width_mm[rings.deepest] < _NARROW * surface.points.spacing_mm
-
-
 @dataclass(frozen=True)
-class _Rings:
+class RingsAtPeak:
     """How far each ring (n,) departs to a finding's side, and where along the pipe, mm.
 
     ``top_mm`` is the 80 % quantile over the finding's columns and ``foot_mm`` the median there; ``peak_mm``
-    is the departure about the finding's peak and ``width_mm`` its width there.
+    is the departure about the finding's peak and ``width_mm`` its width there. Neighbouring rings are
+    ``spacing_mm`` apart, and ``noise_mm`` is 1 σ of the wall's own unevenness.
     """
 
     frame: Int
@@ -102,6 +59,38 @@ class _Rings:
     peak_mm: Float
     width_mm: Float
     spacing_mm: float
+    noise_mm: float
+
+    def allow(self, depth: Depth, small: bool) -> Depth:
+        """Return the depth, limited by what the rings beside the deepest one allow, and then with a larger σ.
+
+        Unless it is ``small``, so that a bell is fitted between the rings, σ also grows by how much the depth
+        falls off to the neighbouring rings: the deepest place of a narrow pit may lie between them.
+        """
+        if not len(self.frame):
+            return depth
+        if abs(depth.depth_mm) <= self.allowed_mm:
+            falls = 0.0 if small else self.falls_mm
+            return replace(depth, sigma_mm=float(np.hypot(depth.sigma_mm, SHARPENING * falls)))
+        sigma = float(np.hypot(depth.sigma_mm, self.allowed_mm / 2))
+        return replace(depth, depth_mm=float(np.sign(depth.depth_mm)) * self.allowed_mm, sigma_mm=sigma)
+
+    def contradicted_frame(self, depth: Depth) -> int | None:
+        """Return the frame whose ring alone shows more depth than its neighbours allow; None if none does.
+
+        Only where rings on both sides show the finding, too, so that it has a depth without that frame.
+        """
+        if not len(self.frame) or abs(depth.depth_mm) <= self.allowed_mm:
+            return None
+        shown = self.top_mm[self.beside] >= _SHOWN_SIGMAS * self.noise_mm
+        side = np.sign(self.at_mm[self.beside] - self.at_mm[self.deepest])
+        both = bool((side < 0).any() and (side > 0).any())
+        return int(self.frame[self.deepest]) if both and shown.all() else None
+
+    @property
+    def may_be_a_pit(self) -> bool:
+        """Whether the deepest ring's departure is so narrow that a round pit fits between the others."""
+        return not len(self.frame) or bool(self.width_mm[self.deepest] < _NARROW * self.spacing_mm)
 
     @property
     def deepest(self) -> int:
@@ -129,7 +118,7 @@ class _Rings:
         return max(gentle, float(steep.max(initial=0.0)))
 
 
-def _rings(depth: Depth, region: Region, surface: Surface) -> _Rings:
+def rings_at_peak(depth: Depth, region: Region, surface: Surface) -> RingsAtPeak:
     """Return each ring's departure about a finding's peak, without frames that the surface left out."""
     samples = _samples(depth, region, surface)
     spacing = surface.points.spacing_mm
@@ -138,7 +127,8 @@ def _rings(depth: Depth, region: Region, surface: Surface) -> _Rings:
     rings = [(k, ring) for k, ring in rings if ring.about.sum() >= _LEAST_OF_RING]
     at, top, foot, peak, width = np.array([ring.summary(spacing) for _, ring in rings]).reshape(-1, 5).T
     frame = np.array([k for k, _ in rings], np.int64)
-    return _Rings(frame, at, top, foot, peak, width, spacing)
+    noise = surface.relief.typical.sigma_mm
+    return RingsAtPeak(frame, at, top, foot, peak, width, spacing, noise)
 
 
 @dataclass(frozen=True)
@@ -164,7 +154,7 @@ class _Samples:
         return np.abs(self.around_mm) <= _MEAN_MM + np.abs(self.along_mm)
 
     def summary(self, spacing_mm: float) -> tuple[float, ...]:
-        """Return at, top, foot, peak and width of `_Rings` for samples that are all of one ring, mm."""
+        """Return at, top, foot, peak and width of `RingsAtPeak` for samples that are all of one ring, mm."""
         about = np.sort(self.out_mm[self.about])
         pitch = float(np.ptp(self.around_mm[self.about])) / (len(about) - 1)
         peak = float(about[-max(round(_MEAN_MM / max(pitch, 1e-9)), 1) :].mean())

@@ -1,0 +1,92 @@
+"""Measure the depth of a region, without the rings that those beside them contradict."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from stages.defects.all_round import bore_beside, goes_round, measure_all_round
+from stages.defects.clean import CleanWall
+from stages.defects.depth import Depth, is_small, measure_depth
+from stages.defects.neighbours import RingsAtPeak, rings_at_peak
+from stages.defects.parameters import DefectParameters
+from stages.defects.segment import Region
+from stages.defects.surface import MeasuredWall, Surface
+
+# At most so many rings with a glint on them are left out when a finding is measured (chosen).
+_MOST_LEFT_OUT = 4
+
+
+@dataclass(frozen=True)
+class Measured:
+    """A region's ``depth`` by a ``surface``, from the first row of which ``here`` counts its own."""
+
+    here: Region
+    surface: Surface
+    depth: Depth
+
+    @cached_property
+    def rings(self) -> RingsAtPeak:
+        """What each ring shows about the region's peak."""
+        return rings_at_peak(self.depth, self.here, self.surface)
+
+    @property
+    def contradicted_frame(self) -> int | None:
+        """The next frame to be left out, None where there is none."""
+        if self.here.all_round or len(self.surface.left_out) >= _MOST_LEFT_OUT:
+            return None
+        return self.rings.contradicted_frame(self.depth)
+
+    @cached_property
+    def allowed(self) -> Depth:
+        """The depth that the rings beside the deepest one allow; what goes all round needs no such limit."""
+        if self.here.all_round:
+            return self.depth
+        return self.rings.allow(self.depth, is_small(self.surface.relief, self.here, self.surface.points))
+
+
+@dataclass(frozen=True)
+class Measurer:
+    """What regions of a wall are measured with."""
+
+    wall: MeasuredWall
+    clean: CleanWall
+    parameters: DefectParameters
+    random: np.random.Generator
+
+    def measured(self, region: Region, every_point: bool, without: tuple[int, ...] = ()) -> Measured | None:
+        """Return a region as measured by points of usual σ or by ``every_point``, ``without`` some frames.
+
+        None where no cell of it has a surface, as between rings that are far apart.
+        """
+        surface, here = self.wall.surface_about(region, every_point, without)
+        shown = here.cut(surface.all_mm if region.all_round else surface.local_mm)
+        if not np.isfinite(shown[here.mask]).any():
+            return None
+        return Measured(here, surface, self._depth(region, here, surface))
+
+    def without_contradicted(self, region: Region, every_point: bool, whole: Measured) -> Measured:
+        """Return a region measured without the rings that those beside them contradict, one by one."""
+        kept = whole
+        while (frame := kept.contradicted_frame) is not None:
+            left = self.measured(region, every_point, (*kept.surface.left_out, frame))
+            if left is None:
+                break
+            kept = left
+        return kept
+
+    def chance_of_bead(self, region: Region) -> float:
+        """Return the probability that a region is not a step of the bore's diameter."""
+        radius_map = self.wall.relief.radius_map
+        if not goes_round(region, radius_map):
+            return 1.0
+        bore = bore_beside(region, radius_map, self.wall.rings_mm)
+        return bore.chance_of_bead(self.parameters.min_depth_mm)
+
+    def _depth(self, region: Region, here: Region, surface: Surface) -> Depth:
+        if region.all_round:
+            bore = bore_beside(region, self.wall.relief.radius_map, self.wall.rings_mm)
+            return measure_all_round(here, surface, self.clean, bore)
+        return measure_depth(here, surface, self.clean, self.parameters.draws, self.random)
