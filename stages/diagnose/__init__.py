@@ -1,1 +1,1 @@
-"""Left-out physics: found, named, sized, confirmed."""
+"""Diagnosis: find, name, size and confirm physics that the model of the instrument leaves out."""

@@ -1,4 +1,4 @@
-"""Whether two measurements of the same physics, each on data of its own, agree in sign and size."""
+"""Test whether two measurements of the same effect, each from its own data, agree in sign and size."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ from stages.diagnose.effects.base import EffectModel, Shape
 from stages.diagnose.inference import DEGREES, UNKNOWN
 from stages.diagnose.result import Confirmation, Value
 
-# They agree when their difference is no rarer than this.
+# They agree unless chance makes such a difference less often than this.
 AGREE = 1e-3
-# Predictions are good to this part of an effect's size.
+# Predictions are accurate to this fraction of an effect's size.
 _LAW = 0.05
-# A measurement tells something only when it is known to this part of the effect.
+# A measurement is used only if its 1 σ is at most this fraction of the effect.
 TELLING = 0.25
 _DRAWS = 400
 
 
 @dataclass(frozen=True)
 class Part:
-    """What one part of the measurements says of an effect: a name of the part, words, and numbers (Q,)."""
+    """An effect as measured in one part of the data: name of the part, description, and numbers (Q,)."""
 
     where: str
     words: str
@@ -34,14 +34,14 @@ class Part:
 
 @dataclass(frozen=True)
 class Agreement:
-    """A second prediction, and by how much it favours the named cause.
+    """The comparison of a second measurement with the first, and how strongly it favours the named cause.
 
     Attributes
     ----------
     confirmation : Confirmation
     ratio : float
-        Likelihood of the second measurement if the first one's cause made both, over that if it were of a
-        like size but owed nothing to the first, sign included.
+        Likelihood of the second measurement if the cause of the first one made both, over its likelihood if
+        it had a similar size but, including its sign, nothing to do with the first.
     """
 
     confirmation: Confirmation
@@ -49,7 +49,7 @@ class Agreement:
 
 
 def agreement(first: Part, second: Part, own: tuple[Float, Float], gap: Float) -> Agreement | None:
-    """Return whether two parts agree; None when either tells too little.
+    """Return whether two parts agree; None when either is too uncertain.
 
     Parameters
     ----------
@@ -72,16 +72,16 @@ def agreement(first: Part, second: Part, own: tuple[Float, Float], gap: Float) -
 
 
 def same(first: Float, second: Float, gap: Float, size: float, rarest: float = AGREE) -> bool:
-    """Return whether two estimates (Q,) agree: in sign, and as closely as noise and laws let expect.
+    """Return whether two estimates (Q,) agree, in sign and within noise and the accuracy of predictions.
 
     Parameters
     ----------
     gap : (Q, Q)
         Covariance of their difference.
     size
-        Of the effect, in their unit: predictions are good to a part of it.
+        Size of the effect, in their unit: predictions are accurate to a fraction of it.
     rarest
-        Chance below which a difference is none of noise's (F distribution).
+        Probability below which a difference is not attributed to noise (F distribution).
     """
     apart, count = second - first, len(first)
     statistic = float(apart @ np.linalg.solve(_spread(gap, size), apart))
@@ -96,15 +96,15 @@ def _spread(gap: Float, size: float) -> Float:
 def chance_of_name(
     p_value: float, doubts: int, agreements: Sequence[Agreement], fits_p: float = 1.0, otherwise: float = 0.0
 ) -> float:
-    """Return the probability that the named cause made it, and not chance, a rival, or something unknown.
+    """Return the probability that the named cause is right, and not chance, a rival, or something unknown.
 
-    Chance weighs −e p ln p, the most that a p-value can say for it (T. Sellke, M. J. Bayarri and J. O.
-    Berger, "Calibration of p values for testing precise null hypotheses", Am. Stat., 2001). Rivals that were
-    not told apart, and all else that speaks against the name, weigh as much as it. What is unknown loses by
-    the likelihood ratio of the best second prediction, or wins by that of one that fails; those of one
-    recording share its pictures and count once. It also wins where what the name leaves is no noise: by as
-    much as the chance of that, ``fits_p``, can say; and by how likely it is with a course of its own in the
-    name's place, ``otherwise``.
+    Chance has the weight −e p ln p, the most that a p-value can say for it (T. Sellke, M. J. Bayarri and J.
+    O. Berger, "Calibration of p values for testing precise null hypotheses", Am. Stat., 2001). Each
+    undistinguished rival, and each other doubt about the name, has the same weight as the name. An unknown
+    cause loses weight by the likelihood ratio of the best second measurement, or gains by that of one that
+    disagrees; measurements from one recording share its pictures and count once. An unknown cause also gains
+    weight if the residual beside the named cause is not noise (``fits_p``, the chance that noise makes it),
+    and by its likelihood with a course of its own, relative to the name (``otherwise``).
     """
     nothing = _at_most(p_value)
     ratios = [a.ratio for a in agreements]
@@ -115,13 +115,13 @@ def chance_of_name(
 
 
 def _at_most(p_value: float) -> float:
-    """Return how likely chance may be at most, beside something else, when it gives such a p-value."""
+    """Return the largest weight of chance, relative to an alternative, at such a p-value."""
     p = float(np.clip(p_value, 1e-300, 1 / np.e))
     return float(-np.e * p * np.log(p))
 
 
 def sized(model: EffectModel, shape: Shape, amplitude: Float, covariance: Float) -> str:
-    """Return an effect's quantities, each with its own 1 σ, of amplitudes (Q,)."""
+    """Return an effect's quantities, each with its 1 σ, as text, from amplitudes (Q,)."""
     told = drawn(partial(model.quantities, shape), amplitude, covariance)
     words = {name: f" ± {v.sd:.2g}" if v.sd > 0 else "" for name, v in told.items()}
     return ", ".join(f"{name} {v.value:.4g}{words[name]}" for name, v in told.items() if np.isfinite(v.value))
@@ -130,7 +130,7 @@ def sized(model: EffectModel, shape: Shape, amplitude: Float, covariance: Float)
 def drawn(
     numbers: Callable[[Float], dict[str, float]], amplitude: Float, covariance: Float
 ) -> dict[str, Value]:
-    """Return numbers of amplitudes (Q,) with 1 σ, by draws; NaN where a covariance is not known."""
+    """Return numbers computed from amplitudes (Q,), with 1 σ by random draws; NaN if it is unknown."""
     middle, random = numbers(amplitude), np.random.default_rng(0)
     if not np.isfinite(covariance).all():
         return {name: Value(value, float("nan")) for name, value in middle.items()}
@@ -139,7 +139,7 @@ def drawn(
     for name, value in middle.items():
         apart = np.array([d[name] for d in each]) - value
         if name in ("direction_deg", "phase_deg"):
-            # A direction may pass from 180 to -180 degrees in between.
+            # A direction may wrap from 180 to −180 degrees between draws.
             apart = (apart + 180) % 360 - 180
         out[name] = Value(value, float(np.sqrt(np.mean(apart**2))))
     return out

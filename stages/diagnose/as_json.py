@@ -1,4 +1,4 @@
-"""The answer as diagnosis.json holds it."""
+"""The diagnosis as it is written to diagnosis.json."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _FORMAT = 1
 
 
 def to_json(found: Diagnosis) -> dict[str, object]:
-    """Return what diagnosis.json holds: all but the pictures."""
+    """Return the contents of diagnosis.json: all of the diagnosis except pictures."""
     told = {k: v for k, v in _fields(found).items() if not k.endswith("_picture")}
     return {
         "format": _FORMAT,
@@ -34,7 +34,7 @@ def _effect(found: EffectFound, answer: Diagnosis) -> dict[str, object]:
 
 
 def _fields(record: object) -> dict[str, object]:
-    """Return a record's fields: of a place those that are known, of a course its numbers beside its kind."""
+    """Return a record's fields: the known ones of a location, the numbers of a course beside its kind."""
     if isinstance(record, CourseFound):
         return {"kind": record.kind, **_plain(record.parameters), "probability": _plain(record.probability)}
     each = {"class" if k == "members" else k: _plain(v) for k, v in vars(record).items()}
@@ -42,7 +42,7 @@ def _fields(record: object) -> dict[str, object]:
 
 
 def _plain(value: Any) -> Any:
-    """Return a value as JSON has it: numbers in six figures, None for what is no number."""
+    """Return a value as JSON has it: numbers with six digits, None for NaN and infinity."""
     if isinstance(value, StrEnum):
         return str(value)
     if isinstance(value, float):

@@ -1,4 +1,4 @@
-"""What is measured of each recording before anything is asked, and what each channel then says of it."""
+"""Measurements of each recording that are made once, and what each channel of evidence derives from them."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from stages.diagnose.travel.sight import PLACED_SIGMA_MM, sight_of_poses
 from stages.motion import EncoderReadings, Equations, Measurements, MotionParameters, State
 
 _MOST_OF_RING = 0.5
-# What motion against encoder tells better than rings and fiducials do.
+# Effects that motion against encoder measures better than rings and fiducials do.
 TRAVEL_EFFECTS = frozenset(
     {"probe_vibration", "encoder_scale", "encoder_slip", "encoder_backlash", "time_offset", "motion_blur"}
 )
@@ -38,20 +38,20 @@ TRAVEL_EFFECTS = frozenset(
 def gauge_travel(
     recording: Recording, run: MeasuredRun, state: Unknowns, without: Collection[str] = ()
 ) -> TravelEvidence:
-    """Return what motion and encoder of a gauge run say.
+    """Return what the motion and the encoder of a gauge run show.
 
-    Only frames with fiducials count: these place the camera to a few µm, so that the encoder, loosely
-    weighted in the adjustment, has no say there. The scale is that of the fiducials' stated places.
+    Only frames with fiducials count: these determine the camera's pose to a few µm, so that the encoder, of
+    low weight in the adjustment, has no influence. The scale is that of the fiducials' stated places.
 
     Parameters
     ----------
     state
         The adjusted state, as of `stages.diagnose.gauge.search.prepare`.
     without
-        Effects that are not known.
+        Effects that are treated as unknown.
     """
     fiducials = recording.pipe.fiducials
-    # Markers of one row were put there together and err alike: rows count, not markers.
+    # Markers of one row were placed together and share an error: rows count as independent, not markers.
     places = np.unique([round(m.distance_mm, 1) for m in fiducials.markers]) if fiducials else np.zeros(1)
     spread = float(np.sqrt(np.sum((places - places.mean()) ** 2)))
     sight = sight_of_poses(recording, state.T_pc, run.posed, PLACED_SIGMA_MM / max(spread, 1.0))
@@ -63,7 +63,7 @@ def gauge_travel(
 
 
 def _shown(run: MeasuredRun) -> Bool:
-    """Return the frames (N,) placed by fiducials or most of a ring; others only lie between neighbours."""
+    """Return the frames (N,) with fiducials or most of a ring; poses of others are interpolated."""
     count = np.bincount(run.measured.rings.frame, minlength=len(run.measured.time_s))
     shown = count > _MOST_OF_RING * np.max(count, initial=1)
     shown[run.posed] = True
@@ -71,14 +71,14 @@ def _shown(run: MeasuredRun) -> Bool:
 
 
 class DiagnosisParameters(Parameters):
-    """What the diagnosis lets the user choose."""
+    """Options of the diagnosis."""
 
     without: tuple[str, ...] = Field((), description="effects that are left out of the library")
 
 
 @dataclass(frozen=True)
 class Seen:
-    """All that one recording says; a channel that could not be examined is None, and the reason is told.
+    """All evidence from one recording; a channel that could not be examined is None, and the reason is given.
 
     Attributes
     ----------
@@ -87,8 +87,11 @@ class Seen:
     geometry : Examined or None
         Rings and fiducials of a gauge run.
     travel : TravelEvidence or None
+        Motion in the pictures against the encoder.
     profile : ProfileEvidence or None
+        Width, shape and brightness of the laser line.
     shortcomings : tuple of str
+        Why channels could not be examined.
     field : FieldEvidence or None
         Rings and texture of an inspection.
     """
@@ -101,32 +104,32 @@ class Seen:
     field: FieldEvidence | None = None
 
     def with_run(self, run: FieldRun | None) -> Seen:
-        """Return what was seen with the adjusted run that it was seen in, which is not stored with it."""
+        """Return the evidence together with the adjusted run it came from, which is not stored with it."""
         return replace(self, field=replace(self.field, run=run)) if self.field is not None else self
 
 
 @dataclass(frozen=True)
 class LineProfile:
-    """What the line's light says of a recording; without evidence, ``problem`` tells why."""
+    """Evidence from the line's light in one recording; without evidence, ``problem`` says why."""
 
     evidence: ProfileEvidence | None
     problem: str = ""
 
     @property
     def limits(self) -> tuple[str, ...]:
-        """Sentences on what it does not tell, and why."""
+        """Sentences on what it cannot show, and why."""
         if self.problem:
             return (f"The profile of the laser line was not examined: {self.problem}.",)
         return self.evidence.uncovered if self.evidence is not None else ()
 
     def known_light(self, without: Collection[str]) -> ProfileEvidence | None:
-        """Return what the line's light says to one who does not know some effects."""
+        """Return the evidence from the line's light with some effects treated as unknown."""
         return self.evidence.without(without) if self.evidence is not None and without else self.evidence
 
 
 @dataclass(frozen=True)
 class GaugeMeasured:
-    """A gauge run measured, before any adjustment; without a run, ``problem`` tells why."""
+    """Measurements of a gauge run before any adjustment; without a run, ``problem`` says why."""
 
     run: MeasuredRun | None
     problem: str = ""
@@ -134,7 +137,7 @@ class GaugeMeasured:
 
 @dataclass(frozen=True)
 class Adjusted:
-    """A `FieldRun` without the recording, the probe and the rings that it was made from."""
+    """A `FieldRun` without the recording, the probe and the rings from which it was made."""
 
     measured: Measurements
     state: State
@@ -146,19 +149,19 @@ class Adjusted:
 
     @staticmethod
     def of(run: FieldRun) -> Adjusted:
-        """Return a run without what it was made from."""
+        """Return a run without its inputs."""
         return Adjusted(**{f.name: getattr(run, f.name) for f in fields(Adjusted)})
 
 
 @dataclass(frozen=True)
 class FreeMotion:
-    """A field recording adjusted without its encoder; without an adjustment, ``problem`` tells why."""
+    """A field recording adjusted without its encoder; if it failed, ``problem`` says why."""
 
     adjusted: Adjusted | None
     problem: str = ""
 
     def run(self, recording: Recording, probe: Probe, rings: RingSamples) -> FieldRun | None:
-        """Return the adjusted run of the recording, probe and rings that it was made from."""
+        """Return the adjusted run, given the recording, probe and rings it was made from."""
         if self.adjusted is None:
             return None
         return FieldRun(recording=recording, probe=probe, rings=rings, **vars(self.adjusted))
@@ -173,7 +176,7 @@ def examine_line(
     parameters: Parameters,
     context: Context,
 ) -> LineProfile:
-    """Test every effect that the line's light can show: see `profile_evidence`."""
+    """Test every effect that the line's light can show; see `profile_evidence`."""
     try:
         return LineProfile(profile_evidence(frames.applied_to(recording), rings, probe, context))
     except UnusableError as error:
@@ -189,7 +192,7 @@ def measure_fiducials(
     parameters: GaugeParameters,
     context: Context,
 ) -> GaugeMeasured:
-    """Measure rings and fiducials of a gauge run: see `measure_gauge`."""
+    """Measure rings and fiducials of a gauge run; see `measure_gauge`."""
     try:
         checked = frames.applied_to(recording)
         return GaugeMeasured(measure_gauge(checked, rings, probe, parameters, context))
@@ -207,7 +210,7 @@ def adjust_freely(
     parameters: MotionParameters,
     context: Context,
 ) -> FreeMotion:
-    """Adjust a field recording without its encoder, so that what is seen can be held against it."""
+    """Adjust a field recording without its encoder, so that its motion can be compared with the encoder."""
     try:
         run = field_run(frames.applied_to(recording), probe, rings, points, parameters, context)
     except UnusableError as error:
@@ -225,7 +228,7 @@ def examine_gauge(
     parameters: DiagnosisParameters,
     context: Context,
 ) -> Seen:
-    """Return what a gauge run's rings, fiducials, motion and line profile say."""
+    """Return what a gauge run's rings, fiducials, motion and line profile show."""
     recording, run, without = frames.applied_to(recording), fiducials.run, parameters.without
     missing, problem = profile.limits, fiducials.problem
     geometry, travel, light = None, None, profile.known_light(without)
@@ -253,7 +256,7 @@ def examine_field(
     parameters: DiagnosisParameters,
     context: Context,
 ) -> Seen:
-    """Return what an inspection's rings, texture, motion and line profile say."""
+    """Return what an inspection's rings, texture, motion and line profile show."""
     recording = frames.applied_to(recording)
     run, light = motion.run(recording, probe, rings), profile.known_light(parameters.without)
     if run is None:
@@ -268,10 +271,10 @@ def examine_field(
 def _of_geometry(
     library: Mapping[str, EffectModel], profile: ProfileEvidence | None
 ) -> dict[str, EffectModel]:
-    """Return the effects that rings and fiducials are asked about.
+    """Return the effects for which rings and fiducials are tested.
 
-    Light moves the line in ways that many causes share: where the profile was examined, only those count that
-    it shows.
+    Many causes in the line's light displace the line: where the profile was examined, only those that it
+    shows are tested.
     """
     shown = {f.effect for f in profile.found} if profile is not None else None
     return {

@@ -1,4 +1,4 @@
-"""What motion and the line's profile say of each recording, each effect once, with what bears it out."""
+"""Effects claimed by motion and by the line's profile of each recording, each once, with confirmations."""
 
 from __future__ import annotations
 
@@ -23,17 +23,18 @@ from stages.diagnose.travel.evidence import TravelEstimate, TravelEvidence
 from stages.diagnose.travel.lines import Line
 from stages.diagnose.travel.steps import StepFound
 
-# Drawn cases of each channel that were named, all of them rightly: gauge runs at ring level, drawn lines.
-# After n of them the next is right with a chance of (n + 1) / (n + 2): no more is told.
+# Number of simulated cases per channel in which a name was given, always rightly: gauge runs at ring level,
+# simulated lines. After n of them the next is right with probability (n + 1) / (n + 2), and no higher
+# probability is stated.
 _DRILLED = {Channel.MOTION: 44, Channel.PROFILE: 9}
-# What the fitted pattern goes with: distance along the pipe, turning back, or speed.
+# What each effect's pattern depends on: distance along the pipe, reversals, or speed.
 _GOES_WITH = {
     "encoder_scale": (FixedTo.PIPE, "static"),
     "encoder_backlash": (FixedTo.TIME, "reversal"),
     "time_offset": (FixedTo.TIME, "speed"),
     "motion_blur": (FixedTo.CAMERA, "speed"),
 }
-# Of a swing: what one ring takes for a turn of the camera.
+# A ring takes this share of a sideways swing for a rotation of the camera.
 _TURNED = 0.01
 
 
@@ -48,26 +49,27 @@ class Claim:
     statement : str
     p_value : float
     alike : tuple of str
-        Effects that would show the same and that nothing excludes.
+        Effects that would look the same and that nothing excludes.
     where : str
         The recording.
     location : Location
         As far as it was measured.
     agreements : tuple of Agreement
-        Second predictions of the same physics that tell enough.
+        Sufficiently precise second measurements of the same effect.
     fits_p : float
-        Chance that what the channel is left with is noise.
+        Probability that noise makes the residual that the effect leaves.
     otherwise : float
-        How likely causes without a name are, with other courses in its place, beside it.
+        Likelihood of unnamed causes with other courses, relative to this effect.
     unknown : frozenset of str
-        Effects that are not known to who claims it.
+        Effects that are treated as unknown.
     counted : bool
-        Whether names were counted on pictures like these; if not, past cases bear nothing out.
+        Whether the rate of right names was counted on pictures like these; if not, past cases do not support
+        the name.
     beside : int
-        What else the same readings show and nobody can name, by kinds. Each may come of a cause that made
-        this as well, at even odds: the name is unsure then, but no less likely than that.
+        Number of further, unnamed deviations in the same readings. Each may share its cause with this effect,
+        at even odds, which limits the name's probability.
     whole : tuple of (str, Value)
-        Sizes before a part was taken off that another effect makes: recordings are compared by these.
+        Sizes before the part that another effect makes was subtracted: recordings are compared by these.
     """
 
     name: str
@@ -87,19 +89,19 @@ class Claim:
 
     @property
     def rivals(self) -> tuple[str, ...]:
-        """What else may have made it; where its parts disagree, all that the catalogue calls like it too."""
+        """Other possible causes; where its parts disagree, also all that the catalogue lists as similar."""
         disagree = any(not a.confirmation.agrees for a in self.agreements)
         like_it = effect(self.name).alike if disagree else ()
         return (*self.alike, *(n for n in like_it if n not in self.unknown))
 
     @property
     def sure(self) -> bool:
-        """Whether the name is sure."""
+        """Whether the name is certain."""
         return self._chance > SURE
 
     @property
     def may_go_otherwise(self) -> bool:
-        """Whether what it leaves, or other courses in its place, leave more in doubt than its rivals do."""
+        """Whether residual or other courses add more doubt than the rivals do."""
         clear = replace(self, alike=(), beside=0)
         return not clear.sure and replace(clear, fits_p=1.0, otherwise=0.0).sure
 
@@ -110,21 +112,21 @@ class Claim:
 
     @property
     def compared(self) -> dict[str, Value]:
-        """What recordings are compared by: sizes, whole where another effect makes a part."""
+        """The quantities by which recordings are compared: ``whole`` sizes where another effect adds."""
         return self.parameters | dict(self.whole)
 
     def not_knowing(self, names: Collection[str]) -> Claim:
-        """Return the claim of one who does not know some effects."""
+        """Return the claim with some effects treated as unknown."""
         return replace(self, alike=tuple(n for n in self.alike if n not in names), unknown=frozenset(names))
 
     @property
     def of_gauge_alone(self) -> bool:
-        """Whether it tells of an event of the gauge run, which the inspection does not share."""
+        """Whether it is an event of the gauge run, which the inspection does not share."""
         return "time_s" in self.parameters and self.where == "gauge"
 
     @property
     def found(self) -> EffectFound:
-        """The effect with the chance that it is the right name."""
+        """The effect with the probability that its name is right."""
         drilled = _DRILLED[Channel(self.location.channel)]
         return EffectFound(
             self.name, min(self._chance, (drilled + 1) / (drilled + 2)),
@@ -136,7 +138,7 @@ class Claim:
 
 
 def claims_of(field: Seen | None, gauge: Seen | None, stated_exposure_s: float) -> list[Claim]:
-    """Return what travel and profile show; of one effect the clearer, the other recording set beside it."""
+    """Return the effects that motion and profile show; of two recordings the clearer with the other."""
     recordings = field, gauge
     of_probe = Exposure.of(stated_exposure_s, (field, gauge)), Exposure.of(stated_exposure_s, (gauge, field))
     field, gauge = of_probe[0].taken_off(field), of_probe[1].taken_off(gauge)
@@ -154,13 +156,13 @@ def claims_of(field: Seen | None, gauge: Seen | None, stated_exposure_s: float) 
 
 
 def _of_exposure(claim: Claim, recordings: Sequence[Seen | None], own_delay: bool) -> Claim:
-    """Return the claim of a longer exposure with how late it makes pictures; any other as it is."""
+    """Return the claim of a longer exposure with the delay that it causes; any other unchanged."""
     size, words = how_late(claim.parameters, recordings, own_delay)
     return replace(claim, parameters=size, statement=claim.statement + words)
 
 
 def _excluded(claim: Claim, claims: Sequence[Claim]) -> bool:
-    """Return whether a recording that tells a claim's rivals apart has decided for one of them."""
+    """Return whether a recording that can distinguish a claim's rivals has decided for one of them."""
     return any(c.name in claim.alike and claim.name not in c.alike for c in claims)
 
 
@@ -192,7 +194,7 @@ def _of_estimate(e: TravelEstimate, travel: TravelEvidence, exposure: Exposure) 
     goes_with = [_GOES_WITH[n] for n in (e.effect, *alike) if n in _GOES_WITH]
     places, times = {place for place, _ in goes_with}, {time for _, time in goes_with}
     fixed_to, time = places.pop() if len(places) == 1 else None, times.pop() if len(times) == 1 else None
-    # Stray pictures are as likely as a slip where a step is in doubt.
+    # Where a step is in doubt, stray pictures are as likely as a slip.
     beside = bool(travel.unsettled) + (travel.unexplained is not None)
     beside += exposure.leaves_open(e)
     return Claim(
@@ -209,12 +211,12 @@ def _of_slip(step: StepFound, travel: TravelEvidence) -> Claim:
         "duration_s": Value(step.lasting_s, step.time_sigma_s),
     }  # fmt: skip
     words = (
-        f"The encoder's wheel slips at {step.time_s:.2f} s for about {step.lasting_s:.2f} s and its reading "
+        f"The encoder's wheel slips at {step.time_s:.2f} s for about {step.lasting_s:.2f} s, and its reading "
         f"{'gains' if step.gain_mm > 0 else 'loses'} {abs(step.gain_mm):.2f} mm."
     )
     where = (step.place - 1, step.place)
     location = stretch(travel, where, FixedTo.TIME, "event")
-    # A slip that the reading alone shows does not hang on what pictures leave in doubt elsewhere.
+    # A slip visible in the readings alone does not depend on what pictures leave in doubt elsewhere.
     alone = bool(step.agreements) and all(a.confirmation.agrees for a in step.agreements)
     beside = (bool(travel.unsettled) and not alone) + (travel.unexplained is not None)
     return Claim(
@@ -262,7 +264,7 @@ def _of_finding(f: Finding, profile: ProfileEvidence, where: str) -> Claim:
 def stretch(
     travel: TravelEvidence, places: tuple[int, int] | None, fixed_to: FixedTo | None, time: str | None
 ) -> Location:
-    """Return where motion shows it: in the frames between two places of the sight, else in all."""
+    """Return where motion shows it: in the frames between two places of the sight, or in all frames."""
     sight = travel.fit.sight if travel.fit is not None else None
     frames, stretch = None, None
     if sight is not None and len(sight.frame):
@@ -275,7 +277,7 @@ def stretch(
 
 
 def _borne_out(claim: Claim, other: Claim) -> Claim:
-    """Return the claim with what the other recording says; a rival stays only where both leave it."""
+    """Return the claim with the other recording's evidence; a rival remains only where both leave it."""
     alike = tuple(n for n in claim.alike if n in other.alike)
     both = agreements(
         claim.where, claim.compared, other.where, other.compared, "whole " if claim.whole else ""
@@ -284,7 +286,7 @@ def _borne_out(claim: Claim, other: Claim) -> Claim:
 
 
 def _against(claim: Claim, other: Seen | None) -> Claim:
-    """Return the claim with the other recording's estimate, though that be too small to be a claim itself."""
+    """Return the claim compared with the other recording's estimate, even if that is no claim itself."""
     travel = other.travel if other is not None else None
     estimate = travel.estimate(claim.name) if travel is not None else None
     if travel is None or estimate is None or not np.isfinite(estimate.sigma) or estimate.alike:

@@ -1,4 +1,4 @@
-"""Residuals before and after the correction, on the recording that had no say in it, and on its picture."""
+"""Residuals before and after the correction, on a recording that was not used for it, and on a picture."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from stages.diagnose.residual import (
 from stages.diagnose.result import Diagnosis, FitQuality, Picture, ReadingPicture, WallPicture
 from stages.diagnose.travel.model import TravelFit
 
-# A frame that is shown has at least this share of the bins of the fullest ring: chosen, so that the picture
+# A frame is shown only if it has this share of the bins of the fullest ring: chosen, so that the picture
 # shows the pattern all round.
 _MOST_OF_BINS = 0.8
 
@@ -36,13 +36,13 @@ Linear = tuple[tuple[EffectModel, Shape, Float], ...]
 
 @dataclass(frozen=True)
 class Compared:
-    """Residuals of the same rings without and with the correction, and the quality of fit they make.
+    """Residuals of the same rings without and with the correction, and the resulting quality of fit.
 
     Attributes
     ----------
     before, after : RingResidual
     fit : FitQuality or None
-        None where the gauge run does not tell.
+        None where the gauge run does not determine it.
     """
 
     before: RingResidual
@@ -58,16 +58,14 @@ def compared(
     correction: Correction | None,
     encoder_share: float = 0.0,
 ) -> Compared | None:
-    """Return the residuals of the field, else of the gauge; None where neither has any.
+    """Return the residuals of the inspection, or else of the gauge run; None where neither has any.
 
     Parameters
     ----------
     field, corrected
-        The field with the stated and with the corrected probe.
+        The inspection adjusted with the stated and with the corrected probe.
     examined, gauge
-        What rings and fiducials of the gauge run say, and its recording.
-    encoder_share
-        By what share of its reading the inspection's encoder is known to read too much.
+        Evidence from rings and fiducials of the gauge run, and its recording.
     """
     try:
         of_gauge = _of_gauge(gauge, examined) if gauge is not None and examined is not None else None
@@ -76,8 +74,8 @@ def compared(
             return _gauge_alone(of_gauge, examined) if of_gauge is not None else None
         terms = examined.best.fit.terms if examined is not None and examined.best is not None else ()
         if of_gauge is not None and any(of_own_clock(t.model) for t in terms):
-            # What happens at a time of the gauge run need not happen in the field: the gauge's own held-out
-            # rings tell.
+            # An event of the gauge run need not happen in the inspection: the held-out rings of the gauge run
+            # itself are used.
             return _gauge_alone(of_gauge, examined)
         return _in_field(field, corrected or field, linear, of_gauge, encoder_share)
     except np.linalg.LinAlgError:
@@ -85,7 +83,7 @@ def compared(
 
 
 def with_pictures(found: Diagnosis, seen: Compared | None) -> Diagnosis:
-    """Return the answer with the pictures of the residuals, and how well they fit."""
+    """Return the diagnosis with pictures of the residuals, and the quality of fit."""
     if seen is None:
         return found
     frames = np.unique(seen.before.frame)
@@ -99,9 +97,9 @@ def with_pictures(found: Diagnosis, seen: Compared | None) -> Diagnosis:
 
 
 def with_readings(found: Diagnosis, recordings: Sequence[Seen | None]) -> Diagnosis:
-    """Return the answer with readings against pictures in place of rings, if all of it is of the encoder.
+    """Return the diagnosis with encoder readings in place of rings, if all its effects are the encoder's.
 
-    Of several recordings it is the one in which that makes the most difference.
+    Of several recordings, the one in which the effects make the largest difference is used.
     """
     names = {e.name for e in found.effects}
     fits = [s.travel.fit for s in recordings if s is not None and s.travel is not None and s.travel.fit]
@@ -113,7 +111,7 @@ def with_readings(found: Diagnosis, recordings: Sequence[Seen | None]) -> Diagno
 
 
 def _of_readings(fit: TravelFit) -> FitQuality:
-    """Return how far readings are from pictures; held out is each picture, which all the others predict."""
+    """Return the quality of fit of readings to pictures; each picture is predicted from all others."""
     before, (missed, sigma) = rms(fit.stated_mm), fit.left_out_mm
     return FitQuality(
         "mm of the reading", before, rms(fit.whitened.residual), before, rms(missed), rms(sigma)
@@ -127,14 +125,14 @@ def _of_gauge(gauge: Recording, examined: Examined) -> GaugeResiduals:
 
 
 def _gauge_alone(of: GaugeResiduals, examined: Examined | None) -> Compared:
-    """Return the gauge's residuals; how well they fit was judged on parts of its run held out in turn."""
+    """Return the gauge run's residuals; the quality of fit comes from parts of the run held out in turn."""
     return Compared(of.before, of.after, examined.quality if examined is not None else None)
 
 
 def _in_field(
     field: FieldRun, corrected: FieldRun, linear: Linear, of: GaugeResiduals | None, encoder_share: float
 ) -> Compared:
-    """Return the field's residuals; it was not used for the correction, so it is what is held out."""
+    """Return the inspection's residuals; all of it is held out, since the correction did not use it."""
     before = rings_against_texture(field)
     after = rings_against_texture(corrected, linear, encoder_share)
     every = (of.before.rms_px, of.after.rms_px) if of is not None else (before.rms_px, after.rms_px)
@@ -158,7 +156,9 @@ class OnImage:
     frame : int
     grey : (H, W) uint8
     uv_before, uv_after : (M, 2), (K, 2)
+        Ring samples, px, before and after the correction.
     before_px, after_px : (M,), (K,)
+        Their residuals.
     """
 
     frame: int
@@ -170,7 +170,7 @@ class OnImage:
 
 
 def image_of(seen: Compared | None, field: Recording | None, gauge: Recording | None) -> OnImage | None:
-    """Return the ring frame that departs most from what was expected, or None where no ring is usable."""
+    """Return the ring frame with the largest residuals, or None where no ring is usable."""
     if seen is None or not seen.before.usable.any():
         return None
     recording = field if seen.before.source == "field" else gauge
@@ -190,8 +190,8 @@ def image_of(seen: Compared | None, field: Recording | None, gauge: Recording | 
 def worst_frame(residual: RingResidual) -> int:
     """Return the number of the frame with the largest median residual, among frames with most of a ring.
 
-    An effect that begins during the recording is not there in every frame; the median does not follow a
-    single bad bin.
+    An effect that begins during the recording is absent from earlier frames; the median ignores a single bad
+    bin.
     """
     frames, count = np.unique(residual.frame[residual.usable], return_counts=True)
     whole = frames[count >= _MOST_OF_BINS * count.max()]

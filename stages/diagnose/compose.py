@@ -1,4 +1,4 @@
-"""From what each channel of each recording says to one answer."""
+"""Combine what the channels of all recordings show into one answer."""
 
 from __future__ import annotations
 
@@ -33,9 +33,9 @@ _OF_ENCODER = "an error of the encoder that depends on distance or speed in anot
 def composed(
     field: Seen | None, gauge: Seen | None, probe: Probe, without: Collection[str] = ()
 ) -> Diagnosis:
-    """Return the answer to which the channels of both recordings come together.
+    """Return the answer from the channels of both recordings together.
 
-    Effects ``without`` which the library has to do may be seen, but not named.
+    Effects in ``without``, which the library must do without, may be seen but not named.
     """
     examined = gauge.geometry if gauge is not None else None
     every = claims_of(field, gauge, probe.shutter.exposure_s)
@@ -72,7 +72,7 @@ def composed(
 
 @dataclass(frozen=True)
 class _Said:
-    """The verdict, the effects it rests on, the class that is left, and what of that has a size."""
+    """The verdict, the certain effects, the remaining class, and those of its members that have a size."""
 
     verdict: Verdict
     effects: tuple[EffectFound, ...]
@@ -84,9 +84,9 @@ def _said(
     examined: Examined | None, known: Sequence[Claim], unnamed: bool, unexplained: bool,
     doubtful: Sequence[str],
 ) -> _Said:  # fmt: skip
-    """Return what rings and fiducials, and then the claims beyond them, come to.
+    """Return the verdict of rings and fiducials, and then of the claims beyond them.
 
-    What is sure is named, whatever is left beside it; what is left is a class, or unexplained. Names that are
+    What is certain is named, whatever is left beside it; what is left is a class, or unexplained. Names in
     ``doubtful`` may be no effect at all.
     """
     rings = verdict_of_rings(examined, bool(known))
@@ -115,9 +115,10 @@ def _said(
 
 
 def _sure_of_rings(examined: Examined | None, rings: Verdict, unexplained: bool) -> tuple[EffectFound, ...]:
-    """Return the effects that rings and fiducials name for sure.
+    """Return the effects that rings and fiducials name with certainty.
 
-    Where the line's profile shows what nothing explains, its light may have moved the line, within its width.
+    Where the line's profile shows something unexplained, its light may have displaced the line within its
+    width.
     """
     if examined is None or rings not in (Verdict.NAMED, Verdict.PARTLY):
         return ()
@@ -131,16 +132,16 @@ def _sure_of_rings(examined: Examined | None, rings: Verdict, unexplained: bool)
 
 
 def _is_nameless(examined: Examined | None, rings: Verdict) -> bool:
-    """Return whether rings show what no effect of the library explains."""
+    """Return whether rings show something that no effect of the library explains."""
     best = examined.best if examined is not None else None
     return rings is Verdict.UNEXPLAINED or (rings is Verdict.PARTLY and best is not None and not best.named)
 
 
 def verdict_of_rings(examined: Examined | None, claimed: bool) -> Verdict:
-    """Return what rings and fiducials of a gauge run come to beside what other channels claim, if anything.
+    """Return the verdict of rings and fiducials of a gauge run, given what other channels claim, if anything.
 
-    Where something touches them for which nothing is still the likeliest pattern, it is the claim's doing:
-    play or a slip pulls at the poses too.
+    Where rings deviate but "no effect" is still the likeliest explanation, the claimed effect is taken to be
+    the cause: play or a slip disturbs the poses, too.
     """
     if examined is None:
         return Verdict.NOT_IDENTIFIABLE
@@ -157,9 +158,9 @@ def _next(said: _Said, asked: Sequence[str]) -> str:
 
 
 def _identifiable(said: _Said, examined: Examined | None, encoder_otherwise: bool) -> str:
-    """Return what is determined all the same: the size each unsure cause would have, or an empirical formula.
+    """Return what is determined in any case: a size for each uncertain cause, or an empirical formula.
 
-    ``encoder_otherwise``: something with another course may be in the place of an encoder's effect.
+    With ``encoder_otherwise``, the effect on the encoder may have another course than the named one.
     """
     if said.verdict is Verdict.CLASS or said.unsure:
         unknown = (*_unknown(examined), *(_OF_ENCODER,) * encoder_otherwise)
@@ -170,14 +171,14 @@ def _identifiable(said: _Said, examined: Examined | None, encoder_otherwise: boo
 
 
 def _unknown(examined: Examined | None) -> tuple[str, ...]:
-    """Return the likeliest of what the library lacks and would show so, in words."""
+    """Return, in words, the likeliest causes that are not in the library but would look like this."""
     if examined is None:
         return ()
     return (*of_gauge.unknown_rivals(examined), *of_gauge.like_a_name(examined))[:1]
 
 
 def _beyond(claims: Sequence[Claim], effects: Sequence[EffectFound]) -> list[Claim]:
-    """Return the claims that the effects found in rings and fiducials do not already make."""
+    """Return the claims that are not already covered by effects found in rings and fiducials."""
     names = {e.name for e in effects}
     rocking = [e.parameters["frequency_hz"].value for e in effects if e.name == "laser_rocking"]
     out = []
@@ -190,7 +191,7 @@ def _beyond(claims: Sequence[Claim], effects: Sequence[EffectFound]) -> list[Cla
 
 
 def _location(examined: Examined | None, claims: Sequence[Claim], asked: Sequence[str]) -> Location | None:
-    """Return the place as far as it was measured, and for the rest what all causes in question share."""
+    """Return the location as far as it was measured, and otherwise what all candidate causes share."""
     of_claims = bool(asked) and set(asked) <= {c.name for c in claims}
     if examined is not None and examined.location is not None and not of_claims:
         return examined.location
@@ -206,14 +207,14 @@ def _location(examined: Examined | None, claims: Sequence[Claim], asked: Sequenc
 
 
 def _unexplained_profile(*recordings: Seen | None) -> tuple[str, ...]:
-    """Return sentences on what the lines' profiles show and no shape with a name fits."""
+    """Return sentences on features of the lines' profiles that no named shape fits."""
     profiles = [(s.name, s.profile) for s in recordings if s is not None and s.profile is not None]
     return tuple(f"{name}: {p.unexplained.statement}" for name, p in profiles if p.unexplained is not None)
 
 
 @dataclass(frozen=True)
 class _Untold:
-    """What is between motion and encoder and has no name; whether a slip may have made it."""
+    """An unnamed difference between motion and encoder, and whether a slip may have made it."""
 
     sentence: str
     location: Location
@@ -221,10 +222,10 @@ class _Untold:
 
 
 def _unexplained_travel(*recordings: Seen | None) -> list[_Untold]:
-    """Return what is between motion and encoder and may be a slip or stray pictures, or nothing explains.
+    """Return differences between motion and encoder that may be a slip or stray pictures, or are unexplained.
 
-    Several steps in one recording that may all be stray pictures may have a cause that nobody knows, and so
-    may one beside what no slip explains.
+    Several doubtful steps in one recording may have one unknown cause, and so may a step beside something
+    that no slip explains.
     """
     out = []
     for name, travel in ((s.name, s.travel) for s in recordings if s is not None and s.travel is not None):
@@ -240,7 +241,7 @@ def _unexplained_travel(*recordings: Seen | None) -> list[_Untold]:
 
 
 def _global_p(field: Seen | None, gauge: Seen | None) -> float:
-    """Return the least chance of all channels, counted as often as channels show anything at all."""
+    """Return the smallest p-value of all channels, times the number of channels that show anything."""
     each = []
     for seen in (field, gauge):
         if seen is None:

@@ -1,4 +1,4 @@
-"""The stated probe, and the encoder's readings, with what was found put in."""
+"""Apply the effects that were found to the stated probe and to the encoder's readings."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from stages.diagnose.inference import INSTRUMENT, Column, Evidence, Stated, esti
 from stages.diagnose.result import EffectFound
 
 Change = Callable[[dict[str, float], Float, Shape], None]
-# A longer exposure makes pictures late, so that readings seem late by what it adds to their own delay.
+# A longer exposure delays pictures: readings then appear late by that delay, in addition to their own.
 _OF_ENCODER = {
     "encoder_scale": "relative", "encoder_slip": "slip_mm", "encoder_backlash": "backlash_mm",
     "time_offset": "delay_s", "motion_blur": "late_s",
@@ -39,19 +39,20 @@ _OF_CAMERA = frozenset({"principal_point", "focal_scale", "pixel_aspect", "radia
 
 
 def encoder_effects(effects: Sequence[EffectFound]) -> tuple[EffectFound, ...]:
-    """Return the effects that falsify the inspection's readings."""
+    """Return the effects that falsify the inspection's encoder readings."""
     return tuple(e for e in effects if e.name in _OF_ENCODER and e.recording != "gauge")
 
 
 def with_true_readings(recording: Recording, effects: Sequence[EffectFound]) -> Recording:
-    """Return the recording with its encoder's readings as they would be without the effects.
+    """Return the recording with its encoder's readings corrected for the effects.
 
-    Its ``content_key`` stays: whoever stores results by it has to tell the readings apart.
+    Its ``content_key`` stays the same: a caller that stores results by it must distinguish the readings
+    itself.
     """
     if recording.encoder is None:
         return recording
     encoder, found = recording.encoder, encoder_effects(effects)
-    # Steps first: what is left of one would look like speed to the others.
+    # Steps first: the rest of one would look like a dependence on speed to the other effects.
     reading = encoder.distance_mm - _shift(encoder, encoder.distance_mm, [e for e in found if _shape(e)])
     smooth, true = [e for e in found if not _shape(e)], reading
     for _ in range(_ROUNDS):
@@ -60,7 +61,7 @@ def with_true_readings(recording: Recording, effects: Sequence[EffectFound]) -> 
 
 
 def _shift(encoder: Encoder, true_mm: Float, effects: Sequence[EffectFound]) -> Float:
-    """Return by how much effects falsify readings (N,) of a way (N,)."""
+    """Return by how much the effects falsify readings (N,), mm, at true distances (N,), mm."""
     travel = Travel(encoder.time_s, true_mm, np.gradient(true_mm, encoder.time_s))
     shift = np.zeros(len(true_mm))
     for e in effects:
@@ -69,7 +70,7 @@ def _shift(encoder: Encoder, true_mm: Float, effects: Sequence[EffectFound]) -> 
 
 
 def _size(effect: EffectFound) -> float:
-    """Return the size; of a longer exposure what the encoder shows of it, nothing where none shows any."""
+    """Return the size of an effect; for a longer exposure, only the delay that the encoder shows."""
     size = effect.parameters.get(_OF_ENCODER[effect.name])
     if effect.name == "motion_blur":
         return 2 * size.value if size is not None else 0.0
@@ -81,7 +82,7 @@ def _shape(effect: EffectFound) -> Shape:
 
 
 def _adds(*names: str, unit: float = 1.0) -> Change:
-    """Return that each amplitude, times ``unit``, is added to a parameter."""
+    """Return a change that adds each amplitude, times ``unit``, to a parameter of the probe."""
 
     def change(p: dict[str, float], a: Float, shape: Shape) -> None:
         for name, value in zip(names, a, strict=True):
@@ -113,7 +114,7 @@ def _aspect(p: dict[str, float], a: Float, shape: Shape) -> None:
     p["fy"] /= float(np.sqrt(1 + a[0]))
 
 
-# Effects that a probe file can express, and how.
+# Effects that a probe file can express, and the change of its parameters.
 CHANGES: Mapping[str, Change] = MappingProxyType({
     "laser_tilt": _tilt, "laser_cone": _adds("cone_rad", unit=float(np.radians(1.0))),
     "baseline": _adds("baseline_mm"), "beam_decentre": _adds("decentre_x_mm", "decentre_y_mm"),
@@ -124,13 +125,13 @@ CHANGES: Mapping[str, Change] = MappingProxyType({
 
 @dataclass(frozen=True)
 class Correction:
-    """The stated probe with what a gauge run found put in.
+    """The stated probe with the effects that a gauge run found.
 
     Attributes
     ----------
     probe : Probe
     put_in, unsaid : tuple of str
-        Effects that the probe now has, and those that a probe file cannot express.
+        Effects that the probe now contains, and those that a probe file cannot express.
     """
 
     probe: Probe
@@ -139,7 +140,7 @@ class Correction:
 
 
 def correction_by_gauge(examined: Examined, probe: Probe, stated: Stated, source: str) -> Correction:
-    """Return the probe as the gauge run's likeliest explanation has it, with what that is worth."""
+    """Return the probe of the gauge run's likeliest explanation, with its uncertainty."""
     found = examined.best.fit if examined.best is not None else examined.searched.found
     names = [t.model.name for t in found.terms]
     known = evidence(examined.searched.run, found, ())[0]
@@ -157,13 +158,13 @@ def correction_by_gauge(examined: Examined, probe: Probe, stated: Stated, source
 
 @dataclass(frozen=True)
 class Corrected:
-    """What a gauge run makes of the stated probe; None where it tells nothing of it."""
+    """The probe corrected by a gauge run; None where the run determines nothing of it."""
 
     correction: Correction | None
 
 
 def correct(seen: Seen, probe: Probe, *, parameters: Parameters, context: Context) -> Corrected:
-    """Put what a gauge run shows into the stated probe."""
+    """Apply the effects that a gauge run shows to the stated probe."""
     if seen.geometry is None:
         return Corrected(None)
     return Corrected(correction_by_gauge(seen.geometry, probe, stated_belief(probe), seen.name))
@@ -176,7 +177,7 @@ class CorrectedMotion:
     adjusted: Adjusted | None
 
     def run(self, stated: FieldRun, correction: Correction) -> FieldRun | None:
-        """Return the adjusted run of the stated one and the correction that it was made from."""
+        """Return the adjusted run, given the stated run and the correction it was made from."""
         if self.adjusted is None:
             return None
         return replace(stated, probe=correction.probe, **vars(self.adjusted))
@@ -193,7 +194,7 @@ def adjust_corrected(
     parameters: Parameters,
     context: Context,
 ) -> CorrectedMotion:
-    """Adjust an inspection anew with the probe that its gauge run corrects."""
+    """Adjust an inspection again with the probe that its gauge run corrects."""
     run = motion.run(frames.applied_to(recording), probe, rings)
     if run is None or corrected.correction is None:
         return CorrectedMotion(None)
@@ -203,7 +204,7 @@ def adjust_corrected(
         return CorrectedMotion(None)
 
 
-CORRECTION = Stage("correction", "1", Parameters, correct, "the stated probe with what was found put in")
+CORRECTION = Stage("correction", "1", Parameters, correct, "the stated probe with the effects found")
 CORRECTED_MOTION = Stage(
     "corrected_motion", "1", Parameters, adjust_corrected, "an inspection's motion with the corrected probe"
 )
@@ -211,7 +212,7 @@ CORRECTED_MOTION = Stage(
 
 @dataclass(frozen=True)
 class _Parameters:
-    """The probe's parameters as a function of evidence's columns, true − stated."""
+    """The probe's parameters as a function of the columns of the evidence, true − stated."""
 
     probe: Probe
     columns: tuple[Column, ...]
@@ -223,7 +224,7 @@ class _Parameters:
         return name in CHANGES and (known or name not in _OF_CAMERA)
 
     def middle(self, instrument: Float) -> Float:
-        """Return the columns' values (K,) of the instrument's corrections (P,) and the terms."""
+        """Return the columns' values (K,) from the instrument's corrections (P,) and the terms."""
         of_instrument = dict(zip(self.probe.parameter_names, instrument, strict=True))
         of_terms = {
             _column(t, a): float(v)
@@ -250,7 +251,7 @@ class _Parameters:
         return np.array([values[n] for n in self.probe.parameter_names])
 
     def slope(self, x: Float, step: Float) -> Float:
-        """Return (P, K) derivatives, over ± ``step`` (K,)."""
+        """Return the derivatives (P, K), by differences over ± ``step`` (K,)."""
         moves = np.diag(np.maximum(step, 1e-12))
         return np.stack([(self.of(x + m) - self.of(x - m)) / (2 * m.sum()) for m in moves], axis=1)
 
@@ -260,7 +261,7 @@ def _column(term: Term, amplitude: Amplitude) -> Column:
 
 
 def _spread(known: Evidence, stated: Stated, terms: Sequence[Term]) -> Float:
-    """Return the true covariance (K, K) of the estimate: neighbours that err alike counted once."""
+    """Return the true covariance (K, K) of the estimate, with correlated neighbours counted once."""
     found = estimate(known, stated, prior_sigma(known, terms)).covariance
     excess = known.score_covariance - known.information
     return np.asarray(found + found @ excess @ found)

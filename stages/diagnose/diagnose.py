@@ -1,4 +1,4 @@
-"""Left-out physics: what could be seen, what is seen, what it is, and what else bears it out."""
+"""The stage that diagnoses left-out physics: it combines all evidence, names causes and confirms them."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ _SHEET = ("tilt_x", "tilt_y", "cone_rad")
 
 @dataclass(frozen=True)
 class Noticed:
-    """What the command noticed of the recordings, to be told with the answer."""
+    """What the command noticed in the recordings, to be reported with the diagnosis."""
 
     sentences: tuple[str, ...] = ()
 
@@ -60,7 +60,7 @@ class Diagnosed:
     ----------
     found : Diagnosis
     probe : Probe
-        As corrected; as stated without a gauge run that tells the instrument.
+        Corrected; as stated without a gauge run that determines the instrument.
     image : OnImage or None
         The residual on one picture.
     """
@@ -87,9 +87,9 @@ def diagnose(
     parameters: DiagnosisParameters,
     context: Context,
 ) -> Diagnosed:
-    """Bring together what an inspection and a gauge run of one probe say; either may be missing.
+    """Combine the evidence of an inspection and of a gauge run of one probe; either may be missing.
 
-    Effects ``parameters.without`` which the library has to do may be seen, but not named.
+    Effects in ``parameters.without`` may be seen, but not named.
     """
     correction = corrected.correction if corrected is not None else None
     run, run_corrected = None, None
@@ -129,9 +129,9 @@ def _by_correction(
     probe: Probe,
     without: Sequence[str],
 ) -> tuple[Seen | None, Seen | None]:
-    """Return what field and gauge say, less what the correction of the probe explains or forbids."""
+    """Return the evidence of both recordings, without what the probe's correction explains or excludes."""
     if field is not None and corrected is not None:
-        # The scale of the way seen is the instrument's: what is wrong with that is not the encoder's.
+        # The scale of the motion seen depends on the instrument: an error of that is not the encoder's.
         field = _with_travel(field, travel_of_run(corrected, "field with the corrected probe", without))
     if field is not None and correction is not None and correction.unsaid:
         field = _without_scale(field, correction.unsaid)
@@ -142,13 +142,13 @@ def _by_correction(
 
 
 _NOT_CORRECTED = (
-    "The probe file is written as it was stated: with what was found put in, rings that had no part in the "
-    "fit lie farther from where they are expected."
+    "The probe file is written as it was stated: with the effects that were found, held-out rings would lie "
+    "farther from their expected places."
 )
 
 
 def _worse(fit: FitQuality | None) -> bool:
-    """Return whether measurements that were held out fit worse after the correction than before."""
+    """Return whether held-out measurements fit worse after the correction than before."""
     return fit is not None and fit.heldout_after > fit.heldout_before
 
 
@@ -160,7 +160,7 @@ def _with_travel(seen: Seen, travel: TravelEvidence | None) -> Seen:
 
 
 def _without_scale(seen: Seen, unsaid: Sequence[str]) -> Seen:
-    """Return the field without the encoder's scale: its way is seen with an instrument in part wrong."""
+    """Return the inspection's evidence without the encoder's scale, if the instrument is partly wrong."""
     if seen.travel is None:
         return seen
     kept = tuple(e for e in seen.travel.estimates if e.effect != "encoder_scale")
@@ -174,7 +174,7 @@ def _without_scale(seen: Seen, unsaid: Sequence[str]) -> Seen:
 
 DIAGNOSIS = Stage(
     "diagnosis", "34", DiagnosisParameters, diagnose,
-    "what physics was left out, where it shows, and what bears it out",
+    "what physics was left out, where it shows, and what confirms it",
 )  # fmt: skip
 _OF_FIELD = (PREMISES, RINGS, TRIANGULATE, LINE_PROFILE, FREE_MOTION, FIELD_EVIDENCE)
 _OF_GAUGE = (PREMISES, RINGS, LINE_PROFILE, FIDUCIALS, GAUGE_EVIDENCE, CORRECTION)
@@ -190,7 +190,7 @@ def diagnosis_stages(with_field: bool, with_gauge: bool) -> tuple[Stage, ...]:
 
 @dataclass(frozen=True)
 class SheetByRings:
-    """What the rings of a gauge run say of the laser sheet.
+    """The laser sheet as the rings of a gauge run determine it.
 
     Attributes
     ----------
@@ -204,7 +204,7 @@ class SheetByRings:
 
 
 def sheet_by_rings(gauge: Seen | None, correction: Correction | None, probe: Probe) -> SheetByRings | None:
-    """Return the sheet as a gauge run's rings have it; None where they leave open what moved them."""
+    """Return the sheet from a gauge run's rings; None where they leave open what displaced them."""
     if gauge is None or gauge.geometry is None or correction is None:
         return None
     if verdict_of(gauge.geometry) not in (Verdict.CONSISTENT, Verdict.NAMED):
@@ -215,9 +215,9 @@ def sheet_by_rings(gauge: Seen | None, correction: Correction | None, probe: Pro
 
 
 def against_rings(found: Finding, sheet: SheetByRings) -> Agreement | None:
-    """Return whether the sheet that a second line's place asks for is that of the rings.
+    """Return whether the sheet implied by the place of a second line agrees with that of the rings.
 
-    None where either tells too little of the sheet.
+    None where either determines the sheet too poorly.
     """
     value = np.array([size.value for size in found.confirms])
     covariance = np.diag([size.sigma**2 for size in found.confirms])
@@ -229,10 +229,10 @@ def against_rings(found: Finding, sheet: SheetByRings) -> Agreement | None:
 
 
 def held_against_rings(seen: Seen, sheet: SheetByRings) -> Seen:
-    """Return what a recording says, its second line borne out by the rings or withdrawn.
+    """Return a recording's evidence with its second line confirmed by the rings, or withdrawn.
 
-    A faint line whose place asks for a sheet that the rings exclude is not light bounced across the bore.
-    Compression, the lens and the wall leave such light too.
+    A faint line whose place implies a sheet that the rings exclude is not light bounced across the bore.
+    Compression, the lens and the wall leave such light, too.
     """
     if seen.profile is None:
         return seen
@@ -246,7 +246,7 @@ def held_against_rings(seen: Seen, sheet: SheetByRings) -> Seen:
     withdrawn = replace(second, p_value=1.0, confirms=(), agreements=())
     words = (
         f"The line's profile of {seen.name} shows faint light beside the line. It is not light "
-        f"bounced across the bore: its place would ask for {told.confirmation.measured.partition(': ')[2]}, "
+        f"bounced across the bore: its place would require {told.confirmation.measured.partition(': ')[2]}, "
         f"and the rings say {told.confirmation.prediction.partition(': ')[2]}."
     )
     return replace(

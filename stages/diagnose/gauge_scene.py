@@ -1,4 +1,4 @@
-"""The scene of a recorded gauge run, so that the simulator can render it again with effects."""
+"""The scene of a recorded gauge run, which the simulator can render again with effects."""
 
 from __future__ import annotations
 
@@ -23,7 +23,8 @@ from pipeline.simulator.wall.grid import Wall, WallGrid
 from stages.calibrate.gauge.geometry import gauge_of
 
 _BEYOND_MM, _STEP_MM, _COLUMNS = 300.0, 0.1, 16
-"""The wall reaches so far beyond the way; its step is finer than the chamfer of a bore; a bore is round."""
+"""How far the wall extends beyond the probe's path, mm; its step along the pipe, mm, finer than the chamfer
+of a bore; columns around: a bore is round."""
 
 
 def gauge_scene(recording: Recording, stated: Probe, probe: Probe, T_pc: Float) -> SceneTruth:
@@ -34,7 +35,7 @@ def gauge_scene(recording: Recording, stated: Probe, probe: Probe, T_pc: Float) 
     recording : Recording
         Of a gauge with fiducials.
     stated, probe : Probe
-        What probe.yaml says, and the instrument that is rendered.
+        The instrument as in probe.yaml, and the one that is rendered.
     T_pc : (N, 4, 4)
         The camera's pose in every frame.
     """

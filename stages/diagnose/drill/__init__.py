@@ -1,1 +1,1 @@
-"""Drill: diagnoses of recordings with concealed effects, held against what was concealed."""
+"""Drill: diagnose recordings with concealed effects, and compare the answers with what was concealed."""

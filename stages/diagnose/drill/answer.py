@@ -1,4 +1,4 @@
-"""A diagnosis and its truth as read from files, whoever wrote them."""
+"""A diagnosis and its truth, as read from files of any origin."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ class _Read(BaseModel):
 
 
 class Value(_Read):
-    """A number and its 1 σ; NaN where it is not known."""
+    """A number and its 1 σ; NaN where unknown."""
 
     value: Number
     sd: Number
 
 
 class NamedEffect(_Read):
-    """One effect that a diagnosis names; ``course`` is None for one that is constant."""
+    """One effect that a diagnosis names; ``course`` is None for a constant effect."""
 
     name: str
     probability: float = Field(ge=0, le=1)
@@ -37,7 +37,7 @@ class NamedEffect(_Read):
 
 
 class Location(_Read):
-    """Where a diagnosis says the mismatch is."""
+    """Where a diagnosis locates the mismatch."""
 
     channel: str = ""
     fixed_to: str = ""
@@ -45,7 +45,7 @@ class Location(_Read):
 
 
 class Fit(_Read):
-    """Residuals before and after the diagnosis' model; NaN where they are not known."""
+    """Residuals before and after applying the diagnosis; NaN where unknown."""
 
     rms_before: Number
     rms_after: Number
@@ -55,14 +55,14 @@ class Fit(_Read):
 
 
 class Feasibility(_Read):
-    """What a diagnosis says beforehand that the recording could show of one effect.
+    """What a diagnosis predicts that the recording could show of one effect.
 
     Attributes
     ----------
     detectable : float
         Size that would stand out by 5 σ.
     left : float
-        Share of its information that is left when its closest rival is free.
+        Share of its information that remains when its closest rival is free.
     """
 
     name: str
@@ -71,31 +71,31 @@ class Feasibility(_Read):
 
 
 class Remainder(_Read):
-    """What a diagnosis leaves beside effects that are sure: a class, or what nothing explains."""
+    """What a diagnosis leaves beside the certain effects: a class, or something unexplained."""
 
     verdict: Literal["class", "unexplained"]
     members: tuple[str, ...] = Field((), alias="class")
 
 
 class Answer(_Read):
-    """What is read of a diagnosis.json; further keys are left alone.
+    """The keys of a diagnosis.json that are read; others are ignored.
 
     Attributes
     ----------
     verdict : str
     global_p : float or None
-        Chance of so much mismatch where nothing is left out; None where it is not known.
+        Probability of as large a mismatch if no physics is left out; None where unknown.
     location : Location or None
     effects : tuple of NamedEffect
         The effects named, each with its probability, and its parameters with 1 σ.
     members : tuple of str
-        The class, which diagnosis.json calls ``class``: effects that cannot be told apart here.
+        Effects that cannot be distinguished here; ``class`` in diagnosis.json.
     remainder : Remainder or None
         What is left beside the effects, when the verdict is ``partly``.
     fit : Fit or None
     feasibility : tuple of Feasibility
     record_next : str
-        What to record to tell more; empty where nothing is asked for.
+        What to record to learn more; empty where nothing is needed.
     """
 
     verdict: Verdict
@@ -150,7 +150,7 @@ def read_concealed(file: Path) -> tuple[Concealed, ...]:
 
 
 def _numbers(values: object) -> tuple[float, ...]:
-    """Return one number or a list of them as a tuple; words among them are left out."""
+    """Return one number or a list of them as a tuple, without any words among them."""
     listed = values if isinstance(values, list | tuple) else [values]
     return tuple(float(v) for v in listed if isinstance(v, int | float))
 

@@ -1,4 +1,4 @@
-"""The recordings of a drill, where their truth is, and a diagnosis in a process that never sees it."""
+"""The recordings of a drill, their truth, and a diagnosis in a process that never sees that truth."""
 
 from __future__ import annotations
 
@@ -33,13 +33,13 @@ class DiagnosisFailedError(BoresightError):
 
     @property
     def was_stopped(self) -> bool:
-        """Whether a signal ended it, so that the same command goes on with it."""
+        """Whether a signal ended it, so that the same command can continue it."""
         return self.code < 0 or self.code == 128 + signal.SIGINT
 
 
 @dataclass(frozen=True)
 class Case:
-    """Recordings of one probe; at least one of ``gauge`` and ``field`` is there."""
+    """Recordings of one probe; at least one of ``gauge`` and ``field`` exists."""
 
     name: str
     gauge: Path | None
@@ -67,10 +67,10 @@ def find_cases(folder: Path) -> tuple[Case, ...]:
 
 
 def diagnose_apart(case: Case, output: Path, without: tuple[str, ...] = ()) -> None:
-    """Diagnose a case in a process of its own that is told the recordings and nothing else.
+    """Diagnose a case in a separate process that is given the recordings and nothing else.
 
-    It is given them in a folder beside which there is no truth. An answer that is there already is kept; a
-    diagnosis that was stopped goes on from the results of its completed stages.
+    The recordings are in a folder without any truth beside it. An existing answer is kept; a diagnosis that
+    was stopped continues from the results of its completed stages.
 
     Raises
     ------
@@ -86,7 +86,7 @@ def diagnose_apart(case: Case, output: Path, without: tuple[str, ...] = ()) -> N
 
 
 def _apart(output: Path) -> Path:
-    """Return the folder in which the diagnosis with this output is at work."""
+    """Return the folder in which the diagnosis with this output works."""
     return output.with_name(_APART + output.name)
 
 
@@ -117,7 +117,7 @@ def _diagnose_into(case: Case, output: Path, without: tuple[str, ...]) -> None:
 
 
 def _alone(case: Case, folder: Path) -> Case:
-    """Return the case with its recordings in a folder of their own, by hard links where they can be made."""
+    """Return the case with its recordings in a folder of their own, by hard links where possible."""
     parts = {}
     for kind, path in (("gauge", case.gauge), ("field", case.field)):
         parts[kind] = None if path is None else folder / path.name
@@ -134,7 +134,7 @@ def _link(source: str, target: str) -> None:
 
 
 def trial_of(case: Case, answer: Path, truth: Path, left_out: tuple[str, ...] = ()) -> Trial:
-    """Open the truth of a case and put it beside the answer; without an answer, nothing was identified.
+    """Read the truth of a case and combine it with the answer; without an answer, nothing was identified.
 
     Raises
     ------
@@ -147,7 +147,7 @@ def trial_of(case: Case, answer: Path, truth: Path, left_out: tuple[str, ...] = 
 
 
 def concealed_in(case: Case, truth: Path) -> tuple[Concealed, ...]:
-    """Return what the recordings of a case conceal together, from ``truth``/NAME-KIND/truth.json."""
+    """Return the effects concealed in all recordings of a case, from ``truth``/NAME-KIND/truth.json."""
     effects: dict[str, Concealed] = {}
     for path in (case.gauge, case.field):
         if path is not None:

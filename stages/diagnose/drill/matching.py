@@ -1,4 +1,4 @@
-"""Names that a diagnosis gives beside what is concealed, one to one."""
+"""Match the names that a diagnosis gives with what is concealed, one to one."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ from scipy.optimize import linear_sum_assignment
 from pipeline.physics.catalogue import EFFECTS
 from stages.diagnose.drill.answer import Concealed, NamedEffect
 
-# More than the numbers of one law can differ: each by its whole range.
+# Distance between different laws: more than the numbers of one law can differ, each by its whole range.
 _STRANGERS = 1e3
-# The quantity that is a whole number.
+# The quantity that is an integer.
 _WHOLE = "order"
 
 
 def matched(
     given: Sequence[NamedEffect], concealed: Sequence[Concealed]
 ) -> list[tuple[NamedEffect, Concealed]]:
-    """Return names with what they name, one to one; laws that come twice so that their numbers differ least.
+    """Return names with the concealed effects they match, one to one; repeated laws by nearest numbers.
 
-    Numbers differ by shares of what the catalogue allows them. Waves of another order are another effect.
+    Differences are relative to the range in the catalogue. A wave of another order is another effect.
     """
     apart = np.array([[_apart(e, c) for c in concealed] for e in given]).reshape(len(given), len(concealed))
     pairs = np.stack(linear_sum_assignment(np.minimum(apart, _STRANGERS)), -1).tolist()
@@ -31,7 +31,7 @@ def matched(
 def _apart(named: NamedEffect, truth: Concealed) -> float:
     if named.name != truth.name:
         return np.inf
-    # What is on pictures alone is not in the catalogue.
+    # An effect of pictures only is not in the catalogue.
     each = zip(EFFECTS[truth.name].quantities, truth.values, strict=False) if truth.name in EFFECTS else ()
     known = [(q, named.parameters[q.name].value - v) for q, v in each if q.name in named.parameters]
     if any(q.name == _WHOLE and abs(d) > 0.5 for q, d in known):

@@ -1,4 +1,4 @@
-"""Scores of diagnoses: rates with goals and intervals, sizes, probabilities, and the confusion of names."""
+"""Scores of diagnoses: rates with goals and intervals, errors of sizes, calibration, confusion of names."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _PROBABILITIES = (0.0, 0.5, 0.8, 0.95, 1.0001)
 
 @dataclass(frozen=True)
 class Trial:
-    """One recording with what it conceals and what was said of it.
+    """One recording with what it conceals, and the answer to it.
 
     Attributes
     ----------
@@ -34,7 +34,8 @@ class Trial:
     left_out : tuple of str
         Effects that the library had to do without.
     oracle_snr : float or None
-        True size over the 1 σ of one who knows the name; None where only the answer's own feasibility tells.
+        True size over the 1 σ of an estimator that knows the name; None where only the answer's own
+        feasibility is known.
     """
 
     name: str
@@ -56,7 +57,7 @@ class Trial:
     def identifiable(self) -> bool:
         """Whether every concealed effect stands out by 5 σ even with its closest rival free.
 
-        By the answer's feasibility; where that is silent, by the oracle's SNR alone.
+        By the answer's feasibility; where that is missing, by the oracle's SNR alone.
         """
         if not self.concealed:
             return False
@@ -81,23 +82,23 @@ class Trial:
 
     @property
     def right(self) -> list[tuple[NamedEffect, Concealed]]:
-        """Names with what they rightly name, one to one."""
+        """Names that match a concealed effect, with that effect, one to one."""
         return matched(self.given, self.concealed)
 
     @property
     def found(self) -> bool:
-        """Whether the answer says that something was left out."""
+        """Whether the answer says that physics was left out."""
         return self.answer.verdict in _FOUND
 
     @property
     def exact(self) -> bool:
-        """Whether all that is concealed, and nothing else, is named, and nothing said to be left."""
+        """Whether exactly what is concealed is named, and nothing is said to be left."""
         count = len(self.right)
         return self.answer.verdict == "named" and 0 < count == len(self.given) == len(self.concealed)
 
     @property
     def misnamed(self) -> bool:
-        """Whether a name is given that is not concealed, or more often than it is, or with another order."""
+        """Whether a name is wrong, given more often than it is concealed, or has another order."""
         return len(self.right) < len(self.given)
 
     @property
@@ -116,7 +117,7 @@ class Rate:
 
     @property
     def share(self) -> float:
-        """Share; NaN of none."""
+        """Share; NaN without trials."""
         return self.count / self.of if self.of else float("nan")
 
     @property
@@ -149,7 +150,7 @@ class Figure:
 
     @property
     def count(self) -> int:
-        """How many of a share's trials."""
+        """Number of hits of a share."""
         return round((self.value or 0.0) * self.of)
 
     @property
@@ -164,7 +165,7 @@ class Figure:
         return f"{self.words}: {self.count} of {self.of}, {self.value:.1%} [{low:.1%}, {high:.1%}]{goal}"
 
 
-# Each share, its meaning, its goal (those without are only reported), the trials that it is of, and its hits.
+# For each share: key, meaning, goal (if any), the group of trials it is taken over, and what counts as a hit.
 _RATES: tuple[tuple[str, str, str, str, Callable[[Trial], bool]], ...] = (
     ("false_alarms", "False alarms where nothing is hidden", "0", "null", lambda t: t.found),
     ("detected", "Detected at SNR ≥ 8", "≥ 99 %", "clear", lambda t: t.found),
@@ -183,7 +184,7 @@ _RATES: tuple[tuple[str, str, str, str, Callable[[Trial], bool]], ...] = (
     ("pairs_named", "Pairs: both named", "≥ 90 %", "pairs", lambda t: t.exact),
     ("pairs_identifiable", "Pairs: both named, where both are identifiable", "", "pairs identifiable",
      lambda t: t.exact),
-    ("unknown_owned", "Left out of the library (SNR ≥ 8): unexplained or a class of its likes", "≥ 90 %",
+    ("unknown_owned", "Left out of the library (SNR ≥ 8): unexplained or a class of similar ones", "≥ 90 %",
      "unknown", lambda t: owned(t)),
     ("unknown_misnamed", "Left out of the library (any SNR): confidently misnamed", "≤ 5 %", "left out",
      lambda t: t.misnamed),
@@ -191,7 +192,7 @@ _RATES: tuple[tuple[str, str, str, str, Callable[[Trial], bool]], ...] = (
 
 
 def _sorted(trials: Iterable[Trial]) -> dict[str, list[Trial]]:
-    """Return the trials that shares are of."""
+    """Return the groups of trials over which shares are taken."""
     listed = list(trials)
     null = [t for t in listed if not t.concealed]
     known = [t for t in listed if t.concealed and not t.truth & set(t.left_out)]
@@ -199,11 +200,11 @@ def _sorted(trials: Iterable[Trial]) -> dict[str, list[Trial]]:
     single, pairs = ([t for t in known if (len(t.concealed) > 1) == several] for several in (False, True))
     return {
         "all": listed, "null": null, "known": known, "single": single, "pairs": pairs, "left out": left_out,
-        # An effect too small even for an oracle cannot be expected to be called unexplained.
+        # An effect too small even for the oracle is not expected to be called unexplained.
         "unknown": [t for t in left_out if t.snr is None or t.snr >= SNR],
         "clear": [t for t in known if t.snr is not None and t.snr >= SNR],
         "single found": [t for t in single if t.found],
-        # What is on pictures alone is not in the catalogue: it has no channel.
+        # An effect of pictures only is not in the catalogue and has no channel.
         "found": [t for t in single if t.found and t.truth <= EFFECTS.keys()],
         "single identifiable": [t for t in single if t.identifiable],
         "pairs identifiable": [t for t in pairs if t.identifiable],
@@ -211,7 +212,7 @@ def _sorted(trials: Iterable[Trial]) -> dict[str, list[Trial]]:
 
 
 def figures(trials: Iterable[Trial]) -> tuple[Figure, ...]:
-    """Return the scores of diagnoses against what was concealed, in the demand's order."""
+    """Return the scores of diagnoses against what was concealed."""
     given = _sorted(trials)
     rates = [(name, words, goal, rate(map(hit, given[of]))) for name, words, goal, of, hit in _RATES]
     z = [error for t in given["known"] for error in size_errors(t)]
@@ -228,10 +229,10 @@ def figures(trials: Iterable[Trial]) -> tuple[Figure, ...]:
 
 
 def shuffled(trials: Sequence[Trial]) -> tuple[Trial, ...]:
-    """Return the trials, each with the answer that was given to one which conceals something else.
+    """Return the trials, each with the answer to another trial that conceals something else.
 
-    What still scores well then does not depend on the answers. Where more than half conceal the same, some of
-    these keep an answer to their like.
+    A score that stays high does not depend on the answers. Where more than half of the trials conceal the
+    same, some keep an answer to the same effect.
     """
     order = sorted(range(len(trials)), key=lambda k: sorted(trials[k].truth))
     apart = max(Counter(t.truth for t in trials).values(), default=0)
@@ -240,7 +241,7 @@ def shuffled(trials: Sequence[Trial]) -> tuple[Trial, ...]:
 
 
 def owned(trial: Trial) -> bool:
-    """Whether an effect outside the library is called unexplained, or a class of its likes."""
+    """Whether an effect outside the library is called unexplained, or a class of similar effects."""
     likes = {like for name in trial.truth if name in EFFECTS for like in EFFECTS[name].alike}
     answer = trial.answer
     left = answer.remainder
@@ -257,19 +258,19 @@ def size_errors(trial: Trial) -> list[float]:
 def heldout_removed(answer: Answer) -> float | None:
     """Return the share of the held-out discrepancy above the noise floor that the model removes."""
     fit = answer.fit
-    if fit is None or not fit.heldout_before > 1.05 * fit.noise_floor:  # also where a number is not known
+    if fit is None or not fit.heldout_before > 1.05 * fit.noise_floor:  # also where a number is unknown
         return None
     before, after, floor = (rms**2 for rms in (fit.heldout_before, fit.heldout_after, fit.noise_floor))
     return (before - after) / (before - floor)
 
 
 def confusion(trials: Iterable[Trial]) -> Counter[tuple[str, str]]:
-    """Count (concealed, said); a class or other verdict stands in brackets."""
+    """Count (concealed, answered); a class or other verdict is in brackets."""
     return Counter((_joined(t.truth), _joined(t.said) if t.said else f"({t.answer.verdict})") for t in trials)
 
 
 def calibration(trials: Iterable[Trial]) -> list[tuple[float, Rate]]:
-    """Return for each bin of probability its mean and how often the names given with it were right."""
+    """Return, for each bin of stated probability, its mean and the rate of right names."""
     pairs = [(e.probability, e.name in t.truth) for t in trials for e in t.answer.effects]
     bins = pairwise(_PROBABILITIES)
     inside = ([(p, hit) for p, hit in pairs if low <= p < high] for low, high in bins)

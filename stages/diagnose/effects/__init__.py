@@ -1,1 +1,1 @@
-"""How each known effect changes what is measured; one file for each family."""
+"""How each known effect changes the measurements; one module per family of effects."""

@@ -1,8 +1,8 @@
-"""Interface of an effect: by how much it moves each kind of measurement.
+"""Interface of an effect: how it changes each kind of measurement.
 
 An effect has *amplitudes*, in which predictions are linear near zero (Cartesian where the effect has a
 direction), and a *shape* (frequency, time constant, order) that is searched on a grid. All predictions are
-true minus stated: where the measurement is found, less where the stated instrument would find it.
+true minus stated: where the measurement is found, minus where the stated instrument would find it.
 """
 
 from __future__ import annotations
@@ -34,6 +34,7 @@ class ImagePoints:
     time_s : (M,)
         Since the first frame.
     uv : (M, 2)
+        Image of the point, px.
     xyz_c : (M, 3)
         The wall point in C, mm.
     normal_c : (M, 3)
@@ -41,7 +42,7 @@ class ImagePoints:
     along_c : (M, 3)
         Unit direction of the pipe's distance, in C.
     velocity_px : (M, 2)
-        Motion of the point's image while the camera moves, px/s: of a wall point for texture, of the
+        Velocity of the point's image due to the camera's motion, px/s: of a wall point for texture, of the
         line for rings.
     speed_mm_s : (M,)
         Of the camera along the pipe.
@@ -50,14 +51,15 @@ class ImagePoints:
     line_width_px : (M,)
         1 σ of the line's profile; NaN off the line.
     wall_azimuth_rad, distance_mm : (M,), optional
-        Azimuth and distance of the wall point in P; without them P is taken to have the camera's roll, and
-        effects that follow the distance predict nothing.
+        Azimuth and distance of the wall point in P; without them P is assumed to have the camera's roll, and
+        effects that depend on distance predict nothing.
     per_px_c : (M, 3), optional
-        Way of the line's point in C, mm per px that it is found farther out; none off the line.
+        Displacement in C, mm, of the line's point for each px that it is found farther out; None off the
+        line.
     across_px : (M,), optional
-        By how much the image radius changes over the samples that a point is the mean of.
+        Range of the image radius over the samples that a point averages.
     albedo_slope_per_mm : (M,), optional
-        ∂ ln A of the wall's albedo along the pipe; without it the albedo moves no line.
+        ∂ ln A / ∂s of the wall's albedo along the pipe; without it the albedo displaces no line.
     """
 
     probe: Probe
@@ -79,14 +81,14 @@ class ImagePoints:
 
     @cached_property
     def fraction(self) -> Float:
-        """(M, 2) cosine and sine of 2πρ of the image radius ρ, px, each the mean over a point's samples."""
+        """(M, 2) cosine and sine of 2πρ of the image radius ρ, px, averaged over each point's samples."""
         rho = np.linalg.norm(self.uv - self.probe.camera.centre_px, axis=1)
         left = np.sinc(self.across_px) if self.across_px is not None else np.ones(len(rho))
         return np.asarray(left[:, None] * np.stack([np.cos(2 * np.pi * rho), np.sin(2 * np.pi * rho)], -1))
 
     @cached_property
     def patterns(self) -> dict[tuple[str, Shape, bool], Float]:
-        """What static laws do here, for all their courses: by name, shape, and whether on the line."""
+        """Cache of what static laws predict here, for all courses: by name, shape, and on the line or not."""
         return {}
 
     @cached_property
@@ -111,7 +113,7 @@ class ImagePoints:
 
     @cached_property
     def camera_distance_mm(self) -> Float:
-        """(M,) distance of the camera, not of the wall point, along the pipe; 0 where that is not known."""
+        """(M,) distance of the camera, not of the wall point, along the pipe; 0 where unknown."""
         if self.distance_mm is None:
             return np.zeros(len(self.uv))
         return np.asarray(self.distance_mm - np.sum(self.xyz_c * self.along_c, axis=1))
@@ -123,7 +125,7 @@ class ImagePoints:
 
     @cached_property
     def azimuth_p_rad(self) -> Float:
-        """(M,) azimuth in P, or where the wall faces in C."""
+        """(M,) azimuth in P, or, where that is unknown, of the outward wall normal in C."""
         if self.wall_azimuth_rad is not None:
             return self.wall_azimuth_rad
         return np.asarray(np.arctan2(self.normal_c[:, 1], self.normal_c[:, 0]))
@@ -137,7 +139,7 @@ class ImagePoints:
 
 @dataclass(frozen=True)
 class Travel:
-    """How the camera moved along the pipe, at the frames' times.
+    """Motion of the camera along the pipe, at the frames' times.
 
     Attributes
     ----------
@@ -153,7 +155,7 @@ class Travel:
 
 @dataclass(frozen=True)
 class Amplitude:
-    """One linear amplitude: its name, unit, and how large it may plausibly be (1 σ)."""
+    """One linear amplitude: its name, unit, and plausible size (1 σ of its prior)."""
 
     name: str
     unit: str
@@ -161,25 +163,25 @@ class Amplitude:
 
 
 class EffectModel(ABC):
-    """The prediction of one effect of the catalogue.
+    """The predictions of one effect of the catalogue.
 
-    A prediction that an effect does not make is zero. ``amplitude`` is (Q,), in the order of
-    `amplitudes`; ``shape`` is one of `shapes`.
+    A measurement that the effect does not change has a prediction of zero. ``amplitude`` is (Q,), in the
+    order of `amplitudes`; ``shape`` is one of `shapes`.
     """
 
     name: str
     amplitudes: tuple[Amplitude, ...]
     kind: CourseKind = CourseKind.CONSTANT
-    # 1 σ of what the law leaves out, as a part of the effect's size.
+    # 1 σ of what the law neglects, as a fraction of the effect's size.
     law_sigma: float = 0.002
-    # Whether it may come more than once, at different shapes.
+    # Whether it may occur more than once, with different shapes.
     repeats: bool = False
-    # Whether predictions are proportional to the amplitudes.
+    # Whether predictions are exactly proportional to the amplitudes.
     linear: bool = False
 
     @property
     def law(self) -> str:
-        """Name of the law in the catalogue, whatever its course."""
+        """Name of the law in the catalogue, without its course."""
         return self.name
 
     def course(self, shape: Shape, amplitude: Float) -> dict[str, float]:
@@ -187,7 +189,7 @@ class EffectModel(ABC):
         return {}
 
     def shape_step(self, shape: Shape) -> float | None:
-        """Return by how much the shape's number may be off the grid; None where it is a choice."""
+        """Return the uncertainty of the shape's number between grid points; None for a discrete shape."""
         return None
 
     def shapes(self, duration_s: float, frame_rate: float) -> tuple[Shape, ...]:
@@ -195,27 +197,27 @@ class EffectModel(ABC):
         return ((),)
 
     def factored(self, points: ImagePoints, shape: Shape) -> Factored | None:
-        """Return what a `Product` is made of, else None."""
+        """Return the factors of a `Product`, else None."""
         return None
 
     def image_shift_px(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
-        """Return (M, 2) by which the image of every wall point moves, line or texture alike."""
+        """Return the shift (M, 2) of the image of every wall point, line or texture alike, px."""
         return np.zeros((len(points.uv), 2))
 
     def sheet_shift_mm(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
-        """Return (M,) by which the sheet lies farther along the optical axis at each line point."""
+        """Return the shift (M,) of the sheet forward along the optical axis at each line point, mm."""
         return np.zeros(len(points.uv))
 
     def line_shift_px(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
-        """Return (M,) by which the line's centroid moves outward for photometric reasons."""
+        """Return the outward shift (M,) of the line's centroid for photometric reasons, px."""
         return np.zeros(len(points.uv))
 
     def wall_shift_mm(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
-        """Return (M,) by which the wall itself lies farther out (pipe effects)."""
+        """Return the outward shift (M,) of the wall itself (effects of the pipe), mm."""
         return np.zeros(len(points.uv))
 
     def reading_shift_mm(self, travel: Travel, shape: Shape, amplitude: Float) -> Float:
-        """Return (N,) by which the encoder reads too much."""
+        """Return the excess (N,) of the encoder's reading, mm."""
         return np.zeros(len(travel.time_s))
 
     @abstractmethod
@@ -224,10 +226,10 @@ class EffectModel(ABC):
 
     @abstractmethod
     def statement(self, shape: Shape, amplitude: Float) -> str:
-        """Return the effect in a plain sentence with its size."""
+        """Return a sentence that states the effect with its size."""
 
     def equation(self, shape: Shape, amplitude: Float) -> str:
-        """Return the catalogue's law with the numbers to put into it."""
+        """Return the catalogue's law with its numbers."""
         numbers = (f"{name} = {value:.5g}" for name, value in self.quantities(shape, amplitude).items())
         return f"{effect(self.law).law}, {', '.join(numbers)}"
 
@@ -238,29 +240,29 @@ class EffectModel(ABC):
         return all(low <= found[name] <= high for name, (low, high) in ranges.items() if name in found)
 
 
-# Parts (M,) of a size, a law, and its shape: what an effect is that is a product.
+# Fractions (M,) of the size at each point, a law, and its shape: the factors of a `Product`.
 Factored: TypeAlias = tuple[tuple[Float, ...], EffectModel, Shape]
 
 
 class Product(EffectModel):
-    """A law times parts of its size; the amplitudes are the law's, once for each part."""
+    """A law multiplied by a function of time, speed or place; it has the law's amplitudes once per factor."""
 
     @abstractmethod
     def factored(self, points: ImagePoints, shape: Shape) -> Factored:
-        """Return the parts (M,) of the size that are there, the law, and its shape."""
+        """Return the fractions (M,) of the size at each point, the law, and its shape."""
 
     def image_shift_px(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
-        """Return the law's shift at each point's part of the size."""
+        """Return the law's shift times the fraction of the size at each point, px."""
         each = self._each(points, shape, amplitude)
         return np.asarray(sum(p[:, None] * law.image_shift_px(points, own, a) for p, law, own, a in each))
 
     def sheet_shift_mm(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
-        """Return the law's shift at each point's part of the size."""
+        """Return the law's shift times the fraction of the size at each point, mm."""
         each = self._each(points, shape, amplitude)
         return np.asarray(sum(p * law.sheet_shift_mm(points, own, a) for p, law, own, a in each))
 
     def wall_shift_mm(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
-        """Return the law's shift at each point's part of the size."""
+        """Return the law's shift times the fraction of the size at each point, mm."""
         each = self._each(points, shape, amplitude)
         return np.asarray(sum(p * law.wall_shift_mm(points, own, a) for p, law, own, a in each))
 

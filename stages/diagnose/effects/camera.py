@@ -1,4 +1,4 @@
-"""Effects of the camera: they move the image of every wall point, on the line or off it."""
+"""Effects of the camera: they shift the image of every wall point, on the line or off it."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _STEPS = 6
 
 
 class PrincipalPoint(Directed):
-    """The optical axis meets the image elsewhere."""
+    """The optical axis meets the image at another point than stated."""
 
     name = "principal_point"
     amplitudes = along_x_and_y(name, 0.5)
@@ -29,7 +29,7 @@ class PrincipalPoint(Directed):
 
 
 class FocalScale(Scalar):
-    """The whole image is larger."""
+    """The whole image is larger than stated."""
 
     name = "focal_scale"
     amplitudes = one(name, 1e-3)
@@ -44,7 +44,7 @@ class FocalScale(Scalar):
 
 
 class RadialDistortion(Scalar):
-    """The image radius has k f θ³ more."""
+    """The image radius is larger by k f θ³."""
 
     name = "radial_distortion"
     amplitudes = one(name, 1e-3)
@@ -59,7 +59,7 @@ class RadialDistortion(Scalar):
 
 
 class SensorTilt(Directed):
-    """Brown's decentring on the angle: a sensor that is not square to the axis, or decentred lenses."""
+    """Brown's decentring by the angle: a sensor not perpendicular to the axis, or decentred lenses."""
 
     name = "sensor_tilt"
     amplitudes = along_x_and_y(name, 5e-4)
@@ -76,7 +76,7 @@ class SensorTilt(Directed):
 
 
 class PixelAspect(Scalar):
-    """Pixels are not square as stated: wider images by √(1 + a), lower ones by the same."""
+    """Pixels are not square as stated: the image is wider by √(1 + a) and lower by the same factor."""
 
     name = "pixel_aspect"
     amplitudes = one(name, 1e-3)
@@ -90,7 +90,7 @@ class PixelAspect(Scalar):
 
 
 class PupilShift(Scalar):
-    """The entrance pupil moves along the axis with the field angle, by E = ε (θ/sin θ − 1) forward."""
+    """The entrance pupil moves forward along the axis with the field angle, by E = ε (θ/sin θ − 1)."""
 
     name = "pupil_shift"
     amplitudes = one(name, 0.3)
@@ -100,7 +100,7 @@ class PupilShift(Scalar):
     )
 
     def image_shift_px(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
-        """Return the image from the moved viewpoint, less that from the stated one."""
+        """Return the image from the moved viewpoint minus that from the stated one."""
         seen, theta = points.xyz_c.copy(), points.theta
         for _ in range(_STEPS):
             seen[:, 2] = points.xyz_c[:, 2] - amplitude[0] * (1 / np.sinc(theta / np.pi) - 1)
@@ -109,14 +109,14 @@ class PupilShift(Scalar):
 
 
 class RollingShutter(Scalar):
-    """Rows are exposed one after another; the time of a row is counted from that of the middle row."""
+    """Rows are exposed one after another; the time of a row counts from that of the middle row."""
 
     name = "rolling_shutter"
     amplitudes = one(name, 0.01)
     words = "The shutter is rolling: the last row is exposed {readout_s:.4f} s after the first."
 
     def image_shift_px(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
-        """Return the motion from the middle row's time to the row's own."""
+        """Return the image motion between the middle row's time and the row's own time."""
         height = points.probe.camera.image_size[1]
         row_s = amplitude[0] * ((points.uv[:, 1] + 0.5) / height - 0.5)
         return np.asarray(row_s[:, None] * points.velocity_px)
@@ -159,14 +159,14 @@ class CentreDrift(Drifting):
 
 
 class PixelLocking(Scalar):
-    """The line is found off by a sine of the fraction of a pixel it lies at."""
+    """The measured line is displaced by a sine of its position within a pixel."""
 
     name = "pixel_locking"
     amplitudes = one(name, 0.02)
-    # It is held against the stated centre: one that is off by σ leaves J₀(2πσ) of the wave, .90 at .1 px.
-    # Drawn cases came out 1, 17 and 17 % too small (ring level, .085, .06 and .03 px).
+    # It is computed with the stated centre: a centre wrong by σ px leaves J₀(2πσ) of the wave, .90 at .1 px.
+    # Simulated cases came out 1, 17 and 17 % too small (ring level, .085, .06 and .03 px).
     law_sigma = 0.17
-    words = "The line is found off by {amplitude_px:+.3f} px × sin 2πρ, with its image radius ρ in px."
+    words = "The line is found displaced by {amplitude_px:+.3f} px × sin 2πρ, with its image radius ρ in px."
 
     def line_shift_px(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
         """Return a sin 2πρ."""
@@ -174,13 +174,13 @@ class PixelLocking(Scalar):
 
 
 def image_shift(points: ImagePoints, seen_c: Float) -> Float:
-    """Return (M, 2) by which the image moves when the points are seen as though they were at ``seen_c``."""
+    """Return the image shift (M, 2), px, when the points appear at ``seen_c`` (M, 3), mm, instead."""
     camera = points.probe.camera
     return np.asarray(camera.project(seen_c).uv - points.projected_uv)
 
 
 def focal_px(camera: Camera) -> Float:
-    """Return (2,) px per rad along u and v at the axis."""
+    """Return px per rad (2,) along u and v at the axis."""
     towards = np.array([[_NEAR_AXIS, 0, 1.0], [0, _NEAR_AXIS, 1.0]])
     return np.asarray(np.diag(camera.project(towards).uv - camera.centre_px) / _NEAR_AXIS)
 

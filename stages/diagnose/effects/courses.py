@@ -1,7 +1,7 @@
-"""Laws of the library with a course: a knocked sheet, a lens that warms, a baseline that swings.
+"""Laws of the library with a course in time: a knocked sheet, a lens that warms up, a baseline that swings.
 
-Any geometric law may come with any course. A product that the catalogue has as an effect of its own
-(`laser_rocking`, `baseline_drift`, ...) keeps its own name and model.
+Any geometric law may have any course. Combinations that the catalogue lists as effects (`laser_rocking`,
+`baseline_drift`, ...) keep their own name and model.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ _MOVABLE: Mapping[str, tuple[Shape, ...]] = {
     "sheet_waviness": ((2.0,), (3.0,)), "principal_point": ((),), "focal_scale": ((),),
     "radial_distortion": ((),), "sensor_tilt": ((),), "pixel_aspect": ((),),
 }  # fmt: skip
-# What the catalogue has under names of its own.
+# Combinations that are effects of the catalogue under their own name.
 _NAMED = {
     ("laser_tilt", CourseKind.SINUSOID), ("baseline", CourseKind.EXPONENTIAL),
     ("focal_scale", CourseKind.EXPONENTIAL), ("principal_point", CourseKind.EXPONENTIAL),
@@ -33,23 +33,23 @@ SEARCHED = (
     CourseKind.STEP, CourseKind.RAMP, CourseKind.EXPONENTIAL, CourseKind.SPEED, CourseKind.REVERSAL,
     CourseKind.DISTANCE,
 )  # fmt: skip
-# Courses that tell of times of their own recording alone.
+# Courses whose parameters are times of their own recording.
 _OWN_CLOCK = frozenset({CourseKind.STEP, CourseKind.RAMP, CourseKind.EXPONENTIAL, CourseKind.SINUSOID})
-# Times of a step on the first grid: a step half a cell off (a 64th of the recording) still keeps 97 % of
-# its information in the middle of the recording, n (T − n) / T² of what is before and after.
+# Number of step times on the first grid: a step half a cell off (a 64th of the recording) keeps 97 % of its
+# information in the middle of the recording, n (T − n) / T² with n frames before it.
 _TIMES = 32
-# Share of the recording at either end in which no step is searched: half a second of 7 s shows 8 rings at
-# 15 a second, and from fewer the spread of their common errors is not known.
+# Share of the recording at either end in which no step is searched: half a second of 7 s has 8 rings at 15
+# per second; with fewer, the scatter of their common errors is unknown.
 _EDGE = 1 / 14
 _SHARES = (0.1, 0.2, 0.4, 0.8, 1.6)
 _SPEED_MM_S, _DISTANCE_MM = 20.0, 100.0
-# A probe stands that is slower than a tenth of its fastest so many seconds before and after: after a sudden
-# stop `rates` of `stages.diagnose.gauge.points`, taken over a third of a second and more where frames are
-# few, go back by up to .08 of it, unless the stop is in the last ten frames. It stands, too, where it is
-# slower than a hundredth of its fastest anywhere: noise of poses makes .1 mm/s.
+# A probe counts as standing if for so many seconds before and after it is slower than a tenth of its top
+# speed: after a sudden stop, `rates` of `stages.diagnose.gauge.points`, taken over a third of a second or
+# more, overshoot backward by up to .08 of it, unless the stop is in the last ten frames. It also counts as
+# standing when slower than a hundredth of its top speed: noise of poses makes .1 mm/s.
 _STANDS, _ABOUT_S, _STILL = 0.1, 0.4, 0.01
 _WORDS: Mapping[CourseKind, str] = {
-    CourseKind.STEP: "a step at {time_s:.2f} s: before it there is none of it",
+    CourseKind.STEP: "a step at {time_s:.2f} s: before that it is absent",
     CourseKind.RAMP: "growing evenly from nothing at the first frame to this at {time_s:.1f} s",
     CourseKind.EXPONENTIAL: "grown in the first second, with a time constant of {time_s:.1f} s",
     CourseKind.SINUSOID: "the amplitude of a swing at {frequency_hz:.2f} Hz",
@@ -66,9 +66,9 @@ _FORMULAS: Mapping[CourseKind, str] = {
 
 @dataclass(frozen=True)
 class Coursed(Product):
-    """A law of the library at one shape of its own, with a course; the shape is the course's number.
+    """A law of the library, at one shape of its own, with a course; its shape is the parameter of the course.
 
-    A swing has every amplitude twice: of its sine, then of its cosine.
+    A swing has every amplitude twice: for its sine, then for its cosine.
     """
 
     static: EffectModel
@@ -95,7 +95,7 @@ class Coursed(Product):
         return self.static.law
 
     def shapes(self, duration_s: float, frame_rate: float) -> tuple[Shape, ...]:
-        """Return the course's numbers to be searched; the size of the others is at a fixed reference."""
+        """Return the course's parameters to be searched; courses without one have a fixed reference."""
         if self.kind is CourseKind.STEP:
             inside = _EDGE + (1 - 2 * _EDGE) * (np.arange(_TIMES) + 0.5) / _TIMES
             return tuple((float(t),) for t in duration_s * inside)
@@ -110,11 +110,11 @@ class Coursed(Product):
         return ((reference[self.kind],),) if self.kind in reference else ((),)
 
     def shape_step(self, shape: Shape) -> float | None:
-        """Return a part of the time constant, the step of a frequency; None where nothing is continuous."""
+        """Return a fraction of the time constant, or a frequency step; None if nothing is continuous."""
         return {CourseKind.EXPONENTIAL: 0.3 * sum(shape), CourseKind.SINUSOID: 0.05}.get(self.kind)
 
     def factored(self, points: ImagePoints, shape: Shape) -> Factored:
-        """Return the course's factor, of a swing its sine's and its cosine's, and the law."""
+        """Return the course's factor (for a swing those of sine and cosine), and the law."""
         return factors(self.kind, points, shape), self.static, self.own
 
     def _swing(self, amplitude: Float) -> tuple[Float, float]:
@@ -129,18 +129,18 @@ class Coursed(Product):
         return self._swing(amplitude)[0] if self.kind is CourseKind.SINUSOID else np.asarray(amplitude)
 
     def course(self, shape: Shape, amplitude: Float) -> dict[str, float]:
-        """Return the numbers of the course, the phase of a swing among them."""
+        """Return the parameters of the course, including the phase of a swing."""
         values = shape
         if self.kind is CourseKind.SINUSOID:
             values = (shape[0], self._swing(amplitude)[1])
         return Course(self.kind, values).quantities
 
     def quantities(self, shape: Shape, amplitude: Float) -> dict[str, float]:
-        """Return the law's quantities at its size; the course's numbers stand in `course`."""
+        """Return the law's quantities at its size; the parameters of the course are in `course`."""
         return self.static.quantities(self.own, self._size(amplitude))
 
     def statement(self, shape: Shape, amplitude: Float) -> str:
-        """Return the law's sentence, and how it comes."""
+        """Return the law's sentence, followed by its course."""
         words, size = _WORDS[self.kind].format(**self.course(shape, amplitude)), self._size(amplitude)
         if self.kind is CourseKind.EXPONENTIAL:
             # What it comes to in the end, a short run only continues.
@@ -148,14 +148,14 @@ class Coursed(Product):
         return f"{self.static.statement(self.own, size).rstrip('.')} ({words})."
 
     def equation(self, shape: Shape, amplitude: Float) -> str:
-        """Return the law and its course with the numbers to put into them."""
+        """Return the law and its course with their numbers."""
         known = self.quantities(shape, amplitude) | self.course(shape, amplitude)
         numbers = ", ".join(f"{name} = {value:.5g}" for name, value in known.items())
         return f"({effect(self.law).law}) × ({_FORMULAS[self.kind]}), {numbers}"
 
 
 def of_own_clock(model: EffectModel) -> bool:
-    """Return whether an effect comes at times of its own recording, which no other has to share."""
+    """Return whether an effect depends on times of its own recording, which no other recording shares."""
     return model.kind in _OWN_CLOCK
 
 
@@ -179,7 +179,7 @@ def in_words(kind: CourseKind, shape: Shape) -> str:
 def with_courses(
     library: Mapping[str, EffectModel], kinds: tuple[CourseKind, ...] = SEARCHED
 ) -> dict[str, EffectModel]:
-    """Return the library with every movable law of it also with each course."""
+    """Return the library, with every movable law also in each course."""
     more = [
         Coursed(library[name], own, kind)
         for name, shapes in _MOVABLE.items()
@@ -194,11 +194,11 @@ def with_courses(
 def shape_alike(
     model: EffectModel, other: EffectModel, shape: Shape, amplitude: Float, duration_s: float
 ) -> Shape | None:
-    """Return the shape at which a model grows as another does in a run, if one drifts as the other's ramp.
+    """Return the shape at which a model has nearly the course of another effect; None if there is none.
 
-    A ramp and a slow drift are one curve under two names: with a time constant of 6.4 runs the drift is off
-    a straight line by 1.6 % of its size. What it comes to in the end must be possible, so that only a quicker
-    one, which is bent more, may be in a large ramp's place.
+    A ramp and a slow drift are nearly the same curve: with a time constant of 6.4 recordings, the drift
+    differs from a straight line by 1.6 % of its size. The final size must be possible, so that a large ramp
+    can only be replaced by a quicker drift, which is bent more.
 
     Parameters
     ----------
@@ -216,7 +216,7 @@ def shape_alike(
 
 
 def _stands(time_s: Float, speed: Float) -> Bool:
-    """Return where a probe of such speeds (M,) at times (M,), in any order, stands."""
+    """Return when a probe with speeds (M,) at times (M,), in any order, stands still."""
     if not len(time_s):
         return np.zeros(0, bool)
     order = np.argsort(time_s, kind="stable")

@@ -1,4 +1,4 @@
-"""Patterns of one harmonic that grow with the radius in any way: one law that the library does not have."""
+"""Patterns of one harmonic with any dependence on the radius: one law that the library does not contain."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from stages.diagnose.effects.nameless import GENERIC, STEADY, GenericTerm, Moves
 
 @dataclass(frozen=True)
 class FreeProfile(Nameless):
-    """A harmonic's patterns with all powers of the radius or of θ, each with its own amplitudes."""
+    """The patterns of one harmonic with all powers of the radius or of θ, each with amplitudes of its own."""
 
     name: str
     harmonic: int
@@ -32,11 +32,11 @@ class FreeProfile(Nameless):
         return np.asarray(sum(term.image_shift_px(points, STEADY, a) for term, a in each))
 
     def quantities(self, shape: Shape, amplitude: Float) -> dict[str, float]:
-        """Return the root sum of squares of all amplitudes."""
+        """Return the root of the sum of squares of all amplitudes."""
         return {"amplitude": float(np.linalg.norm(amplitude))}
 
     def goes_with(self, shape: Shape) -> tuple[FixedTo, str, int | None]:
-        """Return what its patterns go with."""
+        """Return what its patterns are fixed to."""
         return self.powers[0].goes_with(STEADY)
 
     def formula(self, shape: Shape) -> str:

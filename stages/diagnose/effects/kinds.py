@@ -1,4 +1,4 @@
-"""What effects have in common: one signed size, a size with a direction, and behaviour in time."""
+"""Common bases of effects: one signed size, a size with a direction, and courses in time."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ _EITHER = re.compile(r"\[([^|]*)\|([^]]*)\]")
 
 @dataclass(frozen=True)
 class Worded(EffectModel):
-    """An effect whose statement is a sentence with its quantities put in.
+    """An effect whose statement is a sentence template filled with its quantities.
 
-    Of ``[farther|nearer]`` the second word stands where the first quantity is negative, which is then told
-    without its sign.
+    In ``[farther|nearer]`` the second word is used where the first quantity is negative, which is then
+    written without its sign.
     """
 
     words: ClassVar[str]
 
     def statement(self, shape: Shape, amplitude: Float) -> str:
-        """Return the effect in a plain sentence with its size."""
+        """Return a sentence that states the effect with its size."""
         quantities, signed = self.told(shape, amplitude), effect(self.name).quantities[0].name
         if "[" in self.words:
             word = 2 if quantities[signed] < 0 else 1
@@ -36,25 +36,25 @@ class Worded(EffectModel):
         return self.words.format(**quantities)
 
     def told(self, shape: Shape, amplitude: Float) -> dict[str, float]:
-        """Return what the sentence tells, by name."""
+        """Return the quantities in the sentence, by name."""
         return self.quantities(shape, amplitude)
 
 
 class Scalar(Worded):
-    """An effect whose one amplitude is the catalogue's first quantity itself."""
+    """An effect with one amplitude, which is the catalogue's first quantity."""
 
     def quantities(self, shape: Shape, amplitude: Float) -> dict[str, float]:
-        """Return the size by its catalogue name."""
+        """Return the size by its name in the catalogue."""
         return {effect(self.name).quantities[0].name: float(amplitude[0])}
 
 
 class Directed(Worded):
-    """An effect with a size and an azimuth ψ₀; amplitudes are its parts along x and y."""
+    """An effect with a size and an azimuth ψ₀; the amplitudes are its components along x and y."""
 
     order: int = 1
 
     def quantities(self, shape: Shape, amplitude: Float) -> dict[str, float]:
-        """Return size and direction of the crest by their catalogue names."""
+        """Return size and direction of the crest by their names in the catalogue."""
         return {
             effect(self.name).quantities[0].name: float(np.hypot(*amplitude)),
             "direction_deg": float(np.degrees(np.arctan2(amplitude[1], amplitude[0])) / self.order),
@@ -62,18 +62,18 @@ class Directed(Worded):
 
 
 class Drifting(Worded, Product):
-    """A static effect that comes up as 1 − exp(−t/t₀); the shape is t₀ in s."""
+    """A static effect that grows as 1 − exp(−t/t₀); the shape is t₀ in s."""
 
     static: EffectModel
     kind = CourseKind.EXPONENTIAL
 
     def shapes(self, duration_s: float, frame_rate: float) -> tuple[Shape, ...]:
-        """Return time constants from the shortest, a step at the start, to the longest, a straight line."""
+        """Return time constants from the shortest, a step at the start, to the longest, nearly linear."""
         parts = np.array([0.1, 0.2, 0.4, 0.8, 1.6, 3.2, 6.4])
         return _within(effect(self.name).quantity("time_s"), duration_s * parts)
 
     def shape_step(self, shape: Shape) -> float:
-        """Return a part of the time constant."""
+        """Return a fraction of the time constant."""
         return 0.3 * shape[0]
 
     def course(self, shape: Shape, amplitude: Float) -> dict[str, float]:
@@ -81,17 +81,18 @@ class Drifting(Worded, Product):
         return {"time_s": shape[0]}
 
     def reached(self, time_s: Float, shape: Shape) -> Float:
-        """Return (M,) the part of the final size that is reached."""
+        """Return the fraction (M,) of the final size that is reached."""
         return np.asarray(-np.expm1(-time_s / shape[0]))
 
     def factored(self, points: ImagePoints, shape: Shape) -> Factored:
-        """Return the share of its final size that is reached, and the static law."""
+        """Return the fraction of the final size that is reached, and the static law."""
         return (self.reached(points.time_s, shape),), self.static, ()
 
     def told(self, shape: Shape, amplitude: Float) -> dict[str, float]:
-        """Return the quantities and the growth in the first second.
+        """Return the quantities, and the growth in the first second.
 
-        Of a drift slower than its recording that is known, and the final size, a continuation, is not.
+        For a drift slower than its recording the latter is well determined, while the final size is
+        extrapolated.
         """
         quantities = self.quantities(shape, amplitude)
         final = abs(quantities[effect(self.name).quantities[0].name])
@@ -105,9 +106,10 @@ class Drifting(Worded, Product):
 
 
 class Periodic(Worded):
-    """A directed effect at one frequency; amplitudes are (x, y) of its sine, then of its cosine.
+    """A directed effect at one frequency; the amplitudes are (x, y) of its sine, then of its cosine.
 
-    The frequency found is the lowest of all that look the same in these frames, |f − k · frame rate|.
+    The reported frequency is the lowest of all aliases |f − k · frame rate| that look the same in these
+    frames.
     """
 
     kind = CourseKind.SINUSOID
@@ -123,11 +125,11 @@ class Periodic(Worded):
         return _within(effect(self.name).quantity("frequency_hz"), frequencies)
 
     def shape_step(self, shape: Shape) -> float:
-        """Return the step of the frequency: the resolution of the recording's duration."""
+        """Return the step of the frequency: the resolution of a recording of this duration."""
         return 0.05
 
     def quantities(self, shape: Shape, amplitude: Float) -> dict[str, float]:
-        """Return the ellipse's longer half axis, its direction, and the frequency."""
+        """Return the ellipse's semi-major axis, its direction, and the frequency."""
         axes, size, _ = np.linalg.svd(np.asarray(amplitude).reshape(2, 2).T)
         return {
             effect(self.name).quantities[0].name: float(size[0]),
@@ -137,7 +139,7 @@ class Periodic(Worded):
 
 
 def _within(quantity: Quantity, grid: Float) -> tuple[Shape, ...]:
-    """Return the grid's shapes within the catalogue's range."""
+    """Return the shapes of the grid within the catalogue's range."""
     return tuple((float(x),) for x in grid if quantity.low <= x <= quantity.high)
 
 
@@ -157,7 +159,7 @@ def along_x_and_y(name: str, plausible: float) -> tuple[Amplitude, Amplitude]:
 
 
 def sine_and_cosine_at(time_s: Float, frequency_hz: float) -> tuple[Float, Float]:
-    """Return (M,) both waves at the times (M,)."""
+    """Return sine and cosine (M,) at times (M,)."""
     phase = 2 * np.pi * frequency_hz * time_s
     return np.sin(phase), np.cos(phase)
 

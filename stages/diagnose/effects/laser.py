@@ -1,4 +1,4 @@
-"""Effects of the laser: its sheet moves the line along the wall, and its light moves the line's centroid."""
+"""Effects of the laser: its sheet displaces the line on the wall, its light the line's centroid."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _DEG_PER_MRAD = float(np.degrees(0.001))  # a unit
 
 
 class AlbedoBias(Worded):
-    """The line's centroid is drawn toward the brighter wall; the amplitude is the line's variance, mm²."""
+    """The line's centroid is displaced toward brighter wall; the amplitude is the line's variance, mm²."""
 
     name = "albedo_bias"
     amplitudes = (Amplitude("line_sigma_mm squared", "mm²", 0.05),)
@@ -35,20 +35,19 @@ class AlbedoBias(Worded):
     )
 
     def sheet_shift_mm(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
-        """Return σ_z² ∂_z ln A; none where the albedo is not known."""
+        """Return σ_z² ∂_z ln A, mm; zero where the albedo is unknown."""
         slope = points.albedo_slope_per_mm
         return np.zeros(len(points.uv)) if slope is None else np.asarray(amplitude[0] * slope)
 
     def quantities(self, shape: Shape, amplitude: Float) -> dict[str, float]:
-        """Return the line's 1 σ, negative where the variance came out so."""
+        """Return the line's 1 σ, mm; negative where the variance came out negative."""
         return {"line_sigma_mm": float(np.sign(amplitude[0]) * np.sqrt(abs(amplitude[0])))}
 
 
 class Subsurface(Scalar):
-    """The line's light comes back, on average, the transport length farther on.
+    """The line's light returns, on average, from one transport length away.
 
-    The shape is 0 where that is deeper in the wall, and 1 where it is farther along it: which, depends on how
-    the light enters.
+    The shape is 0 for deeper in the wall and 1 for farther along it: this depends on how the light enters.
     """
 
     name = "subsurface"
@@ -56,32 +55,32 @@ class Subsurface(Scalar):
     words = "The line's light travels {transport_mm:+.3f} mm within the wall before it returns."
 
     def shapes(self, duration_s: float, frame_rate: float) -> tuple[Shape, ...]:
-        """Return deeper and farther along."""
+        """Return both directions: deeper, and farther along."""
         return ((0.0,), (1.0,))
 
     def wall_shift_mm(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
-        """Return the transport length into the wall for the line, nothing for texture."""
+        """Return the transport length into the wall for the line, zero for texture, mm."""
         return np.full(len(points.uv), float(amplitude[0]) * (1 - shape[0]) if points.on_line else 0.0)
 
     def sheet_shift_mm(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
-        """Return the transport length along the wall."""
+        """Return the transport length along the wall, mm."""
         return np.full(len(points.uv), float(amplitude[0]) * shape[0])
 
 
 class LineSkew(Scalar):
-    """The sheet's profile is asymmetric: its peak lies before its mean."""
+    """The sheet's profile is asymmetric: its peak is before its mean."""
 
     name = "line_skew"
     amplitudes = one(name, 0.3)
     words = "The sheet's own profile is asymmetric, with a skewness of {skewness:+.3f}."
 
     def sheet_shift_mm(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
-        """Return −σ × skewness, which is how far the peak lies before the mean."""
+        """Return −σ × skewness, mm: how far the peak is before the mean."""
         return np.full(len(points.uv), -float(amplitude[0]) * points.probe.laser.line_sigma_mm)
 
 
 class Vignetting(Scalar):
-    """Light falls off as cos^k θ and draws the line's centroid inward."""
+    """Light falls off as cos^k θ and displaces the line's centroid inward."""
 
     name = "vignetting"
     amplitudes = one(name, 0.5)
@@ -91,7 +90,7 @@ class Vignetting(Scalar):
     )
 
     def line_shift_px(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
-        """Return σ_px² ∂ ln V/∂ρ = −k σ_px² tan θ / (dρ/dθ), σ of the sheet: the lens blurs later."""
+        """Return σ_px² ∂ ln V/∂ρ = −k σ_px² tan θ / (dρ/dθ), px; σ is the sheet's before lens blur."""
         sigma_px = points.probe.laser.line_sigma_mm * points.ring.read_move(points.ring.per_sheet_c)
         return np.asarray(-amplitude[0] * sigma_px**2 * np.tan(points.theta) / _px_per_rad(points))
 
@@ -108,7 +107,7 @@ PHOTOMETRIC_MODELS: tuple[EffectModel, ...] = (AlbedoBias(), Subsurface(), LineS
 
 
 class LaserTilt(Directed):
-    """The sheet leans forward by tan φ per mm toward ψ₀."""
+    """The sheet is tilted forward by tan φ per mm toward ψ₀."""
 
     name = "laser_tilt"
     amplitudes = along_x_and_y(name, 0.1)
@@ -125,7 +124,7 @@ class LaserTilt(Directed):
 
 
 class LaserCone(Scalar):
-    """The sheet is a cone whose rays rise by ε₀."""
+    """The sheet is a cone: its rays are inclined by ε₀."""
 
     name = "laser_cone"
     amplitudes = one(name, 0.1)
@@ -142,7 +141,7 @@ class LaserCone(Scalar):
 
 
 class Baseline(Scalar):
-    """The sheet stands farther from the camera."""
+    """The sheet is farther from the camera."""
 
     name = "baseline"
     amplitudes = one(name, 0.1)
@@ -170,7 +169,7 @@ class BeamDecentre(Directed):
 
 @dataclass(frozen=True)
 class SheetWaviness(EffectModel):
-    """The sheet's rays rise and fall m times around the ring; the shape is m."""
+    """The inclination of the sheet's rays varies m times around the ring; the shape is m."""
 
     name = "sheet_waviness"
     repeats = True
@@ -195,7 +194,7 @@ class SheetWaviness(EffectModel):
         }
 
     def statement(self, shape: Shape, amplitude: Float) -> str:
-        """Return the effect in a plain sentence with its size."""
+        """Return a sentence that states the effect with its size."""
         return (
             "The laser sheet is wavy: its rays rise and fall by {amplitude_mrad:.2f} mrad {order:.0f} times "
             "around the ring, with a crest at azimuth {direction_deg:.1f}°."
@@ -203,7 +202,7 @@ class SheetWaviness(EffectModel):
 
 
 class LaserRocking(Periodic, Product):
-    """The sheet's tilt swings at one frequency."""
+    """The sheet's tilt oscillates at one frequency."""
 
     name = "laser_rocking"
     amplitudes = sine_and_cosine(name, 1.0)
@@ -213,7 +212,7 @@ class LaserRocking(Periodic, Product):
     )
 
     def factored(self, points: ImagePoints, shape: Shape) -> Factored:
-        """Return both waves, of a tilt in degrees."""
+        """Return sine and cosine, and the law of a tilt in degrees."""
         sine, cosine = sine_and_cosine_at(points.time_s, shape[0])
         return (_DEG_PER_MRAD * sine, _DEG_PER_MRAD * cosine), LaserTilt(), ()
 

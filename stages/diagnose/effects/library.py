@@ -1,4 +1,4 @@
-"""All effects by name, and their predictions: where ring and texture are found, what the encoder reads."""
+"""All effects by name, and their predictions for ring, texture and encoder readings."""
 
 from __future__ import annotations
 
@@ -19,26 +19,26 @@ from stages.diagnose.effects.window import WINDOW_MODELS
 _MODELS = (*LASER_MODELS, *CAMERA_MODELS, *WINDOW_MODELS, *POSE_MODELS, *PHOTOMETRIC_MODELS)
 LIBRARY: Mapping[str, EffectModel] = MappingProxyType({model.name: model for model in _MODELS})
 
-# Effects of the catalogue whose influence on positions cannot be predicted, and why.
+# Effects of the catalogue whose influence on positions cannot be predicted, with the reason.
 NOT_PREDICTED: Mapping[str, str] = MappingProxyType({
-    "slope_bias": "needs the wall's slope and gloss everywhere: told by the profile's skewness and glints",
-    "ghost_ring": "a second peak, which a profile shows; its pull on the line depends on the estimator",
-    "tube_ghost": "a second peak, which a profile shows; its pull on the line depends on the estimator",
+    "slope_bias": "needs the wall's slope and gloss everywhere: seen in the profile's skewness and in glints",
+    "ghost_ring": "a second peak, seen in the profile; its pull on the line depends on the estimator",
+    "tube_ghost": "a second peak, seen in the profile; its pull on the line depends on the estimator",
     "speckle": "random: it is the noise floor",
-    "saturation": "shifts only a skewed profile, by its skewness: told by the flat top of the profile",
-    "gamma": "shifts only a skewed profile, by its skewness: told by the width of the profile",
-    "ambient_light": "needs the stray light's slope at every point: told by the profile's floor",
-    "fixed_pattern": "random from pixel to pixel: told by stacking residuals in the sensor's frame",
-    "dust": "takes light away from a stretch of the ring: told by the line's brightness",
+    "saturation": "shifts only a skewed profile, by its skewness: seen in the flat top of the profile",
+    "gamma": "shifts only a skewed profile, by its skewness: seen in the width of the profile",
+    "ambient_light": "needs the stray light's slope at every point: seen in the profile's floor",
+    "fixed_pattern": "random from pixel to pixel: seen by stacking residuals in the sensor's frame",
+    "dust": "takes light away from a part of the ring: seen in the line's brightness",
 })  # fmt: skip
 _ROUNDS = 3
 
 
 def ring_shift_px(model: EffectModel, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
-    """Return (M,) by which the ring is found farther out along the image radius, at the same image azimuth.
+    """Return by how much (M,), px, the ring is found farther out in the image, at the same image azimuth.
 
-    The sheet's new line on the wall is followed in the half-plane of each point's azimuth; the image's shift
-    is taken there, and read along the radius with the ring's own inclination.
+    The sheet's new intersection with the wall is computed in the half-plane of each point's azimuth; the
+    image shift is taken there, and read along the image radius with the ring's own inclination.
     """
     ring = points.ring
     moved = points
@@ -54,19 +54,19 @@ def ring_shift_px(model: EffectModel, points: ImagePoints, shape: Shape, amplitu
 
 
 def texture_shift_px(model: EffectModel, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
-    """Return (M, 2) by which the image of wall points is found farther along u and v."""
+    """Return the shift (M, 2) of the image of wall points along u and v, px."""
     wall = model.wall_shift_mm(points, shape, amplitude)
     moved = _moved(points, points.xyz_c + wall[:, None] * points.normal_c) if np.any(wall) else points
     return np.asarray(moved.uv - points.uv + model.image_shift_px(moved, shape, amplitude))
 
 
 def columns(model: EffectModel, points: ImagePoints, shape: Shape) -> Float:
-    """Return (M, Q) derivatives of `ring_shift_px` by the amplitudes at zero, for points on the line."""
+    """Return derivatives (M, Q) of `ring_shift_px` by the amplitudes, at zero, for points on the line."""
     return _by_course(_line_columns, model, points, shape)
 
 
 def texture_columns(model: EffectModel, points: ImagePoints, shape: Shape) -> Float:
-    """Return (M, 2, Q) derivatives of `texture_shift_px` by the amplitudes at zero."""
+    """Return derivatives (M, 2, Q) of `texture_shift_px` with respect to the amplitudes, at zero."""
     return _by_course(_texture_columns, model, points, shape)
 
 
@@ -74,7 +74,7 @@ def _by_course(
     made: Callable[[EffectModel, ImagePoints, Shape], Float], model: EffectModel, points: ImagePoints,
     shape: Shape,
 ) -> Float:  # fmt: skip
-    """Return columns; what a static law does, which all its courses share, is made once for these points."""
+    """Return an effect's columns; those of a static law, shared by its courses, are computed once."""
     factored = model.factored(points, shape)
     if factored is None and not model.linear:
         return made(model, points, shape)
@@ -113,7 +113,7 @@ def _texture_columns(model: EffectModel, points: ImagePoints, shape: Shape) -> F
 
 
 def reading_columns(model: EffectModel, travel: Travel, shape: Shape) -> Float:
-    """Return (N, Q) derivatives of the encoder's reading by the amplitudes at zero."""
+    """Return derivatives (N, Q) of the encoder's reading, mm, with respect to the amplitudes, at zero."""
 
     def small(amplitude: Float) -> Float:
         return model.reading_shift_mm(travel, shape, amplitude)
@@ -136,7 +136,7 @@ def _moved(points: ImagePoints, xyz_c: Float) -> ImagePoints:
 
 
 def without(names: Collection[str]) -> Mapping[str, EffectModel]:
-    """Return the library less some effects, as for the test of effects it does not know.
+    """Return the library without some effects, to test how unknown effects are treated.
 
     Raises
     ------

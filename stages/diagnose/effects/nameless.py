@@ -1,4 +1,4 @@
-"""Patterns without a known cause: slow ones of low harmonic, and swings; they model "none of the library"."""
+"""Patterns without a known cause, of low harmonic and slow or swinging: causes outside the library."""
 
 from __future__ import annotations
 
@@ -15,22 +15,22 @@ from stages.diagnose.effects.kinds import cosine, sine_and_cosine_at
 _REFERENCE_MM = 50.0
 _HARMONICS = (0, 1, 2, 3, 4)
 _EXPONENTS = (0, 1, 2, 3)
-# Units of a pattern's size: any would do.
+# Reference values for the units of a pattern's size; any would do.
 _REFERENCE_S, _REFERENCE_MM_S = 10.0, 20.0
-# Shapes of a term: which coordinate its size is proportional to.
+# Shapes of a term: the coordinate that its size is proportional to.
 STEADY, WITH_TIME, WITH_SPEED, WITH_DISTANCE = (0.0,), (1.0,), (2.0,), (3.0,)
 _COURSES = ("", " t/10", " v/20", " s/50")
 _IN_TIME = ("static", "drift", "speed", "static")
 
 
 class Nameless(EffectModel):
-    """A pattern of m waves around the ring, with a cosine and a sine part; m = 0 has the first part only."""
+    """A pattern with m waves around the ring, with a cosine and a sine part; m = 0 has only the first."""
 
     harmonic: int
     linear = True
 
     def quantities(self, shape: Shape, amplitude: Float) -> dict[str, float]:
-        """Return the amplitude and the direction of a crest; with m = 0 the signed size alone."""
+        """Return the amplitude and the direction of a crest; for m = 0 only the signed size."""
         if len(amplitude) == 1:
             return {"amplitude": float(amplitude[0])}
         crest = np.degrees(np.arctan2(amplitude[1], amplitude[0])) / max(self.harmonic, 1)
@@ -41,16 +41,16 @@ class Nameless(EffectModel):
         raise NotImplementedError
 
     def goes_with(self, shape: Shape) -> tuple[FixedTo, str, int | None]:
-        """Return what the pattern turns and travels with, its behaviour in time, and its harmonic."""
+        """Return what the pattern is fixed to, its behaviour in time, and its harmonic."""
         return FixedTo.TIME, "static", self.harmonic
 
     def equation(self, shape: Shape, amplitude: Float) -> str:
-        """Return the formula with the numbers to put into it."""
+        """Return the formula with its numbers."""
         numbers = (f"{name} = {value:.5g}" for name, value in self.quantities(shape, amplitude).items())
         return f"{self.formula(shape)}, {', '.join(numbers)} {self.amplitudes[0].unit}"
 
     def statement(self, shape: Shape, amplitude: Float) -> str:
-        """Return that it is a pattern without a known cause, with its formula."""
+        """Return a sentence that states a pattern without a known cause, with its formula."""
         return f"A pattern without a known cause: {self.equation(shape, amplitude)}."
 
     def possible(self, shape: Shape, amplitude: Float) -> bool:
@@ -64,13 +64,13 @@ def two_parts(unit: str, plausible: float) -> tuple[Amplitude, ...]:
 
 
 def growth(points: ImagePoints, exponent: float) -> Float:
-    """Return (M,) the power of the distance from the optical axis, 1 at 50 mm."""
+    """Return the power (M,) of the distance from the optical axis, 1 at 50 mm."""
     return np.asarray((points.radius_mm / _REFERENCE_MM) ** exponent)
 
 
 @dataclass(frozen=True)
 class SwingTerm(Nameless, Product):
-    """One harmonic of the line with one power of the radius; amplitudes are of its sine, then its cosine."""
+    """One oscillating harmonic of the line with one power of the radius; amplitudes: sine, cosine."""
 
     name: str
     harmonic: int
@@ -87,7 +87,7 @@ class SwingTerm(Nameless, Product):
         return 0.05
 
     def factored(self, points: ImagePoints, shape: Shape) -> Factored:
-        """Return both waves and the steady pattern."""
+        """Return sine and cosine, and the steady pattern."""
         steady = _term(Moves.LINE, self.harmonic, self.exponent)
         return sine_and_cosine_at(points.time_s, shape[0]), steady, STEADY
 
@@ -96,7 +96,7 @@ class SwingTerm(Nameless, Product):
         return {"amplitude": float(np.linalg.norm(amplitude)), "frequency_hz": shape[0]}
 
     def goes_with(self, shape: Shape) -> tuple[FixedTo, str, int | None]:
-        """Return the laser: the line moves against the fiducials, and the camera has no part in that."""
+        """Return the laser: the line moves relative to the fiducials, which the camera does not affect."""
         return FixedTo.LASER, "periodic", self.harmonic
 
     def formula(self, shape: Shape) -> str:
@@ -113,12 +113,12 @@ def _swing(harmonic: int, exponent: int) -> SwingTerm:
     return SwingTerm(f"generic_swing_{harmonic}_{exponent}", harmonic, exponent, amplitudes)
 
 
-# A sheet lifts and falls, or rocks.
+# A sheet that moves along the axis, or rocks.
 SWINGS: tuple[SwingTerm, ...] = (_swing(0, 1), _swing(1, 2))
 
 
 class Moves(StrEnum):
-    """What a generic term moves: the line on the wall, every image outward or around, or the wall itself."""
+    """What a generic term displaces: the line on the wall, images outward or around, or the wall itself."""
 
     LINE = "line"
     OUTWARD = "outward"
@@ -136,7 +136,7 @@ _FIXED_TO = {
 
 @dataclass(frozen=True)
 class GenericTerm(Nameless):
-    """One harmonic with one power of the radius (line) or of θ (image); the shape is the power of time."""
+    """One harmonic with one power of the radius (line) or of θ (image); the shape is its course."""
 
     name: str
     moves: Moves
@@ -145,7 +145,7 @@ class GenericTerm(Nameless):
     amplitudes: tuple[Amplitude, ...]
 
     def shapes(self, duration_s: float, frame_rate: float) -> tuple[Shape, ...]:
-        """Return constant and linear in time."""
+        """Return constant, and linear in time."""
         return ((0.0,), (1.0,))
 
     def factored(self, points: ImagePoints, shape: Shape) -> Factored | None:
@@ -153,7 +153,7 @@ class GenericTerm(Nameless):
         return None if shape == STEADY else ((self._course(points, shape),), self, STEADY)
 
     def wall_shift_mm(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
-        """Return a (r/50)^p cos m(ψ − ψ₀) on the line, or the wall's own a cos m(ψ_P − ψ₀)."""
+        """Return a (r/50)^p cos m(ψ − ψ₀) on the line, or the wall's own a cos m(ψ_P − ψ₀), mm."""
         if self.moves is Moves.WALL:
             parts = np.array([*amplitude, 0.0])[:2]
             return self._course(points, shape) * cosine(points.azimuth_p_rad, parts, self.harmonic)
@@ -162,7 +162,7 @@ class GenericTerm(Nameless):
         return np.asarray(growth(points, self.exponent) * self._pattern(points, shape, amplitude))
 
     def image_shift_px(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
-        """Return a θ^p cos m(ψ − ψ₀) outward or around."""
+        """Return a θ^p cos m(ψ − ψ₀) outward or around, px."""
         if self.moves in (Moves.LINE, Moves.WALL):
             return np.zeros((len(points.uv), 2))
         heading = points.outward if self.moves is Moves.OUTWARD else points.outward[:, ::-1] * [-1.0, 1.0]
@@ -180,7 +180,7 @@ class GenericTerm(Nameless):
         return f"image {self.moves}: a θ^{self.exponent}{wave}{course}"
 
     def goes_with(self, shape: Shape) -> tuple[FixedTo, str, int | None]:
-        """Return what it moves, or time where it grows with that."""
+        """Return what it displaces, or time where it grows with time."""
         time = _IN_TIME[int(shape[0])]
         return FixedTo.TIME if time == "drift" else _FIXED_TO[self.moves], time, self.harmonic
 
@@ -200,14 +200,14 @@ class GenericTerm(Nameless):
 
 @dataclass(frozen=True)
 class RowTerm(Nameless):
-    """A delay that grows down the rows: the image moves by its own velocity, in proportion to the row."""
+    """A delay proportional to the image row: the image shifts by its velocity times the delay."""
 
     name: str = "generic_rows"
     harmonic: int = 0
     amplitudes: tuple[Amplitude, ...] = (Amplitude("delay", "s", 0.01),)
 
     def image_shift_px(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
-        """Return a (v/H − 1/2) times the image's velocity."""
+        """Return a (v/H − 1/2) times the image's velocity, px."""
         row = (points.uv[:, 1] + 0.5) / points.probe.camera.image_size[1] - 0.5
         return np.asarray(amplitude[0] * row[:, None] * points.velocity_px)
 
@@ -222,14 +222,14 @@ class RowTerm(Nameless):
 
 @dataclass(frozen=True)
 class FractionTerm(Nameless):
-    """A wave in the fraction of a pixel that the line lies at."""
+    """A wave in the sub-pixel position of the line."""
 
     name: str = "generic_fraction"
     harmonic: int = 0
     amplitudes: tuple[Amplitude, ...] = two_parts("px", 0.02)
 
     def line_shift_px(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
-        """Return a cos 2πρ + b sin 2πρ of the line's image radius ρ, nothing on texture."""
+        """Return a cos 2πρ + b sin 2πρ of the line's image radius ρ, px; zero for texture."""
         if not points.on_line:
             return np.zeros(len(points.uv))
         return np.asarray(points.fraction @ amplitude)
@@ -265,5 +265,5 @@ def _vocabulary() -> tuple[tuple[Nameless, Shape], ...]:
     return (*moving, *wall, (RowTerm(), STEADY), (FractionTerm(), STEADY))
 
 
-# The patterns that an empirical formula is made of, in (r, ψ, t, s, speed, row).
+# The patterns that empirical formulas are built from, in (r, ψ, t, s, speed, row).
 VOCABULARY: tuple[tuple[Nameless, Shape], ...] = _vocabulary()

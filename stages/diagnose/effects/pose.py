@@ -1,4 +1,4 @@
-"""Effects of the pose, the pipe and the odometer."""
+"""Effects of the pose, the pipe and the encoder."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _SLIP_TIMES = 64
 
 
 class PipeBend(Directed):
-    """The pipe's axis is curved: the wall ahead has moved aside by the sagitta."""
+    """The pipe's axis is curved: wall ahead is displaced sideways by the sagitta."""
 
     name = "pipe_bend"
     amplitudes = along_x_and_y(name, 4e-4)
@@ -34,13 +34,13 @@ class PipeBend(Directed):
     )
 
     def wall_shift_mm(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
-        """Return the sagitta L²/8ρ of a chord twice the way ahead, along the wall's normal."""
+        """Return the sagitta L²/8ρ of a chord twice the distance ahead, along the wall's normal, mm."""
         ahead = np.sum(points.xyz_c * points.along_c, axis=1)
         return np.asarray(ahead**2 / 2 * cosine(points.azimuth_p_rad, amplitude))
 
 
 class Ovality(Directed):
-    """The pipe's section is an oval that keeps its azimuth in P."""
+    """The pipe's section is an oval at a constant azimuth in P."""
 
     name = "ovality"
     order = 2
@@ -56,7 +56,7 @@ class Ovality(Directed):
 
 
 class ProbeVibration(Periodic):
-    """The camera swings across the pipe at one frequency; a pose in every frame absorbs nearly all of it."""
+    """The camera oscillates across the pipe at one frequency; free poses absorb nearly all of it."""
 
     name = "probe_vibration"
     amplitudes = sine_and_cosine(name, 0.2)
@@ -66,7 +66,7 @@ class ProbeVibration(Periodic):
     )
 
     def image_shift_px(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
-        """Return the image from the displaced camera less that from the stated place; the sheet comes too."""
+        """Return the image from the displaced camera minus the stated one; the sheet moves along."""
         waves, seen = sine_and_cosine_at(points.time_s, shape[0]), points.xyz_c.copy()
         seen[:, :2] -= np.stack(waves, 1) @ np.reshape(amplitude, (2, 2))
         return image_shift(points, seen)
@@ -85,26 +85,26 @@ class EncoderScale(Scalar):
 
 
 class EncoderSlip(Worded):
-    """The encoder's wheel slips once; the shape is the time of its middle and, if it lasts, for how long."""
+    """The encoder's wheel slips once; the shape is the slip's middle and, if it lasts, duration, s."""
 
     name = "encoder_slip"
     amplitudes = one(name, 2.0)
     words = "The encoder's wheel slips after {time_s:.2f} s and its reading [gains|loses] {slip_mm:.2f} mm."
 
     def shapes(self, duration_s: float, frame_rate: float) -> tuple[Shape, ...]:
-        """Return times within the recording, no closer than frames are."""
+        """Return times within the recording, no closer together than frames."""
         count = int(min(_SLIP_TIMES, max(duration_s * frame_rate, 2)))
         return tuple((float(t),) for t in duration_s * np.arange(1, count) / count)
 
     def reading_shift_mm(self, travel: Travel, shape: Shape, amplitude: Float) -> Float:
-        """Return what has come of the gain, evenly while it lasts."""
+        """Return how much of the gain has accumulated, evenly during the slip, mm."""
         time_s, *lasting_s = shape
         if not lasting_s:
             return np.asarray(amplitude[0] * (travel.time_s > time_s))
         return np.asarray(amplitude[0] * np.clip((travel.time_s - time_s) / lasting_s[0] + 0.5, 0.0, 1.0))
 
     def quantities(self, shape: Shape, amplitude: Float) -> dict[str, float]:
-        """Return the gain and when it comes."""
+        """Return the gain and its time."""
         return {"slip_mm": float(amplitude[0]), "time_s": shape[0]}
 
 
@@ -116,14 +116,14 @@ class EncoderBacklash(Scalar):
     words = "The encoder has {backlash_mm:.2f} mm of play at a reversal."
 
     def reading_shift_mm(self, travel: Travel, shape: Shape, amplitude: Float) -> Float:
-        """Return −(b/2) sgn v, coming over while the play is taken up."""
+        """Return −(b/2) sgn v, mm, with a transition while the play is taken up."""
         half = abs(float(amplitude[0])) / 2
         return np.asarray(np.sign(amplitude[0]) * _lag(np.diff(travel.distance_mm, prepend=0.0), half))
 
 
 @numba.njit(cache=True, nogil=True)
 def _lag(steps, half):  # type: ignore[no-untyped-def]
-    """Return (N,) by how much a reading is behind; the way's step before the first reading does not count."""
+    """Return by how much (N,) a reading lags; the motion before the first reading does not count."""
     lag = np.zeros(len(steps))
     moving = np.flatnonzero(steps[1:])
     behind = -half * np.sign(steps[moving[0] + 1]) if len(moving) else 0.0
@@ -135,14 +135,14 @@ def _lag(steps, half):  # type: ignore[no-untyped-def]
 
 
 class TimeOffset(Scalar):
-    """The encoder's readings are late: they state where the probe was a little earlier."""
+    """The encoder's readings are late: they give the distance at a slightly earlier time."""
 
     name = "time_offset"
     amplitudes = one(name, 0.02)
     words = "The encoder's readings come {delay_s:.4f} s [late|early] against the pictures."
 
     def reading_shift_mm(self, travel: Travel, shape: Shape, amplitude: Float) -> Float:
-        """Return s(t − τ) − s(t), so that visual − encoder = v τ; speed held beyond the ends."""
+        """Return s(t − τ) − s(t), mm, so that visual − encoder = v τ; beyond the ends the speed is held."""
         earlier = travel.time_s - amplitude[0]
         held = np.clip(earlier, travel.time_s[0], travel.time_s[-1])
         beyond = (earlier - held) * np.interp(held, travel.time_s, travel.speed_mm_s)
@@ -150,10 +150,10 @@ class TimeOffset(Scalar):
 
 
 class MotionBlur(TimeOffset):
-    """A longer exposure from the same start: all pictures are late by half of it.
+    """A longer exposure with the same start: all pictures are late by half of the excess.
 
-    Poses are free in every picture and follow it, so that rings and fiducials show none of it: only the
-    encoder, which then reads as though it were late, and the line's width.
+    The free pose of every picture follows, so that rings and fiducials show nothing of it; only the encoder,
+    whose readings then seem late, and the line's width do.
     """
 
     name = "motion_blur"
@@ -163,7 +163,7 @@ class MotionBlur(TimeOffset):
     )
 
     def reading_shift_mm(self, travel: Travel, shape: Shape, amplitude: Float) -> Float:
-        """Return what readings that are late by half the exposure would be off by."""
+        """Return the error of readings that are late by half the excess exposure, mm."""
         return super().reading_shift_mm(travel, shape, 0.5 * np.asarray(amplitude))
 
 

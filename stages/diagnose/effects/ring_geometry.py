@@ -1,4 +1,4 @@
-"""The line on the wall, seen in the image: how far it is found to move when sheet, wall or image move."""
+"""The line on the wall as seen in the image: how it moves when sheet, wall or image move."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ class RingGeometry:
     Attributes
     ----------
     per_sheet_c, per_wall_c : (M, 3)
-        Way of the line's point in its half-plane, mm in C, per mm by which the sheet lies farther along the
-        optical axis, and per mm by which the wall lies farther out.
+        Displacement in C, mm, of the line's point in its half-plane per mm by which the sheet moves forward
+        along the optical axis, and per mm by which the wall moves outward.
     tangent_px : (M, 2)
         Direction of the line in the image.
     outward_px : (M, 2)
@@ -29,7 +29,7 @@ class RingGeometry:
     rho_px : (M,)
         Image radius.
     by_point : (M, 2, 3)
-        Derivative of the image by the point.
+        Derivative of the image with respect to the point, px/mm.
     """
 
     per_sheet_c: Float
@@ -40,10 +40,11 @@ class RingGeometry:
     by_point: Float
 
     def read(self, shift_px: Float) -> Float:
-        """Return (M,) how much farther out the line is found, at the same image azimuth, after shifts (M, 2).
+        """Return how much (M,), px, farther out the line is found at one image azimuth after shifts (M, 2).
 
-        What a shift moves across the radius counts by the line's inclination to the circle through it, which
-        tells a shifted image from a tilted sheet in an off-centre ring, and by the circle's curvature.
+        A shift across the radius counts by the line's inclination to the circle through it, which
+        distinguishes a shifted image from a tilted sheet in an off-centre ring, and by the circle's
+        curvature.
         """
         across = _cross(self.outward_px, shift_px)
         return self.read_small(shift_px) - across**2 / (2 * self.rho_px)
@@ -53,12 +54,12 @@ class RingGeometry:
         return _cross(shift_px, self.tangent_px) / _cross(self.outward_px, self.tangent_px)
 
     def read_move(self, way_c: Float) -> Float:
-        """Return `read_small` (M,) of small moves (M, 3), mm in C, of the line's points."""
+        """Return `read_small` (M,) for small displacements (M, 3), mm in C, of the line's points."""
         return self.read_small(np.einsum("mij,mj->mi", self.by_point, way_c))
 
 
 def ring_geometry(probe: Probe, xyz_c: Float, normal_c: Float, uv: Float) -> RingGeometry:
-    """Return the geometry of the stated sheet's line at wall points (M, 3) with outward normals (M, 3)."""
+    """Return the geometry of the stated sheet's line at wall points and outward normals (M, 3) in C."""
     psi = np.arctan2(xyz_c[:, 1], xyz_c[:, 0])
     slope = probe.laser.slope(psi)
     unit_q = np.stack([np.cos(psi), np.sin(psi), np.zeros_like(psi)], axis=1)
@@ -77,7 +78,7 @@ def ring_geometry(probe: Probe, xyz_c: Float, normal_c: Float, uv: Float) -> Rin
 
 
 def _sheet_normal(laser: LaserSheet, xyz_c: Float, psi: Float, unit_q: Float) -> Float:
-    """Return (M, 3) the gradient of z − height(ψ) − q slope(ψ)."""
+    """Return the gradient (M, 3) of z − height(ψ) − q slope(ψ)."""
     q = np.hypot(xyz_c[:, 0], xyz_c[:, 1])
 
     def height(azimuth: Float) -> Float:

@@ -1,8 +1,8 @@
 """Effects of windows and media between the probe and the wall.
 
-Rays are followed in the half-plane of their azimuth: a coaxial tube is met at the angle i from its normal,
-with tan i = z/q for a straight ray, and every layer of thickness b and relative index n lets the ray climb by
-b tan i′, sin i′ = sin i / n, instead of b tan i.
+Rays are traced in the half-plane of their azimuth: a ray meets a coaxial tube at the angle i from its normal,
+with tan i = z/q for a straight ray. In every layer of thickness b and relative index n it advances along the
+axis by b tan i′, sin i′ = sin i / n, instead of by b tan i.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ from stages.diagnose.effects.camera import image_shift
 from stages.diagnose.effects.kinds import Directed, Scalar, along_x_and_y, cosine, one
 
 # Glasses and clear plastics of windows have an index of 1.45 to 1.55 (fused silica 1.458, PMMA 1.491, BK7
-# 1.517), here evenly. The shift grows as 1 − 1/n, so that a size found with n = 1.5 errs
-# by the share dn / (n (n − 1)).
+# 1.517), taken as uniform. The shift grows as 1 − 1/n, so that a size computed with n = 1.5 has a relative
+# error of dn / (n (n − 1)).
 _BY_INDEX = 0.1 / np.sqrt(12) / (GLASS_INDEX * (GLASS_INDEX - 1))
 _STEPS = 6
 
@@ -31,13 +31,13 @@ class HousingGlass(Scalar):
     words = "A coaxial glass tube {thickness_mm:.3f} mm [thicker|thinner] than stated stands before the wall."
 
     def image_shift_px(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
-        """Return the image through the tube, less that without."""
+        """Return the image through the tube minus that without it, px."""
         layers = _layers(points, np.full(len(points.uv), float(amplitude[0])))
         return _seen_under(points, points.azimuth_rad, _steepness(points, *layers, GLASS_INDEX))
 
 
 class TubeWedge(Directed):
-    """The tube's outer face is decentred: glass is thicker on one side, and a prism on the flanks."""
+    """The tube's outer face is decentred: the glass is thicker on one side, and a prism on the flanks."""
 
     name = "tube_wedge"
     amplitudes = along_x_and_y(name, 0.1)
@@ -47,10 +47,10 @@ class TubeWedge(Directed):
     )
 
     def image_shift_px(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
-        """Return the image through glass of thickness δt cos(ψ − ψ₀), less that without.
+        """Return the image through glass of thickness δt cos(ψ − ψ₀) minus that without it, px.
 
-        Where the outer normal is turned by β around the tube, the ray leaves turned by
-        −(n cos i′ − cos i) β around it.
+        Where the outer normal is turned by β around the tube, the ray leaves turned by −(n cos i′ − cos i) β
+        around it.
         """
         sine = np.sin(points.theta)
         bent = np.sqrt(GLASS_INDEX**2 - 1 + sine**2) - sine
@@ -61,9 +61,9 @@ class TubeWedge(Directed):
 
 
 class TubeTilt(Directed):
-    """A glass tube of 2 mm leans; the crest is where its outward normal leans forward.
+    """A glass tube of 2 mm thickness is tilted; the crest is where its outward normal leans forward.
 
-    The shape is 1 where the laser crosses the tube too, 0 where only the camera looks through it.
+    The shape is 1 where the laser also passes through the tube, 0 where only the camera looks through it.
     """
 
     name = "tube_tilt"
@@ -77,11 +77,11 @@ class TubeTilt(Directed):
     law_sigma = 0.3
 
     def shapes(self, duration_s: float, frame_rate: float) -> tuple[Shape, ...]:
-        """Return a tube before the camera alone and one before both."""
+        """Return a tube before the camera only, and one before both."""
         return ((0.0,), (1.0,))
 
     def image_shift_px(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
-        """Return the image through the leaning tube, less that through the straight one."""
+        """Return the image through the tilted tube minus that through the straight one, px."""
         straight = np.array([0.0, 0.0, 1.0])
         lean = np.radians(amplitude)
         leaning = np.array([-lean[0], -lean[1], 1.0]) / np.sqrt(1 + lean @ lean)
@@ -92,14 +92,14 @@ class TubeTilt(Directed):
         return image_shift(points, seen)
 
     def sheet_shift_mm(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
-        """Return the laser's displacement by the leaning glass."""
+        """Return the laser's displacement by the tilted glass, mm."""
         sine = np.sin(cosine(points.azimuth_rad, np.radians(amplitude)))
         glass = np.sqrt(GLASS_INDEX**2 - sine**2)
         return np.asarray(shape[0] * TUBE_THICKNESS_MM * sine * (1 - np.sqrt(1 - sine**2) / glass))
 
 
 class DomeAxial(Scalar):
-    """The viewpoint stands ahead of the centre of a concentric glass dome, or behind it."""
+    """The viewpoint is ahead of the centre of a concentric glass dome, or behind it."""
 
     name = "dome_axial"
     amplitudes = one(name, 0.3)
@@ -108,12 +108,12 @@ class DomeAxial(Scalar):
     )
 
     def image_shift_px(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
-        """Return the image through the dome whose centre is at −d on the axis, less that without."""
+        """Return the image through the dome with its centre at −d on the axis minus that without it, px."""
         return _through_dome(points, np.array([0.0, 0.0, -amplitude[0]]))
 
 
 class DomeLateral(Directed):
-    """The centre of a concentric glass dome lies beside the viewpoint."""
+    """The centre of a concentric glass dome is beside the viewpoint."""
 
     name = "dome_lateral"
     amplitudes = along_x_and_y(name, 0.2)
@@ -122,12 +122,12 @@ class DomeLateral(Directed):
     )
 
     def image_shift_px(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
-        """Return the image through the dome whose centre is beside the axis, less that without."""
+        """Return the image through the dome with its centre beside the axis minus that without it, px."""
         return _through_dome(points, np.array([amplitude[0], amplitude[1], 0.0]))
 
 
 class OutsideIndex(Scalar):
-    """The medium outside a sealed tube of 15 mm radius bends rays where they leave the tube."""
+    """The medium outside a sealed tube of 15 mm radius refracts rays where they leave the tube."""
 
     name = "outside_index"
     amplitudes = one(name, 2e-3)
@@ -137,19 +137,19 @@ class OutsideIndex(Scalar):
     )
 
     def image_shift_px(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
-        """Return the image through the medium, less that without."""
+        """Return the image through the medium minus that without it, px."""
         plain, dense = _layers(points, points.radius_mm - TUBE_OUTER_RADIUS_MM)
         steep = _steepness(points, plain, dense, 1 + float(amplitude[0]))
         return _seen_under(points, points.azimuth_rad, steep)
 
 
 def _layers(points: ImagePoints, dense_mm: Float) -> tuple[Float, Float]:
-    """Return the way (M,) across without the index, and that with it."""
+    """Return the path (M,), mm, across layers without the index, and that in layers with it."""
     return points.radius_mm - dense_mm, dense_mm
 
 
 def _steepness(points: ImagePoints, plain_mm: Float, dense_mm: Float, index: float) -> Float:
-    """Return (M,) tan i at the lens, by Newton's method on z = plain · tan i + dense · tan i′."""
+    """Return tan i (M,) at the lens, by Newton's method on z = plain · tan i + dense · tan i′."""
     z = points.xyz_c[:, 2]
     steep = z / points.radius_mm
     for _ in range(_STEPS):
@@ -160,13 +160,13 @@ def _steepness(points: ImagePoints, plain_mm: Float, dense_mm: Float, index: flo
 
 
 def _seen_under(points: ImagePoints, azimuth_rad: Float, steep: Float) -> Float:
-    """Return (M, 2) the image's shift where rays leave the lens at azimuths and with tan i (M,)."""
+    """Return the image shift (M, 2), px, where rays leave the lens at azimuths and with tan i (M,)."""
     q = points.radius_mm
     return image_shift(points, np.column_stack([q * np.cos(azimuth_rad), q * np.sin(azimuth_rad), q * steep]))
 
 
 def _displacement_c(ray_c: Float, axis_c: Float) -> Float:
-    """Return (M, 3) parallel displacement of rays from the viewpoint by a tube about an axis through it.
+    """Return the parallel displacement (M, 3) of rays from the viewpoint by a tube about an axis through it.
 
     The ray stays in the plane of the axis, in which the tube's wall is a plane plate.
     """
@@ -179,10 +179,10 @@ def _displacement_c(ray_c: Float, axis_c: Float) -> Float:
 
 
 def _through_dome(points: ImagePoints, centre_c: Float) -> Float:
-    """Return (M, 2) the image's shift through a thin concentric dome about ``centre_c`` (3,).
+    """Return the image shift (M, 2), px, through a thin concentric dome about ``centre_c`` (3,).
 
     A ray that passes the centre at distance b leaves turned about it by b (n−1) t / (n ρ²), away from the
-    centre; the wall point turned back about the centre is seen as though there were no dome.
+    centre; the wall point, turned back about the centre, is seen as if there were no dome.
     """
     from_centre = points.xyz_c - centre_c
     seen = points.xyz_c

@@ -1,1 +1,1 @@
-"""What a field recording says of left-out physics: pipe, poses and wall unknown, rings against texture."""
+"""Evidence of left-out physics in an inspection: rings against texture, with pipe, poses, wall unknown."""

@@ -1,4 +1,4 @@
-"""An inspection against a gauge run of the same probe: causes refuted, effects borne out or contradicted."""
+"""Compare an inspection with a gauge run of the same probe: refute causes, confirm or contradict effects."""
 
 from __future__ import annotations
 
@@ -21,22 +21,21 @@ from stages.diagnose.gauge.scan import Scored
 from stages.diagnose.inference import Evidence, Score, Stated, places_of, score
 from stages.diagnose.result import Confirmation
 
-# Inspection and gauge confirm or refute each other only where the 1 σ of what is asked is below this share of
-# the other's size: it is then three such σ away from nothing. Debt: data/debts.md.
+# Inspection and gauge run confirm or refute each other only where the 1 σ of one is below this share of the
+# other's size, which is then three σ from zero. Debt: data/debts.md.
 TELLING = 0.33
-# The same where the time of a step was searched for: six σ away from nothing.
+# The same where the time of a step was searched: six σ from zero.
 _SEARCHED = 0.5 * TELLING
 _PARTS_OF_THE_PROBE = ("laser", "camera", "window")
-# The medium is that of the pipe or of the gauge, not of the probe.
+# The medium belongs to the pipe or the gauge, not to the probe.
 _OF_THE_MEDIUM = ("outside_index",)
 
 
 def not_refuted(shown: Sequence[Scored], gauge: Examined, stated: Stated) -> tuple[Scored, ...]:
-    """Return the causes that a gauge run, in which nothing was found, leaves possible.
+    """Return the causes that remain possible after a gauge run in which nothing was found.
 
-    What is fixed to the probe and never changes acts in both recordings alike; the gauge's own estimate of
-    it must then agree with that of the inspection. Whatever acts in a pipe, in a medium or at times may be
-    in one recording alone.
+    What is fixed to the probe and never changes acts in both recordings; the gauge run's estimate of it must
+    agree with that of the inspection. Effects of a pipe, a medium or a time may be in one recording only.
     """
     asked = [s for s in shown if _in_every_recording(s)]
     if not asked:
@@ -68,11 +67,11 @@ def confirm_in_field(
     found: FieldEvidence,
     stated: Stated,
 ) -> Confirmation | None:
-    """Return whether the field by itself says the same of an effect as the gauge; None when it cannot tell.
+    """Return whether the inspection alone agrees with the gauge run on an effect; None if too uncertain.
 
-    The field's estimate owes nothing to the gauge but the encoder's scale, where that is named: poses from
-    texture, a pipe of unknown size, the stated instrument within its uncertainty. ``amplitude`` (Q,) and
-    ``covariance`` (Q, Q) are the gauge's.
+    The inspection's estimate uses nothing of the gauge run except the encoder's scale, where that is named:
+    poses come from texture, in a pipe of unknown size, with the stated instrument within its uncertainty.
+    ``amplitude`` (Q,) and ``covariance`` (Q, Q) are the gauge run's.
     """
     if found.run is None:
         return None
@@ -90,7 +89,7 @@ def confirm_in_field(
 def met_in_field(
     examined: Examined, found: FieldEvidence, stated: Stated
 ) -> tuple[Confirmation | None, ...]:  # fmt: skip
-    """Return, for each effect of the gauge's likeliest hypothesis, whether the field says the same."""
+    """Return, for each effect of the gauge run's likeliest hypothesis, whether the inspection agrees."""
     best = examined.best
     if best is None:
         return ()
@@ -113,9 +112,9 @@ def _met(term: Term, covariance: Float, found: FieldEvidence, stated: Stated) ->
 
 
 def _same_step(term: Term, covariance: Float, found: FieldEvidence, stated: Stated) -> Confirmation | None:
-    """Return that the inspection shows the same step at a time of its own; None where it does not.
+    """Return a confirmation that the inspection has the same step at a time of its own; None without one.
 
-    What happens once in a gauge run need not happen in another recording: nothing contradicts it.
+    An event of a gauge run need not happen in another recording, so that nothing can contradict it.
     """
     if found.run is None:
         return None

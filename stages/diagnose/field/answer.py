@@ -1,4 +1,4 @@
-"""What a field recording says by itself, a class of effects and never one name, and beside the gauge."""
+"""What an inspection shows alone, which is a class of effects and never one name, and with the gauge run."""
 
 from __future__ import annotations
 
@@ -30,11 +30,11 @@ from stages.diagnose.result import (
     record_next,
 )
 
-# Something was left out when its probability by chance, corrected for all tried, is below this.
-# Debt: data/debts.md.
+# Physics was left out when the probability of chance, corrected for all effects tried, is below this. Debt:
+# data/debts.md.
 DETECTED = 1e-4
-# Effects that explain almost as much as the best belong to its class: laws err by a few per cent, and the
-# recording's own unknowns absorb nearly the same of each. Debt: data/debts.md.
+# Effects that explain almost as much as the best one are in its class: laws err by a few per cent, and the
+# recording's own unknowns absorb nearly the same part of each. Debt: data/debts.md.
 _ALMOST, _APART = 0.1, 20.0
 _OTHER_ENCODER = (
     "The inspection's own readings and pictures do not show the encoder off by so much: it counted otherwise "
@@ -55,14 +55,14 @@ _LOOKS_LIKE = (
 
 @dataclass(frozen=True)
 class FieldAnswer:
-    """What a field recording by itself says.
+    """What an inspection shows alone.
 
     Attributes
     ----------
     global_p : float
-        Chance of such measurements when nothing is hidden.
+        Probability of such measurements when nothing is hidden.
     shown : tuple of Scored
-        Effects that would explain it about as well as the best, the best first; empty when nothing shows.
+        Effects that explain it about as well as the best, the best first; empty when nothing shows.
     """
 
     global_p: float
@@ -70,7 +70,7 @@ class FieldAnswer:
 
     @property
     def members(self) -> tuple[str, ...]:
-        """The class: what explains it, and what no single kind of recording tells from that."""
+        """The class: what explains it, and what no single kind of recording distinguishes from that."""
         return classes_of([s.model.name for s in self.shown])
 
     @property
@@ -80,7 +80,7 @@ class FieldAnswer:
 
     @property
     def next(self) -> str:
-        """Return what to record: a gauge run, and what tells the members apart."""
+        """Return what to record: a gauge run, and what distinguishes the members."""
         more = record_next([s.model.name for s in self.shown]) if self.shown else ""
         return (
             f"A gauge run with this probe, off the axis of known bores, rolled, to and fro. {more}".rstrip()
@@ -88,7 +88,7 @@ class FieldAnswer:
 
 
 def field_answer(found: FieldEvidence, library: Mapping[str, EffectModel], stated: Stated) -> FieldAnswer:
-    """Return what the field's rings and texture show beyond the stated instrument's uncertainty."""
+    """Return what rings and texture of an inspection show beyond the stated instrument's uncertainty."""
     scores = scores_of(found.whole, library, stated)
     p_value = min((s.p_value for s in scores), default=1.0) * max(len(scores), 1)
     if p_value > DETECTED:
@@ -99,7 +99,7 @@ def field_answer(found: FieldEvidence, library: Mapping[str, EffectModel], state
 def scores_of(
     whole: Evidence, library: Mapping[str, EffectModel], stated: Stated
 ) -> list[Scored]:  # fmt: skip
-    """Return every effect's score at its best shape, the most telling first."""
+    """Return every effect's score at its best shape, the most significant first."""
     best: dict[str, Scored] = {}
     tried: dict[str, int] = {}
     for name, shape in sorted({(c.effect, c.shape) for c in whole.columns if c.effect != INSTRUMENT}):
@@ -116,7 +116,7 @@ def scores_of(
 
 
 def location_in_field(found: FieldEvidence, shown: Sequence[Scored]) -> Location | None:
-    """Return where and when the field shows it; one diameter gives no exponent."""
+    """Return where and when the inspection shows it; one diameter determines no radial exponent."""
     if not shown or found.run is None:
         return None
     first = EFFECTS[shown[0].model.name]
@@ -139,10 +139,10 @@ def _about_as_good(scores: Sequence[Scored]) -> tuple[Scored, ...]:
 def met_by_field(
     found: Diagnosis, field: Seen | None, gauge: Seen | None, probe: Probe
 ) -> tuple[Confirmation | None, ...]:
-    """Return, for each effect of the gauge's likeliest hypothesis, whether the field says the same.
+    """Return, for each effect of the gauge run's likeliest hypothesis, whether the inspection agrees.
 
-    Of the encoder's scale counts what the gauge's markers say: from the field's own way it would follow that
-    the field agrees with any place of the sheet.
+    The encoder's scale is the one that the gauge run's markers show: estimated from the inspection's own
+    motion, it would make the inspection agree with any place of the sheet.
     """
     examined = gauge.geometry if gauge is not None else None
     if gauge is None or examined is None or field is None or field.field is None or field.field.run is None:
@@ -155,7 +155,7 @@ def met_by_field(
 
 
 def borne_out(gauge: Seen | None, met: Sequence[Confirmation | None]) -> Seen | None:
-    """Return a gauge run with what the field bears out of it, ``met`` as of `met_by_field`."""
+    """Return the gauge run's evidence with the inspection's confirmations, ``met`` as from `met_by_field`."""
     if gauge is None or gauge.geometry is None or not met:
         return gauge
     each = zip(gauge.geometry.confirmed, met, strict=False)
@@ -167,7 +167,7 @@ def with_field(
     found: Diagnosis, field: Seen | None, gauge: Seen | None, met: Sequence[Confirmation | None],
     probe: Probe, library: Mapping[str, EffectModel],
 ) -> Diagnosis:  # fmt: skip
-    """Return the answer with what the field's rings and texture say put in; ``met`` as of `met_by_field`."""
+    """Return the answer with what the inspection's rings and texture show; ``met`` as from `met_by_field`."""
     if field is None or field.field is None or field.field.run is None:
         return found
     stated = stated_belief(probe)
@@ -192,7 +192,7 @@ def with_field(
 
 
 def _scale_named(found: Diagnosis) -> Value | None:
-    """Return by what share of the way the encoder surely reads too much, where that is named."""
+    """Return the relative error by which the encoder is known to read too much, where that is named."""
     certain = found.effects if found.verdict in (Verdict.NAMED, Verdict.PARTLY) else ()
     return next((e.parameters["relative"] for e in certain if e.name == _SCALE), None)
 
@@ -205,10 +205,10 @@ def encoder_share(found: Diagnosis, field: Seen | None, probe: Probe) -> float:
 
 
 def _knowing_encoder(field: Seen, scale: Value | None, stated: Stated) -> tuple[FieldEvidence, Stated]:
-    """Return what the field says, and is believed, when an error of the encoder's scale is known.
+    """Return the inspection's evidence, and the stated beliefs, for a known error of the encoder's scale.
 
-    Taken for right, an encoder that counts short makes the wall seem nearer than it is. An error that the
-    field's own way contradicts is that of another recording.
+    If taken as right, an encoder that counts short makes the wall seem nearer than it is. An error that the
+    inspection's own motion contradicts belongs to another recording.
     """
     assert field.field is not None
     own = field.travel.estimate(_SCALE) if field.travel is not None else None
@@ -223,7 +223,7 @@ def _knowing_encoder(field: Seen, scale: Value | None, stated: Stated) -> tuple[
 
 
 def _met(found: Diagnosis, met: Mapping[str, Confirmation | None]) -> Diagnosis:
-    """Return the answer with the field's confirmations, or less sure where the field contradicts it."""
+    """Return the answer with the inspection's confirmations, or less certain where it contradicts them."""
     effects = tuple(_confirmed(e, met.get(e.name)) for e in found.effects)
     silent = [name for name, each in met.items() if each is None and name in EFFECTS]
     missing = tuple(
@@ -241,14 +241,14 @@ def _met(found: Diagnosis, met: Mapping[str, Confirmation | None]) -> Diagnosis:
 
 
 def _beside(found: Diagnosis, certain: Sequence[EffectFound], members: Sequence[str]) -> Diagnosis:
-    """Return the answer with a class more: beside what is sure a remainder, else the answer itself."""
+    """Return the answer with one more class: a remainder beside what is certain, or the answer itself."""
     before = found.remainder
     every = _union(members, before.members if before is not None else found.members)
     if not certain:
         return replace(
             found, verdict=Verdict.CLASS, members=every, remainder=None, record_next=record_next(every)
         )
-    # What is unexplained stays so: a class does not hold it.
+    # What is unexplained stays so: a class does not contain it.
     nameless = before is not None and before.verdict is Verdict.UNEXPLAINED
     left = Remainder(
         Verdict.UNEXPLAINED if nameless else Verdict.CLASS, None, every, before.formula if before else ""
@@ -266,10 +266,10 @@ def _alone(
     found: Diagnosis, alone: FieldAnswer, possible: FieldAnswer, field: FieldEvidence, with_gauge: bool,
     doubt: str = "",
 ) -> Diagnosis:  # fmt: skip
-    """Return the class that the field alone shows, beside whatever other channels say.
+    """Return the class that the inspection alone shows, beside whatever other channels show.
 
-    Where none of it is ``possible``, what the field shows is unexplained: ``doubt`` says why, or the gauge
-    run refutes every one of them.
+    Where none of it is ``possible``, what the inspection shows is unexplained: ``doubt`` says why, or else
+    the gauge run refutes every member.
     """
     refuted = doubt or _LOOKS_LIKE.format(alone.identifiable)
     told = _BY_FIELD + possible.identifiable if possible.shown else refuted
@@ -279,7 +279,7 @@ def _alone(
     names = () if certain else classes_of([e.name for e in found.effects])
     where = location_in_field(field, alone.shown)
     if where is not None and not possible.shown:
-        # What the refuted causes are fixed to was not measured.
+        # What the refuted causes would be fixed to was not measured.
         where = replace(where, fixed_to=None, time=None)
     found = _beside(found, certain, _union(possible.members, names)) if possible.shown else _nameless(found)
     following = possible.next if possible.shown or not with_gauge else AGAIN
@@ -290,7 +290,7 @@ def _alone(
 
 
 def _nameless(found: Diagnosis) -> Diagnosis:
-    """Return the answer with something unexplained, beside what is sure or alone: no class holds it."""
+    """Return the answer with something unexplained, alone or beside what is certain: no class contains it."""
     if found.verdict in (Verdict.NAMED, Verdict.PARTLY):
         before = found.remainder or Remainder(Verdict.UNEXPLAINED)
         return replace(found, verdict=Verdict.PARTLY, remainder=replace(before, verdict=Verdict.UNEXPLAINED))

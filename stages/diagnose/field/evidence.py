@@ -1,4 +1,4 @@
-"""Evidence of left-out physics in a field recording, and what it can no longer tell."""
+"""Evidence of left-out physics in an inspection, and what the inspection cannot show."""
 
 from __future__ import annotations
 
@@ -21,16 +21,16 @@ from stages.diagnose.inference import Evidence
 from stages.diagnose.travel.evidence import TravelEvidence, travel_evidence
 from stages.diagnose.travel.sight import sight_of_trajectory
 
-# More shapes than this are searched in the motion's spectrum or in the readings, not one by one.
+# Effects with more shapes are searched in the motion's spectrum or in the readings, not shape by shape.
 _FEW_SHAPES = 12
 _CELL_MM, _CELL_RAD = 10.0, np.radians(30.0)
 # Relative error of a nominal diameter: pipes are made to about 1 %, of which this is 3 σ.
 _DIAMETER_SHARE = 0.03
 _SHORTEST_MM = 40.0
-# Of fewer lit pictures the motion may be anything: 3 of a drawn pipe, 5 mm apart, gave a way of 58 mm.
+# With fewer lit pictures the motion is undetermined: 3 of a simulated pipe, 5 mm apart, gave a path of 58 mm.
 _FEWEST_LIT = 10
-# 1 σ by which the whole line is found beside its middle, px: the mean radius of three rendered inspections,
-# each with its right probe, was off by -0.09, 0.03 and 0.09 (open-1, open-3, a03). It scales the way seen.
+# 1 σ of a common radial error of the line, px: the mean radius of three rendered inspections, each with its
+# right probe, was off by -0.09, 0.03 and 0.09 (open-1, open-3, a03). It scales the distance seen.
 _LINE_PX = 0.08
 _LOST_SHARE = 0.25
 _LEAST_OFFSET_MM = 0.5
@@ -38,7 +38,7 @@ _LEAST_ROLL_RAD = np.radians(5.0)
 
 
 def shortcomings_of(run: FieldRun) -> tuple[str, ...]:
-    """Return what this field recording cannot tell."""
+    """Return sentences on what this inspection cannot show."""
     return (*_diameter(run), *_length(run), *_texture(run), *_sweep(run), *_one_bore())
 
 
@@ -53,7 +53,7 @@ def _diameter(run: FieldRun) -> tuple[str, ...]:
 
 
 def travels(run: FieldRun) -> bool:
-    """Return whether the probe travels far enough that agreement means anything."""
+    """Return whether the probe travels far enough for an agreement to be meaningful."""
     return not _length(run)
 
 
@@ -66,13 +66,13 @@ def _length(run: FieldRun) -> tuple[str, ...]:
     if lit < _FEWEST_LIT:
         return (
             f"Only {lit} pictures show the lit wall, where {_FEWEST_LIT} are needed to follow the probe: "
-            "drift and relief of the wall cannot be told from errors of the instrument.",
+            "drift and relief of the wall look like errors of the instrument.",
         )  # fmt: skip
     if way > _SHORTEST_MM:
         return ()
     return (
-        f"The probe travels only {way:.0f} mm: relief of the wall cannot be told from errors of the "
-        "instrument, nor a drift of the instrument from the pipe's own shape.",
+        f"The probe travels only {way:.0f} mm: relief of the wall looks like errors of the "
+        "instrument, and a drift of the instrument like the pipe's own shape.",
     )  # fmt: skip
 
 
@@ -93,14 +93,14 @@ def _sweep(run: FieldRun) -> tuple[str, ...]:
     across = float(np.sqrt(np.mean(np.var(T[:, :2, 3], axis=0))))
     if across < _LEAST_OFFSET_MM:
         out.append(
-            f"The probe moves across the pipe by only {across:.2f} mm (1 σ): a shifted image can hardly be "
-            "told from a tilted or decentred sheet."
+            f"The probe moves across the pipe by only {across:.2f} mm (1 σ): a shifted image looks nearly "
+            "like a tilted or decentred sheet."
         )
     roll = np.unwrap(np.arctan2(T[:, 1, 0], T[:, 0, 0]))
     if float(np.ptp(roll)) < _LEAST_ROLL_RAD:
         out.append(
             f"The probe rolls by only {np.degrees(np.ptp(roll)):.1f}°: an error with two waves around "
-            "the ring cannot be told from an oval pipe."
+            "the ring looks like an oval pipe."
         )
     return tuple(out)
 
@@ -114,21 +114,21 @@ def _one_bore() -> tuple[str, ...]:
 
 @dataclass(frozen=True)
 class FieldEvidence:
-    """All that a field recording says.
+    """All evidence from an inspection's rings, texture and encoder.
 
     Attributes
     ----------
     travel : TravelEvidence or None
-        Motion against encoder, and lines in the motion.
+        Motion against encoder, and lines in the motion's spectrum.
     whole : Evidence
-        Of rings and texture together.
+        From rings and texture together.
     shortcomings : tuple of str
-        What this recording cannot tell, and why.
+        What this recording cannot show, and why.
     run : FieldRun or None
-        None when rings and texture alone do not determine the motion. It is not stored with the evidence:
-        a stage of its own holds it.
+        None when rings and texture alone do not determine the motion. It is not stored with the evidence: a
+        stage of its own stores it.
     encoder_scale : float
-        By what share of its reading the encoder is known to read too much; the evidence is about that.
+        Known relative error by which the encoder reads too much; the evidence is relative to it.
     """
 
     travel: TravelEvidence | None
@@ -145,14 +145,14 @@ class FieldEvidence:
         return _about_encoder(found, self.encoder_scale)
 
     def with_encoder(self, scale: float) -> FieldEvidence:
-        """Return the evidence of one who knows by what share of the way the encoder reads too much."""
-        # Of what it reads, as its column counts, and not of the way.
+        """Return the evidence when the relative error of the encoder is known."""
+        # As a share of the reading, like its column, and not of the true distance.
         share = scale / (1 + scale)
         return replace(self, whole=_about_encoder(self.whole, share), encoder_scale=share)
 
 
 def _about_encoder(found: Evidence, scale: float) -> Evidence:
-    """Return the evidence with the encoder's scale counted from another value than the stated one."""
+    """Return the evidence with the encoder's scale relative to another value than the stated one."""
     if ENCODER_SCALE not in found.place:
         return found
     own = found.place[ENCODER_SCALE]
@@ -162,7 +162,7 @@ def _about_encoder(found: Evidence, scale: float) -> Evidence:
 
 
 def nothing_said(recording: Recording, problem: str) -> FieldEvidence:
-    """Return empty evidence of a recording whose motion rings and texture do not determine, and why."""
+    """Return empty evidence, with the reason, if rings and texture do not determine the motion."""
     lit = len(recording.frames.of(Illumination.LED, Illumination.BOTH))
     why = problem or "they do not determine the motion"
     sentences = [f"Rings and texture of the inspection say nothing about the instrument: {why}."]
@@ -181,10 +181,10 @@ def field_evidence(
     run: FieldRun, library: Mapping[str, EffectModel], without: Collection[str] = (),
     progress: Progress = unheard,
 ) -> FieldEvidence:  # fmt: skip
-    """Return what a field recording says of every effect whose columns it can have, some not known.
+    """Return an inspection's evidence about every effect for which it has columns; some may be unknown.
 
     Poses, landmarks, the pipe's radius, ovality and axis, errors of matching and the encoder's creep are
-    eliminated; the stated instrument's parameters stay as columns, without prior.
+    eliminated; the stated instrument's parameters remain as columns, without prior.
     """
     travel = travel_of_run(run, without=without)
     asked, slips = asked_of(library, run, travel), _slips(run, travel)
@@ -200,9 +200,9 @@ def field_evidence(
 def asked_of(
     library: Mapping[str, EffectModel], run: FieldRun, travel: TravelEvidence | None
 ) -> list[tuple[EffectModel, Shape]]:
-    """Return effects and shapes for which a field recording can have columns.
+    """Return effects and shapes for which an inspection can have columns.
 
-    Periodic effects are asked about at the lines of the motion, slips where the readings jump.
+    Periodic effects are tested at the lines of the motion's spectrum, slips where the readings jump.
     """
     duration = float(run.measured.time_s[-1] - run.measured.time_s[0])
     out: list[tuple[EffectModel, Shape]] = []
@@ -221,9 +221,9 @@ def asked_of(
 def travel_of_run(
     run: FieldRun, source: str = "field", without: Collection[str] = ()
 ) -> TravelEvidence | None:
-    """Return what the run's motion and encoder say to one who does not know some effects.
+    """Return the evidence from the run's motion and encoder, with some effects unknown.
 
-    None where no frame shows the way.
+    None where no frame shows the motion.
     """
     sight = sight_of_trajectory(run.recording, run.trajectory)
     if not len(sight.frame):
@@ -238,7 +238,7 @@ def travel_of_run(
 
 
 def scale_by_line(points: ImagePoints) -> float:
-    """Return the relative 1 σ of the radius, and with it of the way seen, by the place of the whole line."""
+    """Return the relative 1 σ of the radius, and so of the distance seen, by the line's common error."""
     if not len(points.uv):
         return 0.0
     farther = points.probe.triangulate(points.uv + _LINE_PX * points.outward)
@@ -246,7 +246,7 @@ def scale_by_line(points: ImagePoints) -> float:
 
 
 def _slips(run: FieldRun, travel: TravelEvidence | None) -> Int:
-    """Return the frames before which the readings jump: all while a slip lasts."""
+    """Return the frames before which the readings jump: all frames of a slip that lasts."""
     if travel is None:
         return np.zeros(0, np.int64)
     time_s, found = run.measured.time_s, [np.zeros(0, np.int64)]
@@ -266,7 +266,7 @@ def _evidence(run: FieldRun, asked: Asked, slips: Int) -> Evidence:
 
 
 def _cells(distance_mm: Float, azimuth_rad: Float) -> Int:
-    """Return numbers (M,) of the cells of wall in which points lie: relief is alike within one."""
+    """Return each point's cell number (M,) on the wall: relief is correlated within a cell."""
     along = np.floor((distance_mm - np.min(distance_mm, initial=0.0)) / _CELL_MM).astype(np.int64)
     around = np.floor((azimuth_rad % (2 * np.pi)) / _CELL_RAD).astype(np.int64)
     return np.asarray(100 * along + around)

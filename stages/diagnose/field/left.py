@@ -1,4 +1,4 @@
-"""Whether what an inspection shows is explained by the likeliest effect, or mostly left by it."""
+"""Whether the likeliest effect explains what an inspection shows, or leaves most of it."""
 
 from __future__ import annotations
 
@@ -8,22 +8,22 @@ from stages.diagnose.field.evidence import FieldEvidence
 from stages.diagnose.gauge.scan import Scored
 from stages.diagnose.residual import rings_against_texture
 
-# Texture alone places the middle of a ring with a 1 σ of .09 to .11 px in four sound inspections, of which
-# the largest is taken; its error there was .05 to .08 px (`RingResidual.floor_px`).
+# 1 σ of the place of a ring's middle from texture alone, px: .09 to .11 in four sound inspections, of which
+# the largest is used; its error there was .05 to .08 px (`RingResidual.floor_px`).
 _MIDDLE_PX = 0.11
 _LEFT = (
-    "The inspection alone shows what no effect of the library explains. The likeliest, {}, leaves {:.2f} px "
-    "of {:.2f} px between rings and texture, most of it alike at one place of the image, where noise makes "
-    "{:.2f} px"
+    "The inspection alone shows something that no effect of the library explains. The likeliest, {}, leaves "
+    "{:.2f} px of {:.2f} px between rings and texture, most of it constant at one place of the image, where "
+    "noise makes {:.2f} px"
 )
 
 
 def why_unexplained(field: FieldEvidence, likeliest: Scored) -> str:
-    """Return why what rings show is not the likeliest effect; empty where that may be right, or nobody knows.
+    """Return why rings contradict the likeliest effect; empty where it may be right or cannot be judged.
 
-    What repeats at one azimuth of the image on other wall is no noise, but for where texture alone has the
-    middle of a ring. An effect that explains the rest takes most of it: it does not where it leaves more than
-    half, and more than noise and middle make besides.
+    What repeats at one azimuth of the image on other wall is not noise, except for the uncertain place of a
+    ring's middle from texture. An effect that explains the rest removes most of it: it does not if it leaves
+    more than half, and more than noise and middle explain.
     """
     assert field.run is not None
     taken = ((likeliest.model, likeliest.shape, likeliest.score.amplitude),)

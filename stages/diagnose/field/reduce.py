@@ -1,4 +1,4 @@
-"""Elimination of poses, landmarks, pipe and matching's errors: evidence over the shared columns."""
+"""Eliminate poses, landmarks, pipe and matching errors: the result is evidence over the shared columns."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ class Reduced:
     ----------
     factor : Factor
     information, right : (K, K), (K,)
-        Over the named columns.
+        Normal equations over the named columns.
     follow : (B, K)
-        How all columns of the border follow the named ones.
+        Response of all border columns to the named ones.
     step : (B,)
-        Of the recording's own columns, the named ones staying.
+        Step of the recording's own columns with the named ones fixed.
     landmark_inverse : (L, 3, 3)
     """
 
@@ -63,7 +63,7 @@ def reduced(system: FieldSystem, frames: int) -> Reduced:
 
 
 def evidence_of(system: FieldSystem, found: Reduced, ring_cell: Int, landmark_cell: Int) -> Evidence:
-    """Return the evidence; rings and landmarks of one cell (M,), (L,) err alike."""
+    """Return the evidence; rings (M,) and landmarks (L,) of one cell have correlated errors."""
     scores, squares, misfit = _ring_scores(system, found)
     texture, more, rest = _texture_scores(system, found)
     cells = np.concatenate([ring_cell, landmark_cell + int(ring_cell.max(initial=0)) + 1])
@@ -78,7 +78,7 @@ def evidence_of(system: FieldSystem, found: Reduced, ring_cell: Int, landmark_ce
 
 
 def rings_after(rows: Rows, found: Reduced, named: Float) -> Float:
-    """Return the rings' residuals (M,) after a step ``named`` (K,), all other unknowns at their best."""
+    """Return the rings' residuals (M,) after a step ``named`` (K,), all other unknowns at their optimum."""
     return np.asarray(rows.residual + _after_step(rows, found) + _by_named(rows, found) @ named)
 
 
@@ -91,7 +91,7 @@ def _ring_scores(system: FieldSystem, found: Reduced) -> tuple[Float, Float, flo
 
 
 def _by_named(rows: Rows, found: Reduced) -> Float:
-    """Return (M, K) how residuals follow the named columns when frames and own columns do."""
+    """Return the residuals' derivatives (M, K) by the named columns, frames and own columns following."""
     return np.asarray(found.factor.border_rows(rows) @ found.follow)
 
 
@@ -103,7 +103,7 @@ def _after_step(rows: Rows, found: Reduced) -> Float:
 
 
 def _texture_scores(system: FieldSystem, found: Reduced) -> tuple[Float, Float, float]:
-    """Return each landmark's score (L, K), the plain sum of squares (K,), and the misfit."""
+    """Return each landmark's score (L, K), the sum of squares (K,), and the misfit."""
     rows, size = system.texture, len(system.names)
     poses = found.factor.frames_follow(found.follow)
     step = found.factor.frames_after(found.step)

@@ -1,4 +1,4 @@
-"""A field recording or a stretch of it, adjusted with the stated instrument, and the points it measured."""
+"""A field recording, or a stretch of it, adjusted with the stated instrument, and its measured points."""
 
 from __future__ import annotations
 
@@ -47,12 +47,12 @@ class FieldRun:
         Without encoder.
     state : State
     equations : Equations
-        At ``state``, with the weights that count from now on.
+        At ``state``, with the final robust weights.
     trajectory : Trajectory
         In P.
     encoder : EncoderReadings or None
     ring_frames : (F,) int
-        Places of the ring frames in the frame table.
+        Indices of the ring frames in the frame table.
     parameters : MotionParameters
     """
 
@@ -99,7 +99,7 @@ def field_run(
 
 
 def warn_of_knock(knock: KnockTest | None, context: Context) -> None:
-    """Warn of a laser that was knocked in mid-run, or may have been: the run is examined as it is."""
+    """Warn of a laser that was, or may have been, knocked during the run; the run is examined as it is."""
     if knock is None or not (knock.told or knock.ambiguous):
         return
     x, y, radius = knock.jump.jump_mm
@@ -112,7 +112,7 @@ def warn_of_knock(knock: KnockTest | None, context: Context) -> None:
 
 
 def with_probe(run: FieldRun, probe: Probe, context: Context) -> FieldRun:
-    """Return the run adjusted anew with another probe, from the same ring samples and texture tracks.
+    """Return the run adjusted again with another probe, from the same ring samples and texture tracks.
 
     Raises
     ------
@@ -130,16 +130,17 @@ def _adjusted_with(run: FieldRun, probe: Probe, context: Context) -> JointEstima
     parameters, before, frames = run.parameters, run.measured, run.recording.frames
     bins = ring_bins(run.rings, run.ring_frames, probe, parameters.ring_bins, parameters.surface_sigma_mm)
     measured = Measurements.of(before.tracks, bins, before.time_s, None, probe)
-    # Convergence is judged by the pipe's radius; the stated probe's is near enough.
+    # Convergence is judged by the pipe's radius; that of the stated probe is close enough.
     radius_mm = float(run.state.globals[0])
     start = replace(run.state, instrument=np.zeros(measured.unsure.shape[1] + MATCH_BIASES))
     return adjust_at_once(start, measured, frames, radius_mm, parameters, context)
 
 
 def ring_points(run: FieldRun) -> ImagePoints:
-    """Return the ring bins where the smooth pipe would have them.
+    """Return the ring bins at the place of the smooth pipe.
 
-    Not where they were found: derivatives that follow a measurement's error correlate with its residual.
+    The measured places are not used: derivatives that follow a measurement's error correlate with its
+    residual.
     """
     frame, found_c = run.measured.rings.frame, run.measured.rings.xyz_c
     uv = run.probe.camera.project(found_c).uv
@@ -161,7 +162,7 @@ def ring_points(run: FieldRun) -> ImagePoints:
 
 
 def texture_points(run: FieldRun) -> ImagePoints:
-    """Return the landmark observations where poses and landmarks of the state place them."""
+    """Return the landmark observations at the places predicted by the state's poses and landmarks."""
     tracks, state = run.measured.tracks, run.state
     xyz_c = transform(inverse(state.T_pc[tracks.frame]), state.xyz_p[tracks.landmark])
     normal_c, along_c, azimuth, distance = _wall_at(run, tracks.frame, xyz_c)
@@ -197,5 +198,5 @@ def _wall_at(run: FieldRun, frame: Int, xyz_c: Float) -> tuple[Float, Float, Flo
 
 
 def _passing(run: FieldRun, frame: Int, xyz_c: Float) -> Float:
-    """Return how points (M, 3) of the wall pass in C, mm/s."""
+    """Return the velocity (M, 3) of wall points in C, mm/s."""
     return Moving.of(run.state.T_pc, run.measured.time_s, SHARP).passing_mm_s(frame, xyz_c)

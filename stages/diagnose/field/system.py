@@ -1,4 +1,4 @@
-"""A field recording's equations with columns for the stated instrument and for effects."""
+"""The equations of a field recording, with columns for the stated instrument and for effects."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ Asked = Sequence[tuple[EffectModel, Shape]]
 _RADIUS_SHARE = 0.1
 _SLIPPED_MM = 1e3
 _MORE_BIASES = 2
-_MIDDLE_RAD, _SPAN_RAD = 1.0, 0.35  # polar angles at which texture is tracked
+_MIDDLE_RAD, _SPAN_RAD = 1.0, 0.35  # middle and half range of the polar angles of tracked texture
 _HOLD, _SCALE_SIGMA = 1e3, 0.002
 ENCODER_SCALE = Column(INSTRUMENT, "encoder_scale")
-# The pipe's own shape and the camera's way are unknowns of every field recording.
+# The pipe's own shape and the camera's motion are unknowns of every field recording.
 OWN = frozenset({"ovality", "pipe_bend", "probe_vibration"})
 
 
@@ -40,11 +40,11 @@ class FieldSystem:
         Without landmarks: first the rings, then the rest.
     texture : LandmarkRows
     names : tuple of Column
-        The last so many columns of the border; those before are the recording's own unknowns.
+        The last columns of the border; those before are the recording's own unknowns.
     value : (K,)
-        Where the named columns are linearised, true − stated.
+        Point of linearisation of the named columns, true − stated.
     held : (K,)
-        Information that holds columns of which nothing is known; to be taken off again.
+        Artificial information that keeps undetermined columns solvable; to be subtracted again.
     """
 
     rows: tuple[Rows, ...]
@@ -67,7 +67,7 @@ def field_system(run: FieldRun, asked: Asked, slips: Int) -> FieldSystem:
     asked
         Effects and shapes for which columns are wanted.
     slips : (J,) int
-        Frames before which the encoder's reading jumps: there it is not followed.
+        Frames before which the encoder's reading jumps: it is not used there.
     """
     known = np.flatnonzero(np.diag(run.probe.covariance) > 0)
     names = [Column(INSTRUMENT, run.probe.parameter_names[k]) for k in known]
@@ -102,7 +102,7 @@ def _pose_rows(run: FieldRun) -> list[Rows]:
 
 
 def _ring_rows(run: FieldRun, known: Int, asked: Asked, size: int) -> Rows:
-    """Return the run's ring equations; a line found farther out makes the wall seem farther out."""
+    """Return the run's ring equations; a line found farther out makes the wall appear farther out."""
     rows, points = run.equations.rings, ring_points(run)
     T = run.state.T_pc[run.measured.rings.frame]
     by_pixel, by_parameters = run.probe.triangulate_jacobian(points.uv)
@@ -142,9 +142,9 @@ def _texture_rows(run: FieldRun, known: Int, asked: Asked, size: int) -> Landmar
 
 
 def _more_biases(run: FieldRun, points: ImagePoints) -> Float:
-    """Return (M, 2, 2) what matching may get wrong all round, quadratic and cubic in the polar angle.
+    """Return (M, 2, 2) radial matching errors that are quadratic and cubic in the polar angle.
 
-    The adjustment allows for errors at knots, linear between; effects on the lens are told by the rest.
+    The adjustment allows for errors at knots, linear between them; effects of the lens show in the rest.
     """
     t = (points.theta - _MIDDLE_RAD) / _SPAN_RAD
     curve = np.stack([1.5 * t**2 - 0.5, 2.5 * t**3 - 1.5 * t], -1) * run.parameters.match_bias_px
@@ -154,7 +154,7 @@ def _more_biases(run: FieldRun, points: ImagePoints) -> Float:
 def _encoder_rows(
     run: FieldRun, encoder: EncoderReadings, scale_at: int, asked: Asked, size: int, slips: Int
 ) -> list[Rows]:
-    """Return: distance seen = reading less what effects add to it + slip, and slip creeps."""
+    """Return the equations distance seen = reading − effects on it + slip, and slip varying slowly."""
     state = run.state
     steady = replace(state, globals=np.append(state.globals[:3], 1.0), slip=np.zeros(len(state.slip)))
     reading, creep = residuals.encoder_rows(steady, encoder, run.parameters.encoder_slip_sigma_mm)
@@ -170,7 +170,7 @@ def _encoder_rows(
 
 
 def _own_priors(state: State, size: int) -> Rows:
-    """Return what is known of the pipe's radius and ovality, and of what matching may get wrong."""
+    """Return the priors of the pipe's radius and ovality, and of matching errors."""
     own = np.r_[0:4, _shape_size(state) : _own_size(state)]
     sigma = np.r_[
         np.full(3, _RADIUS_SHARE * state.nominal_radius_mm), 1.0, np.ones(MATCH_BIASES + _MORE_BIASES)
@@ -192,24 +192,24 @@ def _held(information: Float, border: int) -> Rows:
 
 
 def _shape_size(state: State) -> int:
-    """Return how many columns of the border belong to the pipe."""
+    """Return the number of border columns of the pipe."""
     return state.border_size - len(state.instrument)
 
 
 def _own_size(state: State) -> int:
-    """Return how many columns belong to the recording alone: the pipe's and matching's."""
+    """Return the number of columns of the recording alone: the pipe's and those of matching."""
     return _shape_size(state) + MATCH_BIASES + _MORE_BIASES
 
 
 def _widened(rows: Rows, state: State, size: int) -> Rows:
-    """Return rows with the named columns in place of the instrument's corrections, and zero there."""
+    """Return rows with the named columns, filled with zeros, in place of the instrument's corrections."""
     wide = np.zeros((len(rows.residual), _own_size(state) + size))
     wide[:, : _shape_size(state)] = rows.by_border[:, : _shape_size(state)]
     return replace(rows, by_border=wide)
 
 
 def _usable(rows: Rows, named: Float) -> Rows:
-    """Return rows with the named columns; where a prediction fails they do not count."""
+    """Return rows with the named columns; rows without a valid prediction get no weight."""
     bad = np.asarray(~np.isfinite(named).all(1))
     rows.by_border[:, rows.by_border.shape[1] - named.shape[1] :] = np.where(bad[:, None], 0.0, named)
     return replace(rows, sigma=np.where(bad, np.inf, rows.sigma))

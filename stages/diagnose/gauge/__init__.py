@@ -1,1 +1,1 @@
-"""A gauge run as evidence: poses, rings on known bore, fiducials, encoder against the stated instrument."""
+"""Evidence from a gauge run: poses, rings on a known bore, fiducials and encoder against the stated probe."""

@@ -1,4 +1,4 @@
-"""What was found in a gauge run's rings and fiducials, as effects, class, candidates and quality of fit."""
+"""The result from a gauge run's rings and fiducials: effects, class, candidates and quality of fit."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from stages.diagnose.gauge.unknown_laws import Unknown
 from stages.diagnose.inference import SURE, UNKNOWN
 from stages.diagnose.result import Candidate, Confirmation, EffectFound, Value, Verdict
 
-# Explanations that were only weighed are listed when their chance is above this: all others together change
+# Explanations that were weighed but not fitted are listed above this probability: all others together change
 # no answer.
 _LISTED = 1e-3
 _REPEATS = (
@@ -32,7 +32,7 @@ _REPEATS = (
 
 
 def effects_found(examined: Examined) -> tuple[EffectFound, ...]:
-    """Return the effects of the likeliest hypothesis with sizes and chances."""
+    """Return the effects of the likeliest hypothesis with sizes and probabilities."""
     best, verdicts = examined.best, examined.verdicts
     if best is None or verdicts is None:
         return ()
@@ -41,13 +41,13 @@ def effects_found(examined: Examined) -> tuple[EffectFound, ...]:
 
 
 def chances(examined: Examined) -> tuple[float, ...]:
-    """Return for each effect of the likeliest hypothesis the chance that its name is right.
+    """Return, for each effect of the likeliest hypothesis, the probability that its name is right.
 
-    To the hypotheses without it come, as odds against it: causes that this run is not expected to tell from
-    it, each as likely as it; laws and courses that nobody knows in its place, and one more, `UNKNOWN`, where
-    no second prediction agrees; and an even chance for everything that shows that the hypothesis does not
-    hold: a prediction that fails, a remainder that is no noise, or that moves rings or fiducials by more than
-    the effect, what was held out, and other names, as many or fewer, that predict what was held out better.
+    The odds against it are the sum of: the hypotheses without it; each cause that this run cannot be expected
+    to distinguish from it, as likely as it; unknown laws and courses in its place, and `UNKNOWN` more where
+    no second prediction agrees; and even odds for each sign that the hypothesis is wrong: a prediction that
+    fails, a remainder that is not noise or that moves rings or fiducials by more than the effect, poorly
+    predicted held-out measurements, and other names, as many or fewer, that predict these better.
     """
     best, verdicts = examined.best, examined.verdicts
     if best is None or verdicts is None:
@@ -67,14 +67,14 @@ def chances(examined: Examined) -> tuple[float, ...]:
 
 
 def sure(examined: Examined) -> tuple[bool, ...]:
-    """Return for each effect of the likeliest hypothesis whether its name is sure, whatever else is left."""
+    """Return, for each effect of the likeliest hypothesis, whether its name is certain."""
     return tuple(chance > SURE for chance in chances(examined))
 
 
 def better_held_out(verdicts: Verdicts) -> tuple[Judged, ...]:
-    """Return hypotheses of as many names as the likeliest, or fewer, that predict better what was held out.
+    """Return hypotheses of no more names than the likeliest that predict held-out measurements better.
 
-    A drift of the focal length was once called one of the distortion, at 99 to 1.
+    A drift of the focal length was once named a drift of the distortion, at 99 to 1.
     """
     best, *others = verdicts.judged
     as_few = (j for j in others if j.named and len(j.library_terms) <= len(best.library_terms))
@@ -82,9 +82,9 @@ def better_held_out(verdicts: Verdicts) -> tuple[Judged, ...]:
 
 
 def _fits(examined: Examined) -> bool:
-    """Return whether what had no say in the fit is predicted to about the noise, where that was tried.
+    """Return whether held-out measurements are predicted to about the noise, where that was tested.
 
-    It is not known to be where the noise is not.
+    False where the noise is unknown.
     """
     quality = examined.quality
     if quality is None or np.isnan(quality.heldout_after):
@@ -93,7 +93,7 @@ def _fits(examined: Examined) -> bool:
 
 
 def unknown_rivals(examined: Examined) -> tuple[str, ...]:
-    """Return the patterns without a cause that leave a name of the likeliest unsure, the likeliest first."""
+    """Return the causeless patterns that make a name of the likeliest uncertain, likeliest first."""
     best, verdicts = examined.best, examined.verdicts
     if best is None or verdicts is None:
         return ()
@@ -103,7 +103,7 @@ def unknown_rivals(examined: Examined) -> tuple[str, ...]:
 
 
 def like_a_name(examined: Examined) -> tuple[str, ...]:
-    """Return for each name that a law which nobody knows leaves unsure what that law would be like."""
+    """Return, for each name that an unknown law makes uncertain, a description of that law."""
     best = examined.best
     each = zip(best.library_terms, examined.unknown_laws, strict=True) if best is not None else ()
     unsure = [(t.model.law, beyond) for t, beyond in each if beyond.odds > 1 - SURE]
@@ -112,11 +112,11 @@ def like_a_name(examined: Examined) -> tuple[str, ...]:
 
 def _otherwise(beyond: Unknown) -> str:
     grows = beyond.growth > beyond.course
-    return "that grows otherwise with the radius" if grows else "that changes otherwise in time"
+    return "with another dependence on the radius" if grows else "with another course in time"
 
 
 def beyond_line(examined: Examined) -> tuple[bool, ...]:
-    """Return for each effect whether it moves the line by more than its width, as no light beside it can."""
+    """Return, for each effect, whether it shifts the line by more than its width: no light can."""
     best = examined.best
     width_px = float(np.median(examined.searched.run.width_px))
     return tuple(shift_px(best.fit, t) > width_px for t in best.library_terms) if best is not None else ()
@@ -144,7 +144,7 @@ def _in_the_end(sized: Sized) -> str:
 
 
 def candidates(examined: Examined) -> tuple[Candidate, ...]:
-    """Return every explanation that was fitted, and the likeliest of all others, with what it gains."""
+    """Return every explanation that was fitted, and the likeliest of the others, with what each gains."""
     verdicts = examined.verdicts
     if verdicts is None:
         return ()
@@ -169,7 +169,7 @@ def candidates(examined: Examined) -> tuple[Candidate, ...]:
 
 
 def members(examined: Examined) -> tuple[str, ...]:
-    """Return the names that cannot be ruled out, by these measurements or by what they could tell."""
+    """Return the names that cannot be excluded, by these measurements or by what they are able to show."""
     verdicts, best = examined.verdicts, examined.best
     if verdicts is None or best is None:
         return ()
@@ -179,7 +179,7 @@ def members(examined: Examined) -> tuple[str, ...]:
 
 
 def formula(examined: Examined) -> str:
-    """Return the empirical formula for what nothing of the library explains, or how much it is."""
+    """Return the empirical formula for what no effect of the library explains."""
     if examined.verdicts is None:
         quality = examined.quality if examined.repeats else None
         return _REPEATS.format(quality.heldout_after, quality.noise_floor) if quality is not None else ""
@@ -190,19 +190,19 @@ def formula(examined: Examined) -> str:
 
 
 def verdict_of(examined: Examined) -> Verdict:
-    """Return what rings and fiducials alone come to."""
+    """Return the verdict from rings and fiducials alone."""
     best, verdicts = examined.best, examined.verdicts
     if best is None or verdicts is None:
         return Verdict.UNEXPLAINED if examined.repeats else Verdict.CONSISTENT
     contradicted = [any(not c.agrees for c in each) for each in examined.confirmed]
-    # What does not predict the measurements that were held out, leaves out what nobody knows.
+    # If held-out measurements are not predicted, something unknown was left out.
     if not best.library_terms or verdicts.adequacy < ADEQUATE or not _fits(examined) or all(contradicted):
         return Verdict.UNEXPLAINED
     if all(sure(examined)):
         return Verdict.NAMED if best.named else Verdict.PARTLY
     if any(sure(examined)):
         return Verdict.PARTLY
-    # A class of effects would leave out what nobody knows.
+    # A class of effects would not include the unknown cause.
     known = any(examined.unsplit) or not unknown_rivals(examined)
     known &= all(beyond.odds < 1 for beyond in examined.unknown_laws)
     return Verdict.CLASS if best.named and known else Verdict.UNEXPLAINED

@@ -1,4 +1,4 @@
-"""Second predictions of the same physics in a gauge run, and sizes with all that makes them uncertain."""
+"""Confirm effects within a gauge run from disjoint parts of it; sizes with all their uncertainties."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ from stages.diagnose.gauge.sets import prior_sigma
 from stages.diagnose.inference import Evidence, Stated, estimate
 from stages.diagnose.result import Confirmation, CourseFound, Value
 
-# Estimates from disjoint measurements agree when their difference is no rarer than this: an effect is
-# compared about five times, and noise may contradict it once in a thousand times.
+# Estimates from disjoint measurements agree unless chance makes such a difference less often than this: an
+# effect is compared about five times, and noise may contradict it once in a thousand cases.
 _AGREE = 2e-4
 _LEAST_FRAMES = 8
 _BORE = "bore"
@@ -32,7 +32,7 @@ _BORE = "bore"
 
 @dataclass(frozen=True)
 class Partial:
-    """Amplitudes (Q,) of a term from one part of the measurements, with covariance."""
+    """Amplitudes (Q,) of a term, with covariance, from one part of the measurements."""
 
     where: str
     amplitude: Float
@@ -42,7 +42,7 @@ class Partial:
 def confirmations(
     run: GaugeRun, judged: Judged, regimes: Sequence[Regime], terms: Sequence[Term], stated: Stated
 ) -> tuple[tuple[Confirmation, ...], ...]:
-    """Return for each term what disjoint parts of the run say of it, each against all the others."""
+    """Return, for each term, whether disjoint parts of the run agree, each part against all the others."""
     shared = [*_by_bore(regimes), *_by_direction(run, judged)]
     parts = [[*shared, *_by_half(run, term)] for term in terms]
     everything = np.ones(len(run.time_s), bool)
@@ -67,7 +67,7 @@ def confirmations(
 def passes_again(run: GaugeRun, T_pc: Float, step_s: float) -> bool:
     """Return whether the probe is on the same stretch of the pipe before and after a step.
 
-    If not, the step may as well be a place: a gauge that is not as drawn from there on.
+    If not, the step may be a place instead: a gauge that differs from its drawing from there on.
     """
     along, after = T_pc[:, 2, 3], run.time_s - run.time_s[0] >= step_s
     if after.all() or not after.any():
@@ -79,14 +79,14 @@ def passes_again(run: GaugeRun, T_pc: Float, step_s: float) -> bool:
 
 
 def partial_of(where: str, part: Evidence, judged: Judged, term: Term, stated: Stated) -> Partial | None:
-    """Return the term's estimate from a part of the measurements, the other terms being free."""
+    """Return the term's estimate from a part of the measurements, with the other terms free."""
     result = estimate(part, stated, 10 * prior_sigma(part, judged.fit.terms))
     wanted = [(term.model.name, a.name, term.shape) for a in term.amplitudes]
     keys = [(c.effect, c.amplitude, c.shape) for c in part.columns]
     at = [keys.index(w) for w in wanted]
     if not np.all(np.diag(part.information)[at] > 0):
         return None
-    # Of a difference of two kinds' evidence the spread may come out below that of independent errors.
+    # For a difference of evidence of two kinds, the spread may come out below that of independent errors.
     ratio = np.diag(part.score_covariance)[at] / np.diag(part.information)[at]
     inflation = np.sqrt(np.maximum(ratio, 1.0))
     covariance = result.covariance[np.ix_(at, at)] * np.outer(inflation, inflation)
@@ -94,7 +94,7 @@ def partial_of(where: str, part: Evidence, judged: Judged, term: Term, stated: S
 
 
 def _by_bore(regimes: Sequence[Regime]) -> list[tuple[str, Part]]:
-    """Return the parts of the run within one bore each."""
+    """Return the parts of the run that are within one bore each."""
     out = []
     for section in sorted({r.section for r in regimes}):
         mask = np.any([r.part.frames for r in regimes if r.section == section], axis=0)
@@ -111,7 +111,7 @@ def _by_direction(run: GaugeRun, judged: Judged) -> list[tuple[str, Part]]:
 
 
 def _by_half(run: GaugeRun, term: Term) -> list[tuple[str, Part]]:
-    """Return the halves of the run, or of what comes after a step."""
+    """Return the halves of the run, or of what follows a step."""
     step = term.model.kind is CourseKind.STEP
     begun = run.time_s - run.time_s[0] >= (term.shape[0] if step else 0.0)
     if begun.sum() < 2 * _LEAST_FRAMES:
@@ -121,7 +121,7 @@ def _by_half(run: GaugeRun, term: Term) -> list[tuple[str, Part]]:
 
 
 def _pairs(found: Sequence[Partial]) -> list[tuple[Partial, Partial]]:
-    """Return neighbours of one kind: bores with the next bore, forward with backward, half with half."""
+    """Return the parts to be compared: each bore with the next, forward with backward, half with half."""
     by_kind: dict[str, list[Partial]] = {}
     for p in found:
         kind = _BORE if p.where.startswith(_BORE) else p.where.split()[-1]
@@ -130,7 +130,7 @@ def _pairs(found: Sequence[Partial]) -> list[tuple[Partial, Partial]]:
 
 
 def _compared(first: Partial, second: Partial, term: Term) -> Confirmation | None:
-    """Return whether two estimates agree in sign and size; None when either tells too little."""
+    """Return whether two estimates agree in sign and size; None when either is too uncertain."""
     size = float(np.linalg.norm(term.amplitude))
     if max(np.sqrt(np.trace(p.covariance)) for p in (first, second)) > TELLING * size:
         return None
@@ -145,7 +145,7 @@ def _compared(first: Partial, second: Partial, term: Term) -> Confirmation | Non
 def _by_kind(
     edges: Evidence, both: Evidence, judged: Judged, term: Term, stated: Stated
 ) -> Confirmation | None:
-    """Return fiducials against rings: both show what the camera does, only rings what the sheet does."""
+    """Return fiducials against rings: the camera affects both, the sheet only the rings."""
     if not _seen(edges, term):
         return None
     from_edges = partial_of("fiducials alone", edges, judged, term, stated)
@@ -168,7 +168,7 @@ def _seen(edges: Evidence, term: Term) -> bool:
 class Sized:
     """A term, its continuous shape free, with the covariance (Q, Q) of its amplitudes.
 
-    ``time_s`` is when it came, if it came in a step.
+    ``time_s`` is the time of a step.
     """
 
     term: Term
@@ -177,7 +177,7 @@ class Sized:
 
 
 def sizes_of(run: GaugeRun, judged: Judged, stated: Stated, alike: float) -> tuple[Sized, ...]:
-    """Return the terms of a hypothesis with covariances: by the data, shapes, and laws."""
+    """Return the terms of a hypothesis with covariances from data, shapes, and the accuracy of laws."""
     free = freed(run, judged.fit)
     whole = judged.evidence if free is judged.fit else evidence(run, free, ())[0]
     about = replace(judged, fit=free, evidence=whole)
@@ -196,10 +196,10 @@ def _sized(run: GaugeRun, judged: Judged, term: Term, stated: Stated) -> Sized:
 
 
 def lost_motion(run: GaugeRun, found: Fit, term: Term) -> float:
-    """Return what part of a term's size fast motion adds that rates over many frames lose.
+    """Return by which fraction a term's size is too large because rates over many frames lose fast motion.
 
-    A law c of the motion, of which k is kept, comes out ⟨c, k⟩ / ⟨k, k⟩ times too large. For c stand rates
-    over few frames: noise of poses, independent from frame to frame, adds to both products the same.
+    If a law is proportional to the motion c, of which k is kept, its size comes out ⟨c, k⟩ / ⟨k, k⟩ times too
+    large. Rates over few frames stand for c: independent noise of the poses adds the same to both products.
     """
     points = found.at(run).rings
     sharp = moved(points, Moving.of(found.state.T_pc, run.time_s, SHARP), run.rings.outward)

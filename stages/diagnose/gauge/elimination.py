@@ -1,7 +1,7 @@
-"""Elimination of poses and other unknowns of one recording from its linearised measurements.
+"""Eliminate poses and other unknowns of one recording from its linearised measurements.
 
-What is left is the evidence over the shared columns. B. Triggs et al., "Bundle adjustment: a modern
-synthesis", 2000, § 6.
+The result is the evidence over the shared columns. B. Triggs et al., "Bundle adjustment: a modern synthesis",
+2000, § 6.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from pipeline.arrays import Bool, Float, Int
 POSE = 6
 RING, EDGE, ENCODER = 0, 1, 2
 _REACH = 4
-# Information, relative to that of the best determined pose, that keeps an undetermined pose in its place.
+# Information, relative to that of the best determined pose, that holds an undetermined pose in place.
 _HOLD = 1e-10
 
 
@@ -46,17 +46,17 @@ class Equations:
     residual, weight : (M,)
         Of rings and edges in px, of the encoder in mm.
     cell : (M,) int
-        Measurements of one cell err alike.
+        Measurements of one cell have correlated errors.
     kind : (M,) int
         `RING`, `EDGE` or `ENCODER`.
     wall_mm : (M, 2)
-        Where on the wall a ring's points lie, along and around; NaN for other kinds.
+        Place of a ring's point on the wall, along and around; NaN for other kinds.
     edge : (M,) int
-        Place among all globals of the one fiducial's edge that was measured; −1 where there is none.
+        Index, among all globals, of the measured edge of a fiducial; −1 where there is none.
     by_edge : (M,)
         Derivative by the shift of that edge.
     edges : slice
-        Where the E shifts of edges lie among all G globals.
+        Indices of the E shifts of edges among all G globals.
     """
 
     frame: Int
@@ -78,7 +78,7 @@ class Equations:
 
     @property
     def place(self) -> Int:
-        """Places (G − E,) of the columns of ``by_global`` among all globals."""
+        """Indices (G − E,) of the columns of ``by_global`` among all globals."""
         return np.setdiff1d(np.arange(self.size), np.arange(self.edges.start, self.edges.stop))
 
     def of(self, part: Part) -> Equations:
@@ -94,23 +94,23 @@ class Equations:
 
 
 def of_no_edge(count: int) -> tuple[Int, Float, slice]:
-    """Return the last fields of `Equations` for so many measurements of no fiducial's edge."""
+    """Return the last fields of `Equations` for ``count`` measurements that are not of a fiducial's edge."""
     return np.full(count, -1), np.zeros(count), slice(0, 0)
 
 
 @dataclass(frozen=True)
 class Reduced:
-    """Poses eliminated: normal equations over the globals.
+    """Normal equations over the globals, with the poses eliminated.
 
     Attributes
     ----------
     information, right, misfit
         Over all G globals, without any prior on them.
     pose_by_global : (N, 6, G)
-        How poses follow the globals: δpose = δpose₀ − pose_by_global · δglobal.
+        Response of poses to the globals: δpose = δpose₀ − pose_by_global · δglobal.
     pose_step : (N, 6)
     taken : (N,)
-        How many numbers of each pose its own measurements determine, its neighbours being known.
+        Number of parameters of each pose that its own measurements determine, given its neighbours.
     """
 
     information: Float
@@ -122,9 +122,9 @@ class Reduced:
 
 
 def eliminate_poses(equations: Equations, motion: Rows, frames: int) -> Reduced:
-    """Return the normal equations over the globals at the best poses.
+    """Return the normal equations over the globals with the poses at their optimum.
 
-    ``motion`` are equations of the poses alone, with 6 numbers a frame.
+    ``motion`` are equations of the poses alone, 6 parameters per frame.
     """
     size, place = equations.size, equations.place
     corner = np.zeros((size + 1, size + 1))
@@ -156,7 +156,7 @@ def eliminate_poses(equations: Equations, motion: Rows, frames: int) -> Reduced:
 
 
 def _add_edges(equations: Equations, corner: Float, mixed: Float) -> None:
-    """Add the edges' shifts to the normal equations of the globals and to those of poses by globals."""
+    """Add the edges' shifts to the normal equations of the globals, and to those with the poses."""
     at, place, count = equations.edges, np.append(equations.place, equations.size), len(mixed)
     rows = np.flatnonzero(equations.edge >= 0)
     edge, frame = equations.edge[rows] - at.start, equations.frame[rows]
@@ -173,7 +173,7 @@ def _add_edges(equations: Equations, corner: Float, mixed: Float) -> None:
 
 
 def _band(blocks: Float, motion: Rows) -> tuple[Float, Float]:
-    """Return the poses' information as the block band of `BandedCholesky`, and the prior's pull (N, 6)."""
+    """Return the poses' information as a band for `BandedCholesky`, and the prior's right side (N, 6)."""
     sums = Sums.empty(len(blocks), 0, _REACH, POSE)
     add_rows(motion.frame, motion.by_frame, motion.by_border, motion.residual, motion.weight, *sums.arrays)
     sums.band[:, 0] += blocks
@@ -189,9 +189,9 @@ class OwnUnknowns:
     Attributes
     ----------
     out : (O,) int
-        Their places.
+        Their indices.
     prior, pull, value : (O,)
-        Information of their prior, its product with their present value, and this value.
+        Information of their prior, its product with the present value, and that value.
     """
 
     out: Int
@@ -201,7 +201,7 @@ class OwnUnknowns:
 
 
 def eliminate_globals(reduced: Reduced, own: OwnUnknowns) -> tuple[Marginal, float]:
-    """Return what is left without the recording's own globals, and its misfit."""
+    """Return the evidence without the recording's own globals, and its misfit."""
     information, right = reduced.information.copy(), reduced.right.copy()
     information[own.out, own.out] += own.prior
     right[own.out] -= own.pull
@@ -210,14 +210,14 @@ def eliminate_globals(reduced: Reduced, own: OwnUnknowns) -> tuple[Marginal, flo
 
 
 def by_kind(equations: Equations) -> Iterator[tuple[slice | Int, Int]]:
-    """Yield the rows of each kind and the globals that they depend on at all."""
+    """Yield the rows of each kind, and the globals that they depend on."""
     for kind in np.unique(equations.kind):
         rows = _without_copy(np.flatnonzero(equations.kind == kind))
         yield rows, np.flatnonzero(equations.by_global[rows].any(axis=0))
 
 
 def by_frame(equations: Equations, frames: int) -> Iterator[tuple[slice | Int, Float]]:
-    """Yield each frame's rows and their derivatives by its pose."""
+    """Yield each frame's rows, and their derivatives by its pose."""
     order = np.argsort(equations.frame, kind="stable")
     bounds = np.searchsorted(equations.frame[order], np.arange(frames + 1))
     for first, end in pairwise(bounds):
@@ -226,7 +226,7 @@ def by_frame(equations: Equations, frames: int) -> Iterator[tuple[slice | Int, F
 
 
 def _without_copy(rows: Int) -> slice | Int:
-    """Return rows that follow one another as a slice, which copies nothing."""
+    """Return consecutive rows as a slice, which copies nothing."""
     if len(rows) and rows[-1] - rows[0] == len(rows) - 1 and np.all(np.diff(rows) == 1):
         return slice(int(rows[0]), int(rows[-1]) + 1)
     return rows

@@ -1,4 +1,4 @@
-"""A gauge run examined: what was found in rings and fiducials, judged against rivals, and confirmed."""
+"""Examine a gauge run: find effects in rings and fiducials, judge them against rivals, and confirm them."""
 
 from __future__ import annotations
 
@@ -32,14 +32,14 @@ from stages.diagnose.gauge.unknown_laws import Unknown, excess_exponent, odds_of
 from stages.diagnose.inference import Stated, stated_belief
 from stages.diagnose.result import Confirmation, Feasible, FitQuality, Location
 
-# A gauge is straight and round, so that effects of the pipe's own shape are not tested.
+# A gauge is straight and round: effects of the pipe's own shape are not tested.
 OF_A_PIPE = frozenset({"ovality", "pipe_bend"})
-# Of an examination: preparation, search, judgement of what was found.
+# Parts of an examination: preparation, search, judgement.
 _PARTS = 3
-# Of so many scores expected by chance one is independent: laws, courses and patterns are like each other.
-# One over the mean expected in runs without any effect, seeds 0 to 59 (`bench_diagnosis run FILE --mode nulls
-# --count 60`, then `bench_diagnosis summary FILE`); p of the next 41 is uniform (KS .09, of too many small
-# ones .24).
+# Fraction of the expected number of chance scores that is independent: laws, courses and patterns resemble
+# each other. It is 1 over the mean number expected in runs without any effect, seeds 0 to 59
+# (`bench_diagnosis run FILE --mode nulls --count 60`, then `bench_diagnosis summary FILE`); p of the next 41
+# is uniform (KS .09; of too many small ones, .24).
 _APART = 0.265
 # What was held out is predicted to the noise where its r.m.s. is below so many noise floors. Under right
 # names, and where nothing is hidden, 10 runs at ring level come to 0.93–0.99 and five rendered ones to
@@ -53,7 +53,7 @@ _OF_IMAGE = Location(str(Channel.RING), str(FixedTo.CAMERA), None)
 
 
 def location_of(run: GaugeRun, judged: Judged, stated: Stated, ratio: float) -> Location | None:
-    """Return where the first term shows; its growth with the radius is measured, χ² divided by ``ratio``."""
+    """Return where the first term shows, with its measured radial exponent; χ² is divided by ``ratio``."""
     if not judged.fit.terms:
         return None
     term = judged.fit.terms[0]
@@ -70,7 +70,7 @@ def location_of(run: GaugeRun, judged: Judged, stated: Stated, ratio: float) -> 
 def _exponent(
     run: GaugeRun, judged: Judged, term: Term, stated: Stated, ratio: float
 ) -> tuple[float, float] | None:
-    """Return d ln |δr| / d ln r with 1 σ: the law's own, and what rings show beyond that."""
+    """Return d ln |δr| / d ln r with 1 σ: the law's own plus what rings show beyond it."""
     own = _own_exponent(term)
     if own is None:
         return None
@@ -88,7 +88,7 @@ def _own_exponent(term: Term) -> float | None:
 
 @dataclass(frozen=True)
 class Examined:
-    """What rings and fiducials of a gauge run say.
+    """What rings and fiducials of a gauge run show.
 
     Attributes
     ----------
@@ -100,16 +100,16 @@ class Examined:
     sizes : tuple of Sized
         The same terms' amplitudes with their covariances.
     feasibility : tuple of Feasible
-        What could be seen of each effect, before any residual was looked at.
+        Detectable size of each effect, computed before any residual was used.
     unsplit : tuple of tuple of str
-        For each of the best hypothesis' effects, those that this run is not expected to tell from it at its
-        size.
+        For each effect of the best hypothesis, effects that this run cannot be expected to distinguish from
+        it at its size.
     location : Location or None
     quality : FitQuality or None
     unknown_laws : tuple of Unknown
-        For each of the same terms the odds, beside its name, of laws and courses that nobody knows.
+        For each of the same terms, odds of unknown laws and courses relative to its name.
     patterns_by_chance : float
-        How often what patterns without a cause take up is expected when nothing is hidden.
+        Expected number of fits by patterns without a cause that are as good, when nothing is hidden.
     """
 
     searched: Search
@@ -125,12 +125,12 @@ class Examined:
 
     @property
     def expected(self) -> float:
-        """How many scores as large, of all that are looked at, are expected when nothing is hidden."""
+        """Expected number of scores as large, among all that are tested, when nothing is hidden."""
         return 2 * min(self.searched.steps[0].by_chance, self.patterns_by_chance)
 
     @property
     def global_p(self) -> float:
-        """Chance of this when nothing is hidden: by the library, patterns without a cause, what repeats."""
+        """Probability of this when nothing is hidden, by the library or by patterns without a cause."""
         by_search = float(-np.expm1(-_APART * self.expected))
         return min(by_search, _NO_NOISE) if self.repeats else by_search
 
@@ -160,7 +160,7 @@ def examine(
     stated = stated_belief(probe)
     library = {name: model for name, model in library.items() if name not in OF_A_PIPE}
     try:
-        # More threads gain nothing on blocks this small, and stall when the machine is busy.
+        # More threads gain nothing on blocks this small, and stall on a busy machine.
         with threadpool_limits(1):
             measurements, start = prepare(run, partial(progress, 0, _PARTS))
             nothing = fit(measurements, start, ())
@@ -170,7 +170,7 @@ def examine(
             nothing = nothing.watched(partial(progress, 1, _PARTS))
             searched = search(nothing.run, nothing, coursed, stated)
             searched = searched.watched(partial(progress, 2, _PARTS))
-            # Effects that the library lacks move rings and fiducials as well.
+            # Effects that are not in the library also shift rings and fiducials.
             swung = swings(searched.run, searched.nothing, stated)
             beyond = patterns_by_chance(searched.nothing, stated, swung)
             seen = Examined(searched, None, (), table, patterns_by_chance=beyond)
@@ -190,7 +190,7 @@ def _quality_of_stated(searched: Search, stated: Stated) -> FitQuality:
 
 
 def _judged(seen: Examined, library: Mapping[str, EffectModel], stated: Stated) -> Examined:
-    """Return what was found with its confirmations, location and quality of fit."""
+    """Return the findings with confirmations, location and quality of fit."""
     searched, verdicts, best = seen.searched, seen.verdicts, seen.best
     assert verdicts is not None
     assert best is not None

@@ -1,7 +1,7 @@
-"""Which effects a gauge run can show and which it cannot tell apart, from its motion and bores alone.
+"""Which effects a gauge run can show, and which it cannot distinguish, from its motion and bores alone.
 
-Only the information matrix is used, poses and the stated uncertainties taken out; the scores, which hold the
-residuals, are not looked at.
+Only the information matrix is used, with poses and stated uncertainties eliminated; the scores, which contain
+the residuals, are not.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ def ability(
 def feasibility(
     about: Evidence, shapes: Mapping[str, Shape], library: Mapping[str, EffectModel], stated: Stated
 ) -> tuple[Feasible, ...]:
-    """Return for every effect the least size seen at 5 σ and the effect most like it here."""
+    """Return, for every effect, the smallest size visible at 5 σ and the effect most similar to it here."""
     places = {name: places_of(about, library[name], shape) for name, shape in shapes.items()}
     seen = {
         name: block for name, block in places.items() if _least(own_information(about, stated, block)) > 0
@@ -51,7 +51,7 @@ def not_told_apart(
     run: GaugeRun, nothing: Fit, terms: Sequence[Term], library: Mapping[str, EffectModel], stated: Stated,
     alike: float,
 ) -> tuple[tuple[str, ...], ...]:  # fmt: skip
-    """Return for each term the effects that this run is not expected to tell from it at the size found."""
+    """Return, for each term, effects that this run cannot be expected to distinguish from it at its size."""
     laws = {t.model.law for t in terms}
     rivals = [
         (model, shape)
@@ -73,9 +73,10 @@ def not_told_apart(
 
 
 def _shapes_beside(model: EffectModel, terms: Sequence[Term], run: GaugeRun) -> set[Shape]:
-    """Return the shapes at which a model is a rival of terms: their own course's, else the middle one.
+    """Return the shapes at which a model is a rival of terms: those of their course, else the middle one.
 
-    A law with a course rivals only terms with the same course, and a drift or ramp that is alike in this run.
+    A law with a course is only a rival of terms with the same course, and of a drift or ramp similar to it in
+    this run.
     """
     beside = {t.shape for t in terms if t.model.kind is model.kind and model.kind is not CourseKind.CONSTANT}
     middle, duration_s = _middle(model.shapes(*span(run))), span(run)[0]
@@ -86,14 +87,14 @@ def _shapes_beside(model: EffectModel, terms: Sequence[Term], run: GaugeRun) -> 
 
 
 def expected_gain(about: Evidence, stated: Stated, block: Int, amplitude: Float, rival: Int) -> float:
-    """Return by how much χ² prefers an effect of this size over its rival at the rival's best."""
+    """Return by how much χ² is expected to prefer an effect of this size over its best-fitting rival."""
     free = np.union1d(instrument_places(about), rival)
     own, _, _ = eliminated(about, stated, block, free)
     return float(amplitude @ own @ amplitude)
 
 
 def own_information(about: Evidence, stated: Stated, block: Int, rival: Int | None = None) -> Float:
-    """Return (Q, Q) information on an effect, the stated instrument and a rival being free."""
+    """Return the information (Q, Q) on an effect, with the stated instrument and a rival free."""
     free = instrument_places(about)
     return eliminated(about, stated, block, free if rival is None else np.union1d(free, rival))[0]
 
@@ -117,7 +118,7 @@ def _feasible(
 
 
 def _share(own: Float, left: Float) -> float:
-    """Return the least share of information that is left in any direction."""
+    """Return the least share of information that remains in any direction."""
     root = np.linalg.cholesky(own + 1e-12 * np.trace(own) * np.eye(len(own)))
     inner = np.linalg.solve(root, np.linalg.solve(root, left).T)
     return float(np.clip(np.linalg.eigvalsh(inner)[0], 0.0, 1.0))

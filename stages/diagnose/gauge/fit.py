@@ -1,4 +1,4 @@
-"""Poses, globals and effects adjusted together under one hypothesis; evidence about its neighbours."""
+"""Joint adjustment of poses, globals and effects under one hypothesis, and evidence about its neighbours."""
 
 from __future__ import annotations
 
@@ -32,12 +32,12 @@ from stages.diagnose.gauge.score_spread import score_inflation
 from stages.diagnose.inference import INSTRUMENT, Column, Evidence, instrument_information
 
 _CONVERGED = 0.5
-# Step of a pose, mm and rad, below which it is still: its square over the distance of the wall is far below
-# what a ring can resolve.
+# A pose that moves by less than this, mm and rad, is converged: the square of that over the distance of the
+# wall is far below a ring's resolution.
 _STILL = 1e-3
 _PARTS = (1.0, 0.5, 0.2, 0.05)
-# A fit that would need more than so many times the gain that its equations promise is given up: where laws
-# bend, a second step gains more than the first one promised. Debt: data/debts.md.
+# A fit is abandoned if it would need more than this factor times the gain promised by its equations: with
+# nonlinear laws, a second step gains more than the first one promised. Debt: data/debts.md.
 _AT_MOST = 3.0
 _ITERATIONS = 8
 _DELAY_SIGMA_S = 0.002
@@ -56,7 +56,7 @@ class Fit:
     state : Unknowns
     terms : tuple of Term
     cost : float
-        Weighted sum of squares, priors of the stated instrument included.
+        Weighted sum of squares, including the priors of the stated instrument.
     """
 
     run: GaugeRun
@@ -65,18 +65,18 @@ class Fit:
     cost: float
 
     def watched(self, watch: Watch) -> Fit:
-        """Return the fit with another watch at its run; what was made of it is not made again."""
+        """Return the fit with another watch in its run; cached results are kept."""
         made = replace(self, run=replace(self.run, watch=watch))
         vars(made).update({k: v for k, v in vars(self).items() if k in ("linearised", "reduced")})
         return made
 
     @cached_property
     def linearised(self) -> Linearised:
-        """The run's equations there."""
+        """The run's equations at the optimum."""
         return linearise(self.run, self.state, self.terms)
 
     def at(self, run: GaugeRun) -> Linearised:
-        """Return the equations there of a run that may have other weights or fewer measurements."""
+        """Return the equations, at the optimum, of a run with other weights or fewer measurements."""
         same = run.measures_as(self.run)
         return self.linearised if same else linearise(run, self.state, self.terms)
 
@@ -87,7 +87,7 @@ class Fit:
 
     @cached_property
     def of_patterns(self) -> Evidence:
-        """What the run says of the terms and of all patterns without a cause that are not among them."""
+        """Evidence of the run on the terms, and on all patterns without a cause that are not among them."""
         own = {(t.model, t.shape) for t in self.terms}
         return evidence(self.run, self, [p for p in VOCABULARY if p not in own])[0]
 
@@ -106,9 +106,9 @@ def fit(run: GaugeRun, start: Unknowns, terms: Sequence[Term], iterations: int =
 def fit_beside(
     found: Fit, model: EffectModel, shape: Shape, iterations: int = _ITERATIONS, worth: float = np.inf
 ) -> Fit:
-    """Return the fit with an effect more, begun at size zero; given up where it cannot come to ``worth``.
+    """Return the fit with one more effect, starting at size zero; abandoned where it cannot reach ``worth``.
 
-    Its first equations are those of the fit before, which are not made twice.
+    Its first equations are those of the previous fit, which are not computed again.
     """
     term = Term(model, shape, np.zeros(len(model.amplitudes)))
     start = Fit(found.run, found.state, (*found.terms, term), np.nan)
@@ -117,7 +117,7 @@ def fit_beside(
 
 
 def _minimised(found: Fit, iterations: int, worth: float) -> Fit:
-    """Return the fit after so many steps, or where no step gains or the cost cannot come to ``worth``."""
+    """Return the fit after at most ``iterations`` steps, or when no step gains or reaches ``worth``."""
     for _ in range(iterations):
         prior, pull, _ = _prior(found.state, found.terms, found.run)
         information = found.reduced.information + prior
@@ -127,12 +127,12 @@ def _minimised(found: Fit, iterations: int, worth: float) -> Fit:
         little = promised < _CONVERGED
         if (little and _still(found)) or found.cost - _AT_MOST * promised > worth:
             break
-        # Where only poses are left to move, a shorter step gains nothing that a full one does not.
+        # Where only poses are left to move, a shorter step gains no more than a full one.
         better = _shortened(found.run, found, step, _PARTS[:1] if little else _PARTS)
         if better is None and _still(found):
             return found
         if better is None:
-            # What poses gain by a far step is only promised by their equations: it is taken, and looked at.
+            # What a large step of the poses gains is only promised by equations: take it and check.
             found = _at(found.run, *_moved(found, 0.0 * step))
             continue
         gain, found = found.cost - better.cost, better
@@ -142,14 +142,14 @@ def _minimised(found: Fit, iterations: int, worth: float) -> Fit:
 
 
 def _still(found: Fit) -> bool:
-    """Return whether the poses that are measured stay so near that their linearisation holds."""
+    """Return whether the measured poses move so little that their linearisation holds."""
     equations = found.linearised.equations
     measured = np.unique(equations.frame[(equations.kind != ENCODER_ROW) & (equations.weight > 0)])
     return bool(np.abs(found.reduced.pose_step[measured]).max(initial=0.0) < _STILL)
 
 
 def _shortened(run: GaugeRun, found: Fit, step: Float, parts: Sequence[float]) -> Fit | None:
-    """Return the fit after the first part of the step with which the cost falls; None when it never does."""
+    """Return the fit after the largest fraction of the step that lowers the cost; None if there is none."""
     for part in parts:
         better = _at(run, *_moved(found, part * step))
         if better.cost < found.cost:
@@ -161,14 +161,14 @@ def evidence(
     run: GaugeRun, found: Fit, asked: Sequence[tuple[EffectModel, Shape]], parts: Sequence[Part] = (),
     with_spread: bool = True,
 ) -> tuple[Evidence, ...]:  # fmt: skip
-    """Return what the run says about the fit's terms and the effects asked about, together.
+    """Return the run's evidence on the fit's terms and on the effects asked about, together.
 
     Parameters
     ----------
     parts : sequence of Part
-        Each gives evidence of its own after that of the whole.
+        Each gives evidence of its own after that of the whole run.
     with_spread : bool
-        Whether to look how far the scores spread; without it they spread as independent errors do.
+        Whether the scores' true scatter is estimated; if not, errors are taken as independent.
 
     Returns
     -------
@@ -200,7 +200,7 @@ def _reduced(
         before = block_diag(np.diag([stated.encoder_scale_sigma**-2.0]), instrument_information(stated))
         inflation, degrees = score_inflation(equations, reduced, left, own.out, _by_effect(names), before)
     information, right = left.information, left.right
-    # From the linearisation's place back to nothing beyond the stated.
+    # From the point of linearisation back to the stated instrument.
     misfit += float(2 * right @ value + value @ information @ value)
     known = np.array([k for k, name in enumerate(names) if name is not None])
     pick = np.ix_(known, known)
@@ -214,14 +214,14 @@ def _reduced(
 
 
 def _by_effect(names: Sequence[Column | None]) -> Int:
-    """Return (K,) a number for the columns of each effect and shape, −1 for the instrument's."""
+    """Return a number (K,) for the columns of each effect and shape, −1 for the instrument's."""
     keys = [(c.effect, c.shape) if c is not None and c.effect != INSTRUMENT else None for c in names]
     number = {key: k for k, key in enumerate(dict.fromkeys(k for k in keys if k is not None))}
     return np.array([-1 if key is None else number[key] for key in keys], np.int64)
 
 
 def own_unknowns(run: GaugeRun, found: Fit, size: int) -> OwnUnknowns:
-    """Return which globals are the run's own: offset, delay, bores, fiducials, the baseline at the end."""
+    """Return the globals of the run alone: offset, delay, bores, fiducials, and the baseline at the end."""
     at = found.state.layout
     prior, pull, value = _prior(found.state, found.terms, run)
     wide = [np.zeros(size) for _ in range(3)]
@@ -255,7 +255,7 @@ def _at(run: GaugeRun, state: Unknowns, terms: tuple[Term, ...]) -> Fit:
 
 def _costed(found: Fit) -> Fit:
     _, pull, value = _prior(found.state, found.terms, found.run)
-    # The poses' own step is part of the cost; what is left of the globals' step is below _CONVERGED.
+    # The poses' own step is included in the cost; the remaining step of the globals is below _CONVERGED.
     made = replace(found, cost=found.reduced.misfit + float(value @ pull))
     vars(made).update(linearised=found.linearised, reduced=found.reduced)  # not computed twice
     return made
@@ -283,7 +283,7 @@ def _prior(state: Unknowns, terms: Sequence[Term], run: GaugeRun) -> tuple[Float
 
 
 def _moved(found: Fit, step: Float) -> tuple[Unknowns, tuple[Term, ...]]:
-    """Return state and terms after a step (G,) of the globals, the poses following."""
+    """Return state and terms after a step (G,) of the globals, with the poses following."""
     state, size = found.state, found.state.border_size
     reduced = found.reduced
     poses = reduced.pose_step - reduced.pose_by_global @ step

@@ -1,7 +1,7 @@
-"""An empirical formula by sparse regression, and what is left when nothing of the library is added.
+"""An empirical formula by sparse regression, and tests of what remains without further effects.
 
 Orthogonal matching pursuit (Y. Pati et al., 1993) over patterns in (r, ψ, t, s, speed, row), on the evidence
-from which poses and the stated instrument have been taken out.
+from which poses and the stated instrument are eliminated.
 """
 
 from __future__ import annotations
@@ -32,21 +32,22 @@ from stages.diagnose.inference import (
 )
 
 _MOST_TERMS = 4
-# A further term is added when its probability by chance, corrected for all tried, is below this.
-# Debt: data/debts.md.
+# A further term is added when the probability of chance, corrected for all terms tried, is below this. Debt:
+# data/debts.md.
 _NEEDED = 1e-4
-# A fit is adequate unless its residual has a smaller probability than this under noise alone. Debt:
+# A fit is adequate unless noise alone gives its residual with less than this probability. Debt:
 # data/debts.md.
 ADEQUATE = 1e-5
-# Twice the logarithm of the expected Bayes factor (1000 to 1) from which two causes count as told apart.
+# Twice the logarithm of the expected Bayes factor (1000 to 1) above which two causes count as
+# distinguishable.
 APART = 14.0
-# Directions with less information than this share of the best one are left out of the test of adequacy.
+# Directions with less information than this share of the best one are excluded from the test of adequacy.
 # Debt: data/debts.md.
 _WEAK = 1e-3
 
 
 def empirical(run: GaugeRun, before: Fit, stated: Stated, swung: Sequence[Scored]) -> Fit:
-    """Return a fit with the few patterns added that explain the most of what it leaves.
+    """Return a fit extended by the few patterns that explain most of its residual.
 
     ``swung`` are the `swings` about that fit.
     """
@@ -68,25 +69,25 @@ def empirical(run: GaugeRun, before: Fit, stated: Stated, swung: Sequence[Scored
 
 
 def is_more(left: float, swung: Sequence[Scored]) -> bool:
-    """Return whether a pattern or swing could be needed for what is noise with a chance of ``left``."""
+    """Return whether a pattern or swing may be needed: noise makes the rest with probability ``left``."""
     return left < 2 * _NEEDED or any(s.p_value * len(SWINGS) < _NEEDED for s in swung)
 
 
 def swings(run: GaugeRun, found: Fit, stated: Stated) -> list[Scored]:
-    """Return what each swing without a cause takes up at its best frequency."""
+    """Return what each swing without a cause explains at its best frequency."""
     return scan(run, found, {model.name: model for model in SWINGS}, stated)
 
 
 def patterns_by_chance(nothing: Fit, stated: Stated, swung: Sequence[Scored]) -> float:
-    """Return how often that which patterns and swings take up is expected when nothing is hidden."""
+    """Return the expected number of equally good patterns and swings when nothing is hidden."""
     swinging = min((s.p_value for s in swung), default=1.0) * len(SWINGS)
     return 2 * min(_by_chance(nothing.of_patterns, nothing.terms, stated), swinging)
 
 
 def says_the_same(run: GaugeRun, formula: Fit, named: Fit) -> bool:
-    """Return whether a formula's pattern is, to within the accuracy of laws, one that the named effects make.
+    """Return whether a formula's pattern equals, within the laws' accuracy, one that named effects make.
 
-    Such a pattern describes those effects and is not a rival, even if it fits some of the noise besides.
+    Such a pattern describes those effects and is not a rival, even if it also fits some of the noise.
     """
     terms = freed(run, named).terms
     patterns = [(t.model, t.shape) for t in formula.terms]
@@ -101,7 +102,7 @@ def says_the_same(run: GaugeRun, formula: Fit, named: Fit) -> bool:
 
 
 def adequacy(about: Evidence, terms: Sequence[Term], stated: Stated) -> float:
-    """Return the chance that what terms leave is noise: of the worst single pattern and of all together.
+    """Return the probability that terms leave only noise: by the worst pattern and by all together.
 
     ``about`` is the evidence over the terms and `VOCABULARY`.
     """
@@ -116,9 +117,9 @@ def _by_chance(about: Evidence, terms: Sequence[Term], stated: Stated) -> float:
 
 
 def joint_p(about: Evidence, stated: Stated, given: Int) -> float:
-    """Return the chance of the scores of all patterns together when only noise is left.
+    """Return the probability of the scores of all patterns together when only noise is left.
 
-    Scores are taken along the principal directions of their information, each over its true spread.
+    Scores are taken along the principal directions of their information, each over its true scatter.
     """
     block = places_of_all(about, VOCABULARY)
     free = np.union1d(instrument_places(about), given).astype(np.int64)

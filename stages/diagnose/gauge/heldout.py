@@ -1,4 +1,4 @@
-"""How well a hypothesis predicts regimes that it was not fitted to, in px, beside the noise floor."""
+"""How well a hypothesis predicts regimes that it was not fitted to, in px, compared with the noise floor."""
 
 from __future__ import annotations
 
@@ -23,21 +23,23 @@ from stages.diagnose.inference import INSTRUMENT, Column, Evidence, Stated, esti
 from stages.diagnose.result import FitQuality
 
 _RIDGE = 1e-9
-# What is predicted; the encoder's readings have no say in it, because they may be wrong themselves.
+# Kinds of measurements that are predicted; encoder readings are not used, because they may be wrong
+# themselves.
 _SEEN_KINDS = (RING, EDGE)
-# So long that the poses of a block hold together, so short that several lie on either side of an event.
+# Long enough that the poses within a block are consistent, short enough that several lie on each side of an
+# event.
 _BLOCK_FRAMES = 8
 _SAME_AZIMUTH_RAD = np.radians(3.0)
-# Two edges of other pictures are at one place where the instrument's error is alike, as two rings are at one
-# azimuth: 3° of a circle of 400 px; how many near ones are looked through for one of another picture.
+# Two edges in different pictures are at one place where the instrument's error is the same, like two rings at
+# one azimuth: 3° of a circle of 400 px. Number of near edges among which one of another picture is sought.
 _SAME_PLACE_PX, _SAME_STEEPNESS_RAD, _NEIGHBOURS = 20.0, np.radians(15.0), 40
-# What reflectance and relief do to a line is alike over a few mm of wall. Debt: data/debts.md.
+# Errors by reflectance and relief are correlated over a few mm of wall. Debt: data/debts.md.
 _OTHER_WALL_MM = 10.0
 
 
 @dataclass(frozen=True)
 class Shared:
-    """The shared unknowns of one part of the run: their columns, present values, and normal equations."""
+    """The shared unknowns of one part of the run: columns, present values, and normal equations."""
 
     columns: Sequence[Column | None]
     value: Float
@@ -45,17 +47,18 @@ class Shared:
     right: Float
 
 
-# From the shared unknowns of a part to their step (K,).
+# Maps the shared unknowns of a part to their step (K,).
 Rule = Callable[[Shared], Float]
 
 
 def fit_quality(
     run: GaugeRun, nothing: Judged, best: Judged, regimes: Sequence[Regime], stated: Stated
 ) -> FitQuality:
-    """Return the r.m.s. before and after of rings and fiducials, on all and on parts held out in turn.
+    """Return the RMS before and after of rings and fiducials, on all and on parts held out in turn.
 
-    Before is with the instrument exactly as stated. Parts are the regimes; with a course in the run's own
-    time they are blocks of frames by turns: what comes after a step is not to be told from before it.
+    "Before" is with the instrument exactly as stated. Parts are the regimes; for a course in the run's own
+    time they are alternating blocks of frames, since what follows a step cannot be predicted from what
+    precedes it.
     """
     everything = [Part(np.ones(len(run.time_s), bool), _SEEN_KINDS)]
     floor = repeatability_px(run, best.fit)
@@ -78,19 +81,19 @@ def fit_quality(
 
 
 def _by_turns(frames: int) -> list[Bool]:
-    """Return masks (N,) of the frames in every other block, and in the rest."""
+    """Return masks (N,) of the frames in every second block, and in the others."""
     block = np.arange(frames) // _BLOCK_FRAMES
     return [block % 2 == k for k in range(2)]
 
 
 def repeatability_px(run: GaugeRun, found: Fit) -> float:
-    """Return the r.m.s. noise of rings and fiducials, of image and wall.
+    """Return the RMS noise of rings and fiducials from image and wall, px.
 
-    Of rings it is what two of them differ by at the same azimuth on other wall of the same bore, over √2; of
-    fiducials what edges differ by that other pictures show at the same place of the image, or their stated σ
-    where that is more: samples of one fiducial may err alike. An error of the instrument that is left is
-    alike in both, so that a bad fit makes no larger floor. A kind that repeats nowhere is left out; NaN where
-    neither does.
+    For rings it is the difference of two rings at the same azimuth on other wall of the same bore, over √2;
+    for fiducials the difference of edges in different pictures at the same place of the image, or their
+    stated σ if larger, since samples of one fiducial may have common errors. A remaining error of the
+    instrument is the same in both, so that a bad fit does not raise the floor. A kind without such pairs is
+    left out; NaN if both are.
     """
     equations = found.linearised.equations
     ring, edge = equations.kind == RING, equations.kind == EDGE
@@ -101,17 +104,16 @@ def repeatability_px(run: GaugeRun, found: Fit) -> float:
     azimuth = np.arctan2(run.rings.outward[:, 1], run.rings.outward[:, 0])
     pairs = on_other_wall(azimuth, run.rings.frame, along_mm, run.rings.section)
     rings = variance_of_pairs(equations.residual[ring], of_rings, *pairs)
-    # Without pairs NumPy's maximum stays NaN, where Python's may not.
+    # Without pairs, NumPy's maximum stays NaN, which Python's may not.
     variance = np.array([rings, np.maximum(edges, stated)])
     weight = np.where(np.isfinite(variance), [of_rings.sum(), of_edges.sum()], 0.0)
     return float(np.sqrt(weight @ np.nan_to_num(variance) / weight.sum())) if weight.any() else float("nan")
 
 
 def variance_of_pairs(value: Float, weight: Float, first: Int, second: Int) -> float:
-    """Return the variance that pairs (P,) of values (M,) show, whatever both have in common.
+    """Return the variance within pairs (P,) of values (M,), without what both members have in common.
 
-    It is NaN without pairs. With the product of weights independent errors come to just their weighted mean
-    square.
+    NaN without pairs. With products of weights, independent errors give exactly their weighted mean square.
     """
     both = weight[first] * weight[second]
     used = both > 0
@@ -121,9 +123,9 @@ def variance_of_pairs(value: Float, weight: Float, first: Int, second: Int) -> f
 
 
 def _in_other_pictures(edges: Edges) -> tuple[Int, Int]:
-    """Return pairs (P,) of fiducials' edges of other pictures, at one place of the image and as steep.
+    """Return pairs (P,) of edges in different pictures at one place of the image and of similar direction.
 
-    Edges that the camera model sees nowhere have no place.
+    Edges outside the domain of the camera model are left out.
     """
     place = np.concatenate([edges.uv / _SAME_PLACE_PX, edges.normal / _SAME_STEEPNESS_RAD], axis=1)
     seen = np.flatnonzero(np.isfinite(place).all(axis=1))
@@ -137,12 +139,12 @@ def _in_other_pictures(edges: Edges) -> tuple[Int, Int]:
 
 
 def on_other_wall(azimuth_rad: Float, frame: Int, along_mm: Float, section: Int) -> tuple[Int, Int]:
-    """Return pairs (P,) of ring bins of one azimuth and bore, as near in time as other wall allows.
+    """Return pairs (P,) of ring bins of one azimuth and bore, as close in time as other wall allows.
 
     Parameters
     ----------
     azimuth_rad, frame, along_mm, section : (M,)
-        In the image; where along the pipe; in which bore.
+        Azimuth in the image; frame; place along the pipe; index of the bore.
     """
     turn, apart = turns_apart(frame, along_mm)
     first, second = at_one_azimuth(azimuth_rad, turn, apart, 2 * apart)
@@ -151,7 +153,7 @@ def on_other_wall(azimuth_rad: Float, frame: Int, along_mm: Float, section: Int)
 
 
 def turns_apart(frame: Int, along_mm: Float) -> tuple[Int, int]:
-    """Return which (M,) of all frames each is, and how many frames are apart so as to show other wall."""
+    """Return the rank (M,) of each bin's frame, and how many ranks apart two frames show other wall."""
     frames, at, turn = np.unique(frame, return_index=True, return_inverse=True)
     step_mm = float(np.median(np.abs(np.diff(along_mm[at])))) if len(frames) > 1 else np.inf
     apart = min(max(int(np.ceil(_OTHER_WALL_MM / max(step_mm, 1e-9))), 1), max(len(frames) // 4, 1))
@@ -159,9 +161,9 @@ def turns_apart(frame: Int, along_mm: Float) -> tuple[Int, int]:
 
 
 def at_one_azimuth(azimuth_rad: Float, turn: Int, apart: int, most: int) -> tuple[Int, Int]:
-    """Return pairs (P,) of ring bins (M,) of one azimuth, each with the one ``apart`` places on.
+    """Return pairs (P,) of ring bins (M,) of one azimuth, each with the one ``apart`` places later.
 
-    Where frames are missing there they are farther apart, but by no more than ``most`` frames.
+    Where frames are missing they are farther apart, but by no more than ``most`` frames.
     """
     place = np.round(azimuth_rad / _SAME_AZIMUTH_RAD).astype(np.int64)
     order = np.lexsort((turn, place))
@@ -171,9 +173,9 @@ def at_one_azimuth(azimuth_rad: Float, turn: Int, apart: int, most: int) -> tupl
 
 
 def _rms_px(run: GaugeRun, judged: Judged, parts: Sequence[Part], rules: Sequence[Rule]) -> float:
-    """Return the weighted r.m.s. of parts of the run, each with its poses and own unknowns at their best."""
+    """Return the weighted RMS of parts of the run, px, each with its own unknowns at their optimum."""
     about = judged.fit.at(run)
-    # Smooth patterns of a hundredth of a pixel would take up what is asked about: they stay out of it.
+    # Smooth patterns of a hundredth of a pixel would absorb what is tested: they are excluded.
     whole = asking(run, judged.fit.state, about, (), with_baseline=True)
     whole.by_global[:, -BASELINE_SIZE:] = 0.0
     columns, value = kept_columns(judged.fit, ())
@@ -184,7 +186,7 @@ def _rms_px(run: GaugeRun, judged: Judged, parts: Sequence[Part], rules: Sequenc
         left, _ = eliminate_globals(reduced, own_unknowns(run, judged.fit, equations.size))
         step = left.step + left.follow @ rule(Shared(columns, value, left.information, left.right))
         residual = _residual(equations, reduced.pose_step - reduced.pose_by_global @ step, step)
-        # What is off the camera model has no weight, and no residual either.
+        # Points outside the camera model have no weight and no residual.
         shown = np.isin(equations.kind, (RING, EDGE)) & (equations.weight > 0)
         weight = equations.weight[shown]
         squares += float(weight @ residual[shown] ** 2)
@@ -193,12 +195,12 @@ def _rms_px(run: GaugeRun, judged: Judged, parts: Sequence[Part], rules: Sequenc
 
 
 def _as_stated(shared: Shared) -> Float:
-    """Go back to the stated instrument."""
+    """Return the step back to the stated instrument."""
     return -shared.value
 
 
 def _free(shared: Shared) -> Float:
-    """Let effects go to their best in the part itself, the instrument staying."""
+    """Return the step of the effects to their optimum in the part itself, with the instrument fixed."""
     scale = np.sqrt(np.maximum(np.diag(shared.information), 1e-300))
     ridge = shared.information / np.outer(scale, scale) + _RIDGE * np.eye(len(scale))
     free = np.array([c is not None and c.effect != INSTRUMENT for c in shared.columns], bool)
@@ -208,7 +210,7 @@ def _free(shared: Shared) -> Float:
 
 
 def _from_others(others: Evidence, found: Fit, stated: Stated, shared: Shared) -> Float:
-    """Take what other regimes say."""
+    """Return the step to the values that the other regimes give."""
     known = estimate(others, stated, prior_sigma(others, found.terms)).value
     place = {c: k for k, c in enumerate(others.columns)}
     return np.array(

@@ -1,4 +1,4 @@
-"""Hypotheses of left-out effects, each with its likelihood on all measurements and on regimes held out."""
+"""Hypotheses of left-out effects, each with its likelihood on all measurements and on held-out regimes."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _LEAST_FRAMES = 8
 
 @dataclass(frozen=True)
 class Regime:
-    """A part of the run that can be held out: its name, its frames (N,), the bore its rings lie in."""
+    """A part of the run that can be held out: its name, its frames (N,), and the bore of its rings."""
 
     name: str
     part: Part
@@ -29,20 +29,20 @@ class Regime:
 
 @dataclass(frozen=True)
 class Judged:
-    """A hypothesis with its fit and how it does.
+    """A hypothesis with its fit and likelihoods.
 
     Attributes
     ----------
     fit : Fit
     evidence : Evidence
-        Of the whole run; how far its scores spread is known of the likeliest alone.
+        Of the whole run; the scatter of its scores is estimated only for the likeliest hypothesis.
     by_regime : tuple of Evidence
-        Of each regime on its own.
+        Of each regime alone.
     surprise, heldout : float
-        −2 ln of the likelihood of all, and of each regime given the others, over by how much neighbours err
-        alike.
+        −2 ln of the likelihood of all measurements, and of each regime given the others, divided by the
+        factor for correlated errors.
     beforehand : float
-        −2 ln of its chance before anything was measured.
+        −2 ln of its prior probability.
     """
 
     fit: Fit
@@ -64,22 +64,22 @@ class Judged:
 
     @property
     def library_terms(self) -> tuple[Term, ...]:
-        """The effects of the library; patterns for what they leave stand behind them."""
+        """The effects of the library; patterns for their residual follow them in the list of terms."""
         return tuple(t for t in self.fit.terms if not isinstance(t.model, Nameless))
 
     @property
     def possible(self) -> bool:
-        """Whether the sizes of all its effects are."""
+        """Whether the sizes of all its effects are possible."""
         return all(t.model.possible(*t.at(t.amplitude)) for t in self.fit.terms)
 
     @property
     def named(self) -> bool:
-        """Whether all its effects are of the library, and there are some."""
+        """Whether it has effects, and all are of the library."""
         return bool(self.fit.terms) and not any(isinstance(t.model, Nameless) for t in self.fit.terms)
 
 
 def regimes_of(run: GaugeRun) -> tuple[Regime, ...]:
-    """Return stretches of the run within one bore each."""
+    """Return stretches of the run that are within one bore each."""
     count = len(run.time_s)
     votes = np.zeros((count, int(run.rings.section.max(initial=0)) + 1))
     np.add.at(votes, (run.rings.frame, run.rings.section), 1)
@@ -100,7 +100,7 @@ def regimes_of(run: GaugeRun) -> tuple[Regime, ...]:
 def judged_of(
     run: GaugeRun, found: Fit, regimes: Sequence[Regime], stated: Stated, alike: float, before: float = 0.0
 ) -> Judged:
-    """Return the hypothesis' evidence and its surprise, held out and not."""
+    """Return the hypothesis with its evidence and its surprise on all and on held-out regimes."""
     whole, *parts = evidence(run, found, (), [r.part for r in regimes], with_spread=False)
     sigma = prior_sigma(whole, found.terms)
 

@@ -1,4 +1,4 @@
-"""Rivals compared: the marginal likelihood of all measurements ranks them, held-out regimes guard it."""
+"""Compare rival hypotheses: the marginal likelihood ranks them, and held-out regimes guard the result."""
 
 from __future__ import annotations
 
@@ -29,17 +29,17 @@ from stages.diagnose.gauge.sets import (
 )
 from stages.diagnose.inference import Stated
 
-# Sets that are less likely than the best by more than this in −2 ln are not kept: a thousand of them weigh
-# less than a hundredth of what a name may be wrong by.
+# Sets that are less likely than the best by more than this in −2 ln are dropped: a thousand of them weigh
+# less than a hundredth of the accepted probability of a wrong name.
 _FAR = 30.0
-# How often the likeliest is replaced by what is likelier still, as its own equations show; one round more is
-# for patterns beside the last of them.
+# How often the likeliest hypothesis is replaced by a likelier one that its own equations suggest; one more
+# round adds patterns to the last.
 _ROUNDS = 4
 
 
 @dataclass(frozen=True)
 class Unfitted:
-    """A set of effects that was weighed by the equations of another fit: its members and their amplitudes."""
+    """A set of effects that was weighed with another fit's equations: its members and amplitudes."""
 
     members: tuple[Member, ...]
     amplitudes: tuple[Float, ...]
@@ -48,33 +48,33 @@ class Unfitted:
 
     @property
     def possible(self) -> bool:
-        """Whether all sizes are: an exposure cannot be shorter than none."""
+        """Whether all sizes are possible: for example, an exposure cannot be negative."""
         each = zip(self.members, self.amplitudes, strict=True)
         return all(m.model.possible(m.shape, a) for m, a in each)
 
     @property
     def statement(self) -> str:
-        """What it would be."""
+        """The set in words, with its sizes."""
         each = zip(self.members, self.amplitudes, strict=True)
         return " ".join(m.model.statement(m.shape, a) for m, a in each)
 
 
 @dataclass(frozen=True)
 class Verdicts:
-    """All hypotheses, the likeliest first, with the chance of each.
+    """All hypotheses, the likeliest first, with the probability of each.
 
     Attributes
     ----------
     regimes, judged
     probability : (H,)
     adequacy : float
-        Chance that what the likeliest leaves is noise.
+        Probability that the likeliest hypothesis' residual is noise.
     formula : Judged
         The empirical formula, whether it is the likeliest or not.
     alike : float
-        How many measurements that err alike count as one.
+        Number of measurements with correlated errors that count as one.
     unfitted : tuple of Unfitted
-        Sets of effects and patterns that were weighed and not fitted.
+        Sets of effects and patterns that were weighed but not fitted.
     """
 
     regimes: tuple[Regime, ...]
@@ -86,16 +86,16 @@ class Verdicts:
     unfitted: tuple[Unfitted, ...] = ()
 
     def chance_of(self, term: Term) -> float:
-        """Return the chance that a term's law is among the causes, with whatever course."""
+        """Return the probability that a term's law is among the causes, with whatever course."""
         return sum(p for p, causes, _ in self._each() if cause_of(term.model, term.shape) in causes)
 
     def chance_of_course(self, term: Term) -> float:
-        """Return the chance of a term's course if its law is among the causes."""
+        """Return the probability of a term's course if its law is among the causes."""
         both = sum(p for p, _, names in self._each() if term.model.name in names)
         return min(both / max(self.chance_of(term), 1e-300), 1.0)
 
     def likely_laws(self, sure: float) -> tuple[str, ...]:
-        """Return the laws of the likeliest hypotheses that together are as likely as ``sure``."""
+        """Return the laws of the likeliest hypotheses that together reach the probability ``sure``."""
         each = sorted(self._each(), key=lambda one: -one[0])
         before = np.cumsum([p for p, _, _ in each]) - [p for p, _, _ in each]
         likely = (
@@ -104,7 +104,7 @@ class Verdicts:
         return tuple(dict.fromkeys(law for causes in likely for law, _ in sorted(causes)))
 
     def patterns_beside(self, term: Term) -> dict[str, float]:
-        """Return the chance of each pattern that may be in a term's place, the likeliest first."""
+        """Return the probability of each pattern that may be in a term's place, the likeliest first."""
         cause, found = cause_of(term.model, term.shape), dict[str, float]()
         for one in self.unfitted:
             if cause not in {m.cause for m in one.members}:
@@ -115,7 +115,7 @@ class Verdicts:
         return dict(sorted(found.items(), key=lambda pair: -pair[1]))
 
     def _each(self) -> Iterator[tuple[float, set[Cause], set[str]]]:
-        """Yield every hypothesis' chance, its causes, and the names of its effects."""
+        """Yield every hypothesis' probability, its causes, and the names of its effects."""
         for p, j in zip(self.probability, self.judged, strict=True):
             terms = j.library_terms
             yield float(p), {cause_of(t.model, t.shape) for t in terms}, {t.model.name for t in terms}
@@ -175,7 +175,7 @@ def _of(judged: Sequence[Judged], formula: Fit) -> Judged:
 def _ranked(run: GaugeRun, judged: Sequence[Judged], formula: Fit) -> tuple[tuple[Judged, ...], Bool]:
     """Return the hypotheses, the likeliest first, and which (H,) are allowed at all.
 
-    One that predicts held-out regimes worse than the stated instrument is discarded, as are impossible sizes.
+    Those that predict held-out regimes worse than the stated instrument, or have impossible sizes, are not.
     """
     nothing = next(j for j in judged if not j.fit.terms)
     allowed = np.array([j.heldout <= nothing.heldout and j.possible for j in judged])
@@ -186,7 +186,7 @@ def _ranked(run: GaugeRun, judged: Sequence[Judged], formula: Fit) -> tuple[tupl
 
 
 def _better(run: GaugeRun, best: Judged, near: Sequence[Unfitted]) -> Fit | None:
-    """Return the fit of the likeliest set of named effects, where that is likelier than what was fitted."""
+    """Return the fit of the likeliest set of named effects, if it is likelier than all that was fitted."""
     named = [u for u in near if u.members and not any(m.nameless for m in u.members)]
     first = min(named, key=lambda u: u.surprise, default=None)
     if first is None or first.surprise > best.surprise + best.beforehand:
@@ -197,7 +197,7 @@ def _better(run: GaugeRun, best: Judged, near: Sequence[Unfitted]) -> Fit | None
 def _near(
     run: GaugeRun, best: Judged, scores: Sequence[Scored], laws: int, stated: Stated, ratio: float
 ) -> tuple[float, Sets]:
-    """Return the chance that what the likeliest leaves is noise, and the sets of effects about it."""
+    """Return the probability that the likeliest leaves only noise, and the sets of effects near it."""
     members = members_of(run, best.fit, scores, laws)
     own = {(t.model, t.shape) for t in best.fit.terms}
     asked = [(m.model, m.shape) for m in members if (m.model, m.shape) not in own]
@@ -224,9 +224,9 @@ def _unfitted(sets: Sets, ranked: Sequence[Judged]) -> list[Unfitted]:
 
 
 def _with_patterns(run: GaugeRun, best: Judged, left: float, stated: Stated) -> Fit | None:
-    """Return the likeliest effects with patterns for what they leave, if it is more than noise.
+    """Return the likeliest effects together with patterns for their residual, if that is not noise.
 
-    ``left`` is the chance that it is noise.
+    ``left`` is the probability that it is noise.
     """
     if not best.named:
         return None
@@ -240,7 +240,7 @@ def _with_patterns(run: GaugeRun, best: Judged, left: float, stated: Stated) -> 
 
 
 def _redundant(run: GaugeRun, judged: Sequence[Judged], formula: Judged, total_surprise: Float) -> Bool:
-    """Return (H,) True for the formula where the likeliest named effects make its very pattern."""
+    """Return (H,) True for the formula, where the likeliest named effects make the same pattern."""
     out = np.zeros(len(judged), bool)
     named = [k for k, j in enumerate(judged) if j.named]
     if named and formula.fit.terms:

@@ -1,7 +1,7 @@
 """Measurements of a gauge run as equations about a state and a few effects at their present size.
 
 Rings count in pixels of the image, as fiducials do: a lens that maps a millimetre to more pixels makes the
-same noise fewer millimetres, so that by millimetres it would fit better than the true one.
+same noise fewer millimetres, so that in millimetres it would fit better than the true one.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ def linearise(run: GaugeRun, state: Unknowns, terms: Sequence[Term]) -> Linearis
     moving = Moving.of(state.T_pc, run.time_s)
     edges, edge_at = _without_edge_shift(run, state, moving, terms)
     ring_at = ring_points(state, _on_bore(run, state), run.time_s, moving, run.width_px)
-    # The camera's distance and speed along the gauge, by which the encoder's readings are predicted.
+    # The camera's distance and speed along the gauge, from which the encoder's readings are predicted.
     travel = Travel(run.time_s, state.T_pc[:, 2, 3], moving.speed_mm_s)
     each = (ring_shift_px(t.model, ring_at, *t.at(t.amplitude)) for t in terms)
     shift = sum(each, np.zeros(len(run.rings.uv)))
@@ -70,7 +70,7 @@ def linearise(run: GaugeRun, state: Unknowns, terms: Sequence[Term]) -> Linearis
 
 
 def beside(run: GaugeRun, state: Unknowns, at: Linearised, model: EffectModel, shape: Shape) -> Linearised:
-    """Return the linearisation with an effect of size zero behind the others."""
+    """Return the linearisation with an additional effect of size zero as the last term."""
     return replace(at, equations=asking(run, state, at, [(model, shape)]))
 
 
@@ -78,9 +78,9 @@ def asking(
     run: GaugeRun, state: Unknowns, at: Linearised, asked: Sequence[tuple[EffectModel, Shape]],
     with_baseline: bool = False,
 ) -> Equations:  # fmt: skip
-    """Return equations with columns, behind the others, for the effects asked about and for the baseline.
+    """Return equations with additional columns for the effects asked about and for the baseline.
 
-    Where a prediction fails, measurements do not count.
+    Measurements without a valid prediction get no weight.
     """
     run.watch()
     equations = at.equations
@@ -99,7 +99,7 @@ def asking(
 def _ask(
     run: GaugeRun, state: Unknowns, at: Linearised, asked: Sequence[tuple[EffectModel, Shape]], out: Float,
 ) -> None:  # fmt: skip
-    """Write the derivatives of the residuals by the effects' amplitudes into ``out`` (M, Q)."""
+    """Write the derivatives of the residuals by the effects' amplitudes to ``out`` (M, Q)."""
     edges, rings = len(at.edges.uv), len(at.edges.uv) + len(at.rings.uv)
     first = 0
     for model, shape in asked:
@@ -112,14 +112,14 @@ def _ask(
 
 
 def _across(shift: Float, edges: Edges) -> Float:
-    """Return shifts (E, 2, ...) of edges along their normals."""
+    """Return the components of shifts (E, 2, ...) of edges along their normals."""
     return np.asarray(np.einsum("mi...,mi->m...", shift, edges.normal))
 
 
 def _baseline(run: GaugeRun, at: Linearised) -> Float:
-    """Return (M, 38) derivatives of the residuals by the baseline's patterns, in px."""
+    """Return the derivatives (M, 38) of the residuals by the baseline's patterns, in px."""
     on_edges = edge_baseline(at.edges, run.edges.normal)
-    # The residual of a ring falls with its outward shift.
+    # The residual of a ring decreases with its outward shift.
     on_rings = -ring_baseline(at.rings)
     rest = len(at.equations.frame) - len(on_edges) - len(on_rings)
     # At the edge of the camera model's domain the derivative does not exist; such points are left out.
@@ -127,15 +127,15 @@ def _baseline(run: GaugeRun, at: Linearised) -> Float:
 
 
 def ring_mm_per_px(points: ImagePoints) -> Float:
-    """Return (M,) by how much the radius grows with the ring's outward shift in the image."""
+    """Return by how much (M,) the radius grows with the ring's outward shift in the image, mm/px."""
     assert points.per_px_c is not None
     return np.asarray(np.sum(points.normal_c * points.per_px_c, axis=1))
 
 
 def _on_bore(run: GaugeRun, state: Unknowns) -> BoreRings:
-    """Return the ring bins where the state without any effect has them.
+    """Return the ring bins at the places predicted by the state without any effect.
 
-    Derivatives taken where a ring was measured would share its noise, and scores would be off for it.
+    Derivatives at the measured places would share their noise, and bias the scores.
     """
     rings = run.rings
     for _ in range(_ROUNDS):
@@ -147,7 +147,7 @@ def _without_edge_shift(
     run: GaugeRun, state: Unknowns, moving: Moving, terms: Sequence[Term]
 ) -> tuple[Edges, ImagePoints]:
     points = edge_points(state, run.edges, run.time_s, moving)
-    # Where they are predicted, for the same reason as rings.
+    # At the predicted places, for the same reason as rings.
     points = replace(points, uv=points.projected_uv)
     uv = run.edges.uv
     for t in terms:
@@ -168,7 +168,7 @@ def _ring_part(
 
 
 def _in_px(rows: Rows, mm_per_px: Float) -> Rows:
-    """Return the equations (M,) of rings by pixels; of no weight where the sheet is not seen."""
+    """Return the equations (M,) of rings in pixels, without weight where the sheet is not seen."""
     seen = np.isfinite(mm_per_px) & (mm_per_px > 0)
     per_mm = np.divide(1.0, mm_per_px, out=np.zeros_like(mm_per_px), where=seen)
     return replace(
@@ -181,7 +181,7 @@ def _in_px(rows: Rows, mm_per_px: Float) -> Rows:
 
 
 def _without_edges(state: Unknowns) -> Unknowns:
-    """Return a state whose globals are those that rings and encoder depend on."""
+    """Return a state with only those globals that rings and encoder depend on."""
     return replace(state, edge_mm=np.zeros((0, 4)))
 
 
@@ -192,7 +192,7 @@ def _edge_part(
         return _across(texture_shift_px(model, points, shape, amplitude), edges)
 
     shift = [_slope(t, texture_shift) for t in terms]
-    # Cells of fiducials, one an edge, count on where those of wall end.
+    # Cell numbers of fiducials, one per edge, continue after those of the wall.
     number, at = 4 * edges.marker + edges.side, state.layout.marker
     rows = edge_rows(state, edges)
     by_edge = rows.by_border[np.arange(len(number)), at.start + number]
@@ -219,7 +219,7 @@ def _with_effects(
 
 
 def _slope(term: Term, shift_of: Callable[[EffectModel, Shape, Float], Float]) -> Float:
-    """Return (M, Q) derivatives of a shift by the term's amplitudes, where they are."""
+    """Return the derivatives (M, Q) of a shift by the term's amplitudes, at their present values."""
 
     def shift(amplitude: Float) -> Float:
         return shift_of(term.model, *term.at(amplitude))
@@ -247,7 +247,7 @@ def _encoder_part(
     shift = [_slope(t, lambda model, *at: model.reading_shift_mm(travel, *at)) for t in terms]
     by_global = np.concatenate([by_border, *[scale * s for s in shift]], 1)
     cell = -10_000_000 - np.arange(count) // _ENCODER_CELL
-    # The weight is small: the encoder is examined separately, and a slip must not move the poses.
+    # The weight is small: the encoder is examined separately, and a slip must not affect the poses.
     weight = np.full(count, _ENCODER_SIGMA_MM**-2)
     residual = state.T_pc[:, 2, 3] - scale * reading - offset
     kind = np.full(count, ENCODER_ROW)

@@ -1,4 +1,4 @@
-"""Laws like a named one that grow otherwise with the radius, or change otherwise in time."""
+"""Laws like a named one that depend otherwise on the radius, or change otherwise in time."""
 
 from __future__ import annotations
 
@@ -12,16 +12,17 @@ from stages.diagnose.effects.base import Amplitude, EffectModel, ImagePoints, Sh
 from stages.diagnose.gauge.run import Linearised, Term
 
 _POWERS = (1, 2)
-# Waves of half a period over the run and more of a course that wanders as Brownian motion does: eight hold
-# all but 7 % of its variance, Σ 1/n².
+# Waves of half a period over the run and more, for a course like a Brownian motion: eight contain all but 7 %
+# of its variance, Σ 1/n².
 _WAVES = 8
-# With it such waves of 1 σ, each over its number, have a mean square of 1: (12/π²) Σ 1/(2n²) = 1.
+# With this factor, such waves of 1 σ, each divided by its number, have a mean square of 1: (12/π²) Σ 1/(2n²)
+# = 1.
 _UNIT = np.sqrt(12) / np.pi
 
 
 @dataclass(frozen=True)
 class Otherwise(EffectModel):
-    """A law at a size, times a change that is a part of it; held against a name and never given.
+    """A law at a given size times an unknown change; it competes with a name and is never reported.
 
     Attributes
     ----------
@@ -37,24 +38,24 @@ class Otherwise(EffectModel):
     size: Float = field(compare=False)
 
     def image_shift_px(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
-        """Return the law's shift, changed."""
+        """Return the law's shift times the change, px."""
         change = self._change(points, amplitude)
         return change[:, None] * self.law_of.image_shift_px(points, self.own, self.size)
 
     def sheet_shift_mm(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
-        """Return the law's shift, changed."""
+        """Return the law's shift times the change, mm."""
         return self._change(points, amplitude) * self.law_of.sheet_shift_mm(points, self.own, self.size)
 
     def line_shift_px(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
-        """Return the law's shift, changed."""
+        """Return the law's shift times the change, px."""
         return self._change(points, amplitude) * self.law_of.line_shift_px(points, self.own, self.size)
 
     def wall_shift_mm(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
-        """Return the law's shift, changed."""
+        """Return the law's shift times the change, mm."""
         return self._change(points, amplitude) * self.law_of.wall_shift_mm(points, self.own, self.size)
 
     def quantities(self, shape: Shape, amplitude: Float) -> dict[str, float]:
-        """Return nothing: it is never given."""
+        """Return nothing: it is never reported."""
         return {}
 
     def statement(self, shape: Shape, amplitude: Float) -> str:
@@ -63,12 +64,12 @@ class Otherwise(EffectModel):
 
     @abstractmethod
     def _change(self, points: ImagePoints, amplitude: Float) -> Float:
-        """Return (M,) the part of the law's shift that is added."""
+        """Return the relative change (M,) of the law's shift."""
 
 
 @dataclass(frozen=True)
 class OtherGrowth(Otherwise):
-    """A law times powers of how far off a reference the radius is, as a part of it.
+    """A law times a polynomial in the relative difference of the radius from a reference.
 
     Attributes
     ----------
@@ -89,7 +90,7 @@ class OtherGrowth(Otherwise):
 
 @dataclass(frozen=True)
 class OtherCourse(Otherwise):
-    """A law times a course that is free: a part that stays, and waves of half a period over the run and more.
+    """A law with a free course: a constant part, and waves of half a period over the run and more.
 
     Attributes
     ----------
@@ -107,7 +108,7 @@ class OtherCourse(Otherwise):
 
 
 def other_growth(term: Term, at: Linearised, of_line: bool) -> OtherGrowth:
-    """Return the law like a term's that grows otherwise, its reference in the middle of the rings."""
+    """Return a law like a term's with another growth; its reference is the middle of the rings."""
     middle = float(np.median(_radius(at.rings, of_line)))
     shape, amplitude = term.at(term.amplitude)
     name = f"{term.model.name} {term.shape}, growing otherwise"
@@ -115,9 +116,9 @@ def other_growth(term: Term, at: Linearised, of_line: bool) -> OtherGrowth:
 
 
 def other_course(term: Term, at: Linearised, duration_s: float) -> OtherCourse:
-    """Return the law like a term's that changes otherwise in time, as large in the mean square over rings.
+    """Return a law like a term's with another course in time and the same mean square over the rings.
 
-    A swing that has two directions goes along the longer one.
+    A swing with two directions is taken along the longer one.
     """
     shape, amplitude = term.at(term.amplitude)
     parts, law, own = term.model.factored(at.rings, shape) or ((np.ones(1),), term.model, shape)

@@ -1,8 +1,8 @@
 """Ring bins and fiducial edges of a gauge run as image points of effects, and the patterns of their baseline.
 
-The baseline is errors of ordinary image formation: smooth patterns of a hundredth of a pixel.
-Compression, clipped peaks and line width over texture move rings and edges by about that much (shared notes
-on the recordings). They are unknowns of the recording, so that no effect is seen in what is only baseline.
+The baseline is the error of ordinary image formation: smooth patterns of a hundredth of a pixel. Compression,
+clipped peaks and line width on texture shift rings and edges by about that much (shared notes on the
+recordings). They are unknowns of the recording, so that what is only baseline is not taken for an effect.
 """
 
 from __future__ import annotations
@@ -20,32 +20,33 @@ from stages.calibrate.gauge.geometry import BoreRings
 from stages.calibrate.gauge.state import Unknowns
 from stages.diagnose.effects.base import ImagePoints
 
-# Rates of a gauge run are taken over several frames, for poses are noisy, the more so by a rolling shutter.
-# 11 frames leave of this noise what differences over two frames, smoothed over nine, had left (up to a tenth
-# more), and lose less of the motion. Below 30 frames/s noise makes slower rates: a third of a second, or 7
-# frames, leave at most .10 mm/s of poses that err by .01 mm, and lose .5 % of a sway of .6 Hz at 10 frames/s.
-# 5, sharp ones, lose 1.2 % at an eighth of the frame rate. They are an inspection's, whose adjustment has
-# smoothed its poses before: its sizes do not hold what rates lose.
+# Number of frames over which rates of a gauge run are taken, because poses are noisy, more so with a rolling
+# shutter. 11 frames leave as much of this noise as differences over two frames, smoothed over nine, did (up
+# to a tenth more), and lose less of the motion. Below 30 frames/s a third of a second, or 7 frames, leave at
+# most .10 mm/s of poses that err by .01 mm, and lose .5 % of a sway of .6 Hz at 10 frames/s. 5 frames (sharp)
+# lose 1.2 % at an eighth of the frame rate: these are for inspections, whose adjustment has already smoothed
+# the poses and whose sizes do not include what rates lose.
 _FEWEST, _MOST, _SMOOTHED_S = 7, 11, 1 / 3
 SHARP = 5
-# Of the polynomial: where frames were lost, times are uneven, and a cubic errs by the fourth order.
+# Degree of the polynomial: where frames were lost, times are uneven, and a cubic has an error of fourth
+# order.
 _DEGREE = 4
 BASELINE_SIGMA_PX = 0.01
 _RING_HARMONICS = (0, 1, 2, 3, 4)
 _EDGE_HARMONICS = (0, 1, 2)
 _MIDDLE_THETA = 1.1
-# Half the step of a derivative along the image radius, px: its error is of the third order, below 1e-6.
+# Half the step of a derivative along the image radius, px: its error is of third order, below 1e-6.
 _APART = 0.1
 BASELINE_SIZE = 2 * (2 * len(_RING_HARMONICS) - 1) + 4 * (2 * len(_EDGE_HARMONICS) - 1)
 
 
 def ring_baseline(points: ImagePoints) -> Float:
-    """Return (M, 18) outward shifts in px: harmonics of azimuth, constant and linear in polar angle."""
+    """Return outward shifts (M, 18), px: harmonics of azimuth, constant and linear in the polar angle."""
     return _patterns(points, _RING_HARMONICS)
 
 
 def edge_baseline(points: ImagePoints, normal: Float) -> Float:
-    """Return (M, 20) shifts along the edges' normals (M, 2) in px, of outward and of across patterns."""
+    """Return shifts (M, 20) along the edges' normals (M, 2), px, of radial and of tangential patterns."""
     patterns = _patterns(points, _EDGE_HARMONICS)
     outward = points.outward
     around = np.stack([-outward[:, 1], outward[:, 0]], -1)
@@ -62,7 +63,7 @@ def _patterns(points: ImagePoints, harmonics: tuple[int, ...]) -> Float:
 
 @dataclass(frozen=True)
 class Moving:
-    """How the camera moves at each frame.
+    """The camera's motion at each frame.
 
     Attributes
     ----------
@@ -78,7 +79,7 @@ class Moving:
 
     @staticmethod
     def of(T_pc: Float, time_s: Float, frames: int | None = None) -> Moving:
-        """Return it of poses (N, 4, 4) at times (N,), by so many ``frames``; None: `smoothed`."""
+        """Return the motion from poses (N, 4, 4) at times (N,), by ``frames``; None: as `smoothed`."""
         steps = vector_from_rotation(np.swapaxes(T_pc[:-1, :3, :3], -1, -2) @ T_pc[1:, :3, :3])
         turned = np.concatenate([np.zeros((1, 3)), np.cumsum(steps, axis=0)])
         both = rates(np.hstack([turned, T_pc[:, :3, 3]]), time_s, frames or smoothed(time_s))
@@ -86,14 +87,14 @@ class Moving:
         return Moving(turning_c, np.einsum("nij,ni->nj", T_pc[:, :3, :3], velocity_p), velocity_p[:, 2])
 
     def passing_mm_s(self, frame: Int, xyz_c: Float) -> Float:
-        """Return how points (M, 3) of the wall, seen in frames (M,), pass in C, mm/s."""
+        """Return the velocity (M, 3) in C, mm/s, of wall points (M, 3) seen in frames (M,)."""
         return np.asarray(-self.velocity_c[frame] - np.cross(self.turning_c[frame], xyz_c))
 
 
 def ring_points(
     state: Unknowns, rings: BoreRings, time_s: Float, moving: Moving, width_px: Float
 ) -> ImagePoints:
-    """Return the ring bins, their wall points as probe and poses of the state place them."""
+    """Return the ring bins, with wall points as predicted by the state's probe and poses."""
     T = state.T_pc[rings.frame]
     xyz_c = state.probe.triangulate(rings.uv)
     xyz_p = transform(T, xyz_c)
@@ -108,7 +109,7 @@ def ring_points(
 
 
 def moved(points: ImagePoints, moving: Moving, outward: Float) -> ImagePoints:
-    """Return a gauge run's points of the line, found ``outward`` (M, 2), with what moves them."""
+    """Return a gauge run's points of the line, shifted by ``outward`` (M, 2), with the camera's motion."""
     assert points.per_px_c is not None
     passing = moving.passing_mm_s(points.frame, points.xyz_c)
     rate = np.einsum("mi,mi->m", points.normal_c, passing)
@@ -118,7 +119,7 @@ def moved(points: ImagePoints, moving: Moving, outward: Float) -> ImagePoints:
 
 
 def way_per_px(probe: Probe, uv: Float, outward: Float) -> Float:
-    """Return the way (M, 3) of the line's points in C, mm per px that they are found farther ``outward``."""
+    """Return the displacement (M, 3) of the line's points in C, mm, for each px farther ``outward``."""
     farther, nearer = (probe.triangulate(uv + way * outward) for way in (_APART, -_APART))
     return np.asarray((farther - nearer) / (2 * _APART))
 
@@ -138,14 +139,14 @@ def edge_points(state: Unknowns, edges: Edges, time_s: Float, moving: Moving) ->
 
 
 def widths_at(source: RingSamples, index: Int, frame: Int, outward: Float) -> Float:
-    """Return the line's width (M,) in image directions ``outward`` (M, 2), from the sample nearest to each.
+    """Return the line's width (M,), px, in image directions ``outward`` (M, 2), from the nearest sample.
 
     Parameters
     ----------
     index : (F,) int
-        Places in the recording of the sampled frames.
+        Frame numbers of the sampled frames in the recording.
     frame : (M,) int
-        Place of each point's frame.
+        Index of each point's frame.
     """
     width = source.width_px[np.searchsorted(index, frame), _column(source, outward)].astype(float)
     seen = np.isfinite(width)
@@ -153,9 +154,9 @@ def widths_at(source: RingSamples, index: Int, frame: Int, outward: Float) -> Fl
 
 
 def runs_across(source: RingSamples, index: Int, frame: Int, outward: Float, bins: int) -> Float:
-    """Return by how much the image radius changes (M,) over one of so many ``bins``; 0 where none is seen.
+    """Return by how much (M,), px, the image radius changes over one of ``bins`` bins; 0 where none is seen.
 
-    The other parameters are those of `widths_at`; a bin lies about each direction.
+    The other parameters are those of `widths_at`; a bin is centred on each direction.
     """
     half, row = len(source.azimuth_rad) / (2 * bins), np.searchsorted(index, frame)
     ends = [_column(source, outward, turned) for turned in (-half, half)]
@@ -165,7 +166,7 @@ def runs_across(source: RingSamples, index: Int, frame: Int, outward: Float, bin
 
 
 def _column(source: RingSamples, outward: Float, turned: float = 0.0) -> Int:
-    """Return the column (M,) of samples nearest to directions, or so many ``turned`` from these."""
+    """Return the column (M,) of samples nearest to directions, or to these turned by ``turned``."""
     step = 2 * np.pi / len(source.azimuth_rad)
     turn = (np.arctan2(outward[:, 1], outward[:, 0]) - source.azimuth_rad[0]) / step
     return np.asarray(np.round(turn + turned).astype(np.int64) % len(source.azimuth_rad))
@@ -178,16 +179,16 @@ def _wall_directions(xyz_p: Float, T_pc: Float) -> tuple[Float, Float]:
 
 
 def smoothed(time_s: Float) -> int:
-    """Return over how many frames noise of a gauge run's poses at times (N,) is smoothed."""
+    """Return over how many frames the noise of a gauge run's poses at times (N,) is smoothed."""
     step_s = float(np.ptp(time_s)) / max(len(time_s) - 1, 1)
     return 2 * int(np.clip(np.round(_SMOOTHED_S / max(2 * step_s, 1e-9)), _FEWEST // 2, _MOST // 2)) + 1
 
 
 def rates(value: Float, time_s: Float, frames: int) -> Float:
-    """Return the rates (N, K) of noisy values (N, K) at ascending times (N,), by ``frames`` about each.
+    """Return the rates (N, K) of noisy values (N, K) at ascending times (N,), by ``frames`` around each.
 
-    They are slopes of the polynomial of degree 4 that fits these values best (Savitzky & Golay 1964), of one
-    through them where they are fewer. Times may be uneven; near an end the frames are the first or last.
+    They are slopes of the polynomial of degree 4 that fits these values best (Savitzky & Golay 1964), of
+    lower degree where values are fewer. Times may be uneven; near an end the first or last frames are used.
     """
     count = min(frames, len(time_s))
     if count < 2:

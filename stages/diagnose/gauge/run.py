@@ -1,4 +1,4 @@
-"""A gauge run with fixed weights, the effects taken into its model, and its linearisation."""
+"""A gauge run with fixed weights, the effects included in its model, and its linearisation."""
 
 from __future__ import annotations
 
@@ -28,10 +28,10 @@ _IN_TIME = MappingProxyType({
 
 @dataclass(frozen=True)
 class Term:
-    """An effect taken into the model: at one shape, with amplitudes (Q,).
+    """An effect included in the model: at one shape, with amplitudes (Q,).
 
-    With ``bounds`` its shape, a continuous number, is free within them: how far it is off ``shape`` is one
-    more amplitude, the last.
+    With ``bounds`` its shape, a continuous number, is free within them: the difference from ``shape`` is then
+    one more amplitude, the last.
     """
 
     model: EffectModel
@@ -41,13 +41,13 @@ class Term:
 
     @property
     def amplitudes(self) -> tuple[Amplitude, ...]:
-        """The model's, and that of a free shape."""
+        """The model's amplitudes, and that of a free shape."""
         step = self.model.shape_step(self.shape) if self.bounds is not None else None
         more = () if step is None else (Amplitude("shape", "", step),)
         return (*self.model.amplitudes, *more)
 
     def at(self, amplitude: Float) -> tuple[Shape, Float]:
-        """Return the model's own shape and amplitudes at the term's."""
+        """Return the model's own shape and amplitudes for the term's amplitudes."""
         if self.bounds is None:
             return self.shape, amplitude
         low, high = self.bounds
@@ -72,7 +72,7 @@ class GaugeRun:
     edge_weight, ring_weight : (E,), (R,)
         Fixed, so that hypotheses are compared on the same measurements.
     watch : Watch
-        Called at every linearisation; it is no part of the measurements and is not stored.
+        Called at every linearisation; not part of the measurements, and not stored.
     """
 
     edges: Edges
@@ -87,13 +87,13 @@ class GaugeRun:
     watch: Watch = field(default=unwatched, repr=False, compare=False, metadata=NOT_STORED)
 
     def measures_as(self, other: GaugeRun) -> bool:
-        """Return whether the other run has these very measurements and weights."""
+        """Return whether another run has the same measurements and weights."""
         return all(getattr(self, f.name) is getattr(other, f.name) for f in fields(self) if f.compare)
 
 
 @dataclass(frozen=True)
 class Linearised:
-    """Measurements as equations, the motion's prior, and what the effects were predicted at."""
+    """Measurements as equations, the motion's prior, and the points where effects were predicted."""
 
     equations: Equations
     motion: Rows

@@ -1,4 +1,4 @@
-"""Scores of every effect of the library about one fit of a gauge run; steps and shapes at their best."""
+"""Scores of every effect of the library about one fit of a gauge run, at the best times and shapes."""
 
 from __future__ import annotations
 
@@ -15,23 +15,23 @@ from stages.diagnose.gauge.run import GaugeRun, Term
 from stages.diagnose.inference import Around, Score, Stated, places_of, places_of_all, stated_belief
 from stages.diagnose.result import Value
 
-# More shapes than this are first tried on a thinned run.
+# Effects with more shapes than this are first tried on a thinned run.
 _MANY = 12
 _AT_ONCE = 240
 _REFINED = 5
 _THIN_RINGS, _THIN_EDGES = 8, 4
 _ITERATIONS = 3
-# A drop of χ² that one free number makes by chance two times in three.
+# A drop of χ² that one free parameter makes by chance two times in three.
 _AS_GOOD = 1.0
-# Small enough that no upper limit of the catalogue matters, only on which side of nothing a size lies.
+# Small enough that no upper limit of the catalogue matters, only the allowed sign of a size.
 _LITTLE = 1e-6
-# The search of steps may have come out one cell beside the best one.
+# The search of steps may be one cell off the best one.
 _CELLS = 2
 
 
 @dataclass(frozen=True)
 class Scored:
-    """An effect at its best shape, its score there, and how many shapes were tried."""
+    """An effect at its best shape, its score there, and the number of shapes tried."""
 
     model: EffectModel
     shape: Shape
@@ -40,17 +40,17 @@ class Scored:
 
     @property
     def p_value(self) -> float:
-        """Chance of such a score at the best of the shapes tried when nothing is hidden."""
+        """Probability of such a score at the best of the shapes tried when nothing is hidden."""
         return min(self.score.p_value * self.tried, 1.0)
 
     @property
     def statement(self) -> str:
-        """The effect with its size, as if it were alone."""
+        """The effect in words with its size, as if it were the only one."""
         return self.model.statement(self.shape, self.score.amplitude)
 
 
 def scan(run: GaugeRun, found: Fit, library: Mapping[str, EffectModel], stated: Stated) -> list[Scored]:
-    """Return the scores of the effects not yet in the fit, the most telling first."""
+    """Return the scores of the effects not yet in the fit, the most significant first."""
     known, there = {t.model.name for t in found.terms}, {(t.model.name, t.shape) for t in found.terms}
     models = [m for name, m in library.items() if name not in known or m.repeats]
     shapes = {m.name: [s for s in m.shapes(*span(run)) if (m.name, s) not in there] for m in models}
@@ -59,7 +59,8 @@ def scan(run: GaugeRun, found: Fit, library: Mapping[str, EffectModel], stated: 
     asked = [(m, s) for m in models if len(shapes[m.name]) <= _MANY for s in shapes[m.name]]
     asked += [(c.model, s) for c in coarse for s in _near(c.shape, shapes[c.model.name])]
     once, choice = ([(m, s) for m, s in asked if (len(shapes[m.name]) == 1) == one] for one in (True, False))
-    # How far scores spread is looked at where they are best: it takes longer than the scores themselves.
+    # The scatter of scores is estimated only at their best shapes: it takes longer than the scores
+    # themselves.
     chosen = _best(run, found, choice, stated, with_spread=False)
     scored = _best(run, found, [*once, *((c.model, c.shape) for c in chosen)], stated)
     best = [replace(s, tried=len(shapes[s.model.name])) for s in scored]
@@ -80,7 +81,7 @@ def _best(
     run: GaugeRun, found: Fit, asked: Sequence[tuple[EffectModel, Shape]], stated: Stated,
     with_spread: bool = True,
 ) -> list[Scored]:  # fmt: skip
-    """Return each effect's best shape."""
+    """Return each effect with its best shape."""
     found = found if run.measures_as(found.run) else replace(found, run=run)
     best: dict[str, Scored] = {}
     for part in _portions(asked):
@@ -96,9 +97,9 @@ def _best(
 
 
 def _some_size_is_possible(model: EffectModel, shape: Shape, amplitude: Float) -> bool:
-    """Return whether the effect may be that large, or a little of it with the same sign.
+    """Return whether the effect can have this size, or a small one of the same sign.
 
-    What points to an exposure shorter than none is no evidence of another exposure, however many σ it has.
+    What suggests a negative exposure is no evidence for another exposure, however significant it is.
     """
     return model.possible(shape, amplitude) or model.possible(shape, _LITTLE * amplitude)
 
@@ -116,7 +117,7 @@ def _portions(asked: Sequence[tuple[EffectModel, Shape]]) -> list[list[tuple[Eff
 
 
 def _near(shape: Shape, shapes: Sequence[Shape]) -> list[Shape]:
-    """Return shapes from the grid's neighbour on one side to that on the other."""
+    """Return shapes from the grid's neighbour on one side to the one on the other."""
     grid = np.array([s[0] for s in shapes])
     at = int(np.argmin(np.abs(grid - shape[0])))
     low, high = grid[max(at - 1, 0)], grid[min(at + 1, len(grid) - 1)]
@@ -131,16 +132,16 @@ def span(run: GaugeRun) -> tuple[float, float]:
 
 
 def freed(run: GaugeRun, found: Fit) -> Fit:
-    """Return the fit as it is, with continuous shapes as amplitudes, within what was searched.
+    """Return the same fit with continuous shapes as amplitudes, within the searched range.
 
-    A drift quicker than all that were searched is none: it is what it comes to.
+    A drift faster than all that were searched is treated as a constant.
     """
     terms = tuple(_freed(run, t) for t in found.terms)
     return replace(found, terms=terms) if any(t.bounds is not None for t in terms) else found
 
 
 def refined(run: GaugeRun, found: Fit) -> Fit:
-    """Return the fit with steps and continuous shapes at their best, unless it then fits worse."""
+    """Return the fit with times of steps and continuous shapes optimised, unless it then fits worse."""
     found = retimed(run, found)
     free = freed(run, found)
     if free is found:
@@ -163,7 +164,7 @@ def retimed(run: GaugeRun, found: Fit) -> Fit:
         if term.model.kind is not CourseKind.STEP:
             continue
         time_s, gain = _gains(run, found, k)
-        # Between two rings every moment does as well: the middle of those stands for them.
+        # Between two rings every moment fits equally well: the middle stands for all of them.
         best = replace(term, shape=(float(np.median(time_s[gain > gain.max() - _AS_GOOD])),))
         if best.shape == term.shape:
             continue
@@ -173,24 +174,24 @@ def retimed(run: GaugeRun, found: Fit) -> Fit:
 
 
 def change_time(run: GaugeRun, found: Fit, place: int, alike: float) -> Value:
-    """Return when the step of term ``place`` came, with 1 σ over times that are equally likely beforehand.
+    """Return the time of the step of term ``place``, s, with 1 σ, for a uniform prior.
 
     Parameters
     ----------
     alike : float
-        How many measurements that err alike count as one.
+        Number of measurements with correlated errors that count as one.
     """
     time_s, gain = _gains(run, found, place)
     chance = np.exp(0.5 * (gain - gain.max()) / alike)
     chance /= chance.sum()
     middle = float(chance @ time_s)
-    # Within the gap between two frames every moment is as likely as another.
+    # Within the gap between two frames, every moment is equally likely.
     within = float(np.median(np.diff(run.time_s))) ** 2 / 12
     return Value(middle, float(np.sqrt(chance @ (time_s - middle) ** 2 + within)))
 
 
 def _gains(run: GaugeRun, found: Fit, place: int) -> tuple[Float, Float]:
-    """Return times (T,) in the middle between frames, and the drop of χ² with the step there."""
+    """Return times (T,) midway between frames, and the drop of χ² with the step there."""
     term, others = found.terms[place], found.terms[:place] + found.terms[place + 1 :]
     time_s = _times_near(run, term)
     reduced = fit(run, found.state, others, _ITERATIONS)
@@ -203,7 +204,7 @@ def _gains(run: GaugeRun, found: Fit, place: int) -> tuple[Float, Float]:
 
 
 def _times_near(run: GaugeRun, term: Term) -> Float:
-    """Return the middles between frames within two cells of the grid that steps are searched on, about it."""
+    """Return the times midway between frames, within two cells of the search grid around the step."""
     duration = float(run.time_s[-1] - run.time_s[0])
     grid = [s[0] for s in term.model.shapes(duration, len(run.time_s) / duration)]
     middle = run.time_s[:-1] + np.diff(run.time_s) / 2 - run.time_s[0]

@@ -1,10 +1,9 @@
 """By how much scores scatter more than independent errors would make them.
 
-Scores err alike in cells of wall and in frames: `pipeline.adjustment.robust`. Beyond that they are taken as
-independent from cell to cell, but print, wear and stains on a wall pass from one cell to
-the next. How alike errors are at each distance follows from the residuals of the whole run: the scores of one
-column at the cells' borders are too few for that (T. Conley, "GMM estimation with cross sectional
-dependence", 1999).
+Errors are correlated within cells of wall and within frames: `pipeline.adjustment.robust`. Beyond that they
+are treated there as independent between cells, but print, wear and stains continue from one cell to the next.
+The correlation at each distance is estimated from the residuals of the whole run: the scores of one column at
+the borders of cells are too few for that (T. Conley, "GMM estimation with cross sectional dependence", 1999).
 """
 
 from __future__ import annotations
@@ -18,27 +17,27 @@ from pipeline.arrays import Float, Int
 from stages.calibrate.gauge.terms import WALL_CELL_MM
 from stages.diagnose.gauge.elimination import EDGE, ENCODER, RING, Equations, Reduced, by_frame, by_kind
 
-# Squares of wall to each side of a cell; errors farther apart than a cell are taken as independent.
-# Debt: data/debts.md.
+# Squares of wall per side of a cell; errors farther apart than a cell are taken as independent. Debt:
+# data/debts.md.
 _TO_A_SIDE = 4
 _REACH = np.arange(-_TO_A_SIDE, _TO_A_SIDE + 1)
 
-# The most by which errors are taken to be larger than what is left of them: where a frame has few cells, how
-# many unknowns it has tells it roughly. Debt: data/debts.md.
+# Largest factor by which errors are taken to exceed their residuals: in a frame with few cells, its number of
+# unknowns gives it only roughly. Debt: data/debts.md.
 _MOST_LOST = 4.0
 
 
 def score_inflation(
     equations: Equations, reduced: Reduced, left: Marginal, out: Int, group: Int, known: Float
 ) -> tuple[Float, Float]:
-    """Return (K,) by how much the scores' true 1 σ exceeds that of independent errors, at least 1.
+    """Return by how much (K,) the scores' true 1 σ exceeds that of independent errors, at least 1.
 
-    The second, (K,), is how many degrees of freedom that has; infinite where it is 1.
+    The second result, (K,), is its degrees of freedom; infinite where it is 1.
 
-    ``out`` (O,) are the globals that were eliminated, ``left`` what is left without them.
-    Columns of one ``group`` (K,) are one effect: what they explain together is no error of theirs, else a
-    large effect would hide itself. −1 is the instrument's, which follows effects as far as its information
-    ``known`` (I, I) lets it: an effect's score is that of what the instrument cannot take up.
+    ``out`` (O,) are the globals that were eliminated, ``left`` the evidence without them. Columns of one
+    ``group`` (K,) belong to one effect: what they explain together is not an error, or else a large effect
+    would hide itself. Group −1 is the instrument, which follows effects as far as its information ``known``
+    (I, I) lets it: an effect's score is that of what the instrument cannot absorb.
     """
     follow, step = _with_eliminated(equations, reduced, left, out)
     free, asked = np.flatnonzero(group < 0), np.flatnonzero(group >= 0)
@@ -49,9 +48,9 @@ def score_inflation(
     left_over = _unexplained(equations.weight, follow, residual, group)
     by_row = np.ascontiguousarray((follow * equations.weight * left_over).T)
     lost = _lost(equations, reduced.taken)
-    # What is independent from point to point loses next to nothing to the few unknowns of a frame.
+    # Errors that are independent from point to point are hardly reduced by the few unknowns of a frame.
     cells = cluster_variance(by_row * np.sqrt(lost)[:, None], equations.cell) - (lost - 1) @ by_row**2
-    # Sums over frames lose nothing to poses, but a few frames may hold all of a score.
+    # Sums over frames are not reduced by poses, but a few frames may contain all of a score.
     robust = np.maximum(two_way_variance(by_row, equations.cell, equations.frame), cells)
     ring = np.flatnonzero((equations.kind == RING) & (equations.weight > 0))
     robust += beyond_cells(
@@ -62,20 +61,20 @@ def score_inflation(
 
 
 def _with_eliminated(equations: Equations, reduced: Reduced, left: Marginal, out: Int) -> tuple[Float, Float]:
-    """Return how residuals (M,) change with the K kept globals, and by what is eliminated at its best.
+    """Return how residuals (M,) change with the K kept globals, and with the optimum of what is eliminated.
 
-    The derivatives (K, M) include what poses, edges and the globals ``out`` (O,) do to follow the kept ones;
-    the second, (M,), is added to the residuals.
+    The derivatives (K, M) include the response of poses, edges and the globals ``out`` (O,) to the kept ones;
+    the second result, (M,), is added to the residuals.
     """
     pose_by_kept = reduced.pose_by_global @ left.follow
-    # An effect's column is gone through again and again, so that it lies in one piece.
+    # An effect's column is used repeatedly, so it is stored contiguously.
     follow, step = np.zeros((left.follow.shape[1], len(equations.frame))), np.zeros(len(equations.frame))
     place = equations.place
     stays, goes = np.flatnonzero(np.isin(place, out, invert=True)), np.flatnonzero(np.isin(place, out))
     for rows, used in by_kind(equations):
         gone = np.intersect1d(used, goes)
         by_gone = equations.by_global[rows][:, gone]
-        # What is kept follows itself alone.
+        # A kept global only follows itself.
         follow[:, rows] = (equations.by_global[rows][:, stays] + by_gone @ left.follow[place[gone]]).T
         step[rows] = by_gone @ left.step[place[gone]]
     at = np.flatnonzero(equations.edge >= 0)
@@ -88,11 +87,11 @@ def _with_eliminated(equations: Equations, reduced: Reduced, left: Marginal, out
 
 
 def _lost(equations: Equations, taken: Float) -> Float:
-    """Return (M,) by how much errors that cells share have a larger variance than what a frame's fit leaves.
+    """Return by how much (M,) the variance of errors common to cells exceeds that of a frame's residuals.
 
-    A pose and the places of fiducials' edges follow what is alike in a cell: of n cells of a frame they take
-    up as many as they have unknowns (J. MacKinnon, H. White, "Some heteroskedasticity-consistent covariance
-    matrix estimators", 1985). Each edge's place is shared by the frames that see it.
+    A pose and the places of fiducials' edges absorb what is common in a cell: of n cells of a frame, as many
+    as they have unknowns (J. MacKinnon, H. White, "Some heteroskedasticity-consistent covariance matrix
+    estimators", 1985). The place of each edge is shared by the frames that see it.
     """
     used = (equations.weight > 0) & (equations.kind != ENCODER)
     pair, first = np.unique(np.stack([equations.frame, equations.cell])[:, used], axis=1, return_index=True)
@@ -106,7 +105,7 @@ def _lost(equations: Equations, taken: Float) -> Float:
 
 
 def _unexplained(weight: Float, follow: Float, residual: Float, group: Int) -> Float:
-    """Return (K, M) the residual that each column's own group leaves; ``follow`` is (K, M) too."""
+    """Return the residual (K, M) that each column's own group leaves; ``follow`` is (K, M), too."""
     out = np.tile(residual, (len(follow), 1))
     for own in (np.flatnonzero(group == g) for g in np.unique(group[group >= 0])):
         columns = follow[own]
@@ -116,7 +115,7 @@ def _unexplained(weight: Float, follow: Float, residual: Float, group: Int) -> F
 
 
 def beyond_cells(follow: Float, weight: Float, left: Float, wall_mm: Float) -> Float:
-    """Return (K,) the variance of scores by errors that pass from one cell of wall to the next, at least 0.
+    """Return the variance (K,) of scores from errors that continue into the next cell of wall, at least 0.
 
     Parameters
     ----------
@@ -138,7 +137,7 @@ def beyond_cells(follow: Float, weight: Float, left: Float, wall_mm: Float) -> F
 
 
 def _squares(wall_mm: Float) -> tuple[Int, Int]:
-    """Return each point's square of wall (M,), and how many there are along and around, in whole cells."""
+    """Return each point's square of wall (M,), and the numbers of squares along and around."""
     at = np.floor(wall_mm * (_TO_A_SIDE / WALL_CELL_MM)).astype(np.int64)
     at -= at.min(axis=0) // _TO_A_SIDE * _TO_A_SIDE
     shape = (at.max(axis=0) // _TO_A_SIDE + 1) * _TO_A_SIDE
@@ -155,7 +154,7 @@ def _alike(weight: Float, left: Float, square: Int, shape: Int) -> Float:
     weighted = weight * left
     products = _correlated(_gridded(weighted, square, shape))
     count = _correlated(_gridded(weight[None], square, shape))
-    # A point's error with itself tells nothing of its neighbours'.
+    # A point's error with itself says nothing about neighbours.
     products[:, _TO_A_SIDE, _TO_A_SIDE] -= np.sum(weighted**2, axis=1)
     count[:, _TO_A_SIDE, _TO_A_SIDE] -= np.sum(weight**2)
     return np.where(count > 1e-9 * count.max(), products / np.maximum(count, 1e-300), 0.0)
@@ -166,7 +165,8 @@ def _correlated(grids: Float) -> Float:
     shape = along, around = [next_fast_len(n + _TO_A_SIDE, real=True) for n in grids.shape[1:]]
     spectrum = rfft2(grids, shape)
     power = spectrum.real**2 + spectrum.imag**2
-    # All displacements would take an inverse transform; a power is even, so that few are sums of cosines.
+    # All displacements would need an inverse transform; a power spectrum is even, so that a few are sums of
+    # cosines.
     frequency = np.arange(power.shape[2])
     twice = np.where((frequency == 0) | (2 * frequency == around), 1.0, 2.0)[:, None]
     (cos_x, sin_x), (cos_y, sin_y) = (_waves(np.arange(along), along), _waves(frequency, around))
@@ -181,7 +181,7 @@ def _waves(frequency: Int, length: int) -> tuple[Float, Float]:
 
 
 def _within(columns: Float, alike: Float) -> Float:
-    """Return (K,) what of the variance comes from pairs in one cell."""
+    """Return the part (K,) of the variance that comes from pairs in one cell."""
     count, along, around = columns.shape
     n = _TO_A_SIDE
     cells = columns.reshape(count, along // n, n, around // n, n).swapaxes(2, 3).reshape(count, -1, n * n)

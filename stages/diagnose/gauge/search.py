@@ -1,4 +1,4 @@
-"""Selection of effects on a gauge run: weigh it, score all, refit with the best few, keep what is needed."""
+"""Select effects on a gauge run: weight it, score all, refit with the best few, keep what is needed."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ from stages.diagnose.gauge.scan import Scored, refined, scan
 from stages.diagnose.gauge.sets import key
 from stages.diagnose.inference import Stated
 
-# Something was left out when its probability by chance, corrected for all tried, is below this.
-# Debt: data/debts.md.
+# Physics was left out when the probability of chance, corrected for all effects tried, is below this. Debt:
+# data/debts.md.
 DETECTED = 1e-4
 _REFITTED = 4
 _OTHER_COURSES = 2
@@ -35,17 +35,17 @@ MOST_EFFECTS = 6
 _WORTH_REFITTING = 0.1
 _LEAST_GAIN = 20.0
 _RIVAL_ITERATIONS = 5
-# Rivals whose χ² is worse by more than this are not considered; how often and which weights are recomputed.
+# Rivals whose χ² is worse by more than this are not considered; number and rounds of recomputed weights.
 # Debt: data/debts.md.
 _FAR, _REWEIGHED, _WEIGHINGS = 50.0, 3, 3
 # A further effect or pattern smaller than this share of the first may be an error of the first one's law.
 # Debt: data/debts.md.
 LEAST_SHARE = 0.01
 _CAUCHY = 2.5
-# A bore is not believed to be better known than this. Debt: data/debts.md.
+# The uncertainty of a bore is taken to be at least this. Debt: data/debts.md.
 _LEAST_BORE_SIGMA_MM = 1e-3
-# Factor on the typical jerk: it varies along a run, and the prior must not hold poses where it is larger.
-# Debt: data/debts.md.
+# Factor on the typical jerk: it varies along a run, and the prior must not constrain poses where it is
+# larger. Debt: data/debts.md.
 _LOOSER = 5.0
 # The camera's parameters are free while outliers are separated from effects.
 _FREE = GaugeParameters.model_validate(
@@ -60,10 +60,10 @@ _FREE = GaugeParameters.model_validate(
 
 
 def prepare(measured_run: MeasuredRun, watch: Watch = unwatched) -> tuple[GaugeRun, Unknowns]:
-    """Return the run's measurements, and poses by an instrument free to follow whatever is there.
+    """Return the run's measurements, and poses from an instrument that is free to follow any effect.
 
-    Rings before the first frame with fiducials and after the last do not count: a ring alone does not tell
-    how the probe is turned, and poses drift there.
+    Rings before the first frame with fiducials and after the last are not used: a ring alone does not
+    determine the probe's orientation, and poses drift there.
     """
     measured, source, posed = measured_run.measured, measured_run.source, measured_run.posed
     measured = replace(measured, rings=_between(measured.rings, posed))
@@ -91,9 +91,9 @@ def stated_start(state: Unknowns) -> Unknowns:
 
 
 def weighed(run: GaugeRun, found: Linearised) -> GaugeRun:
-    """Return the run with weights by the residuals' spread frame by frame, outliers counting little.
+    """Return the run with weights from the residuals' scatter frame by frame, with low weights for outliers.
 
-    What the instrument does not see has no weight from then on, whatever instrument a hypothesis has.
+    Points that the instrument does not see have no weight from then on, whatever instrument a hypothesis has.
     """
     of, count = found.equations, len(run.edges.uv)
     edges, rings = slice(0, count), slice(count, count + len(run.rings.uv))
@@ -126,7 +126,7 @@ def _weight(of: Equations, rows: slice, sigma: Float) -> Float:
 class Step:
     """One step of the selection: the fit it starts from, all scores there, and the refits tried.
 
-    ``by_chance`` is how many scores as large as the largest are expected when nothing more is hidden.
+    ``by_chance`` is the expected number of scores as large as the largest when nothing more is hidden.
     """
 
     before: Fit
@@ -137,7 +137,7 @@ class Step:
 
 @dataclass(frozen=True)
 class Search:
-    """The selection's outcome.
+    """The outcome of the selection.
 
     Attributes
     ----------
@@ -146,10 +146,10 @@ class Search:
     nothing, found : Fit
         With no effect, and with those selected.
     rivals : tuple of Fit
-        Fits with another effect in one found one's place, or without one.
+        Fits in which one of the found effects is replaced or left out.
     steps : tuple of Step
     alike : float
-        How many measurements that err alike count as one, after the effects found.
+        Number of measurements with correlated errors that count as one, given the effects found.
     """
 
     run: GaugeRun
@@ -160,7 +160,7 @@ class Search:
     alike: float
 
     def watched(self, watch: Watch) -> Search:
-        """Return the outcome with another watch, whichever of its fits is gone on from."""
+        """Return the outcome with another watch in all of its fits."""
         return replace(
             self, run=replace(self.run, watch=watch), nothing=self.nothing.watched(watch),
             found=self.found.watched(watch), rivals=tuple(f.watched(watch) for f in self.rivals),
@@ -168,7 +168,7 @@ class Search:
 
 
 def search(run: GaugeRun, start: Fit, library: Mapping[str, EffectModel], stated: Stated) -> Search:
-    """Add effects while the data ask for them; whether another set of them does better, the judge weighs."""
+    """Add effects while the data require them; whether another set is better is decided in `judge`."""
     found, steps = start, []
     tried: list[Fit] = []
     while True:
@@ -185,9 +185,9 @@ def search(run: GaugeRun, start: Fit, library: Mapping[str, EffectModel], stated
 
 
 def _weighed_anew(run: GaugeRun, found: Fit) -> tuple[GaugeRun, Fit]:
-    """Return the run with weights by what the fit leaves, and the fit with these.
+    """Return the run with weights from the residuals of the fit, and the fit with these weights.
 
-    Weights from a fit without an effect hold its size back: where it acts, measurements count as outliers.
+    Weights from a fit without an effect reduce its size: where it acts, measurements count as outliers.
     """
     for _ in range(_WEIGHINGS):
         run = weighed(run, found.linearised)
@@ -207,7 +207,7 @@ def _rivals(run: GaugeRun, found: Fit, tried: Sequence[Fit], ratio: float) -> tu
 
 
 def by_chance(scores: Sequence[Scored]) -> float:
-    """Return how many scores as large as the largest are expected when nothing is hidden."""
+    """Return the expected number of scores as large as the largest when nothing is hidden."""
     return float(min((s.p_value for s in scores), default=1.0) * max(len(scores), 1))
 
 
@@ -219,7 +219,7 @@ def refits(run: GaugeRun, found: Fit, scores: Sequence[Scored]) -> list[Fit]:
     fits: list[Fit] = []
     near, allowed = np.inf, _FAR * alike(scores)
     for s in sorted(worth, key=lambda s: -s.score.gain):
-        # The linear prediction of a large effect is wrong, so that its fit starts from size zero.
+        # The linear prediction of a large effect is inaccurate, so that its fit starts from size zero.
         fits.append(fit_beside(found, s.model, s.shape, _RIVAL_ITERATIONS, near))
         near = min(near, fits[-1].cost + allowed)
     possible = [f for f in fits if f.terms[-1].model.possible(f.terms[-1].shape, f.terms[-1].amplitude)]
@@ -227,7 +227,7 @@ def refits(run: GaugeRun, found: Fit, scores: Sequence[Scored]) -> list[Fit]:
 
 
 def _promising(scores: Sequence[Scored]) -> list[Scored]:
-    """Return the scores of the most gain: so many laws with their best courses, and the best law's others."""
+    """Return the scores of largest gain: the best laws, each at its best course, and the best's others."""
     ranked = sorted(scores, key=lambda s: -s.score.gain)
     laws = list(dict.fromkeys(s.model.law for s in ranked))[:_REFITTED]
     best = [next(s for s in ranked if s.model.law == law) for law in laws]
@@ -236,13 +236,13 @@ def _promising(scores: Sequence[Scored]) -> list[Scored]:
 
 
 def alike(scores: Sequence[Scored]) -> float:
-    """Return by how much a gain of χ² is overestimated because neighbouring errors are correlated."""
+    """Return by how much a gain of χ² is overestimated because errors of neighbours are correlated."""
     ratio = [s.score.gain / s.score.statistic for s in scores if s.score.statistic > 1]
     return float(max(np.median(ratio), 1.0)) if ratio else 1.0
 
 
 def shift_px(found: Fit, term: Term) -> float:
-    """Return the r.m.s. shift in px of rings and fiducials by a term."""
+    """Return the RMS shift, px, of rings and fiducials by a term."""
     ring = ring_shift_px(term.model, found.linearised.rings, term.shape, term.amplitude)
     edge = np.linalg.norm(
         texture_shift_px(term.model, found.linearised.edges, term.shape, term.amplitude), axis=1
@@ -265,7 +265,7 @@ def _extended(
 
 
 def _counts(found: Fit) -> bool:
-    """Return whether the last effect is large enough beside the others to count."""
+    """Return whether the last effect is large enough relative to the others."""
     sizes = [shift_px(found, t) for t in found.terms]
     return len(sizes) < 2 or sizes[-1] > LEAST_SHARE * max(sizes[:-1])
 

@@ -1,10 +1,10 @@
-"""Sets of effects compared on one linearisation: none is left out because nobody fitted it.
+"""Compare sets of effects on one linearisation, including sets that were never fitted.
 
-Around a fit all effects of the library, at their best shapes, and all patterns without a cause are columns of
-one evidence. The marginal likelihood of any set of them is then a matter of a few small factorisations, and
-sets are gone through from the likeliest to their neighbours: one added, one dropped, one exchanged. C. Hans,
-A. Dobra, M. West, "Shotgun stochastic search for large p regression", J. Am. Stat. Assoc., 2007, without its
-drawing of lots.
+Around a fit, all effects of the library at their best shapes and all patterns without a cause are columns of
+one evidence. The marginal likelihood of any set then needs only a few small factorisations, and sets are
+visited from the likeliest to their neighbours: one member added, dropped or exchanged. C. Hans, A. Dobra, M.
+West, "Shotgun stochastic search for large p regression", J. Am. Stat. Assoc., 2007, here without random
+choices.
 """
 
 from __future__ import annotations
@@ -38,25 +38,24 @@ from stages.diagnose.inference import (
 Set = frozenset[int]
 # A law and its order, whatever its course: what a name stands for.
 Cause = tuple[str, Shape]
-# Likelihoods do not contain the small errors of laws and of image formation: what looks like odds of 1000 to
-# 1 counts as 100 to 1. A drawn focal length was once called a cone at 100 to 1. Debt: data/debts.md.
+# Likelihoods do not include the small errors of laws and of image formation: nominal odds of 1000 to 1 count
+# as 100 to 1. A simulated focal length was once named a cone at 100 to 1. Debt: data/debts.md.
 _TEMPERED = 1.5
-# Prior: all effects of the library are equally likely, and what has a pattern without a cause is 50 times
-# less likely, because such a pattern can imitate any law. Whether a law suffices is tested separately.
-# Debt: data/debts.md.
+# Prior: all effects of the library are equally likely, and a pattern without a cause is 50 times less likely,
+# because it can imitate any law. Whether a law suffices is tested separately. Debt: data/debts.md.
 NAMELESS = 1 / 50
 _PEAK = 2
 # Relative error of laws: a pattern that differs less from an effect describes it. Debt: data/debts.md.
 SAME = 0.02
 PATTERNS: tuple[tuple[Nameless, Shape], ...] = (*VOCABULARY, *FREE_PROFILES)
-# Neighbours are looked at of the likeliest sets only, and of those that are at least so likely beside the
-# best: ten of them weigh less than what a name may be wrong by.
+# Only the neighbours of the likeliest sets, and of those with at least this probability relative to the best,
+# are visited: ten of them weigh less than the accepted probability of a wrong name.
 _LOOKED_AT, _WORTH = 40, 1e-3
 
 
 @dataclass(frozen=True)
 class Member:
-    """What a set may hold: an effect at a shape, and −2 ln of its chance beforehand among its own kind."""
+    """A possible member of a set: an effect at a shape, and −2 ln of its prior probability among its kind."""
 
     model: EffectModel
     shape: Shape
@@ -74,23 +73,23 @@ class Member:
 
 
 def cause_of(model: EffectModel, shape: Shape) -> Cause:
-    """Return the law and, where it may come more than once, its order."""
+    """Return the law and, if it may occur more than once, its order."""
     own = model.own if isinstance(model, Coursed) else shape if model.repeats else ()
     return model.law, own
 
 
 def key(terms: Iterable[Term | Member]) -> frozenset[tuple[str, Shape]]:
-    """Return what makes two hypotheses the same."""
+    """Return what makes two hypotheses equal."""
     return frozenset(
         (t.model.name, t.shape if t.model.repeats or isinstance(t.model, Nameless) else ()) for t in terms
     )
 
 
 def believed(of: Evidence, alike: float) -> float:
-    """Return what a difference of χ² is divided by before it is believed.
+    """Return the factor by which a difference of χ² is divided.
 
-    It is at least by how much the true variance of the scores of what was found exceeds that of independent
-    errors.
+    It is at least the factor by which the true variance of the scores of the found effects exceeds that of
+    independent errors.
     """
     effects = np.array([c.effect != INSTRUMENT for c in of.columns], bool)
     own, true = np.diag(of.information)[effects], np.diag(of.score_covariance)[effects]
@@ -98,14 +97,14 @@ def believed(of: Evidence, alike: float) -> float:
 
 
 def beforehand(run: GaugeRun, terms: Sequence[tuple[EffectModel, Shape]], laws: int) -> float:
-    """Return −2 ln of a set's chance beforehand: how many others there are like it, shapes included."""
+    """Return −2 ln of a set's prior probability: 1 over the number of similar sets, including shapes."""
     unknown = any(isinstance(model, Nameless) for model, _ in terms)
     each = sum(_one_beforehand(run, model, shape, laws) for model, shape in terms)
     return float(each - 2 * np.log(NAMELESS) * unknown)
 
 
 def _one_beforehand(run: GaugeRun, model: EffectModel, shape: Shape, laws: int) -> float:
-    """Return −2 ln of the chance of an effect or pattern among its own kind."""
+    """Return −2 ln of the prior probability of an effect or pattern among its kind."""
     if (model, shape) in PATTERNS:
         return float(2 * np.log(len(PATTERNS)))
     if isinstance(model, PatternInCourse):
@@ -116,7 +115,7 @@ def _one_beforehand(run: GaugeRun, model: EffectModel, shape: Shape, laws: int) 
 
 
 def prior_sigma(of: Evidence, terms: Sequence[Term]) -> Float:
-    """Return (K,) 1 σ of amplitudes beforehand; infinite for the instrument, which has its own."""
+    """Return the prior 1 σ (K,) of amplitudes; infinite for the instrument, which has its own prior."""
     plausible = {(t.model.name, a.name): a.plausible for t in terms for a in t.amplitudes}
     return np.array(
         [
@@ -127,13 +126,13 @@ def prior_sigma(of: Evidence, terms: Sequence[Term]) -> Float:
 
 
 def members_of(run: GaugeRun, found: Fit, scores: Sequence[Scored], laws: int) -> tuple[Member, ...]:
-    """Return what may be in the place of a fit's effects or beside them: these, all scored, all patterns.
+    """Return what may replace or join a fit's effects: these, all scored effects, and all patterns.
 
-    Laws that come at a time may come at that of a found one, and patterns as a found one does.
+    Laws with a step may have the step of an effect that was found.
     """
     asked = [(t.model, t.shape) for t in found.terms]
     asked += [(s.model, s.shape) for s in scores]
-    # What may come more than once is another cause at another shape.
+    # An effect that may occur more than once is another cause at another shape.
     asked += [(s.model, shape) for s in scores if s.model.repeats for shape in s.model.shapes(*span(run))]
     asked += [
         (s.model, t.shape)
@@ -148,7 +147,7 @@ def members_of(run: GaugeRun, found: Fit, scores: Sequence[Scored], laws: int) -
 
 
 def terms_of(members: Sequence[Member], found: Fit) -> tuple[Term, ...]:
-    """Return a set's terms to begin a fit with: those of another fit as they are, others of size zero."""
+    """Return a set's terms as the start of a fit: those of another fit unchanged, others with size zero."""
     kept = {(t.model.name, t.shape): t for t in found.terms}
     return tuple(
         kept.get((m.model.name, m.shape), Term(m.model, m.shape, np.zeros(len(m.model.amplitudes))))
@@ -164,11 +163,11 @@ class Sets:
     ----------
     members : tuple of Member
     place : tuple of (Q,) int
-        Each one's columns.
+        The columns of each member.
     information, right : (K, K), (K,)
-        Normal equations of all columns in units of their 1 σ beforehand, the stated instrument eliminated.
+        Normal equations of all columns in units of their prior 1 σ, with the stated instrument eliminated.
     sigma : (K,)
-        That 1 σ.
+        That prior 1 σ.
     """
 
     members: tuple[Member, ...]
@@ -179,7 +178,7 @@ class Sets:
 
     @staticmethod
     def of(about: Evidence, members: Sequence[Member], stated: Stated, believed: float) -> Sets:
-        """Return the sets of members that an evidence tells of; χ² is divided by ``believed``."""
+        """Return the sets of those members that the evidence covers; χ² is divided by ``believed``."""
         out = instrument_places(about)
         left = marginalised(
             about.information / believed + stated.over(about.columns), about.right / believed, out, 1e-13
@@ -197,7 +196,7 @@ class Sets:
         return Sets(tuple(seen), tuple(place), scaled, left.right * sigma, sigma)
 
     def surprise(self, chosen: Set) -> float:
-        """Return −2 ln of a set's chance, up to a constant."""
+        """Return −2 ln of a set's posterior probability, up to a constant."""
         before = sum(self.members[k].beforehand for k in chosen)
         before -= 2 * np.log(NAMELESS) * any(self.members[k].nameless for k in chosen)
         if not chosen:
@@ -208,11 +207,11 @@ class Sets:
         return float(before + 2 * np.sum(np.log(np.diag(root))) - gain @ gain)
 
     def in_order(self, chosen: Set) -> tuple[Member, ...]:
-        """Return a set's members."""
+        """Return a set's members in order."""
         return tuple(self.members[k] for k in sorted(chosen))
 
     def amplitudes(self, chosen: Set) -> tuple[Float, ...]:
-        """Return the amplitudes (Q,) of each member of a set at their best."""
+        """Return the optimal amplitudes (Q,) of each member of a set."""
         each = [self.place[k] for k in sorted(chosen)]
         at = np.concatenate([np.zeros(0, np.int64), *each])
         both = np.eye(len(at)) + self.information[np.ix_(at, at)]
@@ -225,7 +224,7 @@ class Sets:
         return frozenset(k for k, m in enumerate(self.members) if (m.model.name, m.shape) in own)
 
     def without_echoes(self, chosen: Set) -> Sets:
-        """Return the sets less the patterns that describe one of some effects: they are no rivals of it."""
+        """Return the sets without patterns that merely describe one of some effects: they are no rivals."""
         echoes = {
             k for k, member in enumerate(self.members)
             if member.nameless and k not in chosen and any(self._apart(k, c) < SAME**2 for c in chosen)
@@ -236,14 +235,14 @@ class Sets:
         )
 
     def _apart(self, pattern: int, effect: int) -> float:
-        """Return the share of a pattern's information that is left when an effect is free."""
+        """Return the share of a pattern's information that remains when an effect is free."""
         at, free = self.place[pattern], self.place[effect]
         own, both = self.information[np.ix_(at, at)], self.information[np.ix_(free, at)]
         taken = both.T @ np.linalg.lstsq(self.information[np.ix_(free, free)], both)[0]
         return float(1 - np.trace(np.linalg.lstsq(own, taken)[0]) / len(at))
 
     def likely(self, first: Collection[Set], most: int) -> dict[Set, float]:
-        """Return the surprise of all sets of up to ``most`` members that were met on the way from some."""
+        """Return the surprise of all sets of up to ``most`` members visited from the ``first`` ones."""
         met = {chosen: self.surprise(chosen) for chosen in first}
         looked_at, grown = set[Set](), set[Set]()
         while len(looked_at) < _LOOKED_AT:
@@ -253,7 +252,7 @@ class Sets:
                 break
             here = min(ahead, key=met.__getitem__)
             looked_at.add(here)
-            # Sets with one member more, less or exchanged.
+            # Sets with one member added, dropped or exchanged.
             for rest in (here, *(here - {gone} for gone in here)):
                 met.setdefault(rest, self.surprise(rest))
                 if rest not in grown and len(rest) < most:
@@ -263,7 +262,7 @@ class Sets:
         return met
 
     def _grown(self, rest: Set) -> Iterator[tuple[Set, float]]:
-        """Yield a set with each member more, and its surprise; a model that does not repeat comes once."""
+        """Yield the set with each member added, and its surprise; a model that does not repeat once."""
         taken = {self.members[k].model.name for k in rest if not self.members[k].model.repeats}
         free = [k for k, m in enumerate(self.members) if k not in rest and m.model.name not in taken]
         first, taken_up, best = self.surprise(rest), *self._taken_up(rest)
@@ -282,7 +281,7 @@ class Sets:
                 yield rest | {k}, float(first + before + more)
 
     def _taken_up(self, rest: Set) -> tuple[Float, Float]:
-        """Return (R, K), (R,) whose products are what a set's R columns take of the normal equations."""
+        """Return (R, K) and (R,) whose products are what a set's R columns absorb of the normal equations."""
         at = np.concatenate([np.zeros(0, np.int64), *(self.place[k] for k in sorted(rest))])
         root = np.linalg.cholesky(np.eye(len(at)) + self.information[np.ix_(at, at)])
         sides = np.column_stack([self.information[at], self.right[at]])

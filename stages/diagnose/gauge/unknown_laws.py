@@ -1,14 +1,15 @@
-"""Laws and courses that nobody knows, in the place of one name or of several.
+"""Unknown laws and courses as alternatives to one name or to several.
 
-A name says how an effect grows from the middle of the picture outward. A law that the library lacks may pass
-for it as long as measurements leave that growth open. So each name is held against its own law times a free
-polynomial of the radius: a Gaussian process about the law. Its marginal likelihood pays for this freedom only
-where measurements could have told it (D. MacKay, "Bayesian interpolation", 1992). Without it, a focal length
-that the library lacked was called a shifted dome, and a shifted dome a focal length.
+A name states how an effect grows from the middle of the picture outward. An unknown law may pass for it as
+long as the measurements leave that growth open. Therefore each name competes with its own law times a free
+polynomial of the radius: a Gaussian process about the law. Its marginal likelihood is penalised for this
+freedom only where measurements could have shown the difference (D. MacKay, "Bayesian interpolation", 1992).
+Without this, a focal length that was not in the library was named a shifted dome, and a shifted dome a focal
+length.
 
-A name also says how an effect comes in time. So each is held, too, against its law with a course that is
-free, a Brownian motion about the named one: an optical axis that drifted as no course in the library does was
-called one that moves evenly beside a laser that rocks once in the whole run.
+A name also states the effect's course in time. Therefore each also competes with its law times a free course,
+a Brownian motion about the named one: an optical axis that drifted as no course in the library does was named
+one that moves evenly, together with a laser that rocks once during the whole run.
 """
 
 from __future__ import annotations
@@ -32,14 +33,14 @@ from stages.diagnose.gauge.scan import span
 from stages.diagnose.gauge.sets import NAMELESS, beforehand, prior_sigma
 from stages.diagnose.inference import INSTRUMENT, Evidence, Stated, estimate, places_of
 
-# How far such a law may be off the named one, as a part of its size: in even steps of the logarithm over
-# what the library's own laws are off each other: over the rings of a gauge of bores of 25 and 38 mm, 122
-# pairs that differ in growth alone are off by .31, 1.4 and 3.8 in the first power (the tenth, the median, all
-# but a tenth) and by .29, 2.1 and 9.8 in the second. Courses of the library (constant, with distance, its
-# sign, all searched in time) are off each other's best size by .32, .70 and 2.6 of it.
+# Size of the difference between an unknown law and the named one, relative to the latter: in equal steps of
+# the logarithm over the differences between the library's own laws. Over the rings of a gauge with bores of
+# 25 and 38 mm, 122 pairs that differ only in their growth differ by .31, 1.4 and 3.8 in the first power (10
+# %, 50 % and 90 % quantile) and by .29, 2.1 and 9.8 in the second. Courses of the library (constant, with
+# distance, its sign, all searched in time) differ from each other's best size by .32, .70 and 2.6 of it.
 _APART = (0.3, 1.0, 3.0)
-# More effects of one harmonic than this come to almost any law together: a shifted optical axis that the
-# library lacked was called a tilted sheet beside two others (`bench_diagnosis --mode leftout`, case 3002).
+# More effects of one harmonic than this can together imitate almost any law: a shifted optical axis that was
+# not in the library was named a tilted sheet beside two others (`bench_diagnosis --mode leftout`, case 3002).
 _AS_ANY = 2
 
 
@@ -57,7 +58,7 @@ def excess_exponent(
 
 @dataclass(frozen=True)
 class Unknown:
-    """Odds beside a name: of laws that nobody knows and that grow otherwise, of courses that nobody knows."""
+    """Odds relative to a name: of unknown laws with another growth, and of unknown courses."""
 
     growth: float
     course: float
@@ -71,14 +72,14 @@ class Unknown:
 def odds_of_unknown_laws(
     run: GaugeRun, best: Judged, stated: Stated, believed: float, library: Mapping[str, EffectModel]
 ) -> tuple[Unknown, ...]:
-    """Return for each effect of the likeliest hypothesis the odds, beside its name, of what nobody knows.
+    """Return, for each effect of the likeliest hypothesis, the odds of unknown causes relative to its name.
 
-    A law that grows otherwise is like one of the effects and is there in its place, or in that of several
-    with its harmonic and behaviour in time, patterns without a cause among them; or it is what several come
-    to together, if these have one direction. Two of which one has no direction of its own come to none. Laws
-    that nobody knows are of a kind (a harmonic, of the sheet or of the picture) as often as those of the
-    library are, and a name is one of these. A course that is free may be there in the place of several with
-    one harmonic, whatever their behaviour in time is. χ² is divided by ``believed``.
+    An unknown law is similar to one of the effects and takes its place, or that of several with its harmonic
+    and behaviour in time, including patterns without a cause; or it is the sum of several that have one
+    direction. Two effects, of which one has no direction, have no such sum. Unknown laws of a kind (a
+    harmonic, of the sheet or of the picture) are as frequent as those of the library, of which a name is one.
+    An unknown course may take the place of several effects with one harmonic, whatever their behaviour in
+    time. χ² is divided by ``believed``.
     """
     laws = {model.law for model in library.values()}
     at, terms = best.fit.linearised, best.fit.terms
@@ -100,10 +101,11 @@ def odds_of_unknown_laws(
 
 
 def known_alike(model: EffectModel, library: Mapping[str, EffectModel]) -> float:
-    """Return how many laws of the library are of a model's kind, its own included.
+    """Return the number of laws of the library that are of a model's kind, including its own.
 
-    Each counts by its chance beforehand beside the model's, once for all its courses of that behaviour. A
-    law without a harmonic is told by what it goes with, grow as it may: of its kind there is itself alone.
+    Each counts by its prior probability relative to the model's, once for all its courses of that behaviour.
+    A law without a harmonic is recognised by what it depends on, whatever its growth: it is the only one of
+    its kind.
     """
     if _kind(model)[0] is None:
         return 1.0
@@ -112,7 +114,7 @@ def known_alike(model: EffectModel, library: Mapping[str, EffectModel]) -> float
 
 
 def _share(model: EffectModel) -> float:
-    """Return how likely a model is beforehand beside a law that the library has for itself."""
+    """Return the prior probability of a model relative to a law of the library without a course."""
     return 1 / len(SEARCHED) if isinstance(model, Coursed) else 1.0
 
 
@@ -126,11 +128,11 @@ def odds_in(
     about: Evidence, terms: Sequence[Term], others: Sequence[str], pattern: Sequence[object],
     before: Callable[[Sequence[Term]], float], stated: Stated, as_one: bool = True,
 ) -> tuple[float, ...]:  # fmt: skip
-    """Return the odds of what nobody knows in the place of each of the terms that ``others`` are like.
+    """Return the odds of unknown laws in the place of each of the terms that ``others`` resemble.
 
-    ``about`` is the evidence over all terms and all others, ``pattern`` what terms must share to be made by
-    one law, and ``before`` −2 ln of the chance of terms beforehand; ``as_one`` says whether terms along one
-    direction may be one law as they are.
+    ``about`` is the evidence over all terms and all others, ``pattern`` what terms must share to be one law,
+    and ``before`` −2 ln of the prior probability of terms; ``as_one`` says whether terms along one direction
+    may be one law as they are.
     """
     alone, odds = _surprise(about, terms, "", 0.0, stated), np.zeros(len(others))
     for group in _groups(pattern):
@@ -149,9 +151,9 @@ def odds_in(
 
 
 def _aligned(about: Evidence, terms: Sequence[Term], group: Sequence[int], first: int) -> Evidence:
-    """Return the evidence when terms of a group act along one of them's direction, at sizes of their own.
+    """Return the evidence when all terms of a group act along one's direction, each with its own size.
 
-    One law has one direction, whatever it is made up from; causes that are several have theirs by chance.
+    One law has one direction, whatever it consists of; several causes have a common one only by chance.
     """
     heading = terms[first].amplitude / np.linalg.norm(terms[first].amplitude)
     along, gone = np.eye(len(about.columns)), list[int]()
@@ -176,7 +178,7 @@ def _groups(pattern: Sequence[object]) -> Iterator[tuple[int, ...]]:
 
 
 def _surprise(about: Evidence, terms: Sequence[Term], other: str, apart: float, stated: Stated) -> float:
-    """Return the surprise of terms and a law that grows otherwise, if any."""
+    """Return the surprise of terms and of a law with another growth, if any."""
     keys = {(t.model.name, t.shape) for t in terms}
     over = about.over([
         c for c in about.columns if c.effect in (INSTRUMENT, other) or (c.effect, c.shape) in keys
