@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from pydantic import Field
 
-from pipeline.arrays import Bool, Int
-from pipeline.artefacts.measured import RingPoints, RingSamples, Trajectory
+from pipeline.arrays import Bool
+from pipeline.artefacts.measured import RingPoints, RingSamples
 from pipeline.errors import UnusableError
 from pipeline.instrument.probe import Probe
 from pipeline.machine.stage import Context, Parameters, Stage
@@ -21,12 +21,12 @@ from stages.calibrate.gauge.state import Unknowns
 from stages.diagnose.effects.base import EffectModel
 from stages.diagnose.effects.library import without as library_without
 from stages.diagnose.field.evidence import FieldEvidence, field_evidence, nothing_said
-from stages.diagnose.field.run import FieldRun, field_run
+from stages.diagnose.field.run import Adjusted, FieldRun, field_run
 from stages.diagnose.gauge.examine import Examined, examine
 from stages.diagnose.profile.evidence import ProfileEvidence, profile_evidence
 from stages.diagnose.travel.evidence import TravelEvidence, travel_evidence
 from stages.diagnose.travel.sight import PLACED_SIGMA_MM, sight_of_poses
-from stages.motion import EncoderReadings, Equations, Measurements, MotionParameters, State
+from stages.motion import MotionParameters
 
 _MOST_OF_RING = 0.5
 # Effects that motion against encoder measures better than rings and fiducials do.
@@ -136,24 +136,6 @@ class GaugeMeasured:
 
 
 @dataclass(frozen=True)
-class Adjusted:
-    """A `FieldRun` without the recording, the probe and the rings from which it was made."""
-
-    measured: Measurements
-    state: State
-    equations: Equations
-    trajectory: Trajectory
-    encoder: EncoderReadings | None
-    ring_frames: Int
-    parameters: MotionParameters
-
-    @staticmethod
-    def of(run: FieldRun) -> Adjusted:
-        """Return a run without its inputs."""
-        return Adjusted(**{f.name: getattr(run, f.name) for f in fields(Adjusted)})
-
-
-@dataclass(frozen=True)
 class FreeMotion:
     """A field recording adjusted without its encoder; if it failed, ``problem`` says why."""
 
@@ -215,7 +197,7 @@ def adjust_freely(
         run = field_run(frames.applied_to(recording), probe, rings, points, parameters, context)
     except UnusableError as error:
         return FreeMotion(None, error.problem)
-    return FreeMotion(Adjusted.of(run))
+    return FreeMotion(run.adjusted)
 
 
 def examine_gauge(

@@ -16,10 +16,10 @@ from pipeline.instrument.probe import Probe
 from pipeline.machine.stage import Context, Of, Parameters, Stage
 from pipeline.recording.base import Encoder, Recording
 from pipeline.recording.checks import CheckedFrames
-from stages.diagnose.channels import Adjusted, FreeMotion, Seen
+from stages.diagnose.channels import FreeMotion, Seen
 from stages.diagnose.effects.base import Amplitude, Shape, Travel
 from stages.diagnose.effects.library import LIBRARY
-from stages.diagnose.field.run import FieldRun, with_probe
+from stages.diagnose.field.run import Adjusted, FieldRun, with_probe
 from stages.diagnose.gauge.examine import Examined
 from stages.diagnose.gauge.fit import evidence
 from stages.diagnose.gauge.run import Term
@@ -199,7 +199,7 @@ def adjust_corrected(
     if run is None or corrected.correction is None:
         return CorrectedMotion(None)
     try:
-        return CorrectedMotion(Adjusted.of(with_probe(run, corrected.correction.probe, context)))
+        return CorrectedMotion(with_probe(run, corrected.correction.probe, context).adjusted)
     except UnusableError:
         return CorrectedMotion(None)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import partial
 
 import numpy as np
@@ -34,15 +34,11 @@ from stages.motion import (
 
 
 @dataclass(frozen=True)
-class FieldRun:
-    """A field recording at the optimum with the stated instrument.
+class Adjusted:
+    """A field recording at the optimum with the stated instrument, without what it was made from.
 
     Attributes
     ----------
-    recording : Recording
-    probe : Probe
-        As stated.
-    rings : RingSamples
     measured : Measurements
         Without encoder.
     state : State
@@ -56,9 +52,6 @@ class FieldRun:
     parameters : MotionParameters
     """
 
-    recording: Recording
-    probe: Probe
-    rings: RingSamples
     measured: Measurements
     state: State
     equations: Equations
@@ -66,6 +59,20 @@ class FieldRun:
     encoder: EncoderReadings | None
     ring_frames: Int
     parameters: MotionParameters
+
+
+@dataclass(frozen=True)
+class FieldRun(Adjusted):
+    """An adjusted field recording with the recording, the stated probe and the rings it was made from."""
+
+    recording: Recording
+    probe: Probe
+    rings: RingSamples
+
+    @property
+    def adjusted(self) -> Adjusted:
+        """The run without what it was made from."""
+        return Adjusted(**{f.name: getattr(self, f.name) for f in fields(Adjusted)})
 
 
 def field_run(
@@ -93,8 +100,8 @@ def field_run(
     encoder = encoder_at_frames(recording, parameters.encoder_sigma_mm, grid.far_mm, context)
     found = adjust_at_once(start, measured, frames, grid.radius_mm, parameters, context)
     return FieldRun(
-        recording, probe, rings, found.measured, found.state, found.equations, found.trajectory,
-        encoder, run.ring_place, parameters,
+        found.measured, found.state, found.equations, found.trajectory, encoder, run.ring_place, parameters,
+        recording, probe, rings,
     )  # fmt: skip
 
 
