@@ -173,7 +173,7 @@ def _without_scale(seen: Seen, unsaid: Sequence[str]) -> Seen:
 
 
 DIAGNOSIS = Stage(
-    "diagnosis", "34", DiagnosisParameters, diagnose,
+    "diagnosis", "35", DiagnosisParameters, diagnose,
     "what physics was left out, where it shows, and what confirms it",
 )  # fmt: skip
 _OF_FIELD = (PREMISES, RINGS, TRIANGULATE, LINE_PROFILE, FREE_MOTION, FIELD_EVIDENCE)

@@ -58,6 +58,19 @@ def examined(
     )
 
 
+@pytest.mark.parametrize(("chance", "verdict"), [(0.986, Verdict.UNEXPLAINED), (0.6, Verdict.CLASS)])
+def test_patterns_that_are_unlikely_each_leave_a_name_unexplained_unless_other_names_are_likelier(
+    chance, verdict, monkeypatch
+):
+    """A focal length that drifted as no law does was a class of the cone and of what might come beside it."""
+    monkeypatch.setattr(answer, "shift_px", lambda fit, term: term.shift_px)
+    seen = examined(unsplit=())
+    seen.verdicts.chance_of = lambda term: chance
+    seen.verdicts.patterns_beside = lambda term: {"image outward: a θ^1": 0.008, "image outward: a(θ)": 0.006}
+    assert answer.verdict_of(seen) is verdict
+    assert answer.unknown_rivals(seen)[:1] == ("image outward: a θ^1",) * (verdict is Verdict.UNEXPLAINED)
+
+
 @pytest.mark.parametrize(
     ("heldout_px", "floor_px", "verdict"),
     [

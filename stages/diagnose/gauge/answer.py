@@ -93,13 +93,21 @@ def _fits(examined: Examined) -> bool:
 
 
 def unknown_rivals(examined: Examined) -> tuple[str, ...]:
-    """Return the causeless patterns that make a name of the likeliest uncertain, likeliest first."""
+    """Return the causeless patterns that make a name of the likeliest uncertain, likeliest first.
+
+    One may do so alone, or all together where no other names are likelier in its place.
+    """
     best, verdicts = examined.best, examined.verdicts
     if best is None or verdicts is None:
         return ()
-    each = chain(*(verdicts.patterns_beside(t).items() for t in best.library_terms))
-    doubted = sorted((pair for pair in each if pair[1] > 1 - SURE), key=lambda pair: -pair[1])
-    return tuple(dict.fromkeys(formula for formula, _ in doubted))
+    doubted = dict[str, float]()
+    for term in best.library_terms:
+        beside = verdicts.patterns_beside(term)
+        together = sum(beside.values())
+        names = 1 - verdicts.chance_of(term) - together
+        least = 0.0 if together > max(1 - SURE, names) else 1 - SURE
+        doubted |= {formula: p for formula, p in beside.items() if p > least}
+    return tuple(sorted(doubted, key=lambda formula: -doubted[formula]))
 
 
 def like_a_name(examined: Examined) -> tuple[str, ...]:
