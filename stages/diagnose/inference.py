@@ -1,7 +1,8 @@
-"""Evidence about effects from one kind of measurement, and the estimates and tests that rest on it.
+"""Evidence about effects from one kind of measurement, and the estimates and tests based on it.
 
-Evidence of independent measurements adds: the sum of information matrices and of right sides over shared
-columns. The stated instrument's parameters are columns too, because gauge and field share one instrument.
+Evidence of independent measurements is additive: information matrices and right sides are summed over shared
+columns. The stated instrument's parameters are columns, too, because gauge run and inspection share one
+instrument.
 """
 
 from __future__ import annotations
@@ -18,19 +19,18 @@ from pipeline.arrays import Float, Int
 from pipeline.instrument.probe import Probe
 from stages.diagnose.effects.base import EffectModel, Shape
 
-# Scores are sums over so many independent cells, or fewer, that χ² has heavier tails: those of F.
+# Scores are sums over at most this many independent cells, so that χ² has heavier tails: those of F.
 DEGREES = 60.0
 _TIED = 1e-6
 _SEEN, _SEEN_BESIDE = 1e-8, 1e-6
-# An amplitude's 1 σ beforehand, in plausible sizes.
+# Prior 1 σ of an amplitude, in plausible sizes.
 PRIOR_PLAUSIBLE = 5.0
 INSTRUMENT = "instrument"
-# Odds beforehand, beside a named cause, of one that the library does not know and that shows just so. Debt:
-# data/debts.md.
+# Prior odds, relative to a named cause, of an unknown cause that looks exactly like it. Debt: data/debts.md.
 UNKNOWN = 0.1
-# What an answer may cost, stated beforehand: a wrong name given with confidence 50, a class of n names that
-# holds the right one 1 − 1 / n, a name that is missed 1. A name is given where its expected cost is below
-# that of a class of two, and a class holds as many names as make it as sure.
+# Costs of an answer, fixed in advance: 50 for a confident wrong name, 1 − 1/n for a class of n names that
+# contains the right one, 1 for a missed name. A name is given where its expected cost is below that of a
+# class of two; a class contains as many names as make it equally certain.
 WRONG = 50.0
 SURE = 1 - 1 / (2 * WRONG)
 
@@ -42,7 +42,7 @@ class Column:
     Attributes
     ----------
     effect : str
-        Name of the catalogue, or ``instrument`` for a parameter of `Probe.parameter_names` or
+        Name in the catalogue, or ``instrument`` for a parameter of `Probe.parameter_names` or
         ``encoder_scale``, whose amplitude is true minus stated in the parameter's own unit.
     amplitude : str
         As the effect's model names it.
@@ -66,12 +66,11 @@ class Evidence:
     right : (K,)
         b at x = 0: the score.
     score_covariance : (K, K)
-        True covariance of b, neighbours that err alike counted once (sandwich over cells); A where that
-        is not known.
+        True covariance of b, with correlated errors of neighbours (sandwich over cells); A where unknown.
     misfit : float
-        Weighted sum of squares at x = 0 with the own unknowns at their best.
+        Weighted sum of squares at x = 0 with the own unknowns at their optimum.
     degrees : (K,)
-        Degrees of freedom of each score's spread; infinite where it is not taken from the data.
+        Degrees of freedom of each score's scatter; infinite where it is not estimated from the data.
     """
 
     columns: tuple[Column, ...]
@@ -83,11 +82,11 @@ class Evidence:
 
     @cached_property
     def place(self) -> dict[Column, int]:
-        """Place of each column."""
+        """Index of each column."""
         return {c: k for k, c in enumerate(self.columns)}
 
     def over(self, columns: Sequence[Column]) -> Evidence:
-        """Return the evidence over other columns, in their order; it says nothing of those it lacks."""
+        """Return the evidence over other columns, in their order; it is empty for columns that it lacks."""
         place = self.place
         here = [k for k, c in enumerate(columns) if c in place]
         own = [place[columns[k]] for k in here]
@@ -100,7 +99,7 @@ class Evidence:
         return Evidence(tuple(columns), information, right, covariance, self.misfit, degrees)
 
     def deflated(self, alike: float) -> Evidence:
-        """Return the evidence when ``alike`` measurements that err alike count as one."""
+        """Return the evidence when ``alike`` measurements with correlated errors count as one."""
         return Evidence(
             self.columns, self.information / alike, self.right / alike, self.score_covariance / alike**2,
             self.misfit / alike, self.degrees,
@@ -123,13 +122,13 @@ def total(parts: Sequence[Evidence]) -> Evidence:
 
 @dataclass(frozen=True)
 class Stated:
-    """What is believed of the instrument beforehand, as information on its columns."""
+    """Prior knowledge of the instrument, as information on its columns."""
 
     names: tuple[str, ...]
     information: Float
 
     def over(self, columns: Sequence[Column]) -> Float:
-        """Return (K, K) the information on columns; nothing on effects."""
+        """Return the information (K, K) on columns; zero on effects."""
         place = {name: k for k, name in enumerate(self.names)}
         out = np.zeros((len(columns), len(columns)))
         here = [k for k, c in enumerate(columns) if c.effect == INSTRUMENT and c.amplitude in place]
@@ -148,22 +147,22 @@ def stated_belief(probe: Probe) -> Stated:
 
 
 def instrument_information(probe: Probe) -> Float:
-    """Return (P, P) information on the stated parameters; those without uncertainty are held fast."""
+    """Return the information (P, P) on the stated parameters; those without uncertainty are held fixed."""
     sigma = np.sqrt(np.diag(probe.covariance))
     scale = np.where(sigma > 0, sigma, 1e-6)
     scaled = probe.covariance / np.outer(scale, scale) + np.diag(np.where(sigma > 0, 0.0, 1.0))
-    # Parameters stated as one number (both focal lengths) differ by next to nothing.
+    # Parameters stated as one number (both focal lengths) are practically equal.
     return np.asarray(covariance_of(scaled, _TIED) / np.outer(scale, scale))
 
 
 @dataclass(frozen=True)
 class Score:
-    """What the data say of one effect when nothing else is added.
+    """Evidence for one effect when nothing else is added.
 
     Attributes
     ----------
     amplitude, covariance : (Q,), (Q, Q)
-        Estimate and its true covariance, the stated instrument's uncertainty included.
+        Estimate and its true covariance, including the stated instrument's uncertainty.
     statistic : float
         χ² with Q degrees of freedom when nothing is hidden.
     p_value : float
@@ -180,17 +179,17 @@ class Score:
 
 @dataclass(frozen=True)
 class Around:
-    """Evidence about every effect when the instrument, and effects that are there, are free.
+    """Evidence about every effect when the instrument, and effects already included, are free.
 
     Attributes
     ----------
     evidence : Evidence
     information, right : (K, K), (K,)
-        What is left of it without the free columns; zero there.
+        The rest of it with the free columns eliminated; zero in those.
     from_stated : (K, K)
-        What of the information comes from the stated instrument's uncertainty.
+        Part of the information that comes from the stated instrument's uncertainty.
     least : float
-        Least share of its own information that an effect must keep to be seen.
+        Least share of its own information that an effect must keep to be tested.
     """
 
     evidence: Evidence
@@ -201,7 +200,7 @@ class Around:
 
     @staticmethod
     def of(evidence: Evidence, stated: Stated, given: Int | None = None) -> Around:
-        """Return what is left when the instrument and columns ``given`` are free."""
+        """Return the evidence with the instrument and the columns ``given`` free."""
         beside = given is not None and len(given) > 0
         own = instrument_places(evidence)
         free = np.union1d(own, given) if given is not None else own
@@ -214,8 +213,8 @@ class Around:
     def score(self, block: Int) -> Score | None:
         """Return the score of columns ``block``.
 
-        None when the columns cannot be seen. What is seen of an effect only beside another, nearly the same
-        one that is free, rests on laws being exact, and does not count.
+        None when the columns cannot be determined. An effect that is determined only beside a nearly
+        identical free one depends on laws being exact, and is not tested.
         """
         at = np.ix_(block, block)
         own, right, from_stated = self.information[at], self.right[block], self.from_stated[at]
@@ -223,13 +222,13 @@ class Around:
         size = np.sqrt(np.maximum(before, 1e-300))
         if not np.all(np.linalg.eigvalsh(own / np.outer(size, size)) > self.least):
             return None
-        # Neighbours that err alike widen what the data say, not what was stated beforehand.
+        # Correlated errors of neighbours widen what the data say, not the prior of the stated instrument.
         inflation = np.sqrt(np.diag(self.evidence.score_covariance)[block] / before)
         spread = (own - from_stated) * np.outer(inflation, inflation) + from_stated
         inverse = np.linalg.inv(own)
         amplitude, covariance = inverse @ right, np.asarray(inverse @ spread @ inverse, np.float64)
         statistic = float(right @ np.linalg.solve(spread, right))
-        # Columns whose spread is sure make up for those of which few cells tell: relative variances average.
+        # Relative variances are averaged, so that columns of well-known scatter support those with few cells.
         degrees = 1 / max(1 / DEGREES, float(np.mean(1 / self.evidence.degrees[block])))
         p_value = float(stats.f.sf(statistic / len(block), len(block), degrees))
         return Score(
@@ -238,14 +237,14 @@ class Around:
 
 
 def score(evidence: Evidence, stated: Stated, block: Int, given: Int | None = None) -> Score | None:
-    """Return the score of columns ``block``, the instrument and columns ``given`` being free."""
+    """Return the score of columns ``block``, with the instrument and the columns ``given`` free."""
     return Around.of(evidence, stated, given).score(block)
 
 
 def eliminated(evidence: Evidence, stated: Stated, block: Int, free: Int) -> tuple[Float, Float, Float]:
-    """Return information (Q, Q) and right side (Q,) of columns ``block``, columns ``free`` eliminated.
+    """Return information (Q, Q) and right side (Q,) of columns ``block``, with columns ``free`` eliminated.
 
-    The third, (Q, Q), is what of the information comes from the stated instrument's uncertainty.
+    The third result, (Q, Q), is the part of the information from the stated instrument's uncertainty.
     """
     a, b = evidence.information, evidence.right
     free = free[np.diag(a)[free] > 0]
@@ -259,25 +258,25 @@ def eliminated(evidence: Evidence, stated: Stated, block: Int, free: Int) -> tup
 
 
 def instrument_places(evidence: Evidence) -> Int:
-    """Return the places of the instrument's columns."""
+    """Return the indices of the instrument's columns."""
     return np.array([k for k, c in enumerate(evidence.columns) if c.effect == INSTRUMENT], np.int64)
 
 
 def places_of(evidence: Evidence, model: EffectModel, shape: Shape) -> Int:
-    """Return the places of an effect's columns."""
+    """Return the indices of an effect's columns."""
     columns = (Column(model.name, a.name, shape) for a in model.amplitudes)
     return np.array([evidence.place[c] for c in columns if c in evidence.place], np.int64)
 
 
 def places_of_all(evidence: Evidence, asked: Sequence[tuple[EffectModel, Shape]]) -> Int:
-    """Return the places of the columns of several effects, one after the other."""
+    """Return the indices of the columns of several effects, one effect after the other."""
     each = [places_of(evidence, model, shape) for model, shape in asked]
     return np.concatenate([np.zeros(0, np.int64), *each])
 
 
 @dataclass(frozen=True)
 class Estimate:
-    """Posterior of the columns: ``value`` (K,), ``covariance`` (K, K), and minus twice the log evidence."""
+    """Posterior of the columns: ``value`` (K,), ``covariance`` (K, K), and −2 ln of the evidence."""
 
     value: Float
     covariance: Float

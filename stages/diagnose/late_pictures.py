@@ -1,4 +1,4 @@
-"""Pictures that are late: readings that come late show the same, unless the line's width tells them apart."""
+"""Late pictures look like late encoder readings, unless the line's width distinguishes them."""
 
 from __future__ import annotations
 
@@ -19,25 +19,26 @@ from stages.diagnose.travel.model import TravelFit, second_predictions
 from stages.diagnose.travel.solve import DELAY
 
 _EXPOSURE, _DELAY = "motion_blur", "time_offset"
-# So many σ beyond what a frame has time for, a width is not that of an exposure: by chance once in 700.
+# A width is not due to the exposure if it exceeds what a frame has time for by this many σ: by chance once in
+# 700.
 _SURE = 3.0
-# Stamps may be of an exposure's begin, of its middle or of any time between, all as likely: pictures are late
-# by none to all of half the exposure. About all of that half this is 1 σ, as a part of it.
+# Time stamps may refer to the start of an exposure, its middle, or any time between, all equally likely:
+# pictures are late by between nothing and half of the exposure. Relative to a full half, this is 1 σ.
 _BY_STAMPS = float(1 / np.sqrt(3))
 
 
 @dataclass(frozen=True)
 class Exposure:
-    """What is known of how long a probe exposes its pictures.
+    """What is known about the exposure time of a probe.
 
-    Pictures exposed longer than stated from the same start are late by half of that, and blur the line by as
-    much as they are exposed longer.
+    Pictures exposed longer than stated from the same start are late by half of the excess, and blur the line
+    by all of it.
 
     Attributes
     ----------
     stated_s : float
     widths : tuple of Finding
-        What the line's width tells of it, in each recording of the probe.
+        The exposure according to the line's width, in each recording of the probe.
     """
 
     stated_s: float
@@ -45,27 +46,27 @@ class Exposure:
 
     @classmethod
     def of(cls, stated_s: float, recordings: Iterable[Seen | None]) -> Exposure:
-        """Return what the line's width in some recordings tells, in their order."""
+        """Return the exposure according to the line's width in some recordings, in their order."""
         profiles = [s.profile for s in recordings if s is not None and s.profile is not None]
         told = (f for p in profiles for f in p.findings if f.effect == _EXPOSURE and f.sizes)
         return cls(stated_s, tuple(told))
 
     def leaves_open(self, found: TravelEstimate) -> bool:
-        """Return whether it is a delay of which a width, which nothing bears out, makes an unsure part."""
+        """Return whether a width without confirmation may account for an uncertain part of this delay."""
         shown = next((f for f in self.widths if f.found), None)
         if found.effect != _DELAY or shown is None:
             return False
         return not (shown.agreements and all(a.confirmation.agrees for a in shown.agreements))
 
     def taken_off(self, seen: Seen | None) -> Seen | None:
-        """Return a recording with the delay that is the encoder's own, if the width shows an exposure."""
+        """Return a recording's evidence with the encoder's own delay, if the width shows an exposure."""
         longer = next((f.sizes[0] for f in self.widths if f.found), None)
         if seen is None or seen.travel is None or longer is None:
             return seen
         fit = seen.travel.fit
         if not self._has_time(fit, longer):
             return seen
-        # Of an encoder in time nothing is taken off: stamps may be of the exposure's middle.
+        # Nothing is subtracted for an encoder without delay: stamps may refer to the exposure's middle.
         each = (
             _less_half(e, longer, fit) if e.effect == _DELAY and is_found(e.p_value) else e
             for e in seen.travel.estimates
@@ -73,23 +74,23 @@ class Exposure:
         return replace(seen, travel=replace(seen.travel, estimates=tuple(each)))
 
     def _has_time(self, fit: TravelFit | None, longer: Size) -> bool:
-        """Return whether pictures can be exposed so much longer: each ends before the next one begins."""
+        """Return whether pictures can be exposed for so much longer: each ends before the next begins."""
         if fit is None:
             return True
         return longer.value - _SURE * longer.sigma < fit.sight.frame_time_s - self.stated_s
 
     def too_long(self, seen: Seen, found: Finding) -> str:
-        """Return what is said of an exposure that no picture has time for; nothing of any other finding."""
+        """Return a sentence on an exposure that no picture has time for; empty for any other finding."""
         fit = seen.travel.fit if seen.travel is not None else None
         if found.effect != _EXPOSURE or not found.sizes or fit is None or self._has_time(fit, found.sizes[0]):
             return ""
         apart = f"{1e3 * fit.sight.frame_time_s:.1f} ms"
-        return f", for which no picture has time: the next begins after {apart}."
+        return f", for which no picture has time: the next one begins after {apart}."
 
     def alike(self, found: TravelEstimate, travel: TravelEvidence) -> tuple[str, ...]:
-        """Return ``motion_blur`` where a longer exposure may be what makes an encoder's readings seem late.
+        """Return ``motion_blur`` where a longer exposure may be the reason why readings seem late.
 
-        The exposure ends before the next picture begins. What the width shows was taken off before.
+        The exposure must end before the next picture begins. What the width shows was subtracted before.
         """
         if found.effect != _DELAY or travel.fit is None or any(f.found for f in self.widths):
             return ()
@@ -102,9 +103,10 @@ class Exposure:
 def how_late(
     size: dict[str, Value], recordings: Sequence[Seen | None], own_delay: bool
 ) -> tuple[dict[str, Value], str]:
-    """Return an effect's size, of an exposure with how late it makes pictures, and what is said beside it.
+    """Return an effect's size, for an exposure with the delay of its pictures, and a sentence to add.
 
-    ``own_delay`` tells whether the encoder has a sure delay of its own, with half the exposure taken off.
+    ``own_delay`` says whether the encoder has a certain delay of its own, with half of the exposure
+    subtracted.
     """
     if own_delay:
         return as_late_as_exposed(size), ""
@@ -112,11 +114,12 @@ def how_late(
 
 
 def as_late_as_shown(size: dict[str, Value], recordings: Iterable[Seen | None]) -> dict[str, Value]:
-    """Return an effect's size, of an exposure with how late it makes pictures as far as an encoder shows it.
+    """Return an effect's size; for an exposure, with the delay of its pictures that an encoder shows.
 
-    Stamps may be of the exposure's middle, so that half of it makes no picture late against its stamp. Of two
-    recordings the first that can tell half of it from nothing counts; where no encoder tells any, nothing is
-    known. What an encoder is later than by half, it may or may not share: it is in σ.
+    Stamps may refer to the exposure's middle, so that half of it need not delay a picture relative to its
+    stamp. Of two recordings, the first that can distinguish half of the exposure from zero is used; where
+    none can, the delay is unknown. Any further delay of the encoder may or may not be due to the exposure: it
+    is included in σ.
     """
     if "exposure_s" not in size or (shown := _shown(size["exposure_s"], recordings)) is None:
         return size
@@ -129,7 +132,7 @@ def as_late_as_shown(size: dict[str, Value], recordings: Iterable[Seen | None]) 
 
 
 def later_than_exposed(size: dict[str, Value], recordings: Iterable[Seen | None]) -> str:
-    """Return what is said of an encoder that is later than half of an exposure makes it; else nothing."""
+    """Return a sentence on an encoder later than half of an exposure explains; else an empty string."""
     if "exposure_s" not in size or (shown := _shown(size["exposure_s"], recordings)) is None:
         return ""
     half = _half(size["exposure_s"])
@@ -141,7 +144,7 @@ def later_than_exposed(size: dict[str, Value], recordings: Iterable[Seen | None]
 
 
 def _shown(exposure: Value, recordings: Iterable[Seen | None]) -> TravelEstimate | None:
-    """Return the delay of the first encoder that tells half of an exposure from nothing, else the surest."""
+    """Return the first encoder's delay that distinguishes half of an exposure from zero, else the best."""
     travels = (s.travel for s in recordings if s is not None and s.travel is not None)
     each = [e for t in travels if (e := t.estimate(_DELAY)) is not None and np.isfinite(e.size_sigma)]
     telling = (e for e in each if is_found(e.p_value) or _SURE * e.size_sigma < exposure.value / 2)
@@ -153,20 +156,20 @@ def _half(exposure: Value) -> Value:
 
 
 def whole_size(late: TravelEstimate) -> Value:
-    """Return a size before anything was taken off, to compare recordings of one probe by.
+    """Return a size before anything was subtracted, to compare recordings of one probe.
 
-    What stamps are of is common to them, and explains no difference.
+    The reference of time stamps is common to them and explains no difference.
     """
     return Value(late.value + late.taken_off, late.size_sigma)
 
 
 def own_size(late: TravelEstimate) -> Value:
-    """Return a size, as unsure as it is and what stamps may be of makes what was taken off."""
+    """Return a size with a σ that includes the uncertain reference of time stamps in what was subtracted."""
     return Value(late.value, float(np.hypot(late.size_sigma, late.taken_off * _BY_STAMPS)))
 
 
 def as_late_as_exposed(size: dict[str, Value]) -> dict[str, Value]:
-    """Return an effect's size, of an exposure with half of it, which is taken off the encoder's own delay."""
+    """Return an effect's size; for an exposure, with its half, subtracted from the encoder's own delay."""
     if "exposure_s" not in size:
         return size
     half = size["exposure_s"].value / 2
@@ -174,9 +177,9 @@ def as_late_as_exposed(size: dict[str, Value]) -> dict[str, Value]:
 
 
 def _less_half(late: TravelEstimate, longer: Size, fit: TravelFit | None) -> TravelEstimate:
-    """Return the delay less half of a longer exposure, and what parts of the travel say of what is left.
+    """Return the delay minus half of a longer exposure, and what parts of the travel say of the rest.
 
-    A delay from none to that half needs no encoder that is late, whatever the stamps are of.
+    A delay between zero and that half does not need a late encoder, whatever stamps refer to.
     """
     half = longer.value / 2
     value, sigma = late.value - half, float(np.hypot(late.sigma, longer.sigma / 2))
@@ -190,7 +193,7 @@ def _less_half(late: TravelEstimate, longer: Size, fit: TravelFit | None) -> Tra
 
 
 def _another(exposure: Size, width: Size) -> bool:
-    """Return whether the line's width tells, and tells of another exposure."""
+    """Return whether the line's width determines the exposure, and determines another one."""
     size = max(exposure.value, abs(width.value))
     gap = np.array([[exposure.sigma**2 + width.sigma**2]])
     agree = same(np.array([exposure.value]), np.array([width.value]), gap, size)

@@ -1,4 +1,4 @@
-"""Where rings lie against where texture alone or fiducials alone have them, under one instrument."""
+"""Rings compared with their places according to texture alone or fiducials alone, under one instrument."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ from stages.diagnose.unrepeated import unrepeated
 
 AZIMUTHS = 72
 WALL_STEP_MM = 2.0
-# Factor on the rings' weight: so small that fiducials determine the poses, and large enough for rings to size
-# the effects. Debt: data/debts.md.
+# Factor on the rings' weight: so small that fiducials determine the poses, and large enough for rings to
+# determine the effects' sizes. Debt: data/debts.md.
 _GAUGE_RELAXED = 1e-4
 _OUTLIER = 0.1
-# Poses are carried over so many frames at most.
+# Poses are carried over at most this many frames.
 _NEAR = 2
 # Factor on the rings' σ, so large that texture alone determines poses and wall.
 _FIELD_RELAXED = 1e3
@@ -37,7 +37,7 @@ _FIELD_RELAXED = 1e3
 
 @dataclass(frozen=True)
 class RingResidual:
-    """By how much ring bins lie farther out than texture, poses and the pipe have them.
+    """By how much ring bins are farther out than texture, poses and the pipe predict.
 
     Attributes
     ----------
@@ -48,6 +48,7 @@ class RingResidual:
     azimuth_c_rad, azimuth_p_rad, distance_mm : (M,)
         Azimuth in C; azimuth and distance of the wall point in P.
     uv : (M, 2)
+        Image of the bin, px.
     residual_mm, residual_px : (M,)
         As radius, and as outward shift in the image.
     usable : (M,) bool
@@ -66,15 +67,16 @@ class RingResidual:
 
     @property
     def rms_px(self) -> float:
-        """R.m.s. of what is usable, px."""
+        """RMS of the usable residuals, px."""
         return float(np.sqrt(np.mean(self.residual_px[self.usable] ** 2)))
 
     @property
     def floor_px(self) -> float:
-        """R.m.s., px, of what rings do not repeat at one azimuth of the image on other wall; NaN: unknown.
+        """RMS, px, of what rings do not repeat at one azimuth of the image on other wall; NaN if unknown.
 
-        Not in it is where texture alone has the middle of a ring, which errs slowly: 0.05 to 0.08 px in four
-        sound inspections, where its σ is 0.09 to 0.11 px. In it is a part of what changes within a few mm.
+        It does not include the slowly varying error of a ring's middle from texture alone: 0.05 to 0.08 px in
+        four sound inspections, with a σ of 0.09 to 0.11 px. It includes a part of what changes within a few
+        mm.
         """
         own = self.usable
         azimuth, frame, along = self.azimuth_c_rad[own], self.frame[own], self.distance_mm[own]
@@ -96,12 +98,12 @@ class RingResidual:
 
 
 def azimuths_rad() -> Float:
-    """Return the middles (`AZIMUTHS`,) of the columns."""
+    """Return the azimuths of the middles (`AZIMUTHS`,) of the columns."""
     return np.asarray((np.arange(AZIMUTHS) + 0.5) / AZIMUTHS * 2 * np.pi - np.pi)
 
 
 def wall_distances_mm(residual: RingResidual) -> Float:
-    """Return the rows' distances (S,)."""
+    """Return the distances of the rows (S,)."""
     low, high = float(residual.distance_mm.min()), float(residual.distance_mm.max())
     return np.arange(np.floor(low), high + WALL_STEP_MM, WALL_STEP_MM)
 
@@ -128,7 +130,7 @@ class GaugeResiduals:
 def rings_against_fiducials(
     run: GaugeRun, start: Unknowns, terms: Sequence[Term], frames: Int
 ) -> GaugeResiduals:
-    """Return the rings' residuals, poses by fiducials and encoder.
+    """Return the rings' residuals with poses from fiducials and encoder.
 
     Parameters
     ----------
@@ -165,17 +167,15 @@ def _gauge_residual(run: GaugeRun, found: Fit, frames: Int) -> RingResidual:
 def rings_against_texture(
     run: FieldRun, terms: Sequence[tuple[EffectModel, Shape, Float]] = (), encoder_share: float = 0.0
 ) -> RingResidual:
-    """Return the rings' residual with the probe as stated and poses by texture.
+    """Return the rings' residual with the probe as stated and poses from texture.
 
-    The pipe's radius is not known beforehand: the mean residual is taken out. Ring frames before the first
-    lit frame and after the last have no pose by texture and do not count.
+    The pipe's radius is not known in advance: the mean residual is subtracted. Ring frames before the first
+    lit frame and after the last have no pose from texture and are left out.
 
     Parameters
     ----------
     terms
-        Effects, their shapes and amplitudes (Q,), whose shift is taken out to first order.
-    encoder_share
-        By what share of its reading the encoder is known to read too much.
+        Effects, their shapes and amplitudes (Q,), whose shift is subtracted to first order.
 
     Raises
     ------
@@ -185,7 +185,7 @@ def rings_against_texture(
     system = field_system(run, [(model, shape) for model, shape, _ in terms], np.zeros(0, np.int64))
     rings = system.rows[0]
     relaxed = replace(system, rows=(replace(rings, sigma=_FIELD_RELAXED * rings.sigma), *system.rows[1:]))
-    # From the instrument as this run would bend it back to the stated one.
+    # From the instrument as this run would adjust it back to the stated one.
     to = -system.value
     to[system.names.index(ENCODER_SCALE)] += encoder_share
     if terms:

@@ -1,4 +1,4 @@
-"""The answer of a diagnosis, as written to diagnosis.json and told in the report; classes of effects."""
+"""The result of a diagnosis, as written to diagnosis.json and shown in the report; classes of effects."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from pipeline.physics.catalogue import CLASSES, EFFECTS, effect
 
 
 def class_of(name: str) -> tuple[str, ...]:
-    """Return the effects that one kind of recording may not tell from this one, itself among them.
+    """Return the effects that one kind of recording may not distinguish from this one, including itself.
 
     Raises
     ------
@@ -30,7 +30,7 @@ def classes_of(names: Sequence[str]) -> tuple[str, ...]:
 
 
 def record_next(names: Sequence[str]) -> str:
-    """Return a sentence on what to record so that these effects can be told apart, or one confirmed."""
+    """Return a sentence on what to record to distinguish these effects, or to confirm a single one."""
     wanted = _without_repeats([part for name in names for part in _recordings(effect(name).told_apart_by)])
     if not wanted:
         return ""
@@ -44,7 +44,7 @@ def _recordings(told_apart_by: str) -> list[str]:
 
 
 def _without_repeats(parts: Sequence[str]) -> list[str]:
-    """Return each part once, and none that another says at more length."""
+    """Return each part once, without those that another part contains at its start."""
     return [p for p in dict.fromkeys(parts) if not any(other.startswith(f"{p} ") for other in parts)]
 
 
@@ -60,7 +60,7 @@ AGAIN = (
 
 
 class Verdict(StrEnum):
-    """What a diagnosis comes to."""
+    """The overall result of a diagnosis."""
 
     CONSISTENT = "consistent"
     NAMED = "named"
@@ -80,7 +80,7 @@ class Value:
 
 @dataclass(frozen=True)
 class Confirmation:
-    """A second prediction of the same physics, what was measured of it, and whether they agree."""
+    """A second prediction of the same effect, its measurement, and whether they agree."""
 
     prediction: str
     measured: str
@@ -89,7 +89,7 @@ class Confirmation:
 
 @dataclass(frozen=True)
 class CourseFound:
-    """How an effect's size changes: a kind of `pipeline.physics.effect`, and its numbers."""
+    """How an effect's size changes: a kind of `pipeline.physics.effect`, and its parameters."""
 
     kind: str
     parameters: dict[str, Value]
@@ -98,10 +98,10 @@ class CourseFound:
 
 @dataclass(frozen=True)
 class EffectFound:
-    """An effect with its size, the chance that it is the right name, and what confirms it.
+    """An effect with its size, the probability that its name is right, and what confirms it.
 
-    ``recording`` is ``gauge`` where it happened in the gauge run alone; else it is empty. ``location`` is
-    None where only that of all effects together was measured.
+    ``recording`` is ``gauge`` for an event of the gauge run alone; else it is empty. ``location`` is None
+    where only that of all effects together was measured.
     """
 
     name: str
@@ -117,7 +117,7 @@ class EffectFound:
 
 @dataclass(frozen=True)
 class Location:
-    """Where the mismatch is: channel, what its pattern is fixed to, and where and when it shows.
+    """Location of the mismatch: channel, what its pattern is fixed to, and where and when it shows.
 
     None is what was not measured.
     """
@@ -134,7 +134,7 @@ class Location:
 
 @dataclass(frozen=True)
 class FitQuality:
-    """Residuals before and after, on all and on held-out measurements, beside the noise floor."""
+    """Residuals before and after, on all and on held-out measurements, with the noise floor."""
 
     unit: str
     rms_before: float
@@ -152,12 +152,12 @@ class Feasible:
     ----------
     name, quantity, unit : str
     detectable : float
-        Least size that would stand out (5 σ), the stated instrument's uncertainty included.
+        Least size that would stand out (5 σ), including the stated instrument's uncertainty.
     typical : float
     rival : str
-        The effect most like it here; empty when none comes near.
+        The most similar effect here; empty when none is similar.
     left : float
-        Share of its information that is left when the rival is free.
+        Share of its information that remains when the rival is free.
     """
 
     name: str
@@ -171,15 +171,15 @@ class Feasible:
 
 @dataclass(frozen=True)
 class Candidate:
-    """One explanation that was tried.
+    """One explanation that was tested.
 
     Attributes
     ----------
     names : tuple of str
     probability : float
     gain, heldout_gain : float
-        Drop of χ² against the stated instrument, corrected for neighbours that err alike: on all
-        measurements, and on regimes held out in turn.
+        Drop of χ² against the stated instrument, corrected for correlated errors: on all measurements, and on
+        regimes held out in turn.
     statement : str
     """
 
@@ -202,7 +202,7 @@ class Picture:
 
 @dataclass(frozen=True)
 class WallPicture:
-    """The same on the unrolled wall: (S, A) before and after."""
+    """Residuals on the unrolled wall, mm of radius: (S, A) before and after."""
 
     distance_mm: Float
     azimuth_rad: Float
@@ -212,7 +212,7 @@ class WallPicture:
 
 @dataclass(frozen=True)
 class ReadingPicture:
-    """The encoder's reading less what pictures show, mm: (N,) at their times, before and after."""
+    """The encoder's reading minus the distance in the pictures, mm: (N,) at their times, before and after."""
 
     time_s: Float
     before_mm: Float
@@ -221,7 +221,7 @@ class ReadingPicture:
 
 @dataclass(frozen=True)
 class Remainder:
-    """What is left beside effects that are sure.
+    """What is left beside the certain effects.
 
     Attributes
     ----------
@@ -242,7 +242,7 @@ class Remainder:
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """What was found, how sure, and what it rests on; fields as in the formats' notes.
+    """What was found, how certain it is, and its evidence; fields as in the notes on formats.
 
     Attributes
     ----------
@@ -274,7 +274,7 @@ class Diagnosis:
     reading_picture: ReadingPicture | None = None
 
     def not_knowing(self, names: Collection[str]) -> Diagnosis:
-        """Return the answer of one who does not know some effects: without them in any class."""
+        """Return the diagnosis with some effects treated as unknown: without them in any class."""
         if not names:
             return self
         members = tuple(n for n in self.members if n not in names)

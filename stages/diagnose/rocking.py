@@ -1,4 +1,4 @@
-"""Whether a ring that swings may be a sheet that rocks."""
+"""Whether an oscillating ring may be due to a rocking laser sheet."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ _ROCKING_P = 0.01
 
 
 def rocking_excluded(line: Line, seen: Seen) -> bool:
-    """Return whether a sheet that rocks as much as the ring swings would show, and rings show none.
+    """Return whether a sheet rocking as much as the ring oscillates would be visible, but rings show none.
 
-    Seen with the sheet believed at rest, a tilt φ of the sheet moves the ring as a camera r² φ / l off the
-    axis does; but only a sheet moves rings against fiducials, the more the wider the bore.
+    If the sheet is assumed to be at rest, a tilt φ of it moves the ring like a camera that is r² φ / l off
+    the axis. But only a sheet moves rings relative to fiducials, the more the wider the bore.
     """
     if seen.geometry is None or any("laser_rocking" in names for names in seen.geometry.unsplit):
         return False

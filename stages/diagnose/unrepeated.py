@@ -1,4 +1,4 @@
-"""What rings of an inspection do not repeat on other wall, every ring counting once."""
+"""The part of an inspection's ring residuals that does not repeat on other wall, every ring counted once."""
 
 from __future__ import annotations
 
@@ -7,16 +7,16 @@ import numpy as np
 from pipeline.arrays import Float, Int
 from stages.diagnose.gauge.heldout import at_one_azimuth, turns_apart
 
-# So little counts a pair of an end and what is beyond it, unless its rings have no other: as good as nothing.
+# Weight of a pair of an end with what is beyond it, negligible unless its rings have no other pair.
 _ELSE = 1e-6
 _ROUNDS = 100
 
 
 def unrepeated(value: Float, azimuth_rad: Float, frame: Int, along_mm: Float) -> float:
-    """Return the variance of what ring bins (M,) do not repeat at one azimuth on other wall.
+    """Return the variance of the part of ring bins (M,) that does not repeat at one azimuth on other wall.
 
-    Bins near an end have a partner on one side alone. Pairs are weighted so that all bins count as much, for
-    noise may be louder at the ends. An effect that comes near an end would be in every pair of that end with
+    Bins near an end have a partner on one side only. Pairs are weighted so that all bins count equally, since
+    noise may be larger at the ends. An effect that begins near an end would be in every pair of that end with
     the rest of the run: bins there are compared with one another, half as far apart. NaN without pairs.
     """
     turn, apart = turns_apart(frame, along_mm)
@@ -35,7 +35,7 @@ def unrepeated(value: Float, azimuth_rad: Float, frame: Int, along_mm: Float) ->
 
 
 def _each_once(first: Int, second: Int, weight: Float, count: int) -> Float:
-    """Return weights (P,) of pairs with which all that are in any count as much (Sinkhorn & Knopp 1967)."""
+    """Return weights (P,) of pairs such that all bins in any pair count equally (Sinkhorn & Knopp 1967)."""
     each = np.ones(count)
     for _ in range(_ROUNDS):
         both = weight * each[first] * each[second]

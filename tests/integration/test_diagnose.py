@@ -257,7 +257,7 @@ def of_another_size(recording):
     [
         (too_short, Verdict.NOT_IDENTIFIABLE, "Only 3 pictures show the lit wall"),
         (without_texture, Verdict.NOT_IDENTIFIABLE, "No frame of the inspection shows the wall's texture"),
-        (without_encoder, Verdict.CLASS, "no encoder: its scale, slips, play and delay cannot be told"),
+        (without_encoder, Verdict.CLASS, "no encoder: its scale, slips, play and delay are not visible"),
         (without_motion, Verdict.NOT_IDENTIFIABLE, "travels only 0 mm"),
     ],
 )

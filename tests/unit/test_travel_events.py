@@ -104,7 +104,7 @@ def test_stray_pictures_at_an_end_are_no_sure_slip(placed: bool, strays: slice, 
     assert f"{count} stray pictures" in found.doubt
     assert f"{found.gain_mm:+.2f} mm" in found.doubt
     assert f"At {found.time_s:.2f} s" in found.doubt
-    assert "they cannot be told apart: record the passage again, slowly" in found.doubt
+    assert "they look the same here: record the passage again, slowly" in found.doubt
 
 
 def test_a_slip_in_the_last_pictures_is_sure_where_the_reading_itself_jumps() -> None:

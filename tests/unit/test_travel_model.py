@@ -210,7 +210,7 @@ def test_stray_pictures_in_a_row_are_told_and_at_an_end_as_a_slip_too(placed, fi
     (told,) = doubts
     if first == 0:
         assert "slip" in told
-        assert "they cannot be told apart: record the passage again, slowly" in told
+        assert "they look the same here: record the passage again, slowly" in told
     else:
         assert left is not None
         assert left.where == (50, 49 + count)

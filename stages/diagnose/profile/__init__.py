@@ -1,1 +1,1 @@
-"""The line's profile as evidence: width, skewness, ghosts, brightness, what is fixed to the sensor."""
+"""Evidence from the line's profile: width, skewness, ghosts, brightness, and patterns fixed to the sensor."""

@@ -1,4 +1,4 @@
-"""How bright the line, its surroundings and the lit wall are: dust, stray light, clipping, beam, fall-off."""
+"""Brightness of the line, its surroundings and the lit wall: dust, stray light, clipping, beam, fall-off."""
 
 from __future__ import annotations
 
@@ -16,18 +16,18 @@ from stages.diagnose.profile.finding import Finding, Regression, Size, finding, 
 from stages.diagnose.profile.measure import LineProfiles
 from stages.texture.light import irradiance
 
-# Light beside the line, relative to its height, that black level and compression may leave. Debt:
-# data/debts.md.
+# Light beside the line, relative to its height, that an error of the black level and compression may leave.
+# Debt: data/debts.md.
 STRAY_FLOOR = 2e-4
-# Change of ln brightness that paint, gloss and markers at one azimuth may cause. Debt: data/debts.md.
+# Change of ln brightness by paint, gloss and markers at one azimuth. Debt: data/debts.md.
 DUST_FLOOR = 0.05
-# Change of ln brightness of a pipe that reflects more on one side. Debt: data/debts.md.
+# Change of ln brightness in a pipe that reflects more on one side. Debt: data/debts.md.
 DECENTRE_FLOOR = 0.05
 _SMOOTH_ORDER = 6
 _WIDTHS_DEG = (1.0, 2.0, 4.0, 8.0)
 _INDEPENDENT = 2.0
-# Errors of exponent and fall-off: the pipe's reflectance may change along it, and LEDs are not perfectly
-# Lambertian. Debt: data/debts.md.
+# Errors of exponent and fall-off, because the pipe's reflectance may change along it, and LEDs are not
+# exactly Lambertian. Debt: data/debts.md.
 EXPONENT_FLOOR, FALLOFF_FLOOR = 0.05, 0.10
 _LOW_DEG, _HIGH_DEG, _STEP_DEG = 24.0, 64.0, 1.0
 _FRAMES, _GROUPS, _EVERY_PX = 48, 8, 3
@@ -35,14 +35,14 @@ _BRIGHT = 215.0
 
 
 def vignetting_finding(recording: Recording, probe: Probe) -> Finding:
-    """Return the finding of `vignetting`; it also measures the response's exponent.
+    """Return the finding of `vignetting`; it also measures the exponent of the response.
 
-    In a straight pipe of known bore the stated lights shine on every depth by a known law E(θ), over an
+    In a straight pipe of known bore, the stated lights illuminate every depth by a known law E(θ), over an
     eightfold range: ln grey = γ ln E + k ln cos θ + constant.
     """
     frames = recording.frames.of(Illumination.LED)
     if recording.kind == "gauge" or len(frames) < 2 * _GROUPS:
-        return untestable("vignetting", "It takes lit frames of a pipe of one bore.")
+        return untestable("vignetting", "This needs lit frames of a pipe of one bore.")
     theta = np.radians(np.arange(_LOW_DEG, _HIGH_DEG, _STEP_DEG) + _STEP_DEG / 2)
     grey = _grey_by_theta(recording, probe, frames[:: max(1, len(frames) // _FRAMES)], theta)
     light = _log_light(probe, recording.pipe.nominal_diameter_mm / 2, theta)
@@ -77,13 +77,13 @@ def _grey_by_theta(recording: Recording, probe: Probe, frames: Int, theta: Float
         grey = image[::_EVERY_PX, ::_EVERY_PX].ravel().astype(float)
         value = np.bincount(ring[inside], grey[inside] - black, len(theta)) / count
         clipped = np.bincount(ring[inside], grey[inside] > _BRIGHT, len(theta)) / count
-        # Where over 2 % of the pixels clip, or hardly any light is left, a mean misstates it (chosen).
+        # If more than 2 % of the pixels clip, or hardly any light is left, the mean is biased (chosen).
         rows.append(np.where((clipped < 0.02) & (value > 2), value, np.nan))
     return np.array(rows).reshape(-1, len(theta))
 
 
 def _black(recording: Recording) -> float:
-    """Return the grey level without light: most of a frame lit by the laser alone; 16 without such frames."""
+    """Return the grey level without light: most of a laser frame has it; 16 without laser frames."""
     for frame in recording.frames.of(Illumination.LASER)[:1]:
         _, image = next(iter(recording.read([int(frame)], "grey")))
         if image is not None:
@@ -109,9 +109,9 @@ def _fitted(grey: Float, light: Float, theta: Float) -> Regression:
 
 
 def dust_finding(rings: RingSamples, profiles: LineProfiles, cells: Cells) -> Finding:
-    """Return the finding of `dust`: a dip of the line's brightness at one azimuth of C through all frames."""
+    """Return the finding of `dust`: a dip of the line's brightness at one azimuth of C in all frames."""
     if len(cells.frames) < 4:
-        return untestable("dust", "Too few frames to tell a spot of the lens from one of the wall.")
+        return untestable("dust", "Too few frames to distinguish a spot on the lens from one on the wall.")
     courses = np.array([_course(rings, profiles.row[rows]) for rows in cells.frames])
     known = np.isfinite(courses)
     middle = np.nanmedian(courses, axis=0)
@@ -131,16 +131,16 @@ def dust_finding(rings: RingSamples, profiles: LineProfiles, cells: Cells) -> Fi
     )  # fmt: skip
     return finding(
         "dust", z, p, sizes,
-        f"At {azimuth:.0f}° the line is {100 * -np.expm1(-depth):.0f} % darker in all frames alike.",
+        f"At {azimuth:.0f}° the line is {100 * -np.expm1(-depth):.0f} % darker in all frames.",
         alike=("fixed_pattern",),
     )  # fmt: skip
 
 
 def stray_finding(profiles: LineProfiles, geometry: LineGeometry) -> Finding:
-    """Return the finding of `ambient_light`: grey beside the line in frames lit by the laser alone.
+    """Return the finding of `ambient_light`: light beside the line in frames lit by the laser alone.
 
-    A camera that is not linear lifts the faintest light as much: a grey level of 1 in 255 becomes 20 under a
-    response I^(1 / 2.2). Therefore the name never stands alone.
+    A nonlinear camera amplifies the faintest light: a grey level of 1 in 255 becomes 20 under a response I^(1
+    / 2.2). Therefore this name never stands alone.
     """
     height = np.nanmedian(geometry.height, axis=1)
     used = geometry.steady & np.isfinite(height)
@@ -152,13 +152,13 @@ def stray_finding(profiles: LineProfiles, geometry: LineGeometry) -> Finding:
     z = worst / sigma
     return finding(
         "ambient_light", z, float(2 * norm.sf(abs(z))), (Size("relative", "", worst, sigma),),
-        f"Beside the line lies light of {100 * worst:.2f} % of its height where there is most.",
+        f"Beside the line there is light of up to {100 * worst:.2f} % of its height.",
         alike=("gamma",),
     )  # fmt: skip
 
 
 def decentre_finding(geometry: LineGeometry, cells: Cells) -> Finding:
-    """Return the finding of `beam_decentre` by the brightness' first harmonic, fixed in C."""
+    """Return the finding of `beam_decentre` from the first harmonic of the brightness, fixed in C."""
     psi = np.broadcast_to(geometry.azimuth_rad, geometry.height.shape)
     group = cells.block_of_frames(len(psi))
     blocks = [(group == k)[:, None] * np.ones_like(psi) for k in range(len(cells.frames))]
@@ -182,7 +182,7 @@ def decentre_finding(geometry: LineGeometry, cells: Cells) -> Finding:
 def clip_finding(profiles: LineProfiles, cells: Cells, geometry: LineGeometry) -> Finding:
     """Return the finding of `saturation`: a longer foot along the columns where the line clips.
 
-    A clipped line alone is ordinary; a sensor that overflows spills along its columns.
+    A clipped line alone is ordinary; a sensor that overflows spills charge along its columns.
     """
     open_foot = np.abs(cells.offset_px) > 5
     foot = np.nanmean(np.where(open_foot & (np.abs(cells.offset_px) < 20), cells.profile, np.nan), axis=1)
@@ -191,7 +191,7 @@ def clip_finding(profiles: LineProfiles, cells: Cells, geometry: LineGeometry) -
     design = np.stack([np.ones_like(share), along, share, -share * along], axis=1)
     fit = regress(design, foot, cells.block)
     clipped = float(np.mean(profiles.clipped[geometry.steady])) if geometry.steady.any() else 0.0
-    # One cell in twenty (chosen): with less, the spill's slope rests on few frames.
+    # One cell in twenty (chosen): with fewer, the slope of the spill depends on few frames.
     if clipped < 0.05 or not np.isfinite(fit.sigma[3]):
         return untestable("saturation", f"{100 * clipped:.1f} % of the line is clipped: too little to test.")
     test = tested(float(fit.coefficient[3]), float(fit.sigma[3]), 2 * STRAY_FLOOR, fit.groups)
@@ -203,11 +203,11 @@ def clip_finding(profiles: LineProfiles, cells: Cells, geometry: LineGeometry) -
 
 
 def _course(rings: RingSamples, rows: Int) -> Float:
-    """Return ln brightness (A,) of the block, its slow change around the ring taken out; NaN where unseen."""
+    """Return ln brightness (A,) of the block without its slow change around the ring; NaN where unseen."""
     height = np.where(rings.valid[rows], rings.amplitude[rows], np.nan).astype(float)
     log = np.log(np.maximum(height, 1e-3))
     seen = np.isfinite(log)
-    # Azimuths seen in less than 0.3 of the frames have no sound median (chosen).
+    # Azimuths seen in less than 0.3 of the frames have no reliable median (chosen).
     good = seen.mean(0) > 0.3
     median = np.nanmedian(np.where(good, log, 0.0), axis=0)
     waves = np.outer(rings.azimuth_rad, np.arange(1, _SMOOTH_ORDER + 1))
@@ -222,7 +222,7 @@ def _course(rings: RingSamples, rows: Int) -> Float:
 
 
 def _deepest(course: Float) -> tuple[float, float, int]:
-    """Return depth, width in degrees and index of the Gaussian dip that takes most out of the course."""
+    """Return depth, width in degrees and index of the Gaussian dip that explains most of the course."""
     step = 360.0 / len(course)
     filled = np.where(np.isfinite(course), course, 0.0)
     best, most = (0.0, _WIDTHS_DEG[0], 0), 0.0

@@ -1,4 +1,4 @@
-"""Where the line lies and moves by frame and sector, and its profiles averaged over neighbouring frames."""
+"""Place and motion of the line by frame and sector, and its profiles averaged over neighbouring frames."""
 
 from __future__ import annotations
 
@@ -38,11 +38,11 @@ class LineGeometry:
     radius_mm : distance from the optical axis.
     theta_rad : polar angle.
     px_per_mm
-        Outward motion of the image for a step of 1 mm back along the axis: positive.
+        Outward shift of the image for a step of 1 mm back along the axis: positive.
     speed_px_s
         Of the line's radius.
     steady : (F,) bool
-        Whether the ring does not jump from bore to bore about this frame.
+        Whether the ring does not jump between bores around this frame.
     """
 
     azimuth_rad: Float
@@ -79,7 +79,7 @@ def line_geometry(
 
 
 def _medians(values: Float32, valid: Bool, sectors: int) -> Float:
-    """Return medians (F, S) of the valid ones of values (F, A) in each of S sectors, A not below S."""
+    """Return medians (F, S) over the valid values (F, A) in each of S sectors; A is at least S."""
     seen = np.where(valid, values, np.nan).astype(float)
     sector = np.arange(seen.shape[1]) * sectors // seen.shape[1]
     first = np.searchsorted(sector, np.arange(1, sectors))
@@ -89,7 +89,7 @@ def _medians(values: Float32, valid: Bool, sectors: int) -> Float:
 
 
 def _steady(middle: Float) -> Bool:
-    """Return (F,) false about frames between which the ring's median radius (F,) jumps."""
+    """Return False around frames (F,) between which the ring's median radius jumps."""
     steady = np.isfinite(middle)
     for k in np.flatnonzero(np.abs(np.diff(middle)) > _JUMP * middle[:-1]):
         steady[max(k - _BEFORE, 0) : k + _AFTER + 1] = False
@@ -97,12 +97,12 @@ def _steady(middle: Float) -> Bool:
 
 
 def _speed(radius: Float, time_s: Float, azimuth_rad: Float, steady: Bool) -> Float:
-    """Return (F, S) px/s: splines through the low harmonics of every run of steady frames."""
+    """Return the speed (F, S), px/s: splines through the low harmonics of every run of steady frames."""
     orders = np.arange(1, _MOTION_ORDER + 1)
     waves = np.outer(azimuth_rad, orders)
     basis = np.concatenate([np.ones((len(azimuth_rad), 1)), np.cos(waves), np.sin(waves)], axis=1)
     out = np.full(radius.shape, np.nan)
-    # With 0.3 of a ring missing, its low harmonics are hardly told apart (chosen).
+    # With 0.3 of a ring missing, its low harmonics can hardly be separated (chosen).
     for run in runs_of(steady & (np.isfinite(radius).mean(1) > 0.7)):
         if run.stop - run.start < 4:
             continue
@@ -115,7 +115,7 @@ def _speed(radius: Float, time_s: Float, azimuth_rad: Float, steady: Bool) -> Fl
 
 @dataclass(frozen=True)
 class Cells:
-    """Profiles of N cells: a block of frames by an azimuth sector.
+    """Profiles of N cells; a cell is a block of frames in one azimuth sector.
 
     Attributes
     ----------
@@ -126,9 +126,9 @@ class Cells:
     centre_px, width_px : (N,)
         Of the Gaussian fitted to the profile.
     rest : (N, B)
-        Profile less that Gaussian, over the Gaussian's height.
+        Profile minus that Gaussian, over the Gaussian's height.
     whole : (N,) bool
-        Whether the line's middle is seen unclipped; without it only tails are.
+        Whether the line's middle is unclipped; otherwise only its tails are used.
     azimuth_rad, px_per_mm, radius_mm, height : (N,)
         Means over the block.
     frames : tuple of (K,) int
@@ -150,7 +150,7 @@ class Cells:
     frames: tuple[Int, ...]
 
     def of_blocks(self, first: int, end: int) -> Cells:
-        """Return the cells of blocks ``first`` to before ``end`` alone."""
+        """Return only the cells of blocks ``first`` up to, but not including, ``end``."""
         k = (self.block >= first) & (self.block < end)
         return Cells(
             self.offset_px, self.block[k] - first, self.sector[k], self.profile[k], self.centre_px[k],
@@ -159,14 +159,14 @@ class Cells:
         )  # fmt: skip
 
     def block_of_frames(self, count: int) -> Int:
-        """Return the block (F,) of each of ``count`` frames; −1 for those of no block."""
+        """Return the block (F,) of each of ``count`` frames; −1 for frames in no block."""
         block = np.full(count, -1)
         for k, rows in enumerate(self.frames):
             block[rows] = k
         return block
 
     def less(self, light: Float) -> Cells:
-        """Return the cells without a light (M, B), over the line's height, in those that are whole."""
+        """Return the cells minus a light (M, B), relative to the line's height, in those that are whole."""
         profile, rest = self.profile.copy(), self.rest.copy()
         profile[self.whole] -= light
         rest[self.whole] -= light
@@ -174,7 +174,7 @@ class Cells:
 
 
 def make_cells(profiles: LineProfiles, geometry: LineGeometry) -> Cells:
-    """Average profiles over blocks of steady frames; frames with a step's second line are left out."""
+    """Average profiles over blocks of steady frames, without frames that show a second line at a step."""
     blocks = _blocks(geometry.steady & ~_second_lines(profiles))
     sectors = len(profiles.azimuth_rad)
     bins = len(profiles.offset_px)
@@ -214,12 +214,12 @@ def fit_gaussians(profile: Float, offset_px: Float) -> tuple[Float, Float, Float
         peak = peak + step[:, 0]
         centre = np.clip(centre + np.clip(step[:, 1], -0.5, 0.5), -4, 4)
         log_width = np.clip(log_width + np.clip(step[:, 2], -0.3, 0.3), np.log(0.4), np.log(4.0))
-    # No line: a height of 1 keeps what is divided by it finite.
+    # Without a line, a height of 1 keeps divisions finite.
     return centre, np.exp(log_width), np.where(np.abs(peak) > 1e-3, peak, 1.0)
 
 
 def _second_lines(profiles: LineProfiles) -> Bool:
-    """Return (F,) whether more light is beside the line than in nearly all frames: an edge of the bore."""
+    """Return frames (F,) with more light beside the line than nearly all others: an edge of the bore."""
     far = np.abs(profiles.offset_px) > 8
     light, height = profiles.light[..., far].sum((1, 2)), profiles.height[..., far].sum((1, 2))
     share = light / np.maximum(height, 1e-9)
@@ -230,7 +230,7 @@ def _second_lines(profiles: LineProfiles) -> Bool:
 
 
 def _blocks(good: Bool) -> list[Int]:
-    """Return runs of neighbouring good frames, of about `BLOCK_FRAMES` each, none below `LEAST_FRAMES`."""
+    """Return runs of neighbouring good frames, about `BLOCK_FRAMES` each and at least `LEAST_FRAMES`."""
     index = np.flatnonzero(good)
     if not len(index):
         return []

@@ -1,4 +1,4 @@
-"""The profile channel of the diagnosis: every test of the line's light on one recording and its halves."""
+"""The profile channel of the diagnosis: all tests of the line's light on one recording and on its halves."""
 
 from __future__ import annotations
 
@@ -30,19 +30,19 @@ from stages.diagnose.profile.naming import UNEXPLAINED, shape_findings
 from stages.diagnose.profile.width import blur_finding, locking_finding, pattern_finding
 
 _LEAST_BLOCKS = 4
-_NAMELESS = "The line's light shows what no known effect explains."
+_NAMELESS = "The line's light shows something that no known effect explains."
 _SPOT_OR_PIXELS = {"dust": "fixed_pattern", "fixed_pattern": "dust"}
 Test = Callable[[Cells], tuple[Finding, ...]]
 _HALVES = ("first half of the frames", "second half of the frames")
 # A jackknife over fewer blocks gives no usable σ.
 _LEAST_BLOCKS_OF_HALF = 3
-# What the drawn cases of `python -m tests.benchmarks.bench_profile_nulls` cover, 39 of seed 1 looked at:
-# widths of unclipped lines, heights and clipped shares. They were encoded by H.264 at crf 18 to 34.
+# Range of the simulated cases of `python -m tests.benchmarks.bench_profile_nulls`, 39 of seed 1: widths of
+# unclipped lines, heights and clipped shares. They were encoded by H.264 at crf 18 to 34.
 _COUNTED_WIDTH_PX, _COUNTED_HEIGHT, _COUNTED_CLIPPED = (1.1, 3.2), (38.0, 251.0), (0.0, 0.84)
 
 
 def with_halves(findings: tuple[Finding, ...], tests: Sequence[Test], cells: Cells) -> tuple[Finding, ...]:
-    """Return the findings, those that were found with what each half of the frames says of the other.
+    """Return the findings; those that were found include whether both halves of the frames agree.
 
     ``tests`` are those that found something; they are repeated on each half.
     """
@@ -60,7 +60,7 @@ def with_halves(findings: tuple[Finding, ...], tests: Sequence[Test], cells: Cel
 def _halves_agree(
     whole: Finding, first: Mapping[str, Finding], second: Mapping[str, Finding]
 ) -> tuple[Agreement, ...]:
-    """Return whether the halves agree on the first quantity; nothing where either tells too little."""
+    """Return whether the halves agree on the first quantity; nothing where either is too uncertain."""
     each = [half[whole.effect].sizes[:1] for half in (first, second) if whole.effect in half]
     sizes = [size for sizes in each for size in sizes]
     if len(sizes) < 2:
@@ -77,7 +77,7 @@ def _words(size: Size) -> str:
 
 @dataclass(frozen=True)
 class Condition:
-    """How the line is pictured in one respect, and the values at which false alarms were counted."""
+    """A property of the line's pictures, and its range in the cases where false alarms were counted."""
 
     words: str
     value: float
@@ -86,13 +86,13 @@ class Condition:
 
     @property
     def covered(self) -> bool:
-        """Whether such pictures were among those counted."""
+        """Whether the value is within that range."""
         return self.low <= self.value <= self.high
 
 
 @dataclass(frozen=True)
 class ProfileEvidence:
-    """What the line's light says of one recording.
+    """Evidence from the line's light in one recording.
 
     Attributes
     ----------
@@ -101,7 +101,7 @@ class ProfileEvidence:
     frame : (F,) int
         Frames lit by the laser alone.
     findings : tuple of Finding
-        One an effect, found or not.
+        One per effect, found or not.
     conditions : tuple of Condition
     """
 
@@ -112,23 +112,23 @@ class ProfileEvidence:
 
     @property
     def uncovered(self) -> tuple[str, ...]:
-        """Sentences on how these pictures differ from all on which the tests' p-values were shown."""
+        """Sentences on how these pictures differ from those on which the tests' p-values were verified."""
         return tuple(
             f"The {c.words} is {c.value:.3g} in {self.source}. How often the line's profile raises "
-            f"false alarms is known from {c.low:.3g} to {c.high:.3g}: here no name rests on it by itself."
+            f"false alarms is known from {c.low:.3g} to {c.high:.3g}: here it gives no name by itself."
             for c in self.conditions
             if not c.covered
         )
 
     @property
     def found(self) -> tuple[Finding, ...]:
-        """Findings with a name beyond what image formation and chance do, the clearest first."""
+        """Findings with a name that exceed image formation and chance, the most significant first."""
         named = (f for f in self.findings if f.found and f.effect != UNEXPLAINED)
         return tuple(sorted(named, key=lambda f: -abs(f.z)))
 
     @property
     def unexplained(self) -> Finding | None:
-        """What the line shows that no shape with a name fits; None where there is nothing of the kind."""
+        """A feature of the line that no named shape fits; None where there is none."""
         return next((f for f in self.findings if f.effect == UNEXPLAINED), None)
 
     def with_finding(self, finding: Finding) -> ProfileEvidence:
@@ -137,9 +137,9 @@ class ProfileEvidence:
         return replace(self, findings=findings)
 
     def without(self, names: Collection[str]) -> ProfileEvidence:
-        """Return the evidence as it is to one who does not know some effects.
+        """Return the evidence with some effects treated as unknown.
 
-        What was found and only they would explain is unexplained.
+        A finding that only they would explain becomes unexplained.
         """
         left = {f.effect for f in self.found} - set(names)
         out = []
@@ -170,7 +170,7 @@ def profile_evidence(
     Raises
     ------
     UnusableError
-        When too few frames are lit by the laser alone, or the ring never holds still for long enough.
+        When too few frames are lit by the laser alone, or the ring is never steady for long enough.
     """
     with warnings.catch_warnings():
         # Where frames and sectors have no line, all values and their median are NaN.
@@ -208,7 +208,7 @@ def _examined(recording: Recording, rings: RingSamples, probe: Probe, context: C
 
 
 def _conditions(profiles: LineProfiles, geometry: LineGeometry) -> tuple[Condition, ...]:
-    """Return how the line is pictured."""
+    """Return the properties of the line's pictures."""
     width, height = float(np.nanmedian(geometry.width_px)), float(np.nanmedian(geometry.height))
     return (
         Condition("line's median width (1 σ, px)", width, *_COUNTED_WIDTH_PX),
@@ -218,9 +218,9 @@ def _conditions(profiles: LineProfiles, geometry: LineGeometry) -> tuple[Conditi
 
 
 def _spot_or_pixels(findings: tuple[Finding, ...]) -> tuple[Finding, ...]:
-    """Return the findings, spot and pixels' own gains without each other as rival where that was found even.
+    """Return the findings, without spot and pixel gains as mutual rivals where the other one was not found.
 
-    Gains of single pixels would show in their own test long before they made a dip in all frames.
+    Gains of single pixels would be visible in their own test long before they made a dip in all frames.
     """
     by_name = {f.effect: f for f in findings}
 
@@ -236,7 +236,7 @@ def _spot_or_pixels(findings: tuple[Finding, ...]) -> tuple[Finding, ...]:
 def _tests(
     rings: RingSamples, profiles: LineProfiles, geometry: LineGeometry, probe: Probe
 ) -> tuple[Test, ...]:
-    """Return the tests that any cells of the recording can be put to."""
+    """Return the tests, each of which takes any cells of the recording."""
     return (
         lambda cells: shape_findings(cells, geometry, probe),
         lambda cells: (blur_finding(cells, geometry, probe),),

@@ -1,4 +1,4 @@
-"""The result of one test of the line's light, and the robust regression by which most are made."""
+"""The result of one test of the line's light, and the robust regression that most tests use."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from pipeline.arrays import Float, Int
 from pipeline.physics.effect import FixedTo
 from stages.diagnose.agreement import Agreement
 
-# A finding needs p below one in ten million by the estimate's own σ, and this many σ of the errors that image
-# formation may cause. Debt: data/debts.md.
+# An effect is found if p is below one in ten million by the estimate's own σ, and if it exceeds the errors of
+# image formation by this many σ. Debt: data/debts.md.
 FOUND_P, FOUND_Z = 1e-7, 6.0
 # Effects that are tested at fixed pixels or azimuths of the image while the pipe moves past.
 _OF_THE_SENSOR = frozenset({"fixed_pattern", "pixel_locking", "dust", "vignetting", "saturation"})
@@ -23,7 +23,7 @@ _STEPS = 8
 
 @dataclass(frozen=True)
 class Regression:
-    """Coefficients (K,), their covariance (K, K) from leaving out groups, and the number of groups."""
+    """Coefficients (K,), their covariance (K, K) by leaving out groups, and the number of groups."""
 
     coefficient: Float
     covariance: Float
@@ -38,8 +38,8 @@ class Regression:
 def regress(design: Float, value: Float, group: Int) -> Regression:
     """Fit ``value`` (...) by ``design`` (..., K) with biweights; σ by the jackknife over ``group`` (...).
 
-    The groups must be far enough apart to err independently; those of the first axes alone hold for all the
-    others. What is not finite, or of a negative group, is left out.
+    Groups must be far enough apart for independent errors; a ``group`` with fewer axes than ``value`` applies
+    to all of its remaining ones. Values that are not finite, or of a negative group, are left out.
     """
     group = np.broadcast_to(
         group.reshape(*group.shape, *[1] * (value.ndim - group.ndim)), value.shape
@@ -63,7 +63,7 @@ def regress(design: Float, value: Float, group: Int) -> Regression:
 
 @dataclass(frozen=True)
 class Tested:
-    """An estimate against nothing: over its σ, and the two-sided p-value."""
+    """An estimate tested against zero: its σ, its ratio to σ, and the two-sided p-value."""
 
     sigma: float
     z: float
@@ -99,7 +99,7 @@ def _solve(normal: Float, right: Float) -> Float:
 
 @dataclass(frozen=True)
 class Size:
-    """One measured quantity, true minus stated, with its 1 σ (random and what image formation may do)."""
+    """One measured quantity, true minus stated, with its 1 σ (random, and from image formation)."""
 
     name: str
     unit: str
@@ -114,11 +114,11 @@ class Finding:
     Attributes
     ----------
     effect : str
-        Name of the catalogue.
+        Name in the catalogue.
     z : float
-        Estimate over its σ, image formation's own doing included.
+        Estimate over its σ, which includes the errors of image formation.
     p_value : float
-        Two-sided, with the degrees of freedom σ was estimated with; 1 when it could not be tested.
+        Two-sided, with the degrees of freedom of σ; 1 when it could not be tested.
     sizes : tuple of Size
         Quantities of the catalogue; empty when the test gives none.
     fixed_to : FixedTo or None
@@ -130,9 +130,9 @@ class Finding:
     confirms : tuple of Size
         Sizes of other effects that this measurement gives independently, named ``effect.quantity``.
     alike : tuple of str
-        Effects that would show the same here.
+        Effects that would look the same here.
     agreements : tuple of Agreement
-        What the two halves of the frames say of each other.
+        Whether the two halves of the frames agree.
     """
 
     effect: str
@@ -148,7 +148,7 @@ class Finding:
 
     @property
     def found(self) -> bool:
-        """Whether it is beyond what image formation and chance do."""
+        """Whether it exceeds image formation and chance."""
         return self.p_value < FOUND_P and abs(self.z) > FOUND_Z
 
 
@@ -156,7 +156,7 @@ def finding(
     name: str, z: float, p_value: float, sizes: tuple[Size, ...], statement: str,
     confirms: tuple[Size, ...] = (), alike: tuple[str, ...] = (),
 ) -> Finding:  # fmt: skip
-    """Return the finding of an effect; what it is fixed to is stated only where the test shows that."""
+    """Return the finding of an effect; what it is fixed to is stated only where the test shows it."""
     fixed_to = FixedTo.CAMERA if name in _OF_THE_SENSOR else None
     time = "speed" if name == "motion_blur" else None
     return Finding(name, z, p_value, sizes, fixed_to, time, statement, confirms, alike)
@@ -168,5 +168,5 @@ def untestable(name: str, why: str) -> Finding:
 
 
 def withdrawn(found: Finding) -> Finding:
-    """Return a finding that something else explains better: measured, and not found."""
+    """Return a finding that something else explains better: measured, but not found."""
     return replace(found, p_value=1.0, confirms=(), alike=())

@@ -1,8 +1,8 @@
-"""A second, fainter line: bounced across the bore, or copied at a constant distance.
+"""A second, fainter line: light bounced across the bore, or a copy at a constant distance.
 
-Light that crosses the bore meets the wall apart from the line by (shared PHYSICS notes)
-tilt 4 r φ cos(ψ − ψ₀) behind it, cone 2 r ε₀ ahead of it, along the axis: the line's own place does not
-matter, so it tells the laser's misalignment from the camera's.
+Light that crosses the bore meets the wall at a distance from the line along the axis of (shared PHYSICS
+notes) tilt: 4 r φ cos(ψ − ψ₀) behind it, cone: 2 r ε₀ ahead of it. The line's own place does not matter, so
+that this separates the laser's misalignment from the camera's.
 """
 
 from __future__ import annotations
@@ -22,12 +22,12 @@ _LARGEST_MM, _COPY_STEP_MM = 5.0, 0.04
 _CLEAR_WIDTHS = 2.5
 # Seen through a filter as wide as the line, a copy of it is 10 % high this many widths from its middle.
 _OWN_WIDTHS = 3.0
-# 30° of the ring: several of the codec's blocks of 16 px, in which it errs alike.
+# 30° of the ring: several of the codec's blocks of 16 px, within which its errors are correlated.
 _SECTORS_A_GROUP = 6
-# A part of the ring tells how its sides differ if it has this share of the best part's information.
+# A part of the ring is used to compare the line's sides if it has this share of the best part's information.
 _LEAST_SHARE = 0.1
 _SHRINK, _HALVINGS = 0.5, 9
-# A step moves a second line by 1 px in the mean; the filter sees the same light over 2 px.
+# One step moves a second line by 1 px on average; the filter sees the same light over 2 px.
 _TRIES_A_STEP = 0.5
 
 
@@ -40,15 +40,15 @@ class SecondLine:
     parameters : (P,)
         Of the law, with their covariance (P, P).
     relative, random, floor : float
-        Height over that of the line, its random 1 σ, and what image formation may leave at its distances.
+        Height relative to the line, its random 1 σ, and the error by image formation at its distances.
     information : float
-        How well the cells show a line there; the misfit falls by relative² × information.
+        How well the cells would show a line there; the misfit falls by relative² × information.
     groups : int
-        Blocks or parts of the ring, whichever are fewer, on which the σ rests.
+        Number of blocks, or of parts of the ring if fewer, from which σ is estimated.
     distance_px : (N,)
         From the line, in every cell.
     tries : float
-        Hypotheses among which it was the best and which do not find the same light.
+        Number of independent hypotheses among which it was the best.
     """
 
     parameters: Float
@@ -63,7 +63,7 @@ class SecondLine:
 
     @property
     def test(self) -> Tested:
-        """Height against its σ, the best of all hypotheses that were tried (Bonferroni)."""
+        """Height against its σ, corrected for the number of hypotheses (Bonferroni)."""
         one = tested(self.relative, self.random, self.floor, self.groups)
         return replace(one, p_value=min(1.0, self.tries * one.p_value))
 
@@ -101,7 +101,7 @@ def _best(
     found: Responses, design: Float, grid: Float, steps: Float, block: Int, sector: Int, width_px: Float,
     floor: float,
 ) -> SecondLine:  # fmt: skip
-    """Search the grid of parameters, then refine by ever smaller steps; σ by leaving out blocks."""
+    """Search the grid of parameters, then refine with decreasing steps; σ by leaving out blocks."""
     clear = _CLEAR_WIDTHS * float(np.median(width_px)) if len(width_px) else 0.0
 
     def rated(parameters: Float) -> Float:
@@ -130,9 +130,10 @@ def _around(best: Float, steps: Float) -> Float:
 
 @numba.njit(cache=True, nogil=True)
 def _rate(score, information, design, parameters, block, clear):  # type: ignore[no-untyped-def]
-    """Σ score / √(Σ information) of parameters (K, P) without the block that speaks most for them.
+    """Σ score / √(Σ information) of parameters (K, P), without the block that supports them most.
 
-    One block beside an edge of the bore must not decide. −1 where hardly any ghost is clear of the line.
+    One block beside an edge of the bore must not decide. −1 where hardly any second line is clear of the
+    line.
     """
     cells, distances = score.shape
     out = np.empty(len(parameters))
@@ -156,7 +157,8 @@ def _rate(score, information, design, parameters, block, clear):  # type: ignore
             i[block[n]] += (1 - f) * information[n, low] + f * information[n, low + 1]
         most = np.argmax(s)
         left = np.sum(i) - i[most]
-        # A ghost apart from its line in less than a fifth of the cells (chosen) passes for the line's foot.
+        # A second line that is clear of the line in less than a fifth of the cells (chosen) may be the line's
+        # foot.
         out[k] = (np.sum(s) - s[most]) / np.sqrt(left) if left > 0 and apart > 0.2 * cells else -1.0
     return out
 
@@ -164,7 +166,7 @@ def _rate(score, information, design, parameters, block, clear):  # type: ignore
 def _sized(found: Responses, design: Float, best: Float, block: Int, sector: Int, floor: float) -> SecondLine:
     """Return height, σ and the parameters' covariance at the best place.
 
-    A second line is as high in all frames and all round: the height errs as parts of either disagree.
+    A second line has the same height in all frames and all round: differences between parts give the σ.
     """
     at = design @ best
     score, information = _at(found.score, found, at), _at(found.information, found, at)
@@ -178,7 +180,7 @@ def _sized(found: Responses, design: Float, best: Float, block: Int, sector: Int
 
 
 def _jackknife(score: Float, information: Float, groups: list[Bool]) -> tuple[float, int]:
-    """Return the σ of Σ score / Σ information by leaving out groups, and how many groups it rests on."""
+    """Return the σ of Σ score / Σ information by leaving out groups, and the number of groups."""
     parts = np.array([(score[g].sum(), information[g].sum()) for g in groups])
     total = parts.sum(0)
     left = total - parts
@@ -189,13 +191,13 @@ def _jackknife(score: Float, information: Float, groups: list[Bool]) -> tuple[fl
 
 
 def _skirt(found: Responses, line: SecondLine, width_px: float, sector: Int) -> float:
-    """Return how much of a second line the line's own skirt may feign, over the line's height, as 1 σ.
+    """Return the relative height, as 1 σ, of a second line that the line's own skirt may imitate.
 
     Compression and the lens leave a skirt around a bright line, higher on one side than on the other by up to
-    its own height. Two things are measured at the second line's distances, and taken together: how high the
-    skirt is, mean of both sides all around (half of the second line's own height taken out), and how much the
-    sides differ in the parts of the ring where no second line is. On a gauge run without any second line,
-    under four codecs, the best second line found was 0.3 to 1.4 times as high.
+    its own height. Two quantities are measured at the second line's distances and combined: the height of the
+    skirt, as mean over both sides all round (minus half of the second line's own height), and the difference
+    of the sides in parts of the ring without a second line. On a gauge run without any second line, under
+    four codecs, the best second line found was 0.3 to 1.4 times as high.
     """
     apart = np.abs(line.distance_px)
     clear = apart > _CLEAR_WIDTHS * width_px
@@ -217,13 +219,13 @@ def _skirt(found: Responses, line: SecondLine, width_px: float, sector: Int) -> 
 
 
 def _parts(sector: Int) -> list[Bool]:
-    """Return, for each part of the ring, which cells (N,) lie in it."""
+    """Return, for each part of the ring, which cells (N,) are in it."""
     part = sector // _SECTORS_A_GROUP
     return [part == p for p in np.unique(part)]
 
 
 def _at(values: Float, found: Responses, distance_px: Float) -> Float:
-    """Return (N,) the values (N, D) of responses at a distance (N,) of each cell; 0 beyond reach."""
+    """Return the values (N,) of responses (N, D) at a distance (N,) in each cell; 0 out of reach."""
     place = (distance_px - found.distance_px[0]) / STEP_PX
     low = np.clip(np.floor(place).astype(int), 0, len(found.distance_px) - 2)
     f, row = place - low, np.arange(len(place))
@@ -232,7 +234,7 @@ def _at(values: Float, found: Responses, distance_px: Float) -> Float:
 
 
 def _place_covariance(found: Responses, design: Float, at: Float, height: float, block: Int) -> Float:
-    """Covariance of the parameters from the curvature of the fit and its slopes' scatter over blocks."""
+    """Return the parameters' covariance from the fit's curvature and its slopes' scatter over blocks."""
 
     def gain(d: Float) -> Float:
         score, information = _at(found.score, found, d), _at(found.information, found, d)

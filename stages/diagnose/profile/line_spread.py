@@ -1,9 +1,9 @@
-"""The line's shape as it is, and which shapes with a name fit it.
+"""The actual shape of the line, and the named shapes that fit it.
 
-First the line is estimated freely: its mean profile at each of a few distances to the wall, whatever its
-shape. Then shapes that physics knows are fitted to it, all of them beside the same ordinary image formation:
-a Gaussian line and a skirt that is alike on both sides. Each is asked how much of the misfit it leaves. A
-shape that leaves much is no explanation, however clearly it improves on nothing.
+First the line is estimated freely: its mean profile at each of a few distances to the wall, of any shape.
+Then the shapes known to physics are fitted to it, each together with ordinary image formation: a Gaussian
+line and a symmetric skirt. Each is judged by the share of the misfit that it leaves: a shape that leaves much
+is no explanation, however clearly it improves the fit.
 """
 
 from __future__ import annotations
@@ -18,18 +18,18 @@ from scipy.special import erfcx
 from pipeline.arrays import Bool, Float
 from stages.diagnose.profile.cells import Cells, fit_gaussians
 
-# A third of the blocks each: near, middle and far wall.
+# Each contains a third of the blocks: near, middle and far wall.
 _DISTANCES = 3
-# 30° of the ring: several of the codec's blocks of 16 px, in which it errs alike.
+# 30° of the ring: several of the codec's blocks of 16 px, within which its errors are correlated.
 SECTORS_A_PART = 6
 _REACH_PX, _STEP_PX = 24.0, 0.5
-# What codec and lens leave of the mean profile on a line without any effect, over its height; the skirt is
-# fitted and does not count. Debt: data/debts.md.
+# What codec and lens leave in the mean profile of a line without any effect, relative to its height; the
+# skirt is fitted and not included. Debt: data/debts.md.
 SHAPE_FLOOR = 1e-3
 # A shape that leaves more than this share of the misfit does not fit. Debt: data/debts.md.
 MOST_LEFT = 0.05
-# Two shapes whose misfits differ by less, in units of what the better one leaves for each value, are not told
-# apart: a ratio of likelihoods of e¹⁰.
+# Two shapes are not distinguished if their misfits differ by less than this, in units of what the better one
+# leaves per value: a likelihood ratio of e¹⁰.
 _TOLD_APART = 20.0
 _STARTS_MM = (0.3, 0.8, 1.6, 3.0)
 
@@ -51,9 +51,9 @@ class LineSpread:
     offset_px : (B,)
         From the line, outward positive.
     px_per_mm : (D,)
-        Outward motion of the image for 1 mm back along the axis.
+        Outward shift of the image for 1 mm back along the axis.
     profile, sigma : (D, B)
-        Light over the line's height, and its 1 σ from leaving out parts of the ring.
+        Light relative to the line's height, and its 1 σ from leaving out parts of the ring.
     """
 
     offset_px: Float
@@ -70,14 +70,14 @@ class Fitted:
     ----------
     shape : Shape
     relative : float
-        Height of the second line over that of the first; of a tail, its share of the light, 1.
+        Height of the second line relative to the first; for a tail, its share of the light, 1.
     way_mm : float
         Distance of the second line, or mean length of the tail; forward positive.
     spread_mm : float
         1 σ by which the second line is wider than the first.
     way_sigma_mm : float
     left : float
-        Share of the misfit of an ordinary line that is left.
+        Share of the misfit of an ordinary line that remains.
     core : float
         Variance of the line without what the shape adds, over that of a Gaussian fitted to all of it.
     """
@@ -92,7 +92,7 @@ class Fitted:
 
 
 def line_spread(cells: Cells) -> LineSpread:
-    """Return the free estimate from the cells whose middle is seen."""
+    """Return the free estimate from the cells whose middle is unclipped."""
     offset = np.arange(-_REACH_PX, _REACH_PX + _STEP_PX / 2, _STEP_PX)
     rows = [r for r in _by_distance(cells) if len(np.unique(cells.sector[r] // SECTORS_A_PART)) > 2]
     each = [_mean_profile(cells, r, offset) for r in rows]
@@ -104,7 +104,7 @@ def line_spread(cells: Cells) -> LineSpread:
 
 
 def without_mean_shape(cells: Cells) -> Cells:
-    """Return the cells without what a Gaussian leaves of the mean profile at each distance."""
+    """Return the cells minus the mean residual of a Gaussian at each distance."""
     mean = np.zeros_like(cells.rest)
     for rows in _by_distance(cells):
         mean[rows] = np.median(cells.rest[rows], axis=0) if rows.any() else 0.0
@@ -112,7 +112,7 @@ def without_mean_shape(cells: Cells) -> Cells:
 
 
 def _by_distance(cells: Cells) -> list[Bool]:
-    """Return the whole cells (N,) of the blocks in which the wall is farthest, in the middle, and nearest."""
+    """Return the whole cells (N,) of the blocks with the farthest, the middle, and the nearest wall."""
     scale = np.array([np.median(cells.px_per_mm[cells.block == b]) for b in range(len(cells.frames))])
     third = np.argsort(np.argsort(scale)) * _DISTANCES // max(len(scale), 1)
     return [cells.whole & (third[cells.block] == k) for k in range(_DISTANCES)]
@@ -129,10 +129,10 @@ def _mean_profile(cells: Cells, rows: Bool, offset: Float) -> tuple[Float, Float
 
 
 def explanations(spread: LineSpread) -> tuple[Fitted, ...]:
-    """Return the shapes that fit and that nothing tells apart, the best first; none where no shape fits.
+    """Return the shapes that fit and cannot be distinguished, the best first; none where no shape fits.
 
-    A washed-out second line contains the sharp one, and comes near the tail: it counts only where both of
-    them fit clearly worse.
+    A blurred second line includes the sharp one as a special case, and resembles the tail: it counts only
+    where both of them fit clearly worse.
     """
     plain = _Fit(spread, None, np.zeros(0))
     tried = sorted((_best(spread, shape) for shape in Shape), key=lambda f: f.misfit)
@@ -161,7 +161,7 @@ def _starts(shape: Shape) -> list[Float]:
 
 
 class _Fit:
-    """Least squares of one shape: height, place, ln width by distance; the skirt; the shape's numbers."""
+    """Least squares of one shape: height, place, ln width by distance; the skirt; the shape's parameters."""
 
     def __init__(self, spread: LineSpread, shape: Shape | None, start: Float) -> None:
         self.spread, self.shape, self.count = spread, shape, len(spread.px_per_mm)
@@ -201,7 +201,7 @@ class _Fit:
         )
 
     def fitted(self, left: float) -> Fitted:
-        """Return what the fit says."""
+        """Return the fitted shape."""
         assert self.shape is not None
         numbers = self.parameters[3 * self.count + 2 :]
         relative, way = (1.0, numbers[0]) if self.shape is Shape.TAIL else numbers[:2]
@@ -215,7 +215,7 @@ class _Fit:
 
 
 def exponential_gaussian(t: Float, sigma: Float, tau: Float) -> Float:
-    """Return the density (...) of a normal of 1 σ ``sigma`` at 0 plus an exponential of mean ``tau``."""
+    """Return the density (...) of a normal variable (0 ± ``sigma``) plus an exponential one (``tau``)."""
     normal = np.exp(-0.5 * (t / sigma) ** 2)
     tau = np.maximum(tau, 1e-3 * sigma)
     with np.errstate(over="ignore", invalid="ignore"):

@@ -1,4 +1,4 @@
-"""How strongly the profile of the line asks for a second line at any distance: a matched filter."""
+"""How strongly the profile of the line indicates a second line at any distance: a matched filter."""
 
 from __future__ import annotations
 
@@ -12,25 +12,25 @@ from pipeline.arrays import Float
 from stages.diagnose.profile.cells import Cells
 
 REACH_PX, STEP_PX = 45.0, 0.5
-# Beyond so many widths a Gaussian is below 0.3 %, and is left out.
+# Beyond this many widths a Gaussian is below 0.3 %, and is neglected.
 _REACH_WIDTHS = 3.5
-# Beyond so many a Gaussian of height 1 is below the rounding of 1: exp(−8.6² / 2) = 9e-17.
+# Beyond this many widths a Gaussian of height 1 is below the rounding of 1: exp(−8.6² / 2) = 9e-17.
 _NOTHING_WIDTHS = 8.6
-# Least noise of a bin, as a part of the line's height; chosen, not measured (data/debts.md).
+# Least noise of a bin, relative to the line's height; chosen, not measured (data/debts.md).
 NOISE_FLOOR = 3e-4
 
 
 @dataclass(frozen=True)
 class Responses:
-    """How strongly each of N cells asks for a second line at D distances from the line.
+    """How strongly each of N cells indicates a second line at D distances from the line.
 
     Attributes
     ----------
     distance_px : (D,)
         Uniform.
     score, information : (N, D)
-        Their ratio is the height over that of the line, less what the opposite side of the line shows;
-        1 / √information its σ if bins erred independently.
+        Their ratio is the height relative to the line, minus that on the opposite side of the line; 1 /
+        √information is its σ if bins have independent errors.
     skirt : (N, D)
         Score of the mean of both sides of the line, at the same information.
     """
@@ -42,9 +42,10 @@ class Responses:
 
 
 def responses(cells: Cells) -> Responses:
-    """Return matched-filter responses of the whole cells; what a Gaussian fit would absorb is taken out.
+    """Return matched-filter responses of the whole cells, orthogonal to what a Gaussian fit absorbs.
 
-    So is what the opposite side of the line shows as well: halos, glare and compression are alike on both.
+    What the opposite side of the line shows as well is subtracted: halos, glare and compression are
+    symmetric.
     """
     distance = np.arange(-REACH_PX, REACH_PX + STEP_PX / 2, STEP_PX)
     rest = cells.rest[cells.whole]
@@ -89,7 +90,7 @@ def _match(rest, offset, centre, width, weight, distance, score, information):  
 
 @numba.njit(cache=True, nogil=True)
 def _draw_ghost(offset, centre, width, basis, ghost, cross):  # type: ignore[no-untyped-def]
-    """Write a Gaussian of height 1 at the bins (B,), and its products with the basis (3, B) summed."""
+    """Write a Gaussian of height 1 at the bins (B,), and its inner products with the basis (3, B)."""
     cross[:] = 0.0
     for b in range(offset.size):
         x = (offset[b] - centre) / width

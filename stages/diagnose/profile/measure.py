@@ -1,4 +1,4 @@
-"""Every laser frame of a recording -> profiles of the line by frame and azimuth sector, in compiled loops."""
+"""Measure the line's profiles by frame and azimuth sector in every laser frame, in compiled loops."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _BOTH_PLANES: tuple[Planes, ...] = ("grey", "bgr")
 
 @numba.njit(cache=True, nogil=True)
 def fit_height(image, pixel, radius, offset, low, high, line, slope, width, trusted, out):  # type: ignore[no-untyped-def]
-    """Least-squares height and background (``out``) of a Gaussian of known place and width; clipped left out.
+    """Fit height and background (``out``) of a Gaussian of known place and width, without clipped pixels.
 
     Returns the largest grey level near the line's middle.
     """
@@ -61,12 +61,12 @@ def stack_frame(  # type: ignore[no-untyped-def]
     image, start, pixel, radius, offset, line, slope, width, usable, dark, trusted,
     fit_widths, core_widths, reach, step, light, height, share, gain,
 ):  # fmt: skip
-    """Add one frame's pixels, in line-centred coordinates, to its sectors' profiles.
+    """Add one frame's pixels, in coordinates centred on the line, to its sectors' profiles.
 
-    ``light`` and ``height`` (S, B) take grey levels above the background and the line's height for every
-    pixel that cannot have clipped; ``share`` (S, 3) counts samples, clipped ones and the largest level;
-    ``gain`` (2, H·W) takes residual × model and model² of the line's bright pixels. ``dark`` is the grey
-    level without light.
+    ``light`` and ``height`` (S, B) accumulate grey levels above the background, and the line's height, for
+    every pixel that cannot have clipped; ``share`` (S, 3) counts samples, clipped samples and the largest
+    level; ``gain`` (2, H·W) accumulates residual × model and model² of the line's bright pixels. ``dark`` is
+    the grey level without light.
     """
     azimuths, sectors = start.size - 1, light.shape[0]
     fit = np.empty(2)
@@ -93,7 +93,7 @@ def stack_frame(  # type: ignore[no-untyped-def]
                 light[s, b] += y - dark
                 height[s, b] += fit[0]
                 x = t / width[a]
-                # Beyond 1.5 widths the line is below a third of its height, and no bell (chosen).
+                # Beyond 1.5 widths the line is below a third of its height and not bell-shaped (chosen).
                 if abs(x) < 1.5 and not clipped:
                     m = fit[0] * np.exp(-0.5 * x * x)
                     gain[0, pixel[k]] += (y - dark - m) * m
@@ -103,7 +103,7 @@ def stack_frame(  # type: ignore[no-untyped-def]
 
 @dataclass(frozen=True)
 class LineProfiles:
-    """The line across itself, by frame and azimuth sector.
+    """Profiles across the line, by frame and azimuth sector.
 
     Attributes
     ----------
@@ -117,21 +117,21 @@ class LineProfiles:
     offset_px : (B,)
         Distance of the bins' middles from the line, outward positive.
     light, height : (F, S, B) float32
-        Sums of grey level above the background, and of the line's height, over the same pixels: their
-        ratio is the profile, 1 at the line's middle.
+        Sums of grey level above the background, and of the line's height, over the same pixels: their ratio
+        is the profile, 1 at the line's middle.
     samples : (F, S)
-        Azimuths with a line.
+        Number of azimuths with a line.
     clipped : (F, S)
         Share of them whose middle clips.
     highest : (F, S)
         Largest grey level on the line.
     background : (F,)
-        Mean grey level, above that of the darkest place, 40 to 60 px away from the line; NaN where the
-        wall is lit.
+        Mean grey level, minus that of the darkest place, 40 to 60 px away from the line; NaN where the wall
+        is lit.
     background_sigma : float
-        By how much noise and compression may put the level of the darkest place too low, grey levels.
+        1 σ of the level of the darkest place, which noise and compression make too low, grey levels.
     gain : (2, 2, N) float64
-        For two halves of the frames in turns: sums of residual × model and of model² in every pixel.
+        For two alternating halves of the frames: sums of residual × model and of model² in every pixel.
     """
 
     frame: Int
@@ -150,9 +150,9 @@ class LineProfiles:
 
 
 def measure_profiles(recording: Recording, rings: RingSamples) -> LineProfiles:
-    """Stack the pixels about the line, line-centred, in every frame lit by the laser alone.
+    """Stack the pixels about the line, centred on it, in every frame lit by the laser alone.
 
-    Frames in which the wall is lit too are left out: its texture is brighter than what is looked for.
+    Frames in which the wall is lit as well are left out: its texture is brighter than the effects.
     """
     sectors = sectors_of(recording.source, rings.centre_px, len(rings.azimuth_rad))
     sectors = sectors.taken or sectors
@@ -187,7 +187,7 @@ def measure_profiles(recording: Recording, rings: RingSamples) -> LineProfiles:
 
 
 def _line(rings: RingSamples, row: int) -> tuple[Float, Float]:
-    """Return radius and width (A,) of a frame's line, bridged around the circle."""
+    """Return radius, px, and width (A,), px, of a frame's line, interpolated across gaps."""
     good = np.flatnonzero(rings.valid[row])
     every, turn = np.arange(len(rings.azimuth_rad)), len(rings.azimuth_rad)
     radius = np.interp(every, good, rings.radius_px[row, good], period=turn)
@@ -203,9 +203,9 @@ def _tile_means(image: Image) -> Float32:
 def _dark_level(tiles: list[Float32]) -> tuple[float, float]:
     """Return the grey level of the darkest place, from the means of tiles (h, w) of every frame, and its 1 σ.
 
-    The darkest of many tiles is dark by chance too: by two of their 1 σ at the percentile that is taken.
-    That σ is how the darkest tiles change from frame to frame. It is not divided by the number of frames,
-    because compression repeats the noise of one frame in those that follow.
+    The darkest of many tiles is also dark by chance: by two of their 1 σ at the chosen percentile. That σ is
+    estimated from how the darkest tiles change from frame to frame. It is not divided by the number of
+    frames, because compression repeats the noise of one frame in those that follow.
     """
     if not tiles:
         return np.nan, np.nan

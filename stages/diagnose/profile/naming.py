@@ -1,4 +1,4 @@
-"""Second lines, tails and widths of the line, and the name a found asymmetry gets: one that fits, or none."""
+"""Name an asymmetry of the line (second lines, tails, widths) by a shape that fits, or by none."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from stages.diagnose.profile.width import scale_law, width_findings
 
 UNEXPLAINED = "unexplained"
 _CLEARLY = 3.0
-# Relative error of the mean way of scattered light, because nobody knows the form of its profile. Debt:
+# Relative error of the mean path of scattered light, because the form of its profile is unknown. Debt:
 # data/debts.md.
 _FORM = 0.1
-# Light relative to the line's height that compression may leave on one side only: in places, and everywhere.
-# Debt: data/debts.md.
+# Light relative to the line's height that compression may leave on one side only: at some places, and all
+# round. Debt: data/debts.md.
 BOUNCED_FLOOR, COPIED_FLOOR = 1e-3, 5e-4
-# Error of a faint line's place, px; relative error, because the radius is that of the stated sheet.
+# Error of a faint line's place, px; relative error, because the radius is computed with the stated sheet.
 # Debt: data/debts.md.
 PLACE_FLOOR_PX, SCALE_FLOOR = 0.05, 0.01
 _LEAST_CELLS = 30
@@ -37,8 +37,8 @@ _SIMPLER = 0.95
 def shape_findings(cells: Cells, geometry: LineGeometry, probe: Probe) -> tuple[Finding, ...]:
     """Return the findings of the line's shape: second lines, tails and widths, named by the shapes that fit.
 
-    Where the line is not alike on both sides and no shape with a name fits, all of them are withdrawn, and a
-    finding `UNEXPLAINED` tells of it.
+    Where the line is asymmetric and no named shape fits, all of them are withdrawn and replaced by a finding
+    `UNEXPLAINED`.
     """
     ring, *all_round = _asymmetries(cells, geometry, probe)
     widths = width_findings(cells, geometry, probe)
@@ -56,7 +56,7 @@ def shape_findings(cells: Cells, geometry: LineGeometry, probe: Probe) -> tuple[
 
 
 def _asymmetries(cells: Cells, geometry: LineGeometry, probe: Probe) -> list[Finding]:
-    """Return the findings of `ghost_ring` and, after it, of all that is alike all round."""
+    """Return the finding of `ghost_ring`, and after it all that are constant all round."""
     ring, copy = ghost_findings(cells, geometry, probe)
     return [ring, *skew_findings(cells, geometry, probe), copy]
 
@@ -64,9 +64,9 @@ def _asymmetries(cells: Cells, geometry: LineGeometry, probe: Probe) -> list[Fin
 def _told_apart(
     ring: Finding, all_round: list[Finding], cells: Cells, geometry: LineGeometry, probe: Probe
 ) -> tuple[Finding, list[Finding], Cells]:
-    """Return a line bounced across the bore and what is alike all round, each if it stands without the other.
+    """Return a line bounced across the bore and findings constant all round, each if it stands.
 
-    The cells are those without the bounced line, where it stands.
+    The cells are those without the bounced line, if it stands.
     """
     without_ring = without_bounced_line(cells)
     _, *others = _asymmetries(without_ring, geometry, probe)
@@ -88,7 +88,7 @@ def _names(
     geometry: LineGeometry,
     probe: Probe,
 ) -> tuple[str, ...]:
-    """Return the effects whose shapes fit; the line's width tells light in the wall from the sheet's own."""
+    """Return the effects whose shapes fit; the line's width separates light in the wall from the sheet."""
     shapes = {f.shape: f for f in fitting}
     names = ["tube_ghost"] if Shape.COPY in shapes else []
     if Shape.TAIL in shapes:
@@ -101,14 +101,14 @@ def _names(
 
 
 def _core_as_stated(halo: Fitted, cells: Cells, geometry: LineGeometry, probe: Probe) -> bool:
-    """Return whether the line without what is washed out has the width that is stated of the sheet."""
+    """Return whether the line without the blurred light has the stated width of the sheet."""
     law = scale_law(cells, geometry, probe)
     scale, sigma = halo.core * float(law.coefficient[0]), halo.core * float(law.sigma[0])
     return bool(abs(scale - 1) < _CLEARLY * np.hypot(sigma, WIDTH_FLOOR))
 
 
 def _renamed(found: Finding, names: tuple[str, ...], clearest: Finding, fitting: Sequence[Fitted]) -> Finding:
-    """Return a finding with what the shapes that fit say of it."""
+    """Return a finding with the names of the shapes that fit."""
     name = found.effect
     if name not in names:
         return withdrawn(found)
@@ -120,31 +120,31 @@ def _renamed(found: Finding, names: tuple[str, ...], clearest: Finding, fitting:
 
 
 def _halo(name: str, halo: Fitted, clearest: Finding, rivals: tuple[str, ...]) -> Finding:
-    """Return the finding of light that lies washed out beside the line."""
+    """Return the finding of blurred light beside the line."""
     sigma = float(np.hypot(halo.way_sigma_mm, _FORM * halo.way_mm))
     size = () if name == "line_skew" else (Size("transport_mm", "mm", abs(halo.way_mm), sigma),)
     return finding(
         name, clearest.z, clearest.p_value, size,
-        f"Beside the line lies light of {100 * halo.relative:.0f} % of its height, {halo.way_mm:+.2f} mm "
-        f"along the axis from it and wider than the line by {halo.spread_mm:.2f} mm (1 σ). This shape leaves "
+        f"Beside the line there is light of {100 * halo.relative:.0f} % of its height, {halo.way_mm:+.2f} mm "
+        f"from it along the axis and wider than the line by {halo.spread_mm:.2f} mm (1 σ). This shape leaves "
         f"{100 * halo.left:.1f} % of the misfit.",
         alike=rivals,
     )  # fmt: skip
 
 
 def _unexplained(clearest: Finding) -> Finding:
-    """Return the finding that the line is asymmetric and no shape with a name fits it."""
+    """Return the finding that the line is asymmetric and no named shape fits it."""
     return finding(
         UNEXPLAINED, clearest.z, clearest.p_value, (),
-        f"The line is not alike on both sides ({abs(clearest.z):.1f} σ), and neither an exponential tail, "
-        "nor a second line, nor light that is washed out fits its shape.",
+        f"The line is asymmetric ({abs(clearest.z):.1f} σ), and neither an exponential tail, "
+        "nor a second line, nor blurred light beside it fits its shape.",
     )  # fmt: skip
 
 
 def ghost_findings(cells: Cells, geometry: LineGeometry, probe: Probe) -> tuple[Finding, Finding]:
     """Return the findings of `ghost_ring` and `tube_ghost`; of two that fit, the clearly better one is kept.
 
-    The bounced line also measures the sheet's tilt and cone, whatever the camera's errors are.
+    The bounced line also measures the sheet's tilt and cone, independently of errors of the camera.
     """
     if cells.whole.sum() < _LEAST_CELLS:
         why = "The line's middle is clipped almost everywhere: no fainter line can be compared with it."

@@ -1,8 +1,8 @@
 """Whether the line is skewed, by the sheet or by light from within the wall, and by how much.
 
-The skewed line is a normal of 1 σ s and an exponential of mean τ added (the simplest one-sided line: light
-that travels on in the sheet's profile or in the wall). All that a Gaussian fit makes of it depends on τ/s
-alone.
+The skewed line is modelled as the sum of a normal variable of 1 σ s and an exponential one of mean τ (the
+simplest one-sided line: light that travels on in the sheet or in the wall). The result of a Gaussian fit to
+it depends on τ/s only.
 """
 
 from __future__ import annotations
@@ -21,7 +21,8 @@ from stages.diagnose.profile.width import scale_law
 
 # Half a grey level of compression on one flank of a line 100 levels high, over its whole width.
 HERMITE_FLOOR = 1e-3
-# Change of (line σ / stated)² that image formation may cause across the image's scales. Debt: data/debts.md.
+# Change of (line σ / stated)² that image formation may cause across the scales of the image. Debt:
+# data/debts.md.
 WIDTH_FLOOR = 0.05
 _SMALLEST_BLUR_PX2 = 1 / 12
 _CLEARLY = 3.0
@@ -30,9 +31,9 @@ _SIGMA_PX, _REACH_PX, _STEP_PX = 1.2, 12.0, 0.05
 
 
 def third_hermite(rest: Float, offset_px: Float, centre_px: Float, width_px: Float) -> Float:
-    """Return (N,) the coefficient of He₃(x) exp(−x²/2) in what a Gaussian fit of unit height leaves (N, B).
+    """Return the coefficient (N,) of He₃(x) exp(−x²/2) in the residual (N, B) of a unit Gaussian fit.
 
-    A small third cumulant κ₃ gives κ₃ / 6w³. What the fit would absorb is taken out of the template.
+    A small third cumulant κ₃ gives κ₃ / 6w³. What the fit would absorb is removed from the template.
     """
     x = (offset_px - centre_px[:, None]) / width_px[:, None]
     e = np.exp(-0.5 * x * x) * (np.abs(x) < CORE_REACH)
@@ -45,7 +46,7 @@ def third_hermite(rest: Float, offset_px: Float, centre_px: Float, width_px: Flo
 
 
 def cell_skewness(cells: Cells) -> Float:
-    """Return (N,) `third_hermite` of the cells, outward positive; NaN where the middle is not seen."""
+    """Return `third_hermite` (N,) of the cells, outward positive; NaN where the middle is not seen."""
     out = np.full(len(cells.whole), np.nan)
     w = cells.whole
     out[w] = third_hermite(cells.rest[w], cells.offset_px, cells.centre_px[w], cells.width_px[w])
@@ -54,7 +55,7 @@ def cell_skewness(cells: Cells) -> Float:
 
 @dataclass(frozen=True)
 class SkewTable:
-    """What a Gaussian fit makes of the skewed line with τ/s = ``ratio``, all (K,) and in units of s.
+    """Results of a Gaussian fit to the skewed line with τ/s = ``ratio``, all (K,) and in units of s.
 
     ``hermite``: third coefficient; ``width``: fitted 1 σ.
     """
@@ -82,7 +83,7 @@ def skew_findings(cells: Cells, geometry: LineGeometry, probe: Probe) -> tuple[F
     """Return the findings of `line_skew` and `subsurface`.
 
     Both are a line with an exponential tail of constant length in mm. The sheet's own skewness leaves its
-    stated 1 σ as it is; light from within the wall adds its length's square to it.
+    stated 1 σ unchanged; light from within the wall adds the square of its length to the variance.
     """
     coefficient = cell_skewness(cells)
     mean = regress(np.ones((len(coefficient), 1)), coefficient, cells.block)
@@ -96,7 +97,7 @@ def skew_findings(cells: Cells, geometry: LineGeometry, probe: Probe) -> tuple[F
 
 
 class _Tail:
-    """The exponential tail that gives the mean skewness, and what the widths leave for it."""
+    """The exponential tail that explains the mean skewness, and whether the widths allow it."""
 
     def __init__(
         self, cells: Cells, geometry: LineGeometry, probe: Probe, hermite: float, hermite_sigma: float
@@ -121,14 +122,14 @@ class _Tail:
 
     @property
     def skewness(self) -> Size:
-        """Of a sheet of the stated 1 σ; forward positive, which is inward in the image."""
+        """Skewness of a sheet of the stated 1 σ; forward positive, which is inward in the image."""
         value = 2 * (self.tau_mm / self.stated_mm) ** 3
         sigma = 3 * value * self.tau_sigma / max(self.tau_mm, 1e-9)
         return Size("skewness", "", -self.sign * value, sigma)
 
     @property
     def transport(self) -> Size:
-        """Mean way within the wall."""
+        """Mean path within the wall."""
         return Size("transport_mm", "mm", self.tau_mm, self.tau_sigma)
 
     @property
@@ -138,7 +139,7 @@ class _Tail:
 
     @property
     def fits_wall(self) -> bool:
-        """Whether the widths allow the stated sheet and the tail on top of it."""
+        """Whether the widths allow the stated sheet with the tail in addition."""
         return self._allows(1 + (self.tau_mm / self.stated_mm) ** 2)
 
     def _allows(self, scale: float) -> bool:
@@ -152,7 +153,7 @@ class _Tail:
 
 
 def _judged(tail: _Tail, test: Tested) -> tuple[Finding, Finding]:
-    """Return both findings; one that the widths rule out keeps p = 1."""
+    """Return both findings; one that the widths exclude keeps p = 1."""
     z, p = test.z, test.p_value
     side = "outside" if tail.sign > 0 else "inside"
     seen = f"The line has a longer tail on its {side}, {z:.1f} σ beyond what compression leaves."

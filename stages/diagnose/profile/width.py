@@ -12,17 +12,17 @@ from stages.diagnose.profile.cells import Cells, LineGeometry
 from stages.diagnose.profile.finding import Finding, Regression, Size, finding, regress, tested, untestable
 from stages.diagnose.profile.measure import LineProfiles
 
-# Changes of (line σ / stated)² and of exposure², s², that compression and clipped neighbours may cause.
-# Debt: data/debts.md.
+# Changes of (line σ / stated)² and of exposure², s², that compression and clipped neighbours may cause. Debt:
+# data/debts.md.
 SCALE_FLOOR, EXPOSURE2_FLOOR = 0.03, 2e-5
 _LEAST_SCALE_SPREAD = 0.05
-# Locking of a line to pixels by pixel integration, rounding and compression, px. Debt: data/debts.md.
+# Apparent pixel locking by pixel integration, rounding and compression, px. Debt: data/debts.md.
 LOCKING_FLOOR_PX = 1.5e-3
-# Gains that speckle on a wall at rest may imitate; what compression imitates is measured. Debt:
-# data/debts.md.
+# Apparent gains by speckle on a wall at rest; those by compression are measured. Debt: data/debts.md.
 GAIN_FLOOR = 0.01
-# Codecs code blocks of 8 px, so that what they leave is alike over several pixels. Those above each other lie
-# across the rows along which gains are compared, so that gains of single pixels have nothing in common there.
+# Codecs code blocks of 8 px, so that their errors are correlated over several pixels. Gains are compared
+# along rows; pixels above each other are in different rows, where gains of single pixels have nothing in
+# common.
 _ROWS_APART = (1, 2, 3, 4)
 _SMOOTH_AZIMUTHS = 41
 _LEAST_SEEN = 3.0e3
@@ -33,14 +33,14 @@ _TILE_PX = 64
 def width_findings(cells: Cells, geometry: LineGeometry, probe: Probe) -> tuple[Finding, Finding]:
     """Return the findings of `gamma` and `albedo_bias`: width² = blur² + s (stated σ · px per mm)².
 
-    A response I^γ divides all widths² by γ; a wider sheet than stated changes s alone. The blur is not
-    stated, so the two look alike here.
+    A response I^γ divides all widths² by γ; a wider sheet than stated changes only s. The blur is not stated,
+    so that both look the same here.
     """
     stated = stated_variance(geometry, probe)
     fit = scale_law(cells, geometry, probe)
     spread = np.nanstd(stated) / np.nanmean(stated) if np.isfinite(stated).any() else 0.0
     if not np.isfinite(fit.sigma[0]) or spread < _LEAST_SCALE_SPREAD:
-        why = "The line is seen at one scale only: its own width and the image's blur cannot be told apart."
+        why = "The line is seen at one scale only: its own width and the image's blur look the same."
         return untestable("gamma", why), untestable("albedo_bias", why)
     scale = float(fit.coefficient[0])
     test = tested(scale - 1, float(fit.sigma[0]), SCALE_FLOOR, fit.groups)
@@ -57,12 +57,12 @@ def width_findings(cells: Cells, geometry: LineGeometry, probe: Probe) -> tuple[
 
 
 def stated_variance(geometry: LineGeometry, probe: Probe) -> Float:
-    """Return (F, S) the stated line's variance in the image, px²."""
+    """Return the stated line's variance in the image (F, S), px²."""
     return np.asarray((probe.laser.line_sigma_mm * geometry.px_per_mm) ** 2)
 
 
 def scale_law(cells: Cells, geometry: LineGeometry, probe: Probe) -> Regression:
-    """Regress width², px², on the stated line's and on 1: (σ / stated)², blur², fixed patterns."""
+    """Regress width², px², on the stated line's and on 1: (σ / stated)², blur², camera patterns."""
     stated = stated_variance(geometry, probe)
     design = np.stack([stated, np.ones_like(stated), *_fixed_patterns(geometry)], axis=-1)
     return regress(design, geometry.width_px**2, cells.block_of_frames(len(stated)))
@@ -71,7 +71,7 @@ def scale_law(cells: Cells, geometry: LineGeometry, probe: Probe) -> Regression:
 def blur_finding(cells: Cells, geometry: LineGeometry, probe: Probe) -> Finding:
     """Return the finding of `motion_blur`: width² grows by (speed · exposure)² / 12.
 
-    Each frame's own mean is taken out, so that only the pattern around the ring counts.
+    Each frame's own mean is subtracted, so that only the pattern around the ring counts.
     """
     columns = [
         geometry.speed_px_s**2 / 12,
@@ -85,7 +85,7 @@ def blur_finding(cells: Cells, geometry: LineGeometry, probe: Probe) -> Finding:
     design, width2 = _without_frame_means(design, known), _without_frame_means(width2[..., None], known)
     fit = regress(design, width2[..., 0], cells.block_of_frames(len(width2)))
     if not np.isfinite(fit.sigma[0]):
-        return untestable("motion_blur", "The line does not move enough for its width to tell the exposure.")
+        return untestable("motion_blur", "The line does not move enough for its width to show the exposure.")
     exposure2, own = float(fit.coefficient[0]), probe.shutter.exposure_s
     test = tested(exposure2 - own**2, float(fit.sigma[0]), EXPOSURE2_FLOOR, fit.groups)
     sigma = test.sigma
@@ -93,31 +93,31 @@ def blur_finding(cells: Cells, geometry: LineGeometry, probe: Probe) -> Finding:
     size = Size("exposure_s", "s", float(total - own), sigma / (2 * max(total, np.sqrt(sigma))))
     return finding(
         "motion_blur", test.z, test.p_value, (size,),
-        f"The line widens with its own speed as an exposure of {1e3 * total:.1f} ms makes it.",
+        f"The line widens with its speed as with an exposure of {1e3 * total:.1f} ms.",
     )  # fmt: skip
 
 
 def _fixed_patterns(geometry: LineGeometry) -> list[Float]:
-    """Return patterns that stay with the camera: a tilted sheet's false radius, pixels seen askew."""
+    """Return patterns fixed to the camera: a tilted sheet's apparent radius, obliquely seen pixels."""
     psi = np.broadcast_to(geometry.azimuth_rad, geometry.px_per_mm.shape)
     return [f(order * psi) for order in (1, 2, 4) for f in (np.cos, np.sin)]
 
 
 def _without_frame_means(values: Float, known: Bool) -> Float:
-    """Return values (F, S, K) less each frame's mean over what is known; NaN elsewhere."""
+    """Return values (F, S, K) minus each frame's mean over known ones; NaN elsewhere."""
     some = np.where(known[..., None], values, 0.0)
     mean = some.sum(1, keepdims=True) / np.maximum(known.sum(1), 1)[:, None, None]
     return np.where(known[..., None], values - mean, np.nan)
 
 
 def locking_finding(rings: RingSamples, profiles: LineProfiles, cells: Cells) -> Finding:
-    """Return the finding of `pixel_locking`: the line's radius pulled by a sin 2πρ.
+    """Return the finding of `pixel_locking`: the line's radius is displaced by a sin 2πρ.
 
-    Radius and prediction are both freed of what is smooth around the ring: that is the pipe's.
+    What is smooth around the ring is subtracted from radius and prediction: it belongs to the pipe.
     """
     rows = np.concatenate([profiles.row[b] for b in cells.frames]) if cells.frames else np.empty(0, int)
     if not len(rows):
-        return untestable("pixel_locking", "The ring never keeps its size for long enough.")
+        return untestable("pixel_locking", "The ring never keeps its size long enough.")
     group = np.repeat(np.arange(len(cells.frames)), [len(b) for b in cells.frames])
     valid = rings.valid[rows]
     smooth = _smoothed(rings.radius_px[rows].astype(float), valid)
@@ -126,7 +126,7 @@ def locking_finding(rings: RingSamples, profiles: LineProfiles, cells: Cells) ->
     parts = [np.where(valid, f(phase) - _smoothed(f(phase), valid), np.nan) for f in (np.sin, np.cos)]
     fit = regress(np.stack(parts, axis=-1), rough, group)
     if not np.isfinite(fit.sigma[0]):
-        return untestable("pixel_locking", "The line lies at the same fraction of a pixel everywhere.")
+        return untestable("pixel_locking", "The line is at the same fraction of a pixel everywhere.")
     size = float(np.hypot(*fit.coefficient))
     random = float(np.sqrt(np.trace(fit.covariance) / 2))
     test = tested(size, random, LOCKING_FLOOR_PX, fit.groups)
@@ -139,11 +139,11 @@ def locking_finding(rings: RingSamples, profiles: LineProfiles, cells: Cells) ->
 
 
 def pattern_finding(profiles: LineProfiles, image_size: tuple[int, int]) -> Finding:
-    """Return the finding of `fixed_pattern`: gains of single pixels, alike in two halves of the frames.
+    """Return the finding of `fixed_pattern`: gains of single pixels that two halves of the frames share.
 
-    The halves' covariance is the variance of what stays in the pixels. A pixel is compared with its
-    neighbours along the row, so that the line's own shape falls out. What pixels above each other have in
-    common is not their own: that is what codec and line leave, and it counts as an error of the variance.
+    The covariance of the halves is the variance of what is fixed to the pixels. A pixel is compared with its
+    neighbours in the row, which cancels the line's own shape. What pixels above each other have in common is
+    not their own: it comes from codec and line, and counts as an error of the variance.
     """
     gain, seen = _gains(profiles, image_size)
     rough = [g - _row_means(g, s) for g, s in zip(gain, seen, strict=True)]
@@ -161,12 +161,12 @@ def pattern_finding(profiles: LineProfiles, image_size: tuple[int, int]) -> Find
     return finding(
         "fixed_pattern", test.z, test.p_value,
         (Size("relative", "", size, sigma / (2 * max(size, np.sqrt(sigma)))),),
-        f"Pixels keep gains of their own of {100 * size:.2f} % (1 σ).", alike=("dust",),
+        f"Pixels have gains of their own, {100 * size:.2f} % (1 σ).", alike=("dust",),
     )  # fmt: skip
 
 
 def _in_common(rough: list[Float], seen: list[Bool], tiles: Int, rows: int) -> Regression | None:
-    """Return the halves' covariance of pixels so many rows apart; None where too few are seen."""
+    """Return the halves' covariance of pixels ``rows`` rows apart; None with too few pixels."""
     other, shows = np.roll(rough[1], -rows, 0), np.roll(seen[1], -rows, 0)
     both = seen[0] & shows
     if np.count_nonzero(both) < _LEAST_PIXELS:
@@ -175,7 +175,7 @@ def _in_common(rough: list[Float], seen: list[Bool], tiles: Int, rows: int) -> R
 
 
 def _smoothed(values: Float, valid: Bool) -> Float:
-    """Return running means around the ring of what is valid."""
+    """Return running means around the ring over valid values."""
     some = np.where(valid, values, 0.0)
     total = uniform_filter1d(some, _SMOOTH_AZIMUTHS, axis=1, mode="wrap")
     weight = uniform_filter1d(valid.astype(float), _SMOOTH_AZIMUTHS, axis=1, mode="wrap")
@@ -183,7 +183,7 @@ def _smoothed(values: Float, valid: Bool) -> Float:
 
 
 def _gains(profiles: LineProfiles, image_size: tuple[int, int]) -> tuple[list[Float], list[Bool]]:
-    """Return for both halves the relative gain less 1 of every pixel (H, W), and where it is seen."""
+    """Return, for both halves, the relative gain minus 1 of every pixel (H, W), and where it is seen."""
     gains, seen = [], []
     for residual, square in profiles.gain:
         enough = square > _LEAST_SEEN

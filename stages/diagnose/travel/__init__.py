@@ -1,1 +1,1 @@
-"""Motion against encoder: scale, slips, play and delay, each as far as the motion determines it."""
+"""Motion against encoder: scale, slips, play and delay, as far as the motion determines each."""

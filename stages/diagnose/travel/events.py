@@ -11,26 +11,27 @@ from stages.diagnose.travel.noise import DriftNoise
 from stages.diagnose.travel.sight import Sight
 from stages.diagnose.travel.solve import DELAY, FAR_BETTER, PLAY, SMOOTH
 
-# So many steps and stray pictures are taken up, one after the other.
+# At most this many events are included, one after the other.
 _MOST = 16
 _ENTERS = 1e-4
-# A step needs so many pictures on both of its sides, else they may be stray; with no more it is in doubt.
+# A step needs at least this many pictures on both sides, or they may be stray; with only that many it is in
+# doubt.
 SIDE = 3
-# Prior of how long a wheel slips: evenly between the time of a few readings, as over a bead, and this, as in
-# mud or grease. What creeps for longer is held by the noise's random walk. Debt: data/debts.md.
+# Prior of the duration of a slip: uniform between the time of a few readings, as over a bead, and this, as in
+# mud or grease. What creeps for longer is modelled by the noise's random walk. Debt: data/debts.md.
 SHORTEST_S, LONGEST_S = 0.03, 0.5
 SLIP = "encoder_slip"
-# Below this chance, motion against encoder shows an effect: of 300 recordings without any, with three smooth
-# effects each, a hundredth of one would.
+# Below this p-value, motion against encoder shows an effect: in 300 recordings without any, with three smooth
+# effects each, a hundredth of one is expected.
 TRAVEL_FOUND = 1e-5
 
 
 def with_events(sight: Sight, encoder: Encoder, without: tuple[str, ...] = ()) -> TravelFit:
-    """Return the fit with the events that the readings ask for, the strongest first.
+    """Return the fit with the events that the readings require, the strongest first.
 
-    Effects ``without`` which it is fitted are not known: what they do is left to others, and to the noise.
-    A slip where the probe turns looks like play at first, and what the play then does elsewhere like more
-    slips: where delay or play is found, the events that are found without them are tried as well.
+    Effects in ``without`` are unknown: what they do is attributed to others, and to noise. A slip at a turn
+    of the probe looks like play at first, and what that play predicts elsewhere looks like more slips: where
+    delay or play is found, events found without them are tested as well.
     """
     fit = _searched(sight, encoder, without)
     lags = [SMOOTH[k] for k in (DELAY, PLAY) if fit.values[k] != 0]
@@ -40,7 +41,7 @@ def with_events(sight: Sight, encoder: Encoder, without: tuple[str, ...] = ()) -
 
 
 def _cost(fit: TravelFit, noise: DriftNoise) -> float:
-    """Return χ² of what is left, and what each thing that was taken up has to gain."""
+    """Return χ² of the residual plus the least gain required of each included event and effect."""
     left = fit.with_columns(fit.columns, noise)
     taken_up = len(fit.events) + np.count_nonzero(fit.values[[DELAY, PLAY]])
     free = sum(e.during for e in fit.events)
@@ -48,7 +49,7 @@ def _cost(fit: TravelFit, noise: DriftNoise) -> float:
 
 
 def _searched(sight: Sight, encoder: Encoder, without: tuple[str, ...]) -> TravelFit:
-    """Return the fit with the events that the readings ask for, one after the other."""
+    """Return the fit with the events that the readings require, one after the other."""
     fit = fitted(sight, encoder, (), None, without)
     for _ in range(_MOST):
         event, score, count = _strongest(fit)
@@ -63,7 +64,7 @@ def _searched(sight: Sight, encoder: Encoder, without: tuple[str, ...]) -> Trave
 
 
 def _with_its_ends(sight: Sight, event: Event) -> Event:
-    """Return a slip that lasts with a picture more on either side: none alone shows its begin and end."""
+    """Return a lasting slip with one more picture on either side: none alone shows its start and end."""
     if not event.during:
         return event
     first, end = max(event.place - event.during - 1, 1), min(event.place + 1, len(sight.time_s) - 1)
@@ -71,12 +72,12 @@ def _with_its_ends(sight: Sight, event: Event) -> Event:
 
 
 def _joined(sight: Sight, events: tuple[Event, ...]) -> tuple[Event, ...]:
-    """Return the events; a step with others that come while a wheel may still be slipping is one of them."""
+    """Return the events, with a step and others during the same possible slip joined to one."""
     out: list[Event] = []
     for event in sorted(events, key=lambda e: e.place - e.during):
         both = _one_slip(out[-1], event, len(sight.time_s) - 1) if out else None
         lasts_s = LONGEST_S if both is None else _around_s(sight, both)[1] - _around_s(sight, both)[0]
-        # Between the pictures around it the slip is shorter than that by as much as a picture's time.
+        # Between the pictures around it, the slip is shorter by up to one picture's time.
         if both is not None and lasts_s < LONGEST_S + sight.time_s[both.place] - sight.time_s[both.place - 1]:
             out[-1] = both
         else:
@@ -85,9 +86,9 @@ def _joined(sight: Sight, events: tuple[Event, ...]) -> tuple[Event, ...]:
 
 
 def _one_slip(first: Event, second: Event, last: int) -> Event | None:
-    """Return the slip that two events are together; None where both are stray pictures.
+    """Return the slip that two events form together; None where both are stray pictures.
 
-    It begins behind the first picture and has ended at the ``last`` one.
+    It begins after the first picture and has ended at the ``last`` one.
     """
     if EventKind.STEP not in (first.kind, second.kind):
         return None
@@ -97,12 +98,12 @@ def _one_slip(first: Event, second: Event, last: int) -> Event | None:
 
 
 def _around_s(sight: Sight, event: Event) -> tuple[float, float]:
-    """Return when the last picture before an event was taken, and the first one after it."""
+    """Return the times of the last picture before an event and of the first one after it, s."""
     return float(sight.time_s[event.place - event.during - 1]), float(sight.time_s[event.place])
 
 
 def _without_needless(fit: TravelFit, encoder: Encoder) -> TravelFit:
-    """Return the fit less the events that those found later have made needless."""
+    """Return the fit without events that later ones have made unnecessary."""
     while fit.events:
         least = int(np.argmin(fit.event_z2))
         if chance(fit.event_z2[least], 2 * len(fit.sight.time_s), len(fit.sight.time_s)) <= _ENTERS:
@@ -112,14 +113,14 @@ def _without_needless(fit: TravelFit, encoder: Encoder) -> TravelFit:
 
 
 def is_found(p_value: float) -> bool:
-    """Return whether what chance would do so rarely is an effect between motion and encoder, or in motion."""
+    """Return whether a p-value is small enough for an effect between motion and encoder, or in motion."""
     return p_value < TRAVEL_FOUND
 
 
 def chance(score: float, count: int, measurements: int) -> float:
-    """Return the probability that the largest of ``count`` scores z² is so large by chance.
+    """Return the probability that chance makes the largest of ``count`` scores z² as large.
 
-    Medians of increments measure the noise about as well as a third of the measurements would.
+    Medians of increments determine the noise about as well as a third of the measurements would.
     """
     one = 2 * student.sf(np.sqrt(max(score, 0.0)), max(measurements / 3, 3.0))
     return float(min(1.0, count * one))

@@ -1,4 +1,4 @@
-"""Evidence of left-out physics in the difference of motion and encoder, and in the motion itself."""
+"""Evidence of left-out physics from the difference between motion and encoder, and from the motion itself."""
 
 from __future__ import annotations
 
@@ -25,44 +25,44 @@ from stages.diagnose.travel.steps import StepFound, steps_found
 _LEAST_FRAMES = 16
 _DETECTED = 5.0
 _INSEPARABLE = 0.95
-# 1 σ of a frame's time stamp, which may be that of the exposure's begin, middle or end. Debt: data/debts.md.
+# 1 σ of a frame's time stamp, which may refer to the exposure's start, middle or end. Debt: data/debts.md.
 _STAMP_SIGMA_S = 1e-3
-# At a reversal a counter may err by up to one count, which is not play of the wheel. Debt: data/debts.md.
+# At a reversal a counter may be wrong by one count, which is not play of the wheel. Debt: data/debts.md.
 _QUANTUM_SHARE = 0.5
 _REPORTED = 1e-3
 _SELDOM = 0.02
 _SHORTEST_MM = 20.0
-# Logarithm of odds beyond which they decide anyway.
+# Logarithm of odds that are decisive in any case.
 _SURE_OF = 50.0
 
 
 @dataclass(frozen=True)
 class TravelEstimate:
-    """One smooth effect between encoder and sight.
+    """One smooth effect between encoder and visual distance.
 
     Attributes
     ----------
     effect, quantity : str
         Names of the catalogue.
     value, sigma : float
-        All effects fitted together; σ infinite where this motion tells nothing of it.
+        With all effects fitted together; σ is infinite where this motion does not determine it.
     stated_sigma : float
-        1 σ that the stated instrument leaves open anyway.
+        1 σ of the stated instrument's uncertainty.
     p_value : float
-        Of so much beyond the stated uncertainty.
+        Of a value as far beyond the stated uncertainty.
     detectable : float
         Least size that would stand out here (5 σ), from motion and noise alone.
     alike : tuple of (str, float)
-        Effects that this motion cannot tell from it, with the correlation of the estimates.
+        Effects that this motion cannot distinguish from it, with the correlation of the estimates.
     agreements : tuple of Agreement
-        What disjoint parts of the travel say of each other.
+        Whether disjoint parts of the travel agree.
     where : tuple of int or None
-        Places of the `Sight`, both included, between which it adds to the readings.
+        First and last index of the `Sight` between which it adds to the readings.
     otherwise : float
-        How likely courses without a name are in its place, beside it, on average.
+        Likelihood of unnamed courses in its place relative to it, on average.
     taken_off : float
-        What another effect makes of the whole, so that ``value`` is the rest: set when recordings are set
-        beside each other, and never stored.
+        Part of the whole that another effect makes, so that ``value`` is the rest: set when recordings are
+        compared, and never stored.
     """
 
     effect: str
@@ -80,18 +80,18 @@ class TravelEstimate:
 
     @property
     def size_sigma(self) -> float:
-        """1 σ of the size: stamps and counts err in the measurement, what a wheel is stated to does not."""
+        """1 σ of the size: includes errors of stamps and counts, but not what is stated of the wheel."""
         return self.sigma if self.effect == SMOOTH[SCALE] else float(np.hypot(self.sigma, self.stated_sigma))
 
     @property
     def statement(self) -> str:
-        """Return the effect in a plain sentence with its size."""
+        """Return a sentence that states the effect with its size."""
         return LIBRARY[self.effect].statement((), np.array([self.value]))
 
 
 @dataclass(frozen=True)
 class TravelEvidence:
-    """Motion against encoder, and lines in the motion, of one recording.
+    """Motion against encoder, and lines in the motion's spectrum, of one recording.
 
     Attributes
     ----------
@@ -101,14 +101,14 @@ class TravelEvidence:
     slips : tuple of StepFound
         Steps that only a slip explains.
     doubtful : tuple of StepFound
-        Steps that a stray picture or missing frames explain as well: their `StepFound.doubt` tells it.
+        Steps that a stray picture or missing frames would also explain, as `StepFound.doubt` says.
     lines : tuple of Line
     fit : TravelFit or None
         None without a usable encoder.
     shortcomings : tuple of str
-        What this recording cannot tell, and why.
+        What this recording cannot show, and why.
     unexplained : LeftOver or None
-        What is between motion and encoder and no effect of the encoder explains.
+        A difference between motion and encoder that no effect of the encoder explains.
     """
 
     source: str
@@ -122,7 +122,7 @@ class TravelEvidence:
 
     @property
     def least_p(self) -> float:
-        """Least chance of what shows between motion and encoder, or in the motion; 1 where nothing does."""
+        """Smallest p-value of what shows between motion and encoder, or in the motion; 1 if nothing does."""
         smooth = (e.p_value for e in self.estimates if e.p_value < _REPORTED)
         steps = (s.p_value for s in (*self.slips, *self.doubtful))
         left = () if self.unexplained is None else (self.unexplained.p_value,)
@@ -135,7 +135,7 @@ class TravelEvidence:
 
     @property
     def fits_p(self) -> float:
-        """Chance that what all effects and steps leave between motion and encoder is noise."""
+        """Probability that noise makes the residual of all effects and steps."""
         return self.fit.fits_p if self.fit is not None else 1.0
 
     def estimate(self, name: str) -> TravelEstimate | None:
@@ -147,22 +147,22 @@ def travel_evidence(
     source: str, recording: Recording, sight: Sight, T_pc: Float, scale_sigma_stated: float,
     shown: Bool | None = None, without: Collection[str] = (),
 ) -> TravelEvidence:  # fmt: skip
-    """Compare the way seen with the encoder, and look for lines in the way across the pipe.
+    """Compare the visual distance with the encoder, and search for lines in the sideways motion.
 
     Parameters
     ----------
     source
         ``gauge`` or ``field``.
     sight
-        From poses made without the encoder.
+        From poses estimated without the encoder.
     T_pc : (K, 4, 4)
         Poses of the recording's frames from the first to the last of ``sight``, both included.
     scale_sigma_stated
         Relative 1 σ of the encoder's scale as stated.
     shown : (K,) bool, optional
-        Whether a frame's own picture places the camera across the pipe; without it, all do.
+        Whether a frame's own picture determines the camera's sideways position; without it, all do.
     without
-        Effects that are not known.
+        Effects that are treated as unknown.
     """
     first = int(np.searchsorted(recording.frames.frame, sight.frame[0])) if len(sight.frame) else 0
     span = slice(first, first + len(T_pc))
@@ -187,7 +187,7 @@ def travel_evidence(
 
 
 def _covered(sight: Sight, encoder: Encoder) -> Sight:
-    """Return the frames within the encoder's time, half a frame more at the ends."""
+    """Return the frames within the encoder's time, with half a frame more at the ends."""
     slack = sight.frame_time_s / 2
     return sight.select(
         (sight.time_s >= encoder.time_s[0] - slack) & (sight.time_s <= encoder.time_s[-1] + slack)
@@ -221,10 +221,10 @@ def _estimates(
             if not (fit.told_apart and {j, k} == {DELAY, PLAY})
         )
         if k == SCALE and source == "field":
-            # In a pipe of unknown size the pictures have the scale that the laser's baseline gives them.
+            # In a pipe of unknown size, the pictures have the scale that the laser's baseline gives them.
             alike = (*alike, ("baseline", 1.0))
-        # The counter errs anew at each reversal; errors of wheel and time stamps are the same in all of the
-        # run.
+        # The counter has an independent error at each reversal; errors of wheel and time stamps are constant
+        # over the run.
         again = second_predictions(fit, k, turning if k == PLAY else 0.0) if p < _REPORTED else ()
         out.append(
             TravelEstimate(
@@ -236,10 +236,11 @@ def _estimates(
 
 
 def _goes_otherwise(fit: TravelFit, column: int) -> float:
-    """Return how likely courses that nobody has a name for are in a smooth effect's place, beside it.
+    """Return the likelihood of unnamed courses in a smooth effect's place, relative to it.
 
-    They go with the way, its square, the speed, its size, or its direction; the effect's own is left out. In
-    each the others that were found stay free; χ² is divided by what the fit leaves in units of the noise.
+    They depend on the distance, its square, the speed, its absolute value, or its sign; the effect's own is
+    left out. The other effects that were found stay free; χ² is divided by what the fit leaves in units of
+    the noise.
     """
     sight, speed = fit.sight, np.gradient(fit.sight.distance_mm, fit.sight.time_s)
     way = (sight.distance_mm - sight.distance_mm.mean()) / max(float(np.ptp(sight.distance_mm)), 1e-9)
@@ -251,7 +252,7 @@ def _goes_otherwise(fit: TravelFit, column: int) -> float:
 
 
 def _where(column: Float) -> tuple[int, int] | None:
-    """Return the first and the last place between which a column does nearly all that it does."""
+    """Return the first and the last index between which a column has nearly all of its effect."""
     moved = np.cumsum(np.abs(np.diff(column)))
     if not len(moved) or moved[-1] <= 0:
         return None
@@ -262,7 +263,7 @@ def _where(column: Float) -> tuple[int, int] | None:
 def _shortcomings(source: str, recording: Recording, sight: Sight) -> tuple[str, ...]:
     out, source = [], _in_words(source)
     if recording.encoder is None:
-        out.append(f"The {source} has no encoder: its scale, slips, play and delay cannot be told.")
+        out.append(f"The {source} has no encoder: its scale, slips, play and delay are not visible.")
     if len(sight.frame) < _LEAST_FRAMES:
         out.append(
             f"Only {len(sight.frame)} frames of the {source} show where the camera is along the pipe: motion "
@@ -270,8 +271,8 @@ def _shortcomings(source: str, recording: Recording, sight: Sight) -> tuple[str,
         )
     elif sight.path_mm[-1] < _SHORTEST_MM:
         out.append(
-            f"The probe moves by only {sight.path_mm[-1]:.1f} mm in the {source}: what grows with distance "
-            "or speed cannot be told."
+            f"The probe moves by only {sight.path_mm[-1]:.1f} mm in the {source}: errors that grow with "
+            "distance or speed are not visible."
         )
     return tuple(out)
 
@@ -281,7 +282,7 @@ def _in_words(source: str) -> str:
 
 
 def _blind(estimates: Sequence[TravelEstimate], sight: Sight) -> tuple[str, ...]:
-    """Return the effects that this motion does not determine, or determines only together."""
+    """Return sentences on effects that this motion does not determine, or determines only together."""
     out = []
     for e in estimates:
         if not np.isfinite(e.sigma):

@@ -1,4 +1,4 @@
-"""What is between motion and encoder and no effect that was told explains: how much, when, how surely."""
+"""A difference between motion and encoder that no reported effect explains: size, time and significance."""
 
 from __future__ import annotations
 
@@ -16,37 +16,38 @@ from stages.diagnose.travel.sight import PLACED_SIGMA_MM
 from stages.diagnose.travel.solve import DELAY, FAR_BETTER, OFFSET, PLAY, SMOOTH
 from stages.diagnose.travel.steps import StepFound, or_else
 
-# What is left of the reading is noise unless its chance is below this. Debt: data/debts.md.
+# The residual of the readings is noise unless its p-value is below this. Debt: data/debts.md.
 _NOISE = 1e-6
-# A stretch whose information is less than this share of the most says nothing.
+# A stretch with less information than this share of the largest is not used.
 _TOLD = 1e-9
-# Neighbouring pictures are off alike where neither is off by more than so many times the other (chosen).
+# Neighbouring pictures have a common offset if neither is off by more than this factor times the other
+# (chosen).
 _ALIKE = 2
-# What a stretch has of its own: begin, end and size.
+# Parameters of a stretch: start, end and size.
 _OWN = 3
 
 
 @dataclass(frozen=True)
 class LeftOver:
-    """By how much the reading is off beyond all that was told, in the stretch where it shows most.
+    """By how much the reading is off beyond all that was reported, in the stretch where it shows most.
 
-    The first picture's reading is taken for right: after a slip the reading is off, not before it.
+    The reading at the first picture is taken to be right: after a slip the reading is off, not before it.
 
     Attributes
     ----------
     off_mm : float
-        Reading − sight, mean over the stretch.
+        Reading − visual distance, mean over the stretch.
     where : tuple of int
-        Places of the `Sight`, both included, between which it is off.
+        First and last index of the `Sight` between which it is off.
     time_s : tuple of float
         Their times.
     p_value : float
-        Of so much by chance, over all stretches that were tried.
+        Of a difference as large by chance, over all stretches that were tested.
     stray : int
-        How many pictures in a row were taken for stray ones: all of the stretch, or all others; 0 where some
-        of them were not.
+        Number of consecutive pictures that were treated as stray: all of the stretch, or all others; 0 where
+        some of them were not.
     by_slip : bool
-        Whether one slip would explain it too.
+        Whether one slip would also explain it.
     """
 
     off_mm: float
@@ -58,7 +59,7 @@ class LeftOver:
 
     @property
     def statement(self) -> str:
-        """Return it in a plain sentence."""
+        """Return it as a sentence."""
         first, last = self.time_s
         off = f"Between {first:.2f} and {last:.2f} s the reading is off by {self.off_mm:+.2f} mm"
         if self.by_slip and not self.stray:
@@ -71,9 +72,9 @@ class LeftOver:
 
 @dataclass(frozen=True)
 class Stretch:
-    """Pictures from ``first`` to before ``end`` that are off by ``size_mm``.
+    """Pictures from ``first`` up to, but not including, ``end`` that are off by ``size_mm``.
 
-    ``gain`` is by how much it lowers χ²; χ² of ``left`` remains, with ``free`` degrees of freedom.
+    ``gain`` is the fall of χ²; ``left`` is the remaining χ², with ``free`` degrees of freedom.
     """
 
     first: int
@@ -85,15 +86,15 @@ class Stretch:
 
     @property
     def misfit(self) -> float:
-        """The χ² that is left for each degree of freedom."""
+        """The remaining χ² per degree of freedom."""
         return self.left / self.free
 
 
 def left_over(fit: TravelFit, steps: Sequence[StepFound], count_mm: float) -> LeftOver | None:
     """Return what is left beside smooth effects, steps and single stray pictures; None where it may be noise.
 
-    Neighbouring pictures that are off alike are no stray ones: what the fit takes out for them is still to be
-    explained. Smooth effects are estimated again beside it, so that they take no share of it.
+    Neighbouring pictures with a common offset are not stray: the part that the fit removes for them is still
+    to be explained. Smooth effects are estimated again beside it, so that they absorb none of it.
 
     Parameters
     ----------
@@ -110,7 +111,7 @@ def left_over(fit: TravelFit, steps: Sequence[StepFound], count_mm: float) -> Le
     if p_value >= _NOISE:
         return None
     off = _simplest(fit, untold, noise, off)
-    # Beside a delay and a play that it does without, a stretch may be far larger than it is alone.
+    # Beside a delay and a play that it does not need, a stretch may come out far larger than alone.
     p_value = max(p_value, _p_of(fit, off, noise))
     if p_value >= _NOISE:
         return None
@@ -123,7 +124,7 @@ def left_over(fit: TravelFit, steps: Sequence[StepFound], count_mm: float) -> Le
 
 
 def _stray_pictures(fit: TravelFit, untold: list[int], off: Stretch) -> int:
-    """Return how many pictures, all of a stretch or all others, were taken for stray; 0 where not all."""
+    """Return how many pictures, all of a stretch or all others, were treated as stray; else 0."""
     events = (fit.events[k - len(SMOOTH)] for k in untold)
     taken = {e.place for e in events if e.kind is EventKind.OUTLIER}
     within = set(range(off.first, off.end))
@@ -132,14 +133,14 @@ def _stray_pictures(fit: TravelFit, untold: list[int], off: Stretch) -> int:
 
 
 def _of_places(fit: TravelFit, count_mm: float) -> DriftNoise:
-    """Return the noise of pictures that fiducials place each by itself: it gathers from none to another."""
+    """Return the noise of pictures whose places fiducials determine independently: it does not accumulate."""
     return DriftNoise(float(np.sqrt(PLACED_SIGMA_MM**2 + fit.noise.white_mm**2 + count_mm**2)), 0.0)
 
 
 def _simplest(fit: TravelFit, untold: list[int], noise: DriftNoise, beside: Stretch) -> Stretch:
-    """Return the stretch that is there ``beside`` delay and play, or beside neither where that is simpler.
+    """Return the stretch found ``beside`` delay and play, or beside neither where that is simpler.
 
-    What is off for a while may have been taken for a delay or a play.
+    A temporary offset may have been taken for a delay or a play.
     """
     lags = [k for k in (DELAY, PLAY) if fit.values[k] != 0]
     if not lags:
@@ -149,15 +150,16 @@ def _simplest(fit: TravelFit, untold: list[int], noise: DriftNoise, beside: Stre
 
 
 def _beside(fit: TravelFit, untold: list[int], noise: DriftNoise) -> Stretch:
-    """Return the strongest stretch beside all that was found but the ``untold`` columns."""
+    """Return the strongest stretch beside all that was found, except the ``untold`` columns."""
     held = [k for k in range(len(SMOOTH)) if k != OFFSET and fit.values[k] == 0]
     return strongest_stretch(fit.with_columns(np.delete(fit.columns, [*held, *untold], axis=1), noise))
 
 
 def strongest_stretch(rest: Whitened) -> Stretch:
-    """Return the stretch that, off by a constant, explains most of what is left, of all behind a picture.
+    """Return the stretch of constant offset that explains most of the residual, among all after a picture.
 
-    What a stretch from a to b adds is a difference of sums up to b and up to a, and its information likewise.
+    The effect of a stretch from a to b is the difference of sums up to b and up to a, and so is its
+    information.
     """
     up_to = np.pad(np.cumsum(rest.weighted), (1, 0))
     places = np.arange(len(up_to))
@@ -178,27 +180,27 @@ def strongest_stretch(rest: Whitened) -> Stretch:
 
 
 def _shared(rest: Whitened, ends: Int) -> Float:
-    """Return the information (N + 1, E) that sums up to each picture share with those up to ``ends``."""
+    """Return the information (N + 1, E) that sums up to each picture share with sums up to ``ends``."""
     before = np.arange(len(rest.residual))[:, None] < ends
     return np.pad(np.cumsum(rest.beyond(before.astype(float)), axis=0), ((1, 0), (0, 0)))
 
 
 def _p_of(fit: TravelFit, off: Stretch, noise: DriftNoise) -> float:
-    """Return the chance of a stretch where fiducials place each picture, or by a way's random walk."""
+    """Return the p-value of a stretch, for independent places by fiducials or for a random walk."""
     return _p_of_places(fit, off, noise) if fit.sight.placed else _p_of_way(fit, off)
 
 
 def _p_of_places(fit: TravelFit, off: Stretch, noise: DriftNoise) -> float:
-    """Return the chance of a stretch by errors of fiducials: neighbouring pictures share them.
+    """Return the p-value of a stretch by errors of fiducials, which neighbouring pictures share.
 
-    The size is unsure by one picture's error at least, and by more where other effects look alike.
+    The size is uncertain by at least one picture's error, and by more where other effects look alike.
     """
     z = min(abs(off.size_mm) / noise.white_mm, np.sqrt(off.gain))
     return min(1.0, _tries(fit) * float(2 * norm.sf(z)))
 
 
 def _p_of_way(fit: TravelFit, off: Stretch) -> float:
-    """Return the chance of a stretch, or of all that is left, by a way's random walk: the lesser of two."""
+    """Return the p-value of a stretch, or of the whole residual, by a random walk: the smaller of both."""
     one = chance(off.gain / max(off.misfit, 1.0), _tries(fit), len(fit.sight.time_s))
     return min(1.0, 2 * min(one, fit.fits_p))
 
@@ -209,7 +211,7 @@ def _tries(fit: TravelFit) -> int:
 
 
 def _untold(fit: TravelFit, steps: Sequence[StepFound]) -> list[int]:
-    """Return which values are of pictures off in a row, or of steps that chance may make."""
+    """Return the indices of values for consecutive stray pictures, or for steps that chance may make."""
     found, out = iter(steps), []
     stray = {e.place: fit.values[4 + k] for k, e in enumerate(fit.events) if e.kind is EventKind.OUTLIER}
     for k, event in enumerate(fit.events):

@@ -1,7 +1,7 @@
-"""Lines in time: sinusoids in the camera's place across the pipe, and which pictures show them.
+"""Lines in the spectrum of the camera's position across the pipe, and which pictures show them.
 
 Harmonic F-test over orthogonal tapers: D. Thomson, "Spectrum estimation and harmonic analysis", Proc. IEEE,
-1982, § XIII. It compares a sinusoid with the noise right around its frequency, whatever the noise elsewhere.
+1982, § XIII. It compares a sinusoid with the noise close to its frequency, whatever the noise elsewhere.
 """
 
 from __future__ import annotations
@@ -24,14 +24,14 @@ _REPORTED = 1e-4
 _MOST = 4
 _SIGNIFICANT = 5.0
 _TRIALS = 40
-# Below this frequency the wander of a towed probe itself contains spectral lines. Debt: data/debts.md.
+# Below this frequency the drift of a towed probe itself contains spectral lines. Debt: data/debts.md.
 SLOWEST_HZ = 1.5
 _WANDER_HZ = 1.2
 LEAST_SAMPLES = 48
 
 
 def shows_apart(time_s: Float, frequency: float) -> bool:
-    """Return whether pictures at these times show the frequency apart from the probe's wander."""
+    """Return whether pictures at these times separate the frequency from the probe's slow drift."""
     rate = 1 / float(np.median(np.diff(time_s)))
     alias = abs(frequency - rate * round(frequency / rate))
     return bool(alias > SLOWEST_HZ or frequency < rate / 2)
@@ -40,14 +40,14 @@ def shows_apart(time_s: Float, frequency: float) -> bool:
 def amplitudes(
     time_s: Float, xy_mm: Float, frequency: float, start_s: float | None = None
 ) -> tuple[Float, float]:
-    """Return amplitudes (2, 2) along x and y of sine and cosine, wander taken out, and their 1 σ.
+    """Return amplitudes (2, 2) along x and y of sine and cosine, mm, beside slow drift, and their 1 σ.
 
-    Phases count from ``start_s``, else from the first picture.
+    Phases count from ``start_s``, or else from the first picture.
     """
     t = time_s - (time_s[0] if start_s is None else start_s)
     line = [np.sin(2 * np.pi * frequency * t), np.cos(2 * np.pi * frequency * t)]
     design = np.concatenate([np.stack(line, 1), wander(time_s)], 1)
-    # Chosen: with fewer pictures too few degrees of freedom are left for a σ.
+    # Chosen: with fewer pictures, too few degrees of freedom are left for a σ.
     if len(t) < 1.3 * design.shape[1]:
         return np.full((2, 2), np.nan), float("nan")
     solution = np.linalg.lstsq(design, xy_mm, rcond=1e-6)[0]
@@ -57,7 +57,7 @@ def amplitudes(
 
 
 def wander(time_s: Float) -> Float:
-    """Return (N, K) columns of whatever changes more slowly than lines are looked for."""
+    """Return columns (N, K) for whatever changes more slowly than the lines."""
     span = float(time_s[-1] - time_s[0])
     t = time_s - time_s[0]
     phase = np.pi / span * np.arange(1, int(2 * span * _WANDER_HZ) + 1) * t[:, None]
@@ -65,7 +65,7 @@ def wander(time_s: Float) -> Float:
 
 
 def swing_agreements(time_s: Float, xy_mm: Float, lit: Bool, frequency_hz: float) -> tuple[Agreement, ...]:
-    """Return whether disjoint pictures show one oscillation: size, direction and phase at its frequency."""
+    """Return whether disjoint pictures show one oscillation: the same size, direction and phase."""
     early = time_s <= (time_s[0] + time_s[-1]) / 2
     pairs = (
         (("first half of the pictures", early), ("second half of the pictures", ~early)),
@@ -79,7 +79,7 @@ def swing_agreements(time_s: Float, xy_mm: Float, lit: Bool, frequency_hz: float
 def _part(
     time_s: Float, xy_mm: Float, frequency_hz: float, where: str, use: Bool
 ) -> tuple[Part, Float] | None:
-    """Return what these pictures say, with its covariance (4, 4); None where they do not show the line."""
+    """Return the oscillation in these pictures, with its covariance (4, 4); None if they show none."""
     t = time_s[use]
     if use.sum() < LEAST_SAMPLES / 2 or not shows_apart(t, frequency_hz):
         return None
@@ -98,7 +98,7 @@ def _compared(first: Part, own: Float, second: Part, other: Float) -> Agreement 
 
 @dataclass(frozen=True)
 class Line:
-    """A sinusoid in the place across the pipe.
+    """A sinusoid in the position across the pipe.
 
     Attributes
     ----------
@@ -111,11 +111,11 @@ class Line:
     p_value : float
         Over all frequencies searched.
     lit_mm, laser_mm, share_sigma_mm : float
-        The amplitudes in lit and in laser pictures alone, and their 1 σ; NaN where one kind is missing or
-        its own rate hides the frequency among the probe's wander.
+        The amplitudes in lit and in laser pictures alone, and their 1 σ; NaN where one kind is missing or its
+        own rate aliases the frequency into the probe's slow drift.
     frequency_sigma_hz : float
     agreements : tuple of Agreement
-        What disjoint pictures say of each other's swing.
+        Whether disjoint pictures show the same oscillation.
     """
 
     frequency_hz: float
@@ -131,10 +131,10 @@ class Line:
 
     @property
     def explained_by(self) -> tuple[str, ...]:
-        """Effects that show so: a camera that swings shows in all pictures, a sheet only in its own."""
+        """Possible effects: an oscillating camera shows in all pictures, a rocking sheet only in its own."""
         if not np.isfinite(self.lit_mm + self.laser_mm):
             return ("probe_vibration", "laser_rocking")
-        # Swings that differ by less than 3 σ or a fifth (chosen) pass for equal.
+        # Amplitudes that differ by less than 3 σ or a fifth (chosen) count as equal.
         equal_mm = max(3 * self.share_sigma_mm, 0.2 * self.laser_mm)
         if abs(self.lit_mm - self.laser_mm) < equal_mm:
             return ("probe_vibration",)
@@ -144,11 +144,11 @@ class Line:
 
 
 def find_lines(time_s: Float, xy_mm: Float, lit: Bool, shown: Bool | None = None) -> tuple[Line, ...]:
-    """Return the lines in places (N, 2) at times (N,), the strongest first.
+    """Return the lines in positions (N, 2), mm, at times (N,), s, the strongest first.
 
-    ``lit`` (N,) tells the pictures in which the wall shows, with the laser or without it; ``shown`` (N,)
-    those that place the camera across the pipe themselves, else all. Places only carried over from
-    neighbours swing too little to be measured by.
+    ``lit`` (N,) marks the pictures in which the wall shows, with or without the laser; ``shown`` (N,) those
+    that determine the sideways position themselves, default all. Interpolated positions oscillate too little
+    to be used for the size.
     """
     lines: list[Line] = []
     if len(time_s) < LEAST_SAMPLES:
@@ -169,7 +169,7 @@ def find_lines(time_s: Float, xy_mm: Float, lit: Bool, shown: Bool | None = None
 
 
 def _strongest(time_s: Float, xy_mm: Float) -> tuple[float, float] | None:
-    """Return frequency and p-value of the largest line that stands out, or None."""
+    """Return frequency and p-value of the largest significant line, or None."""
     rate = 1 / float(np.median(np.diff(time_s)))
     even = time_s[0] + np.arange(int(np.round((time_s[-1] - time_s[0]) * rate)) + 1) / rate
     series = np.stack([np.interp(even, time_s, xy_mm[:, k]) for k in range(2)], 1)
@@ -191,7 +191,7 @@ def _strongest(time_s: Float, xy_mm: Float) -> tuple[float, float] | None:
     chance = np.minimum(fisher.sf(ratio, 4, 4 * (_TAPERS - 1)) * count, 1.0)
     if chance.min() > _REPORTED:
         return None
-    # What samples at two kinds of moments show of one line has images, which are weaker.
+    # Sampling at two kinds of moments makes images of one line, which are weaker.
     best = int(np.argmax(np.where(chance < _REPORTED, power, 0.0)))
     return float(frequency[best]), float(chance[best])
 
@@ -206,7 +206,7 @@ def _measured(time_s: Float, xy_mm: Float, lit: Bool, frequency: float, p_value:
         clear = kind.sum() >= LEAST_SAMPLES / 2 and shows_apart(time_s[kind], frequency)
         shares.append(amplitudes(time_s[kind], xy_mm[kind], frequency) if clear else (both * np.nan, np.nan))
     size, span = float(np.linalg.norm(direction @ both)), float(time_s[-1] - time_s[0])
-    # Of one line in white noise, and the grid it was sought on.
+    # Error of one line in white noise, and of the search grid.
     turning = np.hypot(np.sqrt(3) / np.pi * sigma / max(size, 1e-9), 1 / _TRIALS) / span
     one, other = (float(np.linalg.norm(direction @ s[0])) for s in shares)
     return Line(
@@ -217,14 +217,14 @@ def _measured(time_s: Float, xy_mm: Float, lit: Bool, frequency: float, p_value:
 
 
 def _refined(time_s: Float, xy_mm: Float, frequency: float) -> float:
-    """Return the frequency near ``frequency`` at which a sinusoid takes most."""
+    """Return the frequency near ``frequency`` at which a sinusoid explains most."""
     width = 1 / (time_s[-1] - time_s[0])
     trial = frequency + width * np.linspace(-0.5, 0.5, _TRIALS + 1)
     return float(trial[np.argmax([np.linalg.norm(amplitudes(time_s, xy_mm, f)[0]) for f in trial])])
 
 
 def _without(time_s: Float, xy_mm: Float, lit: Bool, line: Line) -> Float:
-    """Return the places less the line, as lit and as laser pictures show it where both tell."""
+    """Return the positions minus the line, as lit and as laser pictures show it where both determine it."""
     out = xy_mm.copy()
     whole = np.ones(len(time_s), bool)
     for kind in (lit, ~lit) if np.isfinite(line.share_sigma_mm) else (whole,):

@@ -1,7 +1,7 @@
 """Model of the encoder against the visual distance: offset, scale, delay, play, and single events.
 
-An effect estimated from disjoint parts of the travel lets each part predict the other: a column is split by
-increments, and what it adds between two pictures belongs to one part.
+An effect estimated from disjoint parts of the travel gives two predictions: a column is split by increments,
+and what it adds between two pictures belongs to one part.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ from stages.diagnose.travel.solve import (
 )
 
 _AROUND = 10
-# Share of the usual information that a picture must add to what others tell of it.
+# Share of the usual information that a picture must add to what the others determine of it.
 _TOLD = 1e-6
 
 
@@ -47,10 +47,10 @@ class EventKind(StrEnum):
 
 @dataclass(frozen=True)
 class Event:
-    """Something between frames ``place`` − 1 and ``place`` of a `Sight` (an outlier: in frame ``place``).
+    """An event between frames ``place`` − 1 and ``place`` of a `Sight` (an outlier: in frame ``place``).
 
-    A step that takes its time began ``during`` pictures earlier. How far it has come in each of these is
-    free: a wheel need not slip evenly.
+    A lasting step began ``during`` pictures earlier. How far it has progressed in each of these is free: a
+    wheel need not slip evenly.
     """
 
     kind: EventKind
@@ -60,28 +60,28 @@ class Event:
 
 @dataclass(frozen=True)
 class TravelFit:
-    """Encoder against sight, fitted.
+    """The fitted model of the encoder against the visual distance.
 
     Attributes
     ----------
     sight : Sight
     events : tuple of Event
     values : (4 + E + D,)
-        Offset in mm, scale, delay in s, play in mm; then gains in mm (for lost time: in s); then how far off
-        each picture is that was taken during an event.
+        Offset in mm, scale, delay in s, play in mm; then gains in mm (for lost time: in s); then the offset
+        of each picture taken during an event.
     covariance : (4 + E + D, 4 + E + D)
-        Infinite variance where this motion tells nothing.
+        Infinite variance where this motion does not determine a value.
     noise : DriftNoise
     difference_mm : (N,)
-        Reading − sight, less the offset only.
+        Reading − visual distance, minus only the offset.
     whitened : Whitened
         Around ``values``.
     columns : (N, 4 + E + D)
-        What each value adds to reading − sight, per unit.
+        What each value adds to reading − visual distance, per unit.
     told_apart : bool
-        Whether delay or play is there, and the other does not explain it nearly as well.
+        Whether delay or play is present and the other does not explain it nearly as well.
     without : tuple of str
-        Effects that are not known to who fits.
+        Effects that are treated as unknown.
     """
 
     sight: Sight
@@ -102,14 +102,14 @@ class TravelFit:
 
     @property
     def stated_mm(self) -> Float:
-        """(N,) reading − sight with nothing but the offset taken out."""
+        """(N,) reading − visual distance, minus only the offset."""
         return self.difference_mm - float(np.mean(self.difference_mm))
 
     @property
     def left_out_mm(self) -> tuple[Float, Float]:
-        """(K,) by how much pictures are missed when all the others predict them, and 1 σ of that.
+        """(K,) error of each picture as predicted from all others, and 1 σ of that.
 
-        Pictures that an event leaves free are none of them.
+        Pictures that an event leaves free are not included.
         """
         parts = candidate_columns(self.sight, EventKind.OUTLIER, np.zeros(0))
         own = np.concatenate([self.whitened.information(part) for part in parts])
@@ -117,18 +117,18 @@ class TravelFit:
         return self.whitened.weighted[told] / own[told], own[told] ** -0.5
 
     def with_columns(self, columns: Float, noise: DriftNoise | None = None) -> Whitened:
-        """Return the fit of other columns (N, C) in place of its own, with another noise if one is given."""
+        """Return the fit with other columns (N, C), and with another noise if one is given."""
         difference_mm = self.whitened.residual + self.columns @ self.whitened.estimate
         return whitened_fit(difference_mm, columns, (noise or self.noise).precision(self.sight.path_mm))
 
     @property
     def left_over(self) -> float:
-        """χ² of what is left for each degree of freedom; 1 where it is the measured noise."""
+        """Remaining χ² per degree of freedom; 1 where the residual is the measured noise."""
         return _left_over(self.whitened, len(self.values))
 
     @property
     def fits_p(self) -> float:
-        """Chance that noise leaves so much."""
+        """Probability that noise makes such a residual."""
         count = len(self.difference_mm)
         return chance_of_noise(self.left_over, count - len(self.values), count)
 
@@ -143,11 +143,11 @@ def fitted(
     sight: Sight, encoder: Encoder, events: tuple[Event, ...], noise: DriftNoise | None,
     without: tuple[str, ...] = (),
 ) -> TravelFit:  # fmt: skip
-    """Fit offset, scale, delay, play and given events; the noise is measured unless given.
+    """Fit offset, scale, delay, play and given events; the noise is estimated unless given.
 
-    The delay moves the time at which the encoder is read, so that kinks of the motion do no harm; it and the
-    play are found by least absolute deviations first, which unknown events do not disturb. What the effects
-    ``without`` which it is fitted do to a reading is taken for nothing.
+    The delay shifts the time at which the encoder is read, so that kinks of the motion do no harm; delay and
+    play are first found by least absolute deviations, which unknown events do not disturb. Effects in
+    ``without`` are taken to be zero.
     """
     speed = np.gradient(sight.distance_mm, sight.time_s)
     steady = _without_steps(sight, encoder, events)
@@ -163,7 +163,7 @@ def fitted(
     whitened = whitened_fit(end.difference_mm, end.columns, precision)
     values = end.values(precision)
     plain = readings_at(encoder, sight.time_s) - sight.distance_mm
-    # Noise is measured from the pictures' usual steps: what is left in all may be more, never less.
+    # Noise is estimated from the pictures' usual steps: the total residual may be larger, never smaller.
     covariance = max(_left_over(whitened, len(values)), 1.0) * whitened.covariance
     covariance[SCALE, SCALE] += sight.scale_sigma**2
     values[4 : 4 + len(events)] += [_gain(encoder, sight, e) for e in events]
@@ -179,8 +179,8 @@ def _left_over(whitened: Whitened, fitted_values: int) -> float:
 
 
 def moment(sight: Sight, encoder: Encoder, place: int) -> int:
-    """Return the reading after which it jumped most between two pictures: readings come more often."""
-    # One reading more on either side: pictures and readings are stamped to about that.
+    """Return the reading after which it jumped most between two pictures; readings are more frequent."""
+    # One reading more on either side: that is the accuracy of the stamps of pictures and readings.
     stamp = float(np.median(np.diff(encoder.time_s)))
     before, after = sight.time_s[place - 1] - stamp, sight.time_s[place] + stamp
     inside = np.flatnonzero((encoder.time_s[1:] >= before) & (encoder.time_s[:-1] <= after))
@@ -191,7 +191,7 @@ def moment(sight: Sight, encoder: Encoder, place: int) -> int:
 
 
 def _gain(encoder: Encoder, sight: Sight, event: Event) -> float:
-    """Return what one reading gains at a step beyond its neighbours, mm; 0 for other and longer events."""
+    """Return by how much one reading jumps beyond its neighbours at a short step, mm; else 0."""
     if event.kind is not EventKind.STEP or event.during:
         return 0.0
     k = moment(sight, encoder, event.place)
@@ -200,7 +200,7 @@ def _gain(encoder: Encoder, sight: Sight, event: Event) -> float:
 
 
 def _without_steps(sight: Sight, encoder: Encoder, events: tuple[Event, ...]) -> Encoder:
-    """Return the readings less what jumps between two of them, so that they may be read a little off time."""
+    """Return the readings without jumps between two of them, so that small errors of time do no harm."""
     distance = encoder.distance_mm.copy()
     for event in events:
         distance[moment(sight, encoder, event.place) + 1 :] -= _gain(encoder, sight, event)
@@ -217,36 +217,36 @@ def event_columns(sight: Sight, events: tuple[Event, ...], speed: Float) -> Floa
 
 
 def candidate_columns(sight: Sight, kind: EventKind, speed: Float) -> Iterator[Float]:
-    """Yield the columns (N, M) of an event of that kind at every place, `AT_ONCE` places at a time."""
+    """Yield the columns (N, M) of an event of this kind at every place, `AT_ONCE` places at a time."""
     count = len(sight.time_s)
     for places in np.array_split(np.arange(count), count // AT_ONCE + 1):
         yield _columns_at(sight, kind, speed, places)
 
 
 def _columns_at(sight: Sight, kind: EventKind, speed: Float, places: Int) -> Float:
-    """Return (N, M): the columns of events of that kind at places (M,)."""
+    """Return the columns (N, M) of events of this kind at places (M,)."""
     frame = np.arange(len(sight.time_s))[:, None]
     if kind is EventKind.OUTLIER:
         return np.asarray(frame == places, np.float64)
     after = np.asarray(frame >= places, np.float64)
-    # Frames missing after a moment: pictures are later than their times say, by what the probe then moves.
+    # With frames missing after a moment, pictures are later than their stamps, by what the probe then moves.
     return after if kind is EventKind.STEP else -after * speed[:, None]
 
 
 def second_predictions(
     fit: TravelFit, column: int, allowed: float = 0.0, known: float = 0.0
 ) -> tuple[Agreement, ...]:
-    """Return what disjoint parts of the travel say of the effect of a column, those that tell enough.
+    """Return whether disjoint parts of the travel agree on the effect of a column, where precise enough.
 
-    ``allowed`` is 1 σ by which each part may be off for what is no noise of single readings; ``known`` is how
-    much of the size another effect makes, in the column's unit.
+    ``allowed`` is the 1 σ of errors of each part beyond the noise of single readings; ``known`` is the part
+    of the size that another effect makes, in the column's unit.
     """
     each = [_compared(fit, column, words, first, allowed, known) for words, first in _splits(fit, column)]
     return tuple(a for a in each if a is not None)
 
 
 def _splits(fit: TravelFit, column: int) -> list[tuple[tuple[str, str], Bool]]:
-    """Return names of two parts, and which steps (N − 1,) from picture to picture belong to the first."""
+    """Return the names of two parts, and which steps (N − 1,) between pictures belong to the first."""
     if column == SCALE:
         path = fit.sight.path_mm
         halves = (("first half of the way", "second half of the way"), path[1:] <= path[-1] / 2)
@@ -260,7 +260,7 @@ def _splits(fit: TravelFit, column: int) -> list[tuple[tuple[str, str], Bool]]:
 
 
 def _turn(step: Float) -> Int:
-    """Return the number (N − 1,) of the reversal to which each step of the play's column belongs."""
+    """Return the number (N − 1,) of the reversal that each step of the play's column belongs to."""
     moved = np.flatnonzero(np.abs(step) > 1e-9)
     if not len(moved):
         return np.zeros(len(step), np.int64)
@@ -287,7 +287,7 @@ def _compared(
 
 
 def split(fit: TravelFit, column: int, first: Bool) -> tuple[Float, Float]:
-    """Return a column's size (2,) in two parts with its covariance (2, 2), all others shared."""
+    """Return a column's size (2,) in two parts with its covariance (2, 2), with all others in common."""
     step = np.diff(fit.columns[:, column])
     halves = [np.concatenate([[0.0], np.cumsum(np.where(mask, step, 0.0))]) for mask in (first, ~first)]
     design = np.column_stack([np.delete(fit.columns, column, 1), *halves])

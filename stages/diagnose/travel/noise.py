@@ -1,4 +1,4 @@
-"""Noise of an encoder's readings that drifts along the way, and least squares under it."""
+"""Noise of an encoder's readings that drifts with distance, and least squares with that noise."""
 
 from __future__ import annotations
 
@@ -11,21 +11,22 @@ from scipy.stats import f as fisher
 
 from pipeline.arrays import Float
 
-# So many columns as long as the run are looked at together: all of them would take its square.
+# Number of columns as long as the run that are processed together: all of them would need its square in
+# memory.
 AT_ONCE = 256
-# Columns of length 1 are told apart to this share: a root of what doubles resolve.
+# Columns of length 1 count as dependent below this residual: the square root of the resolution of doubles.
 SOLID = 1e-8
 
 
 @dataclass(frozen=True)
 class DriftNoise:
-    """White noise of ``white_mm`` in each difference, and a random walk of ``drift_mm`` per √mm of way."""
+    """White noise of ``white_mm`` in each difference, and a random walk of ``drift_mm`` per √mm of travel."""
 
     white_mm: float
     drift_mm: float
 
     def precision(self, path_mm: Float) -> Precision:
-        """Return it at ways (N,), which never go back."""
+        """Return its inverse covariance at travelled distances (N,), which never decrease."""
         step = np.diff(path_mm, prepend=path_mm[0])
         band = np.zeros((2, len(path_mm)))
         band[0] = 2 * self.white_mm**2 + self.drift_mm**2 * step
@@ -36,7 +37,7 @@ class DriftNoise:
 
 @dataclass(frozen=True)
 class Precision:
-    """Inverse K⁻¹ of the covariance of N differences, whose steps hang together with their neighbours alone.
+    """Inverse K⁻¹ of the covariance of N differences, in which only neighbouring steps are correlated.
 
     Attributes
     ----------
@@ -70,7 +71,7 @@ class Whitened:
     weighted_columns : (N, C)
         K⁻¹ columns.
     inverse : (C, C)
-        Inverse of the columns' information, 0 in directions that say nothing.
+        Inverse of the columns' information, 0 in undetermined directions.
     """
 
     estimate: Float
@@ -82,21 +83,21 @@ class Whitened:
     inverse: Float
 
     def beyond(self, values: Float) -> Float:
-        """Return K⁻¹ times values (N, M), less what the columns take."""
+        """Return K⁻¹ times values (N, M), minus what the columns explain."""
         return self.precision.times(values) - self.weighted_columns @ self.inverse @ (
             self.weighted_columns.T @ values
         )
 
     def information(self, candidates: Float) -> Float:
-        """Return (M,) that of candidate columns (N, M), each alone beside the columns."""
+        """Return the information (M,) of candidate columns (N, M), each alone beside the columns."""
         return np.asarray(np.einsum("nm,nm->m", candidates, self.beyond(candidates)))
 
     def gain(self, candidates: Float) -> tuple[Float, Float]:
-        """Return estimates (M,) and scores z² (M,) that each candidate column (N, M) alone would add."""
+        """Return the estimate (M,) and score z² (M,) of each candidate column (N, M), added alone."""
         return self.gain_in_parts([candidates])
 
     def gain_in_parts(self, parts: Iterable[Float]) -> tuple[Float, Float]:
-        """Return what `gain` does of all candidate columns, some (N, M) of them at a time."""
+        """Return `gain` for all candidate columns, processed some (N, M) at a time."""
         each = [(self.information(part), part.T @ self.weighted) for part in parts]
         information, score = (np.concatenate(one) for one in zip(*each, strict=True))
         seen = information > 1e-9 * np.max(information, initial=1e-30)
@@ -105,7 +106,7 @@ class Whitened:
 
 
 def whitened_fit(difference_mm: Float, columns: Float, precision: Precision) -> Whitened:
-    """Return the generalised least-squares fit; columns that say nothing get no estimate (σ infinite)."""
+    """Return the generalised least-squares fit; undetermined columns get no estimate (σ infinite)."""
     weighted_columns = precision.times(columns)
     information = columns.T @ weighted_columns
     scale = 1 / np.sqrt(np.maximum(np.diag(information), 1e-30))
@@ -123,8 +124,8 @@ def whitened_fit(difference_mm: Float, columns: Float, precision: Precision) -> 
 
 
 def chance_of_noise(left_over: float, free: int, pictures: int) -> float:
-    """Return the chance that noise leaves so much χ² for each of its ``free`` degrees of freedom (F test).
+    """Return the probability that noise leaves such a χ² per each of ``free`` degrees of freedom (F test).
 
-    The noise itself is measured by medians, which tell it as well as a third of the pictures would.
+    The noise itself is estimated by medians, which are about as precise as a third of the pictures.
     """
     return float(fisher.sf(left_over, max(free, 1), max(pictures / 3, 1.0)))

@@ -1,4 +1,4 @@
-"""Distance travelled as seen, without the encoder, beside its readings; where the probe turned."""
+"""Distance travelled according to pictures alone, the encoder's readings, and where the probe turned."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from pipeline.recording.base import Encoder, Illumination, Recording
 from stages.diagnose.effects.base import Travel
 from stages.diagnose.effects.library import LIBRARY
 
-# 1 σ of a picture's place by fiducials, which may be put there wrongly. Debt: data/debts.md.
+# 1 σ of a picture's position from fiducials, which may be misplaced. Debt: data/debts.md.
 PLACED_SIGMA_MM = 0.05
 _END_READINGS = 20
 _ROUNDING_MM, _WHOLE = 2e-4, 0.02
@@ -21,7 +21,7 @@ _ROUNDING_MM, _WHOLE = 2e-4, 0.02
 
 @dataclass(frozen=True)
 class Sight:
-    """The camera's way as seen, in frames whose own picture places the camera along the pipe.
+    """The camera's motion in frames whose own picture determines its position along the pipe.
 
     Attributes
     ----------
@@ -31,13 +31,13 @@ class Sight:
     distance_mm : (N,)
         Along the pipe; from poses estimated without the encoder.
     path_mm : (N,)
-        Way travelled to and fro: what drift accumulates over.
+        Total path travelled to and fro, over which drift accumulates.
     scale_sigma : float
         Relative 1 σ of the scale of ``distance_mm``.
     frame_time_s : float
         Usual time from one frame of the recording to the next.
     placed : bool
-        Whether fiducials place every picture, so that none of its errors lasts.
+        Whether fiducials determine every picture independently, so that errors do not persist.
     """
 
     frame: Int
@@ -50,7 +50,7 @@ class Sight:
 
     @cached_property
     def direction(self) -> Float:
-        """(N,) +1 or −1: which way the probe moves, or moved before it stopped."""
+        """(N,) +1 or −1: the direction of the probe's motion, or of the last one before it stopped."""
         step = np.gradient(self.distance_mm)
         # The probe stands where a step is below a twentieth of the usual one (chosen).
         still = np.abs(step) < 0.05 * np.percentile(np.abs(step), 90)
@@ -72,10 +72,10 @@ class Sight:
 
 
 def sight_of_trajectory(recording: Recording, trajectory: Trajectory) -> Sight:
-    """Return the way in a field recording, from a trajectory made without the encoder.
+    """Return the motion in a field recording, from a trajectory made without the encoder.
 
-    Only lit frames: in the others the pose is carried on from its neighbours. Frames whose texture was lost
-    are left out.
+    Only lit frames are used: in the others the pose is interpolated. Frames whose texture was lost are left
+    out.
     """
     lit = np.isin(trajectory.frame, recording.frames.of(Illumination.LED, Illumination.BOTH))
     for event in trajectory.events:
@@ -85,14 +85,14 @@ def sight_of_trajectory(recording: Recording, trajectory: Trajectory) -> Sight:
 
 
 def sight_of_poses(recording: Recording, T_pc: Float, index: Int, scale_sigma: float) -> Sight:
-    """Return the way in a gauge run from poses (N, 4, 4), where fiducials (``index``) show it."""
+    """Return the motion in a gauge run from poses (N, 4, 4), in frames with fiducials (``index``)."""
     posed = np.zeros(len(T_pc), bool)
     posed[index] = True
     return replace(_sight(recording, recording.frames.frame, T_pc[:, 2, 3], posed, scale_sigma), placed=True)
 
 
 def readings_at(encoder: Encoder, time_s: Float) -> Float:
-    """Return readings (N,) at times (N,); beyond the ends as if the speed there were held."""
+    """Return readings (N,) at times (N,), extrapolated with constant speed beyond the ends."""
     held = np.clip(time_s, encoder.time_s[0], encoder.time_s[-1])
     last = min(_END_READINGS, len(encoder.time_s) - 1)
     early = (encoder.distance_mm[last] - encoder.distance_mm[0]) / (encoder.time_s[last] - encoder.time_s[0])
@@ -133,7 +133,7 @@ class Turns:
 def turns_between(sight: Sight, steady: Encoder, delay_s: float) -> Turns:
     """Return where the probe turned between pictures: as far beyond the last one as the reading still went.
 
-    Until it turns, the reading follows the probe, whatever play there is after that.
+    Until it turns, the reading follows the probe, whatever play follows.
     """
     way = sight.direction
     before = np.flatnonzero(way[1:] != way[:-1])
@@ -155,7 +155,7 @@ def turns_between(sight: Sight, steady: Encoder, delay_s: float) -> Turns:
 
 
 def lag_mm(sight: Sight, turns: Turns, play_mm: float) -> Float:
-    """Return (N,) by how much readings are ahead for play of that size."""
+    """Return by how much (N,), mm, readings are ahead for play of that size."""
     way = np.insert(sight.distance_mm, turns.place, turns.distance_mm)
     same = np.zeros(len(way))
     travel = Travel(same, way, same)

@@ -1,4 +1,4 @@
-"""Offset, scale, delay and play of an encoder by least absolute deviations; the noise that is left."""
+"""Offset, scale, delay and play of an encoder by least absolute deviations, and the noise that remains."""
 
 from __future__ import annotations
 
@@ -18,22 +18,23 @@ OFFSET, SCALE, DELAY, PLAY = range(4)
 SMOOTH = ("offset", "encoder_scale", "time_offset", "encoder_backlash")
 _ROUNDS = 6
 _LONGEST_S = 1.0
-# The search for delay and play: points a side, finest step, tries of the play, rounds; speeds that differ by
-# less than this share tell nothing of a delay.
+# Search for delay and play: points per side, finest step, tries of the play, rounds; relative spread of speed
+# below which a delay is not determined.
 _SEARCHED, _FINEST_S, _PLAYS, _QUICKLY, _SPEEDS = 8, 1e-3, 3, 8, 0.02
 _WIDEST_MM, _PLAY_STEP_MM = 10.0, 0.025
-# χ² of one number exceeds 19.5 by chance once in 10⁵; 23 leaves a margin for noise that is not quite normal.
+# χ² of one parameter exceeds 19.5 by chance once in 10⁵; 23 leaves a margin for noise that is not exactly
+# normal.
 FAR_BETTER = 23.0
 _LEAST_WHITE_MM = 0.002
 _LAGS = (2, 4, 8, 16, 32)
-# Increments a lag needs at least: one or two steps among twelve do not move their median by much.
+# Least number of increments per lag: one or two steps among twelve do not change their median by much.
 _PER_LAG = 12
 _REWEIGHTINGS = 30
 
 
 @dataclass(frozen=True)
 class Asked:
-    """What is fitted: readings less their jumps against the way seen (N,), and what events add (N, E + D)."""
+    """Inputs of a fit: readings without jumps, visual distance (N,), and columns of events (N, E + D)."""
 
     sight: Sight
     steady: Encoder
@@ -44,14 +45,14 @@ class Asked:
 
 @dataclass(frozen=True)
 class End:
-    """Where a fit came to: reading − sight (N,), columns (N, 4 + E) there, and which are held at 0."""
+    """The result of a fit: reading − visual distance (N,), columns (N, 4 + E) there, and those held at 0."""
 
     held: tuple[int, ...]
     difference_mm: Float
     columns: Float
 
     def values(self, precision: Precision) -> Float:
-        """Return (4 + E,) the values; 0 of what is held, and of what this motion does not tell."""
+        """Return the values (4 + E,); 0 for those held, and those that this motion does not determine."""
         free = _free(self.columns, self.held)
         fit = whitened_fit(self.difference_mm, self.columns[:, free], precision)
         out = np.zeros(self.columns.shape[1])
@@ -59,7 +60,7 @@ class End:
         return out
 
     def misfit(self, precision: Precision) -> float:
-        """Return χ² of what is left."""
+        """Return χ² of the residual."""
         free = _free(self.columns, self.held)
         fit = whitened_fit(self.difference_mm, self.columns[:, free], precision)
         return float(fit.residual @ fit.weighted)
@@ -70,7 +71,7 @@ def _free(columns: Float, held: tuple[int, ...]) -> Int:
 
 
 def starts(asked: Asked, delay_s: float, play_mm: float) -> list[tuple[tuple[int, ...], tuple[float, float]]]:
-    """Return what is held at 0 and from where the rest starts: neither, each alone, and last of all both."""
+    """Return what is held at 0, and the start of the rest: nothing held, each alone, and finally both."""
     every = [
         ((DELAY, PLAY), (0.0, 0.0)),
         ((PLAY,), (0.0, 0.0)), ((PLAY,), (delay_s, 0.0)),
@@ -82,7 +83,7 @@ def starts(asked: Asked, delay_s: float, play_mm: float) -> list[tuple[tuple[int
 
 
 def simplest(ends: Sequence[End], precision: Precision) -> tuple[End, bool]:
-    """Return the simplest solution that no other beats by far, and whether delay and play are told apart.
+    """Return the simplest solution that no other beats by far, and whether delay and play are distinguished.
 
     Delay and play can imitate or cancel each other, so that each is kept only where it improves the fit much.
     """
@@ -96,7 +97,7 @@ def simplest(ends: Sequence[End], precision: Precision) -> tuple[End, bool]:
 
 
 def refined(asked: Asked, start: tuple[float, float], held: tuple[int, ...]) -> End:
-    """Return where a fit comes to from a delay and a play, some columns being held at 0."""
+    """Return the result of a fit from a start of delay and play, with some columns held at 0."""
     delay_s, play_mm = start
     for _ in range(_ROUNDS):
         reading = readings_at(asked.steady, asked.sight.time_s + delay_s)
@@ -112,9 +113,10 @@ def refined(asked: Asked, start: tuple[float, float], held: tuple[int, ...]) -> 
 
 
 def nearest_start(asked: Asked) -> tuple[float, float]:
-    """Return delay and play from which the fit starts, by search: play can look like delay from afar.
+    """Return the start of delay and play, found by search: play can look like delay from afar.
 
-    Where the speed changes at once, a delay shows in a few pictures only, and its slope there tells little.
+    Where the speed changes abruptly, a delay is visible in a few pictures only, and its gradient there is of
+    little use.
     """
     best, play_mm, width, speed = 0.0, 0.0, _LONGEST_S, asked.speed
     if np.ptp(speed) < _SPEEDS * float(np.max(np.abs(speed), initial=1e-9)):
@@ -130,7 +132,7 @@ def nearest_start(asked: Asked) -> tuple[float, float]:
 
 
 def _misfit_at_delay(asked: Asked, delay_s: float) -> tuple[float, float]:
-    """Return the sum of absolute increments left at a delay, and the play at which they are least."""
+    """Return the sum of absolute increments left at a delay, and the play that minimises it."""
     difference = readings_at(asked.steady, asked.sight.time_s + delay_s) - asked.sight.distance_mm
     turns = turns_between(asked.sight, asked.steady, delay_s)
     left, play_mm = np.inf, 0.0
@@ -148,10 +150,10 @@ def _within(value: float, most: float) -> float:
 
 
 def _smooth_columns(asked: Asked, turns: Turns, play_mm: float) -> tuple[Float, Float]:
-    """Return (N, 4) columns of offset, scale, delay and play, and what (N,) the play's is off at its size.
+    """Return columns (N, 4) of offset, scale, delay and play, and a correction (N,) of the play's column.
 
-    What the play does to a reading is the column times the size less the second. Columns of what is not known
-    are 0.
+    The effect of the play on a reading is the column times the size minus the correction. Columns of unknown
+    effects are 0.
     """
     sight = asked.sight
     low, here, high = (lag_mm(sight, turns, play_mm + step) for step in (-_PLAY_STEP_MM, 0.0, _PLAY_STEP_MM))
@@ -163,12 +165,12 @@ def _smooth_columns(asked: Asked, turns: Turns, play_mm: float) -> tuple[Float, 
 
 
 def estimated_noise(difference_mm: Float, columns: Float, path_mm: Float, least_mm: float) -> DriftNoise:
-    """Return the noise of differences (N,), what columns (N, C) explain taken out, whatever events are in it.
+    """Return the noise of differences (N,) beside columns (N, C), whatever events they contain.
 
-    Steps of the differences are few, whatever slips there are, so least absolute deviations and medians of
-    increments see past them. Drift is the largest that increments over several lags show, so that drift
-    smoother than a random walk is not mistaken for events. No less than ``least_mm`` is believed: increments
-    of an even motion may hit the readings' quanta alike.
+    Events are few steps of the differences, so that least absolute deviations and medians of increments
+    ignore them. Drift is the largest that increments over several lags show, so that drift smoother than a
+    random walk is not mistaken for events. It is at least ``least_mm``: increments of a uniform motion may
+    all be rounded alike by the readings' quanta.
     """
     left = difference_mm - columns @ robust_coefficients(difference_mm, columns)
     one = _increment_variance(left, 1)
@@ -187,7 +189,7 @@ def _increment_variance(values: Float, lag: int) -> float:
 
 
 def robust_coefficients(values: Float, columns: Float, rounds: int = _REWEIGHTINGS) -> Float:
-    """Return coefficients (C,) of least absolute deviations of the increments (iterated reweighting)."""
+    """Return coefficients (C,) by least absolute deviations of the increments (iterated reweighting)."""
     y, a = np.diff(values), np.diff(columns, axis=0)
     scale = np.maximum(np.linalg.norm(a, axis=0), 1e-12)
     even, found = a / scale, np.zeros(columns.shape[1])
@@ -200,8 +202,9 @@ def robust_coefficients(values: Float, columns: Float, rounds: int = _REWEIGHTIN
 def _least_squares(columns: Float, values: Float) -> Float:
     """Return the shortest (C,) that fits values (N,) best; directions below `SOLID` of the largest get 0.
 
-    By an orthogonal factorisation with pivots, called without NumPy's and SciPy's wrappers: those, and the
-    singular values by which they tell the rank, take ten times as long, and searches ask this 20,000 times.
+    By an orthogonal factorisation with pivots, called without the wrappers of NumPy and SciPy: those, and the
+    singular values by which they determine the rank, take ten times as long, and searches call this 20,000
+    times.
     """
     n, count = columns.shape
     if not columns.size:

@@ -1,4 +1,4 @@
-"""Steps of the reading: when, how large, how long, and what else would explain them."""
+"""Steps of the reading: their time, size and duration, and what else would explain them."""
 
 from __future__ import annotations
 
@@ -17,21 +17,21 @@ from stages.diagnose.travel.sight import Sight, quantum_mm, readings_at
 
 # Explanations whose χ² differs by less than this (3 σ squared) are both kept.
 _APART = 9.0
-# So many neighbouring frames may be lost without a trace in the time stamps; error of a stamp, frames.
+# Number of neighbouring frames that may be lost without a trace in the time stamps; error of a stamp, frames.
 # Debt: data/debts.md.
 _UNNOTICED = 2
 _WITHIN, _TIMING = 3.0, 0.03
-# Least number of readings around a slip that its speed is taken from. Debt: data/debts.md.
+# Least number of readings around a slip from which its speed is taken. Debt: data/debts.md.
 _AROUND = 8
-# Least number of other moments that tell how far a reading's own motion imitates a slip.
+# Least number of other moments that show how far a reading's own motion imitates a slip.
 _LEAST_OTHERS = 20
 _TAIL = 2.275
-# Chance of an even slip that is called uneven: its size then comes from single pictures, as for any slip.
+# Probability that an even slip is called uneven: its size then comes from single pictures, as for any slip.
 _EVEN = 1e-3
 
 
 def jump_of_reading(encoder: Encoder, at: int, lasting_mm: float, sigma_mm: float) -> Agreement | None:
-    """Return whether the reading jumps by what it keeps on gaining on the pictures; None when it cannot tell.
+    """Return whether the reading jumps by what it has permanently gained on the pictures; None if unclear.
 
     Parameters
     ----------
@@ -44,7 +44,7 @@ def jump_of_reading(encoder: Encoder, at: int, lasting_mm: float, sigma_mm: floa
 
 
 def _told_by_reading(lasting_mm: float, sigma_mm: float, jump: float, sigma: float) -> Agreement | None:
-    """Return whether the reading's own jump, with 1 σ, is what it keeps on gaining on the pictures."""
+    """Return whether the reading's own jump, with 1 σ, equals what it has gained on the pictures since."""
     if not np.isfinite(sigma):
         return None
     lasting = Part(
@@ -59,7 +59,7 @@ def _told_by_reading(lasting_mm: float, sigma_mm: float, jump: float, sigma: flo
 
 
 def reading_jump(encoder: Encoder, at: int) -> tuple[float, float]:
-    """Return what the reading gains around a moment beyond its own speed before and after, mm, and 1 σ.
+    """Return what the reading gains at a moment beyond its own speed before and after, mm, and 1 σ.
 
     NaN too close to the ends.
     """
@@ -74,8 +74,8 @@ def reading_jump(encoder: Encoder, at: int) -> tuple[float, float]:
 def _filtered(step: Float, weight: Float, first: int) -> tuple[float, float]:
     """Return the weighted sum of the steps from ``first`` on, and 1 σ.
 
-    1 σ is a quarter of the range that holds the same sum at 95.4 % of all other moments, turns and bursts
-    included. NaN where the steps do not reach, or there are too few other moments.
+    1 σ is a quarter of the range that contains 95.4 % of the same sums at all other moments, including turns
+    and bursts. NaN where the steps do not reach, or there are too few other moments.
     """
     if not 0 <= first <= len(step) - len(weight):
         return float("nan"), float("nan")
@@ -88,10 +88,10 @@ def _filtered(step: Float, weight: Float, first: int) -> tuple[float, float]:
 
 
 def course_of_reading(fit: TravelFit, place_in_list: int, encoder: Encoder) -> Agreement | None:
-    """Return whether the reading's own motion shows a slip that lasts, as pictures and readings together do.
+    """Return whether the reading's own motion shows a lasting slip like pictures and readings together.
 
-    How the slip goes on from picture to picture is taken from both; how large it is, from the reading alone,
-    as what is not motion at an even acceleration. None when it cannot tell.
+    The progress of the slip from picture to picture is taken from both; its size from the reading alone, as
+    what is not motion at constant acceleration. None when it is too uncertain.
     """
     event, sight = fit.events[place_in_list], fit.sight
     gain_mm, sigma = float(fit.values[4 + place_in_list]), float(fit.sigma[4 + place_in_list])
@@ -105,7 +105,7 @@ def course_of_reading(fit: TravelFit, place_in_list: int, encoder: Encoder) -> A
 
 
 def _course(fit: TravelFit, place_in_list: int) -> Float:
-    """Return what the reading gains from picture to picture while an event lasts, (during + 1,) mm."""
+    """Return what the reading gains from picture to picture during an event (during + 1,), mm."""
     event = fit.events[place_in_list]
     gained = fit.difference_mm - fit.columns[:, 1:4] @ fit.values[1:4]
     return np.diff(gained[event.place - event.during - 1 : event.place + 1])
@@ -120,18 +120,18 @@ class StepFound:
     place : int
         Index in the `Sight` of the first picture after it.
     time_s, time_sigma_s : float
-        When, and 1 σ.
+        Its time, and 1 σ.
     gain_mm, sigma_mm : float
     p_value : float
-        Over all moments at which it might have come.
+        Over all moments at which it might have happened.
     rivals : tuple of EventKind
         What explains it as well.
     lasting_s : float
-        How long it takes, as of a wheel that slips evenly.
+        Its duration, if the wheel slips evenly.
     agreements : tuple of Agreement
-        What the reading alone says of it.
+        Whether the reading alone agrees.
     stray : int
-        So many pictures, placed wrongly, would explain it where a stray picture does.
+        Number of stray pictures that would explain it, if stray pictures can.
     """
 
     place: int
@@ -147,7 +147,7 @@ class StepFound:
 
     @property
     def doubt(self) -> str:
-        """What else it may be, in a plain sentence with its time and size; empty where it is a slip."""
+        """What else it may be, as a sentence with its time and size; empty where it is a slip."""
         words = {
             EventKind.OUTLIER: f"{self.stray} stray picture{'s' * (self.stray != 1)}",
             EventKind.LOST_TIME: "missing frames",
@@ -157,12 +157,12 @@ class StepFound:
 
 
 def or_else(slip: str, instead: str) -> str:
-    """Return a sentence that a slip may be something else, and how to find out."""
-    return f"{slip}, or {instead}; they cannot be told apart: record the passage again, slowly."
+    """Return a sentence that a slip may be something else, and how to decide."""
+    return f"{slip}, or {instead}; they look the same here: record the passage again, slowly."
 
 
 def steps_found(fit: TravelFit, encoder: Encoder) -> tuple[StepFound, ...]:
-    """Return the steps among the fit's events, each judged with the others in place."""
+    """Return the steps among the fit's events, each judged with the others included."""
     return tuple(
         _judged(fit, k, encoder) for k, event in enumerate(fit.events) if event.kind is not EventKind.OUTLIER
     )
@@ -171,14 +171,14 @@ def steps_found(fit: TravelFit, encoder: Encoder) -> tuple[StepFound, ...]:
 def _judged(fit: TravelFit, place_in_list: int, encoder: Encoder) -> StepFound:
     event, sight = fit.events[place_in_list], fit.sight
     gain_mm = float(fit.values[4 + place_in_list])
-    # Where an even motion hits the counts alike, readings of one side are rounded alike: no mean helps.
+    # Where a uniform motion is rounded alike by the counts on one side, no mean helps.
     rounding = quantum_mm(encoder) * np.sqrt(2 / 12)
     sigma = float(np.hypot(fit.sigma[4 + place_in_list], rounding))
     rivals = _rivals(fit, place_in_list, encoder)
     beyond = min(event.place - event.during, len(sight.time_s) - event.place)
     if beyond <= SIDE and EventKind.OUTLIER not in rivals:
         rivals = (EventKind.OUTLIER, *rivals)
-    # Somewhere between two pictures; where the reading itself jumps, as long as a short slip lasts.
+    # Somewhere between two pictures; where the reading itself jumps, for the duration of a short slip.
     within_s = float(sight.time_s[event.place] - sight.time_s[event.place - 1])
     if event.during:
         time_s, lasting_s = _middle_and_duration(fit, place_in_list)
@@ -195,7 +195,7 @@ def _judged(fit: TravelFit, place_in_list: int, encoder: Encoder) -> StepFound:
         even = _over_durations(fit, place_in_list)
         if even is not None:
             gain_mm, sigma = even[0], float(np.hypot(even[1], rounding))
-    # A slip that lasts may be stray pictures all along it, one near an end those up to the end.
+    # A lasting slip may be stray pictures throughout, one near an end stray pictures up to the end.
     stray = event.during + (beyond if beyond <= SIDE else 0)
     count = len(sight.time_s)
     z2 = float(fit.event_z2[place_in_list]) if np.isfinite(sigma) else 0.0
@@ -206,11 +206,11 @@ def _judged(fit: TravelFit, place_in_list: int, encoder: Encoder) -> StepFound:
 
 
 def _over_durations(fit: TravelFit, place_in_list: int) -> tuple[float, float] | None:
-    """Return the size and 1 σ of an even slip where it is not known when it came and how long it took.
+    """Return the size and 1 σ of an even slip of unknown time and duration.
 
-    Every moment near it and every duration that a wheel may slip for is as likely as another beforehand. What
-    a slip gains where it begins and ends is lost among the noise of single pictures, and what is taken for a
-    step all at once or for a shorter one is too small. None where the slip is not even.
+    Every moment nearby and every possible duration of a slip are equally likely in advance. What a slip gains
+    at its start and end is lost in the noise of single pictures, so that the size is too small if it is taken
+    for an instant step or a shorter slip. None where the slip is not even.
     """
     own, event, sight = 4 + place_in_list, fit.events[place_in_list], fit.sight
     first = 4 + len(fit.events) + sum(e.during for e in fit.events[:place_in_list])
@@ -220,7 +220,7 @@ def _over_durations(fit: TravelFit, place_in_list: int) -> tuple[float, float] |
     middle = about_s + sight.frame_time_s * 0.5 * np.append(-steps[:0:-1], steps)
     lasts, at = (x.ravel() for x in np.meshgrid(np.maximum(sight.frame_time_s * steps, SHORTEST_S), middle))
     value, gain = rest.gain(np.clip((sight.time_s[:, None] - at) / lasts + 0.5, 0.0, 1.0))
-    # Noise is measured from the pictures' usual steps; what is left may be more.
+    # Noise is estimated from the pictures' usual steps; the residual may be larger.
     more = float(fit.covariance[own, own] / fit.whitened.covariance[own, own])
     uneven = rest.residual @ rest.weighted - fit.whitened.residual @ fit.whitened.weighted - gain.max()
     if event.during and uneven > more * chi2.isf(_EVEN, event.during):
@@ -234,27 +234,27 @@ def _over_durations(fit: TravelFit, place_in_list: int) -> tuple[float, float] |
 
 
 def _middle_and_duration(fit: TravelFit, place_in_list: int) -> tuple[float, float]:
-    """Return when a slip that lasts has its middle, and the duration of an even one of the same spread, s."""
+    """Return when a lasting slip has its middle, and the duration of an even one of that spread, s."""
     event, time_s = fit.events[place_in_list], fit.sight.time_s
     around = time_s[event.place - event.during - 1 : event.place + 1]
     course, middle = _course(fit, place_in_list), around[:-1] + np.diff(around) / 2
     share = course / course.sum()
     mean = float(np.clip(share @ middle, around[0], around[-1]))
-    # Within a gap between pictures the slip spreads evenly, as its course takes it to do.
+    # Within a gap between pictures the slip is taken to be uniform, as in its course.
     spread = float(share @ (middle - mean) ** 2) + float(np.median(np.diff(around))) ** 2 / 12
     return mean, float(np.clip(np.sqrt(12 * max(spread, 0.0)), SHORTEST_S, np.ptp(around)))
 
 
 def _rivals(fit: TravelFit, place_in_list: int, encoder: Encoder) -> tuple[EventKind, ...]:
-    """Return what explains a step as well."""
+    """Return what else explains a step."""
     event, sight = fit.events[place_in_list], fit.sight
     if event.during:
-        # Pictures that drift for a while look the same, but for the reading's own motion. Fiducials do not
+        # Pictures that drift for a while look the same, except in the reading's own motion. Fiducials do not
         # drift.
         return () if sight.placed else (EventKind.OUTLIER,)
     others = fit.events[:place_in_list] + fit.events[place_in_list + 1 :]
     rest = fitted(sight, encoder, others, fit.noise, fit.without)
-    # The step itself does not count as speed.
+    # The step itself is excluded from the speed.
     speed = median_filter(np.gradient(sight.distance_mm, sight.time_s), 5)
     score, size = {}, {}
     for kind in EventKind:
