@@ -42,19 +42,21 @@ def flattened(depth: Depth, region: Region, surface: Surface, held: HeldOver, wa
     way_mm = usual_way(ways_mm[np.unique(surface.near.frame)])
     if not held.handed_on or not way_mm:
         return depth
-    shown = np.sign(depth.depth_mm) * _shown(region, surface, depth.peak[1])
+    shown, whole = (np.sign(depth.depth_mm) * p for p in _profiles(region, surface, depth.peak[1]))
     cell_mm = surface.relief.cell_mm[0]
-    most = _most_held(shown, _LOWER_SIGMAS * _unevenness(region, surface))
+    most = _most_held(whole, _LOWER_SIGMAS * _unevenness(region, surface))
     share = min(float(held.handed_on ** (cell_mm / way_mm)), most)
     lost = abs(depth.depth_mm) * _lost(np.fmax(shown, 0.0), share, cell_mm)
     return replace(depth, sigma_mm=float(np.hypot(depth.sigma_mm, lost)))
 
 
 def _unevenness(region: Region, surface: Surface) -> float:
-    """Return 1 σ of a profile, mm; for an all-round one, that of medians of independent places round it."""
+    """Return 1 σ, mm, of a profile that is the median over the independent places of a region's columns."""
     relief = surface.relief
-    places = 2 * np.pi * relief.radius_mm / PLACE_MM
-    return float(relief.typical.sigma_mm * (MEDIAN_ERRS / np.sqrt(places) if region.all_round else 1.0))
+    around = (
+        2 * np.pi * relief.radius_mm if region.all_round else region.mask.any(0).sum() * relief.cell_mm[1]
+    )
+    return float(relief.typical.sigma_mm * MEDIAN_ERRS / np.sqrt(max(around / PLACE_MM, 1.0)))
 
 
 def _most_held(shown: Float, lower_mm: float) -> float:
@@ -75,13 +77,16 @@ def _most_held(shown: Float, lower_mm: float) -> float:
     return max(most(shown), most(shown[::-1]))
 
 
-def _shown(region: Region, surface: Surface, column: int) -> Float:
-    """Return a finding's profile (H,) along the pipe, mm; for an all-round one, its medians round it."""
-    return (
-        row_median(region.cut(surface.all_mm))
-        if region.all_round
-        else region.cut(surface.local_mm)[:, column]
-    )
+def _profiles(region: Region, surface: Surface, column: int) -> tuple[Float, Float]:
+    """Return a finding's profiles (H,) along the pipe, mm: at its peak, and the median over its columns.
+
+    Those of an all-round one are both its medians round the pipe.
+    """
+    if region.all_round:
+        profile = row_median(region.cut(surface.all_mm))
+        return profile, profile
+    local = region.cut(surface.local_mm)
+    return local[:, column], row_median(local[:, region.mask.any(0)])
 
 
 def _lost(profile: Float, share: float, cell_mm: float) -> float:
