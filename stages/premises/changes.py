@@ -66,16 +66,21 @@ def warn_of_frames(
             f"{_pictures(len(wrong))} in another light than frames.csv states: frame {_listed(wrong)}. What "
             "the pictures show is used. What to do: correct the column illumination"
         )
-    again = frame[np.diff(changes.row, prepend=-1) < 1]
+    repeats = np.diff(changes.row, prepend=-1) < 1
+    again = frame[repeats]
     left = len(table.frame) - 1 - int(changes.row[-1]) - len(again)
     if left > 0:
         context.warn(
             f"the video ends early: it lacks the last {left} of the {len(table.frame)} frames in frames.csv. "
             "Only what was filmed is measured. What to do: copy the video again, it may be cut off"
         )
-    warn_of(
-        again, "left out, since the one before is shown again", "nothing, or repair the recorder", context
+    earlier = 0 if lost else int((changes.retimed & ~repeats).sum())
+    hint = (
+        f"see whether the recorder puts pictures in: the {earlier} frames after them now have the times of "
+        "earlier rows; else correct frames.csv"
     )
+    what = "left out, since the one before is shown again"
+    warn_of(again, what, hint if earlier else "nothing, or repair the recorder", context)
     warn_of(frame[~pictures.seen], "that cannot be decoded", "copy the video again", context)
     dark = (light == Light.UNKNOWN) & pictures.seen & np.any(light != Light.UNKNOWN)
     warn_of(
