@@ -121,7 +121,7 @@ def _numbered(found: Sequence[Defect], first: int) -> tuple[Defect, ...]:
 
 
 def _with_progress(found: Iterator[Found | None], regions: int, context: Context) -> Iterator[Found | None]:
-    """Pass on what regions show, and tell of the progress; the first half of it was the search for them."""
+    """Yield what regions show, and report the progress; the first half of it was the search for them."""
     for done, each in enumerate(found, 1):
         yield each
         context.progress(regions + done, 2 * regions)
@@ -130,7 +130,7 @@ def _with_progress(found: Iterator[Found | None], regions: int, context: Context
 def _found_in(
     region: Region, measurer: Measurer, score: Float32, scene: Scene, fixed: FixedToProbe | None
 ) -> Found | None:
-    """Return what a region shows, None where it was not measured or is too shallow to be reported.
+    """Return what a region shows; None where it was not measured or is too shallow to be reported.
 
     A region without points of usual σ is measured once more with all points.
     """
@@ -150,7 +150,7 @@ def _found_in(
 def _described(
     region: Region, measurer: Measurer, scene: Scene, measured: tuple[Measured, Measured], evidence: Evidence
 ) -> Found:
-    """Return a region with its ``evidence``, ``measured`` with all rings and with those kept."""
+    """Return a region with its ``evidence``; ``measured`` with all rings, and with those that were kept."""
     whole, kept = measured
     here, surface, depth = kept.here, kept.surface, kept.allowed
     cut = abs(whole.depth.depth_mm) - abs(depth.depth_mm)

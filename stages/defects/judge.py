@@ -25,10 +25,10 @@ from stages.defects.surface import MeasuredWall
 # A finding fixed to the image, or where the line ends, is as likely as not on the wall: nothing tells.
 _WALL_OR_NOT = 0.5
 _UNSURE = "Its depth is less than twice its σ, so that it may be zero"
-# A finding whose σ, with all that widens it, exceeds so many times its depth is not confirmed. Chosen: one
-# that a noise filter or a codec flattened to a third still is, with a lower bound of its depth.
+# A finding whose total σ exceeds this many times its depth is not confirmed. Chosen: a finding that a noise
+# filter or a codec flattened to a third is still confirmed, with a lower bound of its depth.
 _VAGUE = 4.0
-_IS_VAGUE = "The σ of its depth is more than four times the depth that is seen"
+_IS_VAGUE = "The σ of its depth is more than four times the measured depth"
 _AT_LEAST = (
     "This depth is a lower bound, with ± {:.2f} mm from noise. The rest of σ is what pictures that repeat "
     "parts of earlier ones may have taken off the depth."

@@ -1,4 +1,4 @@
-"""Measure the depth of a region, without the rings that those beside them contradict."""
+"""Measure the depth of a region, without the rings that their neighbours contradict."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from stages.defects.parameters import DefectParameters
 from stages.defects.segment import Region
 from stages.defects.surface import MeasuredWall, Surface
 
-# At most so many rings with a glint on them are left out when a finding is measured (chosen).
+# At most so many rings with a glint on them are left out when a region is measured (chosen).
 _MOST_LEFT_OUT = 4
 
 
 @dataclass(frozen=True)
 class Measured:
-    """A region's ``depth`` by a ``surface``, from the first row of which ``here`` counts its own."""
+    """A region's ``depth`` from a ``surface``; ``here`` is the region, its rows counted from the surface's."""
 
     here: Region
     surface: Surface
@@ -49,7 +49,7 @@ class Measured:
 
 @dataclass(frozen=True)
 class Measurer:
-    """What regions of a wall are measured with."""
+    """Measures the regions of a wall."""
 
     wall: MeasuredWall
     clean: CleanWall
@@ -57,7 +57,7 @@ class Measurer:
     random: np.random.Generator
 
     def measured(self, region: Region, every_point: bool, without: tuple[int, ...] = ()) -> Measured | None:
-        """Return a region as measured by points of usual σ or by ``every_point``, ``without`` some frames.
+        """Return a region measured with points of usual σ, or with ``every_point``, ``without`` some frames.
 
         None where no cell of it has a surface, as between rings that are far apart.
         """
@@ -68,7 +68,7 @@ class Measurer:
         return Measured(here, surface, self._depth(region, here, surface))
 
     def without_contradicted(self, region: Region, every_point: bool, whole: Measured) -> Measured:
-        """Return a region measured without the rings that those beside them contradict, one by one."""
+        """Return a region measured without the rings that their neighbours contradict, removed one by one."""
         kept = whole
         while (frame := kept.contradicted_frame) is not None:
             left = self.measured(region, every_point, (*kept.surface.left_out, frame))

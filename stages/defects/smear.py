@@ -26,8 +26,8 @@ _SHARPEST_MM = 0.42
 # Bells are tried up to 30 times as wide as the way over which light is retained: the widest lose 1 / 450 of
 # their height.
 _WIDEST, _BELLS = 30.0, 40
-# A profile may be lower than the wall by so many σ of its unevenness, and its flanks are compared over so
-# many cells: farther off next to nothing of any finding is left (both chosen).
+# A profile may be too low by so many σ of the wall's unevenness, and its flanks are compared over so many
+# cells: farther off, hardly anything of any finding is left (both chosen).
 _LOWER_SIGMAS, _FLANK = 3.0, 64
 
 
@@ -60,10 +60,10 @@ def _unevenness(region: Region, surface: Surface) -> float:
 
 
 def _most_held(shown: Float, lower_mm: float) -> float:
-    """Return the largest share of each cell that the next one may hold, whichever way the probe went.
+    """Return the largest possible share of each cell that the next one retains, in either direction.
 
-    Where each cell holds a share of the one before, k cells on at least the k-th power of it is left. The
-    profile ``shown`` (H,), NaN where unseen, may be lower than the wall by ``lower_mm``.
+    If each cell retains a share of the one before, then after k cells at least its k-th power is left. The
+    profile ``shown`` (H,), NaN where unseen, may be too low by ``lower_mm``.
     """
 
     def most(profile: Float) -> float:

@@ -1,4 +1,4 @@
-"""Round places of the image: where a mismatch lies, and whether two of them touch."""
+"""Circular places of the image: where a mismatch lies, and whether two of them touch."""
 
 from __future__ import annotations
 
@@ -10,26 +10,26 @@ from pipeline.artefacts.twin import Mismatch
 
 
 class Disc(NamedTuple):
-    """A round place of the image: its middle and its radius, px."""
+    """A circular place of the image: its middle and its radius, px."""
 
     u_px: float
     v_px: float
     radius_px: float
 
     def touches(self, other: Disc, apart_px: float = 0.0) -> bool:
-        """Return whether two discs overlap, or lie less than ``apart_px`` beside each other."""
+        """Return whether two discs overlap, or are less than ``apart_px`` apart."""
         away = np.hypot(self.u_px - other.u_px, self.v_px - other.v_px)
         return bool(away < self.radius_px + other.radius_px + apart_px)
 
     def around(self, centre_px: tuple[float, float]) -> tuple[float, float]:
-        """Return its azimuth about a centre and half of its width around that, degrees."""
+        """Return its azimuth about a centre, and half of its angular width, degrees."""
         u, v = self.u_px - centre_px[0], self.v_px - centre_px[1]
         wide = np.arctan2(self.radius_px, max(float(np.hypot(u, v)), 1.0))
         return float(np.degrees(np.arctan2(v, u))), float(np.degrees(wide))
 
 
 def disc_of(found: Mismatch) -> Disc | None:
-    """Return where a mismatch lies in the image; None for one that has no place there."""
+    """Return the place of a mismatch in the image; None if it has none."""
     at = {p.name: p.value for p in found.place}
     return Disc(at["u_px"], at["v_px"], at["radius_px"]) if "radius_px" in at else None
 

@@ -22,9 +22,9 @@ _DIMS = ("window_dirt", "window_scatter", "droplet")
 def parted_from_photo(
     found: Sequence[Mismatch], ring: Ring
 ) -> tuple[tuple[Mismatch, ...], tuple[Mismatch, ...]]:
-    """Return what is on the window, and places without a name that what is dim there may leave in the photo.
+    """Return what is on the window, and unnamed places that dim ones may have left in the photo.
 
-    The latter are brighter, by less than what is dim, and at its azimuth.
+    The latter are brighter, by less than what is dim, and at its image azimuth.
     """
     dim = [m for m in found if set(m.names) & set(_DIMS)]
     left = [m for m in found if not m.name and any(_may_be_left_by(m, d, ring) for d in dim)]
@@ -36,9 +36,9 @@ def parted_from_photo(
 def beside_sectors(
     found: Sequence[Mismatch], sectors: Sequence[Mismatch], ring: Ring
 ) -> tuple[tuple[Mismatch, ...], tuple[Mismatch, ...]]:
-    """Return what was found, and what has no name at the azimuth of a sector that the window may dim.
+    """Return the findings that remain, and unnamed ones at the azimuth of a sector that the window may dim.
 
-    Its photo was then made through what lies there: wall that frames show beside it differs from the photo.
+    Their photo was then made through what is there: wall that frames show beside it differs from its photo.
     """
     reach = [
         (at["azimuth_deg"], (at["width_deg"] + SECTOR_STEP_DEG) / 2)
@@ -46,13 +46,13 @@ def beside_sectors(
         if "width_deg" in at
     ]
     left = [m for m in found if not m.name and any(_looks_at(m, *r, ring) for r in reach)]
-    said = "{} But the photo may be made through what dims the line at that azimuth: it cannot be told."
+    said = "{} But the photo may have been made through what dims the line at that azimuth."
     withdrawn = tuple(replace(m, statement=said.format(m.statement)) for m in left)
     return tuple(m for m in found if m not in left), withdrawn
 
 
 def _looks_at(found: Mismatch, azimuth_deg: float, half_deg: float, ring: Ring) -> bool:
-    """Return whether a mismatch is looked at within some degrees of an azimuth of the image."""
+    """Return whether a mismatch is within some degrees of an azimuth of the image."""
     if found.look is None:
         return False
     at = Disc(found.look.u_px, found.look.v_px, 0.0).around(ring.centre_px)[0]

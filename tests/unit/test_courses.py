@@ -204,7 +204,7 @@ def test_a_law_that_settles_under_no_name_of_its_own_is_told_by_its_growth_at_fi
 @pytest.mark.parametrize(
     ("name", "shape", "sigma", "words"),
     [
-        ("baseline_drift", (3.5,), 0.0013, " In the end it comes to 0.301 ± 0.001 mm."),
+        ("baseline_drift", (3.5,), 0.0013, " Its final value is 0.301 ± 0.001 mm."),
         ("baseline_drift", (51.2,), 0.2, ""),
         ("baseline_drift", (51.2,), np.nan, ""),
         ("baseline", (), 0.0013, ""),

@@ -1,7 +1,7 @@
-"""Patterns without a cause that come as an effect does which was found: what else may be there in its place.
+"""Patterns without a cause that have the course of an effect that was found, as alternatives to it.
 
-A slow change of the focal length that the library lacked was called a cone of the sheet at .996: patterns of
-the picture that stay or grow evenly were beside it, and none that settles as it did.
+A slow change of the focal length that was not in the library was once named a cone of the sheet at .996: the
+alternatives were patterns of the picture that are constant or grow evenly, and none that settles as it did.
 """
 
 from __future__ import annotations

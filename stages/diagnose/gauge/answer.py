@@ -26,7 +26,7 @@ from stages.diagnose.result import Candidate, Confirmation, EffectFound, Value, 
 _LISTED = 1e-3
 _REPEATS = (
     "Rings and fiducials of the gauge run lie {:.2f} px from where its other parts have them, and noise is "
-    "{:.2f} px of it. The rest is alike at one place of the image on other wall, and no effect or simple "
+    "{:.2f} px of it. The rest is the same at one place of the image on other wall, and no effect or simple "
     "pattern explains it."
 )
 
@@ -142,12 +142,12 @@ def _found(
 
 
 def _in_the_end(sized: Sized) -> str:
-    """Return what a drift comes to, where that is known; of one slower than its run it is a continuation."""
+    """Return a sentence on the final value of a drift; empty where it is only extrapolated."""
     size = next(iter(quantities(sized).values()), Value(0.0, 0.0))
     if sized.term.model.kind is not CourseKind.EXPONENTIAL or not size.sd < TELLING * abs(size.value):
         return ""
     unit = effect(sized.term.model.law).quantities[0].unit
-    words = f" In the end it comes to {abs(size.value):.3g} ± {size.sd:.1g} {unit}"
+    words = f" Its final value is {abs(size.value):.3g} ± {size.sd:.1g} {unit}"
     return f"{words.rstrip()}."
 
 

@@ -41,14 +41,14 @@ _PARTS = 3
 # (`bench_diagnosis run FILE --mode nulls --count 60`, then `bench_diagnosis summary FILE`); p of the next 41
 # is uniform (KS .09; of too many small ones, .24).
 _APART = 0.265
-# What was held out is predicted to the noise where its r.m.s. is below so many noise floors. Under right
-# names, and where nothing is hidden, 10 runs at ring level come to 0.93–0.99 and five rendered ones to
-# 1.00–1.02 (mean of all 0.974, s.d. 0.030); this is 5 s.d. beyond. A wrong explanation of four effects came
-# to 1.17 (`bench_diagnosis --mode several`, case 1, by an older floor and the ratio of both floors).
+# Held-out measurements are predicted to within the noise if their RMS is below this many noise floors. Under
+# right names, and without hidden effects, 10 runs at ring level give 0.93–0.99 and five rendered ones
+# 1.00–1.02 (mean of all 0.974, s.d. 0.030); this limit is 5 s.d. above. A wrong explanation of four effects
+# gave 1.17 (`bench_diagnosis --mode several`, case 1, with an older floor and the ratio of both floors).
 MOST_OF_FLOOR = 1.12
-# The chance of 5 s.d. and more.
+# Probability of 5 s.d. or more.
 _NO_NOISE = 3e-7
-# Where what repeats at one place of the image shows.
+# Location of a residual that repeats at one place of the image.
 _OF_IMAGE = Location(str(Channel.RING), str(FixedTo.CAMERA), None)
 
 
@@ -136,7 +136,7 @@ class Examined:
 
     @property
     def repeats(self) -> bool:
-        """Whether nothing was found, and yet what is left repeats at one place of the image on other wall."""
+        """Whether nothing was found, but the residual repeats at one place of the image on other wall."""
         known = self.quality if self.best is None else None
         return known is not None and bool(known.heldout_after > MOST_OF_FLOOR * known.noise_floor)
 

@@ -103,7 +103,7 @@ class Linearised:
 
 
 def pattern_of(term: Term) -> tuple[str, str, int | None]:
-    """Return what a term is fixed to, its behaviour in time and its harmonic."""
+    """Return what a term is fixed to, its behaviour in time, and its harmonic."""
     model = term.model
     if isinstance(model, Nameless):
         fixed_to, time, harmonic = model.goes_with(term.shape)
