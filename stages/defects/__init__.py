@@ -159,8 +159,8 @@ def _described(
         widened = replace(widened, sigma_mm=float(np.hypot(widened.sigma_mm, cut)))
     told = describe(here, widened, surface, scene)
     by_noise = replace(told, depth_sigma_mm=depth.sigma_mm)
-    lone_mm = whole.depth.depth_mm if cut > 0 else None
-    return Found(region, told, by_noise, evidence, measurer.chance_of_bead(region), lone_mm)
+    contradicted_mm = whole.depth.depth_mm if cut > 0 else None
+    return Found(region, told, by_noise, evidence, measurer.chance_of_bead(region), contradicted_mm)
 
 
 def _lines(measurer: Measurer, found: Sequence[Found], scene: Scene, context: Context) -> Iterator[Defect]:

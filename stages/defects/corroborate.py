@@ -67,7 +67,7 @@ class Evidence:
         six or more rings show it, of most of them.
     contradicted : bool
         Whether lit pictures, taken when the line was elsewhere, show the wall without it.
-    in_the_way : bool
+    in_probe_path : bool
         Whether the probe would have collided with it.
     """
 
@@ -78,12 +78,12 @@ class Evidence:
     edge: bool = False
     bright: bool = False
     contradicted: bool = False
-    in_the_way: bool = False
+    in_probe_path: bool = False
 
     @property
     def on_wall(self) -> bool:
         """Whether it belongs to the wall, and is not explained by the probe or by the end of the line."""
-        return not (self.fixed or self.edge or self.contradicted or self.in_the_way)
+        return not (self.fixed or self.edge or self.contradicted or self.in_probe_path)
 
     @property
     def corroborated(self) -> bool:
@@ -103,7 +103,7 @@ class Evidence:
                 "Lit pictures taken before and after, when the line was elsewhere, show the wall without it: "
                 "a drop or dirt on the window may have moved the line while it passed"
             )
-        if self.in_the_way:
+        if self.in_probe_path:
             return (
                 "The probe drove past it, and its lamps would have struck it there: a reflection or stray "
                 "light was taken for the line"

@@ -57,7 +57,7 @@ class Credibility:
     tail : NoiseTail
     sure : Counter
         Number of findings, certain not to be noise, that are shown by 1 (or no), 2, 3, ... rings.
-    meets : float
+    overlap_chance : float
         Probability that a neighbouring ring happens to show a glint of the same sign at a finding's place.
     bright, dark : int
         Among the certain findings with less than six rings: number with a bright line, and number of others.
@@ -65,7 +65,7 @@ class Credibility:
 
     tail: NoiseTail
     sure: Counter[int]
-    meets: float
+    overlap_chance: float
     bright: int
     dark: int
 
@@ -74,9 +74,9 @@ class Credibility:
         wrong = self._noise(evidence) + self._clutter(evidence)
         return 1 / (1 + wrong * _odds_by_photo(evidence.photo) + self._glints(evidence))
 
-    def meetings(self, rings: int) -> float:
+    def chance_overlaps(self, rings: int) -> float:
         """Return the expected number of places where ``rings`` neighbouring rings show glints by chance."""
-        return float(self._alone * self.meets ** (rings - 1))
+        return float(self._alone * self.overlap_chance ** (rings - 1))
 
     def _noise(self, evidence: Evidence) -> float:
         """Return the expected number of noise peaks per real finding of such a score."""
@@ -87,7 +87,7 @@ class Credibility:
         """Return the expected number of coinciding glints per real finding in as many rings."""
         if evidence.rings < LEAST_RINGS:
             return float(self._alone / max(self.sure[1] - self._alone, self._few))
-        false = self.meetings(evidence.rings)
+        false = self.chance_overlaps(evidence.rings)
         return float(false / max(self.sure[evidence.rings] - false, self._few))
 
     def _glints(self, evidence: Evidence) -> float:
@@ -142,5 +142,5 @@ def credibility_of(
     # Two findings overlap if their distance is less than half the sum of their widths. Half of them have the
     # same sign.
     overlap = 2 * float(np.mean(alone)) / (2 * np.pi) / 2 if alone else 0.0
-    meets = min(overlap * len(alone) / max(rings, 1), 1.0)
-    return Credibility(tail, sure, meets, bright[True], bright[False])
+    overlap_chance = min(overlap * len(alone) / max(rings, 1), 1.0)
+    return Credibility(tail, sure, overlap_chance, bright[True], bright[False])

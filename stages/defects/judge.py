@@ -52,7 +52,7 @@ class Found:
     evidence : Evidence
     bead : float
         Probability that it is not a step of the bore.
-    lone_mm : float, optional
+    contradicted_mm : float, optional
         The larger depth shown by rings that their neighbours contradict; None where there are none.
     """
 
@@ -61,7 +61,7 @@ class Found:
     by_noise: Defect
     evidence: Evidence
     bead: float
-    lone_mm: float | None = None
+    contradicted_mm: float | None = None
 
     @property
     def step(self) -> bool:
@@ -71,7 +71,7 @@ class Found:
     @property
     def flattened(self) -> bool:
         """Whether its depth is significant against noise, but not with what flattening may have taken off."""
-        if self.lone_mm is not None:
+        if self.contradicted_mm is not None:
             return False
         return is_depth_known(self.by_noise) and not is_depth_known(self.defect)
 
@@ -88,8 +88,8 @@ class Found:
         return replace(self.defect, probability=probability, confidence=sure, statement=told)
 
     def _at_least(self) -> str:
-        if self.lone_mm is not None:
-            return _LONE.format(abs(self.lone_mm))
+        if self.contradicted_mm is not None:
+            return _LONE.format(abs(self.contradicted_mm))
         return _AT_LEAST.format(self.by_noise.depth_sigma_mm) if self.flattened else ""
 
 

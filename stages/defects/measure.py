@@ -21,7 +21,7 @@ _MOST_LEFT_OUT = 4
 
 @dataclass(frozen=True)
 class Measured:
-    """A region's ``depth`` from a ``surface``; ``here`` is the region, its rows counted from the surface's."""
+    """A region's ``depth`` from a ``surface``; ``here`` is the region with rows counted from it."""
 
     here: Region
     surface: Surface

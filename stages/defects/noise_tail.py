@@ -97,8 +97,8 @@ def tail_of(peaks: Float, threshold: float, whole: float = 1.0) -> NoiseTail:
     """
     below = peaks[peaks <= threshold]
     fits = [_fitted_law(power, below, threshold) for power in (2, 1)]
-    best = min(surprise for _, surprise in fits)
-    weight = np.array([math.exp(best - surprise) for _, surprise in fits])
+    best = min(loss for _, loss in fits)
+    weight = np.array([math.exp(best - loss) for _, loss in fits])
     laws = [replace(law, share=float(w)) for (law, _), w in zip(fits, weight / weight.sum(), strict=True)]
     missing = sum(law.above(threshold) for law in laws)
     return NoiseTail((len(below) + 0.5) / (1 - missing) * whole, tuple(laws))
@@ -112,13 +112,13 @@ def _fitted_law(power: int, below: Float, threshold: float) -> tuple[Law, float]
     # The mean of x over Gaussian noise: 1 for power 2, and 1 / FROM for power 1.
     usual = NoiseTail.FROM ** (power - 2)
 
-    def surprise(log_scale: float) -> float:
+    def loss(log_scale: float) -> float:
         scale = math.exp(log_scale)
         cut = len(excess) * math.log(-math.expm1(-most / scale))
         few = _AS_GAUSSIAN * (log_scale + usual / scale)
         return len(excess) * log_scale + float(excess.sum()) / scale + cut + few
 
-    found = minimize_scalar(surprise, bounds=_SCALES, method="bounded")
+    found = minimize_scalar(loss, bounds=_SCALES, method="bounded")
     # The likelihood is a density in h, not in x: dx / dh = h^(power − 1).
     slope = (power - 1) * float(np.log(below).sum())
     lost = _AS_GAUSSIAN * (float(found.x) + usual / math.exp(found.x))

@@ -94,7 +94,11 @@ def _spread(gap: Float, size: float) -> Float:
 
 
 def chance_of_name(
-    p_value: float, doubts: int, agreements: Sequence[Agreement], fits_p: float = 1.0, otherwise: float = 0.0
+    p_value: float,
+    doubts: int,
+    agreements: Sequence[Agreement],
+    fits_p: float = 1.0,
+    other_courses: float = 0.0,
 ) -> float:
     """Return the probability that the named cause is right, and not chance, a rival, or something unknown.
 
@@ -104,13 +108,13 @@ def chance_of_name(
     cause loses weight by the likelihood ratio of the best second measurement, or gains by that of one that
     disagrees; measurements from one recording share its pictures and count once. An unknown cause also gains
     weight if the residual beside the named cause is not noise (``fits_p``, the chance that noise makes it),
-    and by its likelihood with a course of its own, relative to the name (``otherwise``).
+    and by its likelihood with a course of its own, relative to the name (``other_courses``).
     """
     nothing = _at_most(p_value)
     ratios = [a.ratio for a in agreements]
     failed = [a.ratio for a in agreements if not a.confirmation.agrees]
     ratio = min(failed) if failed else max(ratios, default=1.0)
-    unknown = UNKNOWN * (1 / (ratio * _at_most(fits_p)) + otherwise)
+    unknown = UNKNOWN * (1 / (ratio * _at_most(fits_p)) + other_courses)
     return float(1 / (1 + nothing + doubts + unknown))
 
 

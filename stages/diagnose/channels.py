@@ -20,7 +20,7 @@ from stages.calibrate.gauge import GaugeParameters, MeasuredRun, measure_gauge
 from stages.calibrate.gauge.state import Unknowns
 from stages.diagnose.effects.base import EffectModel
 from stages.diagnose.effects.library import without as library_without
-from stages.diagnose.field.evidence import FieldEvidence, field_evidence, nothing_said
+from stages.diagnose.field.evidence import FieldEvidence, empty_evidence, field_evidence
 from stages.diagnose.field.run import Adjusted, FieldRun, field_run
 from stages.diagnose.gauge.examine import Examined, examine
 from stages.diagnose.profile.evidence import ProfileEvidence, profile_evidence
@@ -242,7 +242,7 @@ def examine_field(
     recording = frames.applied_to(recording)
     run, light = motion.run(recording, probe, rings), profile.known_light(parameters.without)
     if run is None:
-        found = nothing_said(recording, motion.problem)
+        found = empty_evidence(recording, motion.problem)
     else:
         library = _of_geometry(library_without(parameters.without), light)
         found = field_evidence(run, library, parameters.without, context.progress)

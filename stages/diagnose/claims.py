@@ -58,7 +58,7 @@ class Claim:
         Sufficiently precise second measurements of the same effect.
     fits_p : float
         Probability that noise makes the residual that the effect leaves.
-    otherwise : float
+    other_courses : float
         Likelihood of unnamed causes with other courses, relative to this effect.
     unknown : frozenset of str
         Effects that are treated as unknown.
@@ -83,7 +83,7 @@ class Claim:
     counted: bool = True
     beside: int = 0
     fits_p: float = 1.0
-    otherwise: float = 0.0
+    other_courses: float = 0.0
     unknown: frozenset[str] = frozenset()
     whole: tuple[tuple[str, Value], ...] = ()
 
@@ -100,15 +100,15 @@ class Claim:
         return self._chance > SURE
 
     @property
-    def may_go_otherwise(self) -> bool:
+    def may_have_other_course(self) -> bool:
         """Whether residual or other courses add more doubt than the rivals do."""
         clear = replace(self, alike=(), beside=0)
-        return not clear.sure and replace(clear, fits_p=1.0, otherwise=0.0).sure
+        return not clear.sure and replace(clear, fits_p=1.0, other_courses=0.0).sure
 
     @property
     def _chance(self) -> float:
         doubts = len(self.rivals) + (not self.counted) + self.beside
-        return chance_of_name(self.p_value, doubts, self.agreements, self.fits_p, self.otherwise)
+        return chance_of_name(self.p_value, doubts, self.agreements, self.fits_p, self.other_courses)
 
     @property
     def compared(self) -> dict[str, Value]:
@@ -200,7 +200,7 @@ def _of_estimate(e: TravelEstimate, travel: TravelEvidence, exposure: Exposure) 
     return Claim(
         e.effect, {e.quantity: own_size(e)}, e.statement, e.p_value, alike, travel.source,
         stretch(travel, e.where, fixed_to, time), e.agreements,
-        beside=beside, fits_p=travel.fits_p, otherwise=e.otherwise,
+        beside=beside, fits_p=travel.fits_p, other_courses=e.other_courses,
         whole=((e.quantity, whole_size(e)),) if e.taken_off else (),
     )  # fmt: skip
 

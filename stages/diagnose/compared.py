@@ -144,7 +144,9 @@ def _beyond_probe(examined: Examined | None, correction: Correction | None) -> L
     best = examined.best if examined is not None else None
     if best is None or correction is None:
         return ()
-    return tuple((t.model, t.shape, t.amplitude) for t in best.fit.terms if t.model.name in correction.unsaid)
+    return tuple(
+        (t.model, t.shape, t.amplitude) for t in best.fit.terms if t.model.name in correction.inexpressible
+    )
 
 
 @dataclass(frozen=True)

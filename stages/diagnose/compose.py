@@ -47,7 +47,7 @@ def composed(
     asked = said.members if said.members else [e.name for e in said.effects]
     nameless = _IN_PROFILE if of_profile else of_travel[0].location if of_travel else None
     location = _location(examined, every, asked) or nameless
-    words = _identifiable(said, examined, any(c.may_go_otherwise for c in known))
+    words = _identifiable(said, examined, any(c.may_have_other_course for c in known))
     identifiable = " ".join(s for s in (words, *of_profile, *(u.sentence for u in of_travel)) if s)
     partly = said.verdict is Verdict.PARTLY
     rest = Verdict.CLASS if said.members else Verdict.UNEXPLAINED
@@ -157,13 +157,13 @@ def _next(said: _Said, asked: Sequence[str]) -> str:
     return record_next(asked) if said.verdict in (Verdict.CLASS, Verdict.PARTLY) and asked else ""
 
 
-def _identifiable(said: _Said, examined: Examined | None, encoder_otherwise: bool) -> str:
+def _identifiable(said: _Said, examined: Examined | None, other_encoder_course: bool) -> str:
     """Return what is determined in any case: a size for each uncertain cause, or an empirical formula.
 
-    With ``encoder_otherwise``, the effect on the encoder may have another course than the named one.
+    With ``other_encoder_course``, the effect on the encoder may have another course than the named one.
     """
     if said.verdict is Verdict.CLASS or said.unsure:
-        unknown = (*_unknown(examined), *(_OF_ENCODER,) * encoder_otherwise)
+        unknown = (*_unknown(examined), *(_OF_ENCODER,) * other_encoder_course)
         told = [*(e.statement for e in said.unsure), *(_UNKNOWN.format(f) for f in unknown)]
         return "; or ".join(dict.fromkeys(w.rstrip(".") for w in told)) + "." * bool(told)
     nameless = said.verdict in (Verdict.UNEXPLAINED, Verdict.PARTLY) and not said.members
@@ -174,7 +174,7 @@ def _unknown(examined: Examined | None) -> tuple[str, ...]:
     """Return, in words, the likeliest causes that are not in the library but would look like this."""
     if examined is None:
         return ()
-    return (*of_gauge.unknown_rivals(examined), *of_gauge.like_a_name(examined))[:1]
+    return (*of_gauge.unknown_rivals(examined), *of_gauge.unknown_law_descriptions(examined))[:1]
 
 
 def _beyond(claims: Sequence[Claim], effects: Sequence[EffectFound]) -> list[Claim]:

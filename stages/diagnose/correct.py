@@ -130,13 +130,13 @@ class Correction:
     Attributes
     ----------
     probe : Probe
-    put_in, unsaid : tuple of str
+    applied, inexpressible : tuple of str
         Effects that the probe now contains, and those that a probe file cannot express.
     """
 
     probe: Probe
-    put_in: tuple[str, ...]
-    unsaid: tuple[str, ...]
+    applied: tuple[str, ...]
+    inexpressible: tuple[str, ...]
 
 
 def correction_by_gauge(examined: Examined, probe: Probe, stated: Stated, source: str) -> Correction:
@@ -152,7 +152,7 @@ def correction_by_gauge(examined: Examined, probe: Probe, stated: Stated, source
     made = probe.with_parameters(at.of(middle), (covariance + covariance.T) / 2)
     return Correction(
         replace(made, calibrated_from=source),
-        tuple(n for n in names if at.sayable(n)), tuple(n for n in names if not at.sayable(n)),
+        tuple(n for n in names if at.expressible(n)), tuple(n for n in names if not at.expressible(n)),
     )  # fmt: skip
 
 
@@ -218,7 +218,7 @@ class _Parameters:
     columns: tuple[Column, ...]
     terms: tuple[Term, ...]
 
-    def sayable(self, name: str) -> bool:
+    def expressible(self, name: str) -> bool:
         """Whether a file of this probe can express the effect."""
         known = {"fx", "fy", "cx", "cy", "k1"} <= set(self.probe.parameter_names)
         return name in CHANGES and (known or name not in _OF_CAMERA)
@@ -243,7 +243,7 @@ class _Parameters:
             if c.effect == INSTRUMENT and c.amplitude in values:
                 values[c.amplitude] += float(value)
         for t in self.terms:
-            if self.sayable(t.model.name):
+            if self.expressible(t.model.name):
                 own = [
                     k for a in t.model.amplitudes for k, c in enumerate(self.columns) if c == _column(t, a)
                 ]

@@ -29,7 +29,7 @@ from stages.diagnose.compared import OnImage, compared, image_of, with_pictures,
 from stages.diagnose.compose import composed
 from stages.diagnose.correct import CORRECTED_MOTION, CORRECTION, Corrected, CorrectedMotion, Correction
 from stages.diagnose.effects.library import without as library_without
-from stages.diagnose.field.answer import borne_out, encoder_share, met_by_field, with_field
+from stages.diagnose.field.answer import borne_out, encoder_share, field_confirmations, with_field
 from stages.diagnose.field.evidence import travel_of_run
 from stages.diagnose.field.run import FieldRun
 from stages.diagnose.gauge.answer import verdict_of
@@ -104,7 +104,7 @@ def diagnose(
     without = parameters.without
     of_field, of_gauge = _by_correction(of_field, of_gauge, run_corrected, correction, probe, without)
     context.progress(0, _STEPS)
-    met = met_by_field(composed(of_field, of_gauge, probe, without), of_field, of_gauge, probe)
+    met = field_confirmations(composed(of_field, of_gauge, probe, without), of_field, of_gauge, probe)
     found = composed(of_field, borne_out(of_gauge, met), probe, without)
     found = with_field(found, of_field, of_gauge, met, probe, library_without(without))
     found = found.not_knowing(without)
@@ -116,7 +116,7 @@ def diagnose(
     context.report("verdict", str(found.verdict))
     found = replace(found, shortcomings=(*noticed.sentences, *found.shortcomings))
     image = image_of(seen, field, gauge) if found.ring_picture is not None else None
-    if correction is None or not (correction.put_in or correction.unsaid) or not _worse(found.fit):
+    if correction is None or not (correction.applied or correction.inexpressible) or not _worse(found.fit):
         return Diagnosed(found, correction.probe if correction is not None else probe, image)
     return Diagnosed(replace(found, notes=(*found.notes, _NOT_CORRECTED)), probe, image)
 
@@ -133,11 +133,11 @@ def _by_correction(
     if field is not None and corrected is not None:
         # The scale of the motion seen depends on the instrument: an error of that is not the encoder's.
         field = _with_travel(field, travel_of_run(corrected, "field with the corrected probe", without))
-    if field is not None and correction is not None and correction.unsaid:
-        field = _without_scale(field, correction.unsaid)
+    if field is not None and correction is not None and correction.inexpressible:
+        field = _without_scale(field, correction.inexpressible)
     sheet = sheet_by_rings(gauge, correction, probe)
     if sheet is not None:
-        gauge, field = (held_against_rings(s, sheet) if s else None for s in (gauge, field))
+        gauge, field = (compared_with_rings(s, sheet) if s else None for s in (gauge, field))
     return field, gauge
 
 
@@ -159,14 +159,14 @@ def _with_travel(seen: Seen, travel: TravelEvidence | None) -> Seen:
     return replace(seen, travel=travel, shortcomings=(*kept, *new))
 
 
-def _without_scale(seen: Seen, unsaid: Sequence[str]) -> Seen:
+def _without_scale(seen: Seen, inexpressible: Sequence[str]) -> Seen:
     """Return the inspection's evidence without the encoder's scale, if the instrument is partly wrong."""
     if seen.travel is None:
         return seen
     kept = tuple(e for e in seen.travel.estimates if e.effect != "encoder_scale")
     words = (
         f"The encoder's scale was not examined in the inspection: a probe file cannot express "
-        f"{' and '.join(unsaid)}, so that the motion was found with an instrument that is partly wrong."
+        f"{' and '.join(inexpressible)}, so that the motion was found with a partly wrong instrument."
     )
     travel = replace(seen.travel, estimates=kept)
     return replace(seen, travel=travel, shortcomings=(*seen.shortcomings, words))
@@ -228,7 +228,7 @@ def against_rings(found: Finding, sheet: SheetByRings) -> Agreement | None:
     return agreement(*parts, (sheet.covariance, covariance), sheet.covariance + covariance)
 
 
-def held_against_rings(seen: Seen, sheet: SheetByRings) -> Seen:
+def compared_with_rings(seen: Seen, sheet: SheetByRings) -> Seen:
     """Return a recording's evidence with its second line confirmed by the rings, or withdrawn.
 
     A faint line whose place implies a sheet that the rings exclude is not light bounced across the bore.

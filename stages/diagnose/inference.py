@@ -280,13 +280,13 @@ class Estimate:
 
     value: Float
     covariance: Float
-    surprise: float
+    deviance: float
 
 
 def estimate(evidence: Evidence, stated: Stated, prior_sigma: Float) -> Estimate:
     """Return the posterior under the stated instrument and Gaussian priors (K,) 1 σ on amplitudes.
 
-    ``prior_sigma`` is infinite for the instrument's columns, whose prior is the stated one. ``surprise`` is
+    ``prior_sigma`` is infinite for the instrument's columns, whose prior is the stated one. ``deviance`` is
     −2 ln of the marginal likelihood up to a constant common to all hypotheses on the same measurements.
     """
     prior = stated.over(evidence.columns) + np.diag(np.where(np.isinf(prior_sigma), 0.0, prior_sigma**-2.0))

@@ -109,11 +109,11 @@ def how_late(
     subtracted.
     """
     if own_delay:
-        return as_late_as_exposed(size), ""
-    return as_late_as_shown(size, recordings), later_than_exposed(size, recordings)
+        return with_half_exposure(size), ""
+    return with_shown_delay(size, recordings), later_than_exposed(size, recordings)
 
 
-def as_late_as_shown(size: dict[str, Value], recordings: Iterable[Seen | None]) -> dict[str, Value]:
+def with_shown_delay(size: dict[str, Value], recordings: Iterable[Seen | None]) -> dict[str, Value]:
     """Return an effect's size; for an exposure, with the delay of its pictures that an encoder shows.
 
     Stamps may refer to the exposure's middle, so that half of it need not delay a picture relative to its
@@ -168,7 +168,7 @@ def own_size(late: TravelEstimate) -> Value:
     return Value(late.value, float(np.hypot(late.size_sigma, late.taken_off * _BY_STAMPS)))
 
 
-def as_late_as_exposed(size: dict[str, Value]) -> dict[str, Value]:
+def with_half_exposure(size: dict[str, Value]) -> dict[str, Value]:
     """Return an effect's size; for an exposure, with its half, subtracted from the encoder's own delay."""
     if "exposure_s" not in size:
         return size

@@ -21,7 +21,7 @@ from stages.twin.causes import causes
 from stages.twin.compare import Comparison, block_ratios, block_textures
 from stages.twin.fixed_line import on_line
 from stages.twin.fixed_pattern import pattern_figures
-from stages.twin.glints import told_apart
+from stages.twin.glints import window_and_glints
 from stages.twin.lamp_power import lamp_power
 from stages.twin.lamps import flicker_of_measured
 from stages.twin.locate import (
@@ -37,7 +37,7 @@ from stages.twin.on_wall import ring_step_mm, unnamed
 from stages.twin.pixels import defective_pixels
 from stages.twin.render import Region, Renderer
 from stages.twin.scene import Scene, scene_of
-from stages.twin.seen_in_photo import beside_sectors, parted_from_photo
+from stages.twin.seen_in_photo import beside_sectors, separated_from_photo
 from stages.twin.state import (
     PhotometricState,
     Sampled,
@@ -48,7 +48,7 @@ from stages.twin.state import (
     sample_frames,
 )
 from stages.twin.sums import Sums
-from stages.twin.window import beside_blur, or_on_window
+from stages.twin.window import or_on_window, separated_from_blur
 from stages.twin.worst import maps_of, worst_places
 
 _EVERY = 10
@@ -214,10 +214,10 @@ def compared_with(
     over_time = (*over_time, *flicker_of_measured(photometry.state, over_time, scene.ring))
     failed = any("led_dead" in m.name for m in over_time)
     whole, withdrawn = sums.named(samples, recording, failed)
-    on_window, of_photo = parted_from_photo(sums.on_window(samples), scene.ring)
-    on_window, unsure = beside_blur(on_window, whole)
+    on_window, of_photo = separated_from_photo(sums.on_window(samples), scene.ring)
+    on_window, unsure = separated_from_blur(on_window, whole)
     bent = on_line(fixed, rings, scene.ring, on_window)
-    on_window, glints = told_apart((*on_window, *bent), sums.glints(whole, bent))
+    on_window, glints = window_and_glints((*on_window, *bent), sums.glints(whole, bent))
     apart_mm, clear = ring_step_mm(rings, scene.trajectory), (*on_window, *glints, *of_photo)
     line_rad = float(np.arctan2(scene.ring.radius_mm, scene.ring.ahead_mm))
     of_wall = unnamed(samples and samples.clear_of(clear), scene.surface, apart_mm, line_rad)

@@ -15,8 +15,8 @@ import numpy as np
 
 from pipeline.arrays import Float, Float32, Int
 from pipeline.artefacts.twin import Mismatch, NamedFigure
-from stages.twin.falls import over_frames
 from stages.twin.locate import FALSE_ALARM
+from stages.twin.significance import significance_over_frames
 from stages.twin.switched import Law, Pair, Shown
 
 _SURE, _MOST, _FEWEST = 3.0, 16, 6
@@ -60,7 +60,7 @@ class Suspected:
     size_of: Callable[[Float], Float] = np.asarray
     measured: Callable[[Shown, Float], float] | None = None
 
-    def by_others(self, frame: int) -> Float:
+    def from_other_half(self, frame: int) -> Float:
         """Return the law's numbers from the half of the frames that does not contain this one."""
         half = np.arange(len(self.frame)) % 2
         own = half[int(np.searchsorted(self.frame, frame))]
@@ -83,7 +83,7 @@ def _judged(one: Suspected, again: Again) -> tuple[Mismatch, bool]:
     """Return the mismatch with the figures from frames rendered again, and whether its name stays."""
     squares, sizes = [np.zeros((0, 4))], []
     for frame, shown in again(one.judges):
-        numbers = one.by_others(frame)
+        numbers = one.from_other_half(frame)
         squares.append(_squares(shown, one.law(shown, numbers))[None])
         if one.measured is not None:
             sizes.append(one.measured(shown, numbers))
@@ -107,10 +107,10 @@ def _borne_out(fall: Float, foretold: Float) -> tuple[float, float]:
     looks like chance. Divided by the predicted falls, in frames where it acts, they are alike: the more
     significant of both tests counts, with a chance doubled for two tries.
     """
-    each = [over_frames(fall)]
+    each = [significance_over_frames(fall)]
     acts = foretold > _LEAST_FALL * np.median(foretold) if len(foretold) else foretold > 0
     if acts.sum() >= _FEWEST:
-        each.append(over_frames(fall[acts] / foretold[acts]))
+        each.append(significance_over_frames(fall[acts] / foretold[acts]))
     told, chance = min(each, key=lambda e: e[1])
     return told, min(len(each) * chance, 1.0)
 

@@ -231,7 +231,7 @@ def _frames_of(spots: Sequence[Spot]) -> int:
     return len({s.frame for s in spots})
 
 
-def told_apart(
+def window_and_glints(
     window: Sequence[Mismatch], glints: Sequence[Mismatch]
 ) -> tuple[tuple[Mismatch, ...], tuple[Mismatch, ...]]:
     """Return what is on the window and what are glints, so that no place of the image is in both.

@@ -81,7 +81,7 @@ def uneven_lamps(lamp: LampLight | None, scene: Scene, frame: Int) -> tuple[Susp
     return (Suspected(found, lamp_pattern, frame, told),)
 
 
-def parted_from_wall(
+def separated_from_wall(
     uneven: Sequence[Suspected], lamp: LampLight | None, scene: Scene, samples: BlockSamples | None
 ) -> tuple[tuple[Suspected, ...], tuple[Mismatch, ...]]:
     """Return uneven lamps confirmed by wall that is seen at several places of the image, and those withdrawn.

@@ -158,7 +158,7 @@ def beside(places: tuple[ImagePlace, ...], others: tuple[ImagePlace, ...]) -> tu
     return tuple(p for p in places if not any(p.disc.touches(o.disc, _APART_PX) for o in others))
 
 
-def told_once(found: list[Mismatch]) -> tuple[Mismatch, ...]:
+def without_duplicates(found: list[Mismatch]) -> tuple[Mismatch, ...]:
     """Return what is on the window, without mismatches that name the same spot again with a worse fit."""
     kept: list[Mismatch] = []
     for one in sorted(found, key=lambda m: m.chi2_after - m.chi2_before):

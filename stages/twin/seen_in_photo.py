@@ -19,7 +19,7 @@ from stages.twin.scene import Ring
 _DIMS = ("window_dirt", "window_scatter", "droplet")
 
 
-def parted_from_photo(
+def separated_from_photo(
     found: Sequence[Mismatch], ring: Ring
 ) -> tuple[tuple[Mismatch, ...], tuple[Mismatch, ...]]:
     """Return what is on the window, and unnamed places that dim ones may have left in the photo.

@@ -10,7 +10,7 @@ from scipy.optimize import least_squares
 from pipeline.adjustment.robust import left_out_sd
 from pipeline.arrays import Float, Float32, Int
 from pipeline.artefacts.twin import NamedFigure
-from stages.twin.falls import over_frames
+from stages.twin.significance import significance_over_frames
 
 WIDEST_PX = 48.0
 """Half width of the window about a place, px: at least this much, else two radii but at most this much beyond
@@ -49,8 +49,8 @@ class FittedLaw:
         like chance; the shares that they show are alike. The more significant test counts.
         """
         if self.shown is None:
-            return over_frames(self.fall)[1]
-        return over_frames(self.shown)[1] if self.fall.sum() > 0 else 1.0
+            return significance_over_frames(self.fall)[1]
+        return significance_over_frames(self.shown)[1] if self.fall.sum() > 0 else 1.0
 
 
 def fall_of_spot(sums: Float32, start: Float, beyond: float) -> FittedLaw:

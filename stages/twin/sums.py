@@ -18,8 +18,8 @@ from stages.twin.dead_led import dead_led
 from stages.twin.gate import Suspected, judged
 from stages.twin.glints import SpotsOfFrames
 from stages.twin.lamp_power import power_of_lamps
-from stages.twin.lamps import parted_from_wall, uneven_lamps
-from stages.twin.locate import ImagePlace, told_once
+from stages.twin.lamps import separated_from_wall, uneven_lamps
+from stages.twin.locate import ImagePlace, without_duplicates
 from stages.twin.name import focus_of, response_of
 from stages.twin.picture import WholePictures
 from stages.twin.reference import BlockSamples, BlocksOfFrames, in_image
@@ -98,7 +98,7 @@ class Sums:
         """Return what is on the window or the lens; places that other frames do not confirm are withdrawn."""
         fixed_to = in_image(samples, tuple(w.place for w in self.window))
         judged = [w.judged(to) for w, to in zip(self.window, fixed_to, strict=True)]
-        return told_once([m for m in judged if m is not None])
+        return without_duplicates([m for m in judged if m is not None])
 
     def glints(self, whole: Sequence[Mismatch], bent: Sequence[Mismatch] = ()) -> tuple[Mismatch, ...]:
         """Return spots far brighter than predicted; ``whole`` are confirmed effects on the whole picture.
@@ -155,7 +155,7 @@ class Sums:
             return (), ()
         lamp = self._state.lamp
         uneven = uneven_lamps(lamp, self._scene, self.whole.frames_of("blur"))
-        uneven, of_wall = parted_from_wall(uneven, lamp, self._scene, samples)
+        uneven, of_wall = separated_from_wall(uneven, lamp, self._scene, samples)
         if any("led_dead" in one.mismatch.names for one in uneven):
             return uneven, of_wall
         return uneven, (*of_wall, *dead_led(samples, self._scene))

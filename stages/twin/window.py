@@ -221,7 +221,7 @@ class WindowPlace:
         return f"{at}, in all frames, {_STATED[names[0]]} {share}{others}."
 
 
-def beside_blur(
+def separated_from_blur(
     found: Sequence[Mismatch], whole: Sequence[Mismatch]
 ) -> tuple[tuple[Mismatch, ...], tuple[Mismatch, ...]]:
     """Return what remains on the window, and what is withdrawn because whole pictures are blurred.

@@ -18,7 +18,7 @@ from stages.diagnose.effects.pose import MotionBlur
 from stages.diagnose.gauge.answer import effects_found, formula, verdict_of
 from stages.diagnose.gauge.examine import Examined, examine
 from stages.diagnose.gauge.fit import evidence, fit
-from stages.diagnose.gauge.formula import says_the_same
+from stages.diagnose.gauge.formula import describes_effects
 from stages.diagnose.gauge.hypotheses import judged_of
 from stages.diagnose.gauge.run import Term
 from stages.diagnose.gauge.scan import scan
@@ -73,8 +73,8 @@ def test_a_tilt_is_named_with_its_size():
     formula_fit = fit(run, found.searched.nothing.state, [Term(pattern, STEADY, np.zeros(2))])
     other = fit(run, found.searched.nothing.state, [Term(LIBRARY["principal_point"], (), np.zeros(2))])
     assert found.best is not None
-    assert says_the_same(run, formula_fit, found.best.fit)
-    assert not says_the_same(run, formula_fit, other)
+    assert describes_effects(run, formula_fit, found.best.fit)
+    assert not describes_effects(run, formula_fit, other)
 
 
 class ShorterExposure(MotionBlur):

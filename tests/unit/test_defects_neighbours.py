@@ -63,7 +63,7 @@ def test_of_a_narrow_finding_single_rings_about_its_peak_are_no_witnesses():
 
 def test_what_single_rings_show_is_told_without_a_sign():
     """A deposit's depth is negative: "single rings show up to -2.30 mm" was the sentence."""
-    deposit = Found(None, None, None, None, 1.0, lone_mm=-2.3)
+    deposit = Found(None, None, None, None, 1.0, contradicted_mm=-2.3)
     assert "show up to 2.30 mm" in deposit._at_least()
     assert not deposit.flattened
 

@@ -38,7 +38,7 @@ def test_what_two_parts_of_one_recording_show_alike_is_named(real_probe: Probe) 
 
 def test_what_leaves_more_than_noise_or_may_go_otherwise_is_not_named(real_probe: Probe) -> None:
     sure = replace(SCALE, agreements=(AGREES,))
-    unsure = of_gauge(real_probe, estimates=(replace(sure, otherwise=0.2),))
+    unsure = of_gauge(real_probe, estimates=(replace(sure, other_courses=0.2),))
     assert unsure.verdict is Verdict.CLASS
     assert "depends on distance or speed in another way" in unsure.identifiable
     assert "in another way" not in of_gauge(real_probe, estimates=(SCALE,)).identifiable

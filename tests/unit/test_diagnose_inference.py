@@ -134,8 +134,8 @@ def test_the_surprise_is_the_marginal_likelihood():
         return float(-2 * stats.multivariate_normal(np.zeros(40), covariance).logpdf(measured))
 
     wide, narrow = np.array([1.0, 2.0]), np.array([0.1, 5.0])
-    surprise = [estimate(of, stated, np.array([np.inf, *s])).surprise for s in (wide, narrow)]
-    assert surprise[0] - surprise[1] == pytest.approx(exact(wide) - exact(narrow), abs=1e-8)
+    deviance = [estimate(of, stated, np.array([np.inf, *s])).deviance for s in (wide, narrow)]
+    assert deviance[0] - deviance[1] == pytest.approx(exact(wide) - exact(narrow), abs=1e-8)
 
 
 def cone_and_sheet() -> tuple[tuple[Column, ...], Stated]:
@@ -193,8 +193,8 @@ def test_deflated_evidence_counts_measurements_that_err_alike_once():
     once = evidence_of(design, noise, columns)
     three_times = total([once, once, once]).deflated(3.0)
     sigma = np.array([np.inf, 1.0])
-    assert estimate(three_times, stated, sigma).surprise == pytest.approx(
-        estimate(once, stated, sigma).surprise
+    assert estimate(three_times, stated, sigma).deviance == pytest.approx(
+        estimate(once, stated, sigma).deviance
     )
 
 

@@ -9,9 +9,9 @@ import pytest
 from stages.diagnose.gauge import judge as judging
 
 
-def hypothesis(name: str, surprise: float) -> Any:
+def hypothesis(name: str, deviance: float) -> Any:
     fit = SimpleNamespace(terms=(), name=name)
-    return SimpleNamespace(fit=fit, surprise=surprise, beforehand=0.0, named=True, library_terms=())
+    return SimpleNamespace(fit=fit, deviance=deviance, prior_deviance=0.0, named=True, library_terms=())
 
 
 @pytest.mark.parametrize(
@@ -33,8 +33,8 @@ def test_patterns_are_weighed_once_beside_each_likeliest_also_where_a_likelier_s
     monkeypatch: pytest.MonkeyPatch, likelier: list[str], with_pattern: float, ranked_as: list[str]
 ) -> None:
     asked: Counter[str] = Counter()
-    surprise = {"nothing": 50.0, "tilt": 0.0, "tilt and cone": 3.0, "tilt and wave": 4.0}
-    surprise["tilt and pattern"] = with_pattern
+    deviance = {"nothing": 50.0, "tilt": 0.0, "tilt and cone": 3.0, "tilt and wave": 4.0}
+    deviance["tilt and pattern"] = with_pattern
     sets = [SimpleNamespace(terms=(), name=n) for n in likelier]
 
     def near(*_: Any) -> tuple[float, None]:
@@ -46,13 +46,13 @@ def test_patterns_are_weighed_once_beside_each_likeliest_also_where_a_likelier_s
         return None if best.fit.name != "tilt" else SimpleNamespace(terms=(), name="tilt and pattern")
 
     def ranked(run: None, judged: list[Any], formula: Any) -> tuple[tuple[Any, ...], list[bool]]:
-        return tuple(sorted(judged, key=lambda j: j.surprise)), [True] * len(judged)
+        return tuple(sorted(judged, key=lambda j: j.deviance)), [True] * len(judged)
 
     stand_ins = {
         "regimes_of": lambda run: (), "evidence": lambda *_: (None,), "believed": lambda *_: 1.0,
         "empirical": lambda *_: None, "_of": lambda *_: None, "_beforehand": lambda *_: 0.0,
         "_distinct": lambda fits: [f for f in fits if f is not None], "_ranked": ranked, "_near": near,
-        "judged_of": lambda run, found, *_: hypothesis(found.name, surprise[found.name]),
+        "judged_of": lambda run, found, *_: hypothesis(found.name, deviance[found.name]),
         "_unfitted": lambda *_: [], "_better": lambda *_: sets.pop() if sets else None,
         "_with_patterns": with_patterns, "replace": lambda best, **_: best,
     }  # fmt: skip

@@ -15,7 +15,7 @@ from pipeline.recording.base import Encoder, Recording
 from stages.diagnose.agreement import Agreement
 from stages.diagnose.channels import Seen
 from stages.diagnose.correct import with_true_readings
-from stages.diagnose.late_pictures import Exposure, as_late_as_shown
+from stages.diagnose.late_pictures import Exposure, with_shown_delay
 from stages.diagnose.profile.evidence import ProfileEvidence
 from stages.diagnose.profile.finding import Size, finding
 from stages.diagnose.result import Diagnosis, Value, Verdict
@@ -178,7 +178,7 @@ def test_a_class_says_that_none_of_it_may_be_right_where_something_else_fits_as_
     recording = late("gauge", thirty_a_second, 0.008, None)
     assert "in another way" not in answer(real_probe, None, recording).identifiable
     assert recording.travel is not None
-    otherwise = (replace(recording.travel.estimates[0], otherwise=0.2),)
+    otherwise = (replace(recording.travel.estimates[0], other_courses=0.2),)
     recording = replace(recording, travel=replace(recording.travel, estimates=otherwise))
     found = answer(real_probe, None, recording)
     assert found.verdict is Verdict.CLASS
@@ -213,9 +213,9 @@ def test_without_an_encoder_nothing_is_told_of_how_late_an_exposure_makes_pictur
 ) -> None:
     """It had been 0 ± .5 ms, "as the encoder shows"."""
     size = {"exposure_s": Value(0.016, 0.001)}
-    assert as_late_as_shown(size, (None, None)) == size
+    assert with_shown_delay(size, (None, None)) == size
     unknown = late("gauge", thirty_a_second, 0.0, None, sigma_s=np.inf)
-    assert as_late_as_shown(size, (unknown,)) == size
+    assert with_shown_delay(size, (unknown,)) == size
     found = answer(real_probe, None, late("gauge", thirty_a_second, None, (16.0, 1.0)))
     assert "late_s" not in found.effects[0].parameters
 
@@ -224,15 +224,15 @@ def test_how_late_pictures_are_is_as_unsure_as_the_encoder_tells_it(thirty_a_sec
     """An encoder known to 10 ms had shown 0 ± .5 ms, and hidden the 8 ± 1 ms of the other recording."""
     size = {"exposure_s": Value(0.020, 0.001)}
     unsure = late("field", thirty_a_second, 0.004, None, sigma_s=0.010)
-    shown = as_late_as_shown(size, (unsure, None))["late_s"]
+    shown = with_shown_delay(size, (unsure, None))["late_s"]
     assert (shown.value, shown.sd) == pytest.approx((0.0, np.hypot(0.010, 0.001)))
     sure = late("gauge", thirty_a_second, 0.008, None)
     # Later than half of the exposure, pictures are so late by no more than that: as unsure as either.
     for exposure_sd, sd in ((0.001, np.hypot(0.0002, 0.001)), (0.004, 0.002)):
-        shown = as_late_as_shown({"exposure_s": Value(0.015, exposure_sd)}, (sure,))["late_s"]
+        shown = with_shown_delay({"exposure_s": Value(0.015, exposure_sd)}, (sure,))["late_s"]
         assert (shown.value, shown.sd) == pytest.approx((0.0075, sd))
     for both in ((unsure, sure), (sure, unsure)):
-        shown = as_late_as_shown(size, both)["late_s"]
+        shown = with_shown_delay(size, both)["late_s"]
         assert (shown.value, shown.sd) == pytest.approx((0.008, np.hypot(0.0002, 0.001)))
 
 

@@ -66,7 +66,7 @@ def test_the_surprise_of_a_set_is_its_marginal_likelihood_and_its_chance_beforeh
 
     nothing = exact(frozenset(), False)
     for chosen, nameless in ((frozenset({0}), False), (frozenset({1, 2}), False), (frozenset({0, 3}), True)):
-        assert sets.surprise(chosen) == pytest.approx(exact(chosen, nameless) - nothing, abs=1e-6)
+        assert sets.deviance(chosen) == pytest.approx(exact(chosen, nameless) - nothing, abs=1e-6)
 
 
 def test_what_is_there_is_reached_from_a_wrong_set_and_its_amplitudes_are_told():
@@ -88,14 +88,14 @@ def test_sets_met_by_adding_a_member_have_their_own_surprise():
     sets = replace(four, members=(*four.members[:2], replace(four.members[2], model=other), four.members[3]))
     met = sets.likely([frozenset(), frozenset({0, 3})], 4)
     assert {frozenset({3}), frozenset({0, 2, 3}), frozenset({0, 1})} <= met.keys()
-    for chosen, surprise in met.items():
-        assert surprise == pytest.approx(sets.surprise(chosen), abs=1e-6)
+    for chosen, deviance in met.items():
+        assert deviance == pytest.approx(sets.deviance(chosen), abs=1e-6)
 
 
 @pytest.mark.parametrize(("like", "left"), [(0.99, 3), (0.8, 4)])
 def test_a_pattern_that_describes_an_effect_is_no_rival_of_it(like, left):
     sets, _, _ = drawn({0: 1.0}, like)
-    assert len(sets.without_echoes(frozenset({0})).members) == left
+    assert len(sets.without_describing_patterns(frozenset({0})).members) == left
 
 
 def test_differences_are_believed_no_further_than_the_scores_of_what_was_found_spread():
@@ -148,7 +148,7 @@ def test_what_settles_has_patterns_of_line_and_picture_beside_it_that_settle_as_
 
 def test_such_a_pattern_is_as_likely_beside_its_effect_as_a_steady_one_beside_a_steady_effect():
     def beside(name: str, model: EffectModel, shape: Shape) -> float:
-        before = {m.model.name: m.beforehand for m in members_beside(model, shape)}
+        before = {m.model.name: m.prior_deviance for m in members_beside(model, shape)}
         return before[name] - before[model.name]
 
     settles = beside(f"generic_line_0_1 as {SETTLING.name}", SETTLING, (12.6,))

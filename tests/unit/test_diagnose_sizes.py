@@ -12,10 +12,10 @@ from stages.diagnose.effects.base import ImagePoints
 from stages.diagnose.effects.library import LIBRARY
 from stages.diagnose.effects.nameless import SWINGS
 from stages.diagnose.gauge import fit as fitting
+from stages.diagnose.gauge.altered_laws import OtherGrowth, other_course
 from stages.diagnose.gauge.confirm import Sized, partial_of, quantities
 from stages.diagnose.gauge.elimination import Reduced
 from stages.diagnose.gauge.fit import Fit
-from stages.diagnose.gauge.otherwise import OtherGrowth, other_course
 from stages.diagnose.gauge.run import Term
 from stages.diagnose.gauge.scan import freed
 from stages.diagnose.gauge.score_spread import score_inflation

@@ -47,7 +47,7 @@ def rings(aside: tuple[float, float] = (0.0, 0.0), axis: int = 0, at_px: float =
 def test_parts_of_the_picture_that_lie_aside_are_told_with_place_and_size(
     axis: int, aside: tuple[float, float]
 ) -> None:
-    """Half of the picture 2 px lower hid a pit and left 44 % of the radii inside their σ, unsaid."""
+    """Half of the picture 2 px lower hid a pit and left 44 % of the radii inside their σ, inexpressible."""
     at_px = (400.0, 310.0)[axis]
     seam = seam_of(rings(aside, axis, at_px))
     assert seam is not None

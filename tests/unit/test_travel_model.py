@@ -12,7 +12,7 @@ from scipy.interpolate import PchipInterpolator
 
 from pipeline.recording.base import Encoder
 from stages.diagnose.travel.events import _strongest, with_events
-from stages.diagnose.travel.evidence import TravelEstimate, _estimates, _goes_otherwise
+from stages.diagnose.travel.evidence import TravelEstimate, _estimates, _other_courses
 from stages.diagnose.travel.left_over import left_over, strongest_stretch
 from stages.diagnose.travel.model import EventKind, fitted
 from stages.diagnose.travel.noise import DriftNoise, whitened_fit
@@ -281,7 +281,7 @@ def test_a_picture_is_missed_by_its_noise_when_all_others_predict_it():
 def test_what_right_effects_leave_is_noise_and_no_other_course_does_as_well(faults):
     fit = with_events(seen(np.random.default_rng(3)), read(**faults))
     assert fit.fits_p > 0.05
-    assert all(e.otherwise < 1e-6 for e in _estimates("gauge", fit, STATED, 0.0) if e.p_value < 1e-5)
+    assert all(e.other_courses < 1e-6 for e in _estimates("gauge", fit, STATED, 0.0) if e.p_value < 1e-5)
 
 
 def test_what_wrong_effects_leave_is_no_noise_though_their_own_size_is_sure():
@@ -296,10 +296,10 @@ def test_what_goes_with_direction_beats_a_play_that_does_not():
     fit = with_events(seen(np.random.default_rng(3)), read(play_mm=0.5))
     columns = fit.columns.copy()
     columns[:, PLAY] = np.random.default_rng(9).standard_normal(len(columns))
-    assert _goes_otherwise(fit, PLAY) < 1e-6
+    assert _other_courses(fit, PLAY) < 1e-6
     left = fit.whitened.residual + (fit.columns - columns) @ fit.whitened.estimate
     wrong = replace(fit, columns=columns, whitened=replace(fit.whitened, residual=left))
-    assert _goes_otherwise(wrong, PLAY) > 1
+    assert _other_courses(wrong, PLAY) > 1
 
 
 def test_what_is_kept_of_a_fit_grows_with_the_run_and_not_with_its_square() -> None:

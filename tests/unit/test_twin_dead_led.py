@@ -70,7 +70,7 @@ def _dirt(theta, phi):
 def test_what_looks_like_a_dim_led_is_said_and_never_named(light, monkeypatch):
     """Dirt and an oval bore had borne the name, at chances of 1e-9 and with sizes off by six σ."""
     monkeypatch.setattr(sums, "uneven_lamps", lambda *_: ())
-    monkeypatch.setattr(sums, "parted_from_wall", lambda *_: ((), ()))
+    monkeypatch.setattr(sums, "separated_from_wall", lambda *_: ((), ()))
     frames = SimpleNamespace(whole=WholePictures(SCENE), _state=SimpleNamespace(lamp=None), _scene=SCENE)
     suspected, untold = sums.Sums._lamps(frames, _samples(light), False)
     assert suspected == ()
@@ -87,7 +87,7 @@ def test_uneven_lamps_that_are_borne_out_are_told_beside_a_dim_led(monkeypatch):
     """They and what the wall's photo holds had been thrown away."""
     lamps, of_wall = (SimpleNamespace(mismatch=SimpleNamespace(names=("uneven_lamps",))) for _ in range(2))
     monkeypatch.setattr(sums, "uneven_lamps", lambda *_: ())
-    monkeypatch.setattr(sums, "parted_from_wall", lambda *_: ((lamps,), (of_wall,)))
+    monkeypatch.setattr(sums, "separated_from_wall", lambda *_: ((lamps,), (of_wall,)))
     frames = SimpleNamespace(whole=WholePictures(SCENE), _state=SimpleNamespace(lamp=None), _scene=SCENE)
     suspected, untold = sums.Sums._lamps(frames, _samples(_dim(1.0)), False)
     assert suspected == (lamps,)

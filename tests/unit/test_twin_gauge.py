@@ -123,7 +123,7 @@ def test_what_a_diagnosis_found_is_switched_on_with_its_size_and_course(tmp_path
     said = switches_of(_diagnosis(tmp_path, [tilt, unsure, unknown, slip]) / "diagnosis.json")
     assert [s.text for s in said.found] == ["laser_tilt~step=0.35@25.0/4.6s", "encoder_slip=3.0/4.0s"]
     assert [s.name for s in said.of_line] == ["laser_tilt"]
-    assert len(said.unsaid) == 2
+    assert len(said.inexpressible) == 2
     assert said.by_chance == 1e-9, "the probability of a name is none of a mismatch by chance"
 
 

@@ -46,7 +46,7 @@ def test_a_response_is_told_by_how_the_wall_brightens_where_lamps_come_nearer(po
     assert found.mismatch.name == name
     assert size.value == pytest.approx(power, abs=3 * size.sd)
     assert size.sd < 0.05
-    assert found.by_others(10)[0] == pytest.approx(power, abs=0.1)
+    assert found.from_other_half(10)[0] == pytest.approx(power, abs=0.1)
 
 
 @pytest.mark.parametrize("power", [1.0, 0.85])

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from stages.twin.cells import chance_of
-from stages.twin.falls import over_frames
 from stages.twin.gate import _borne_out, judged
 from stages.twin.lamp_light import Figure
 from stages.twin.line_light import _plain_line
@@ -16,6 +15,7 @@ from stages.twin.picture import WholePictures, _brings_light
 from stages.twin.reference import BlocksOfFrames
 from stages.twin.render import Region, TwinFrame
 from stages.twin.scene import Ring
+from stages.twin.significance import significance_over_frames
 from stages.twin.switched import STRAY_NAMES, Shown
 
 SHAPE, FRAMES, WHITE = (240, 320), 8, 200.0
@@ -168,8 +168,8 @@ def test_frames_that_follow_each_other_count_as_fewer():
     alike = 1 + np.repeat(random.standard_normal(4), 4)
     alike = 1 + (alike - alike.mean()) * apart.std() / alike.std()
     apart = 1 + apart - apart.mean()
-    assert over_frames(apart)[0] > 1.5 * over_frames(alike)[0] > 0
-    assert over_frames(-apart)[1] > 0.5
+    assert significance_over_frames(apart)[0] > 1.5 * significance_over_frames(alike)[0] > 0
+    assert significance_over_frames(-apart)[1] > 0.5
 
 
 def test_a_displaced_photo_is_no_motion_blur():
@@ -297,7 +297,7 @@ def test_an_effect_that_frames_show_unequally_is_borne_out_where_it_acts():
     random = np.random.default_rng(8)
     foretold = np.array([4.0, 9, 900, 30, 60, 14, 25])
     alike = foretold * (0.8 + 0.1 * random.standard_normal(7))
-    assert over_frames(alike)[0] < 3 < _borne_out(alike, foretold)[0]
+    assert significance_over_frames(alike)[0] < 3 < _borne_out(alike, foretold)[0]
     by_chance = foretold * (-1 + 0.8 * random.standard_normal(7))
     assert _borne_out(by_chance, foretold)[0] < 3
     assert _borne_out(np.zeros(0), np.zeros(0)) == (0.0, 1.0)

@@ -5,7 +5,7 @@ import pytest
 
 from pipeline.artefacts.twin import Look, Mismatch, NamedFigure
 from stages.twin.scene import Ring
-from stages.twin.seen_in_photo import beside_sectors, parted_from_photo
+from stages.twin.seen_in_photo import beside_sectors, separated_from_photo
 
 _RING = Ring((400.0, 298.0), 207.0, 50.0, 22.0)
 
@@ -29,11 +29,11 @@ def _place(name, u, v, share):
 )
 def test_what_the_photo_holds_of_dirt_is_withdrawn_at_its_azimuth(bright, left):
     dust = _place("window_dirt", 497.0, 468.0, 0.294)
-    kept, withdrawn = parted_from_photo((dust, bright), _RING)
+    kept, withdrawn = separated_from_photo((dust, bright), _RING)
     assert kept == ((dust,) if left else (dust, bright))
     assert len(withdrawn) == left
     assert all("darker there" in m.statement for m in withdrawn)
-    assert parted_from_photo((bright,), _RING) == ((bright,), ())
+    assert separated_from_photo((bright,), _RING) == ((bright,), ())
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,7 @@ from pipeline.instrument.probe import Lighting
 from pipeline.recording.base import Illumination
 from stages.twin.glints import SpotsOfFrames
 from stages.twin.lamp_light import Course, LampLight
-from stages.twin.lamps import flicker_of_measured, parted_from_wall, uneven_lamps
+from stages.twin.lamps import flicker_of_measured, separated_from_wall, uneven_lamps
 from stages.twin.laws import dim_share
 from stages.twin.on_wall import ring_step_mm, touching, unnamed
 from stages.twin.reference import BlockSamples, BlocksOfFrames
@@ -242,7 +242,7 @@ def test_lamps_are_uneven_only_where_wall_seen_twice_says_so(rolled_deg, of, kep
         return of_photo + (0.92 - 1) * light(at)  # a response of .92 makes as much of that light as lamps do
 
     scene, samples = _seen_by_a_probe(rolled_deg, change, light)
-    told, withdrawn = parted_from_wall(uneven_lamps(lamp, scene, np.arange(8)), lamp, scene, samples)
+    told, withdrawn = separated_from_wall(uneven_lamps(lamp, scene, np.arange(8)), lamp, scene, samples)
     assert (len(told), len(withdrawn)) == (kept, 1 - kept)
     assert all(("too dark" in w.statement) == (of == "photo") for w in withdrawn)
     assert all(("cannot be told" in w.statement) == (of != "photo") for w in withdrawn)
@@ -263,7 +263,7 @@ def test_a_dim_led_is_told_without_a_roll_where_the_wall_comes_nearer(of):
         of_lamps = np.log1p(-min(lost, 0.999) * share_at(scene, azimuth, theta, at))
         return (of_lamps if of == "lamps" else 0 * at) - lamp.around(at)
 
-    told, withdrawn = parted_from_wall([suspected], lamp, scene, _seen_by_a_probe(0, change)[1])
+    told, withdrawn = separated_from_wall([suspected], lamp, scene, _seen_by_a_probe(0, change)[1])
     assert (len(told), len(withdrawn)) == (of == "lamps", of == "photo")
     assert all("too dark" in w.statement for w in withdrawn)
 

@@ -6,10 +6,10 @@ import pytest
 
 from pipeline.artefacts.twin import Mismatch, NamedFigure
 from stages.twin.compare import BLOCK_PX, block_textures
-from stages.twin.locate import ImagePlace, full_size, places_displaced, places_in_image, told_once
+from stages.twin.locate import ImagePlace, full_size, places_displaced, places_in_image, without_duplicates
 from stages.twin.render import Region, TwinFrame
 from stages.twin.spot import FittedLaw, _slopes_at, _spot_at
-from stages.twin.window import WindowPlace, _fall_of_drop, _with_photo, beside_blur, or_on_window
+from stages.twin.window import WindowPlace, _fall_of_drop, _with_photo, or_on_window, separated_from_blur
 
 
 def _frame(level):
@@ -214,7 +214,9 @@ def test_one_spot_is_told_once_and_two_are_told_twice():
         )
         return Mismatch("window_scatter", "intensity", "image", place, (), 0.0, 5.0, 5.0 - fall, "")
 
-    assert [m.place[0].value for m in told_once([spot(100, 1.0), spot(112, 3.0), spot(300, 2.0)])] == [
+    assert [
+        m.place[0].value for m in without_duplicates([spot(100, 1.0), spot(112, 3.0), spot(300, 2.0)])
+    ] == [
         112,
         300,
     ]
@@ -341,8 +343,8 @@ def test_scatter_is_withdrawn_where_whole_frames_are_blurred():
         return Mismatch(name, "intensity", "image", (), (), 1e-5, 2.0, 1.0, "Something is there.")
 
     spots = [named("window_dirt"), named("window_scatter or window_dirt"), named("droplet")]
-    kept, withdrawn = beside_blur(spots, [named("motion_blur")])
+    kept, withdrawn = separated_from_blur(spots, [named("motion_blur")])
     assert [m.name for m in kept] == ["window_dirt", "droplet"]
     assert [m.name for m in withdrawn] == ["window_scatter or window_dirt"]
     assert "blurred" in withdrawn[0].statement
-    assert beside_blur(spots, [named("bloom")]) == (tuple(spots), ())
+    assert separated_from_blur(spots, [named("bloom")]) == (tuple(spots), ())

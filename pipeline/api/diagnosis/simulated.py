@@ -44,7 +44,7 @@ class Switches:
         Those that the simulator can switch on.
     effects : tuple of NamedEffect
         The same as diagnosis.json has them.
-    unsaid : tuple of str
+    inexpressible : tuple of str
         Sentences about the others.
     by_chance : float
         Probability that chance alone shows as much when nothing was left out; nan where it is not told.
@@ -52,7 +52,7 @@ class Switches:
 
     found: tuple[Switch, ...]
     effects: tuple[NamedEffect, ...]
-    unsaid: tuple[str, ...]
+    inexpressible: tuple[str, ...]
     by_chance: float = math.nan
 
     @property
@@ -75,17 +75,19 @@ def switches_of(file: Path) -> Switches:
     InputError
         When the file cannot be read.
     """
-    found, effects, unsaid = [], [], []
+    found, effects, inexpressible = [], [], []
     answer = read_answer(file)
     for said in answer.effects:
         switch = _switch(said) if said.probability >= _SURE or math.isnan(said.probability) else None
         if switch is None:
-            unsaid.append(f"{said.name.replace('_', ' ').capitalize()} is not simulated: {_why(said)}.")
+            inexpressible.append(
+                f"{said.name.replace('_', ' ').capitalize()} is not simulated: {_why(said)}."
+            )
         else:
             found.append(switch)
             effects.append(said)
     by_chance = math.nan if answer.global_p is None else answer.global_p
-    return Switches(tuple(found), tuple(effects), tuple(unsaid), by_chance)
+    return Switches(tuple(found), tuple(effects), tuple(inexpressible), by_chance)
 
 
 def _why(said: NamedEffect) -> str:
@@ -167,9 +169,9 @@ def try_diagnosis(diagnosis: Path, folder: Path, display: Display) -> DiagnosisT
             "The diagnosis had no gauge run. An inspection measures wall and poses with the very instrument "
             "that is in doubt, whose error then looks like the wall's own shape: record a gauge run."
         )
-        return DiagnosisTried(cannot_tell=(*said.unsaid, *still, sentence))
+        return DiagnosisTried(cannot_tell=(*said.inexpressible, *still, sentence))
     if not said.of_line:
-        return DiagnosisTried(cannot_tell=(*said.unsaid, *still))
+        return DiagnosisTried(cannot_tell=(*said.inexpressible, *still))
     inputs = open_inputs(None, gauge, probe)
     effects = json.dumps([s.text for s in said.of_line])
     configuration = resolve(_STAGES, None, [f"gauge_line.effects={effects}"])
@@ -188,7 +190,7 @@ def _judged(said: Switches, found: GaugeTwin, still: tuple[str, ...]) -> Diagnos
     kept, withdrawn = (
         tuple(m for m, k in zip(each, found.kept, strict=True) if k == want) for want in (True, False)
     )
-    return DiagnosisTried(found, kept, withdrawn, (*said.unsaid, *still, power))
+    return DiagnosisTried(found, kept, withdrawn, (*said.inexpressible, *still, power))
 
 
 def _mismatch(named: NamedEffect, kept: bool, found: GaugeTwin, by_chance: float) -> Mismatch:

@@ -14,7 +14,7 @@ from stages.diagnose.channels import Seen
 from stages.diagnose.effects.base import EffectModel
 from stages.diagnose.field.against_gauge import met_in_field, not_refuted
 from stages.diagnose.field.evidence import FieldEvidence, travels
-from stages.diagnose.field.left import why_unexplained
+from stages.diagnose.field.unexplained import why_unexplained
 from stages.diagnose.gauge.scan import Scored
 from stages.diagnose.inference import INSTRUMENT, Evidence, Stated, places_of, score, stated_belief
 from stages.diagnose.result import (
@@ -136,7 +136,7 @@ def _about_as_good(scores: Sequence[Scored]) -> tuple[Scored, ...]:
     return tuple(s for s in scores if s.score.statistic > top - max(_APART, _ALMOST * top))
 
 
-def met_by_field(
+def field_confirmations(
     found: Diagnosis, field: Seen | None, gauge: Seen | None, probe: Probe
 ) -> tuple[Confirmation | None, ...]:
     """Return, for each effect of the gauge run's likeliest hypothesis, whether the inspection agrees.
@@ -155,7 +155,7 @@ def met_by_field(
 
 
 def borne_out(gauge: Seen | None, met: Sequence[Confirmation | None]) -> Seen | None:
-    """Return the gauge run's evidence with the inspection's confirmations, ``met`` as from `met_by_field`."""
+    """Return the gauge run's evidence with confirmations ``met`` as from `field_confirmations`."""
     if gauge is None or gauge.geometry is None or not met:
         return gauge
     each = zip(gauge.geometry.confirmed, met, strict=False)
@@ -167,7 +167,7 @@ def with_field(
     found: Diagnosis, field: Seen | None, gauge: Seen | None, met: Sequence[Confirmation | None],
     probe: Probe, library: Mapping[str, EffectModel],
 ) -> Diagnosis:  # fmt: skip
-    """Return the answer with what the inspection's rings and texture show; ``met`` as from `met_by_field`."""
+    """Return the answer with the evidence of rings and texture; ``met`` as from `field_confirmations`."""
     if field is None or field.field is None or field.field.run is None:
         return found
     stated = stated_belief(probe)

@@ -161,7 +161,7 @@ def _about_encoder(found: Evidence, scale: float) -> Evidence:
     return replace(found, right=found.right - scale * by_scale, misfit=float(misfit))
 
 
-def nothing_said(recording: Recording, problem: str) -> FieldEvidence:
+def empty_evidence(recording: Recording, problem: str) -> FieldEvidence:
     """Return empty evidence, with the reason, if rings and texture do not determine the motion."""
     lit = len(recording.frames.of(Illumination.LED, Illumination.BOTH))
     why = problem or "they do not determine the motion"
@@ -192,7 +192,7 @@ def field_evidence(
     try:
         whole = _evidence(run, asked, slips)
     except np.linalg.LinAlgError:
-        return replace(nothing_said(run.recording, ""), travel=travel, run=run)
+        return replace(empty_evidence(run.recording, ""), travel=travel, run=run)
     missing = (*(travel.shortcomings if travel else ()), *shortcomings_of(run))
     return FieldEvidence(travel, whole, missing, run)
 

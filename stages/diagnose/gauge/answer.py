@@ -110,7 +110,7 @@ def unknown_rivals(examined: Examined) -> tuple[str, ...]:
     return tuple(sorted(doubted, key=lambda formula: -doubted[formula]))
 
 
-def like_a_name(examined: Examined) -> tuple[str, ...]:
+def unknown_law_descriptions(examined: Examined) -> tuple[str, ...]:
     """Return, for each name that an unknown law makes uncertain, a description of that law."""
     best = examined.best
     each = zip(best.library_terms, examined.unknown_laws, strict=True) if best is not None else ()
@@ -157,17 +157,17 @@ def candidates(examined: Examined) -> tuple[Candidate, ...]:
     if verdicts is None:
         return ()
     nothing = next(j for j in verdicts.judged if not j.fit.terms)
-    before = nothing.surprise + nothing.beforehand
+    before = nothing.deviance + nothing.prior_deviance
     fitted = [
         Candidate(
-            j.names, float(p), nothing.surprise - j.surprise, nothing.heldout - j.heldout,
+            j.names, float(p), nothing.deviance - j.deviance, nothing.heldout - j.heldout,
             " ".join(t.model.statement(t.shape, t.amplitude) for t in j.fit.terms) or "Nothing was left out.",
         )
         for p, j in zip(verdicts.probability, verdicts.judged, strict=True)
     ]  # fmt: skip
     weighed = [
         Candidate(
-            tuple(sorted(m.model.name for m in u.members)), u.probability, before - u.surprise, np.nan,
+            tuple(sorted(m.model.name for m in u.members)), u.probability, before - u.deviance, np.nan,
             u.statement or "Nothing was left out.",
         )
         for u in verdicts.unfitted

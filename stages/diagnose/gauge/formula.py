@@ -68,7 +68,7 @@ def empirical(run: GaugeRun, before: Fit, stated: Stated, swung: Sequence[Scored
     return refined(run, fit(run, before.state, (*before.terms, *terms)))
 
 
-def is_more(left: float, swung: Sequence[Scored]) -> bool:
+def may_need_pattern(left: float, swung: Sequence[Scored]) -> bool:
     """Return whether a pattern or swing may be needed: noise makes the rest with probability ``left``."""
     return left < 2 * _NEEDED or any(s.p_value * len(SWINGS) < _NEEDED for s in swung)
 
@@ -84,7 +84,7 @@ def patterns_by_chance(nothing: Fit, stated: Stated, swung: Sequence[Scored]) ->
     return 2 * min(_by_chance(nothing.of_patterns, nothing.terms, stated), swinging)
 
 
-def says_the_same(run: GaugeRun, formula: Fit, named: Fit) -> bool:
+def describes_effects(run: GaugeRun, formula: Fit, named: Fit) -> bool:
     """Return whether a formula's pattern equals, within the laws' accuracy, one that named effects make.
 
     Such a pattern describes those effects and is not a rival, even if it also fits some of the noise.

@@ -38,19 +38,19 @@ class Judged:
         Of the whole run; the scatter of its scores is estimated only for the likeliest hypothesis.
     by_regime : tuple of Evidence
         Of each regime alone.
-    surprise, heldout : float
+    deviance, heldout : float
         −2 ln of the likelihood of all measurements, and of each regime given the others, divided by the
         factor for correlated errors.
-    beforehand : float
+    prior_deviance : float
         −2 ln of its prior probability.
     """
 
     fit: Fit
     evidence: Evidence
     by_regime: tuple[Evidence, ...]
-    surprise: float
+    deviance: float
     heldout: float
-    beforehand: float
+    prior_deviance: float
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -100,17 +100,17 @@ def regimes_of(run: GaugeRun) -> tuple[Regime, ...]:
 def judged_of(
     run: GaugeRun, found: Fit, regimes: Sequence[Regime], stated: Stated, alike: float, before: float = 0.0
 ) -> Judged:
-    """Return the hypothesis with its evidence and its surprise on all and on held-out regimes."""
+    """Return the hypothesis with its evidence and its deviance on all and on held-out regimes."""
     whole, *parts = evidence(run, found, (), [r.part for r in regimes], with_spread=False)
     sigma = prior_sigma(whole, found.terms)
 
-    def surprise(of: Evidence) -> float:
-        return estimate(of.deflated(alike), stated, sigma).surprise
+    def deviance(of: Evidence) -> float:
+        return estimate(of.deflated(alike), stated, sigma).deviance
 
     if len(parts) < 2:
-        return Judged(found, whole, tuple(parts), surprise(whole), surprise(whole), before)
-    together = surprise(total(parts).over(whole.columns))
+        return Judged(found, whole, tuple(parts), deviance(whole), deviance(whole), before)
+    together = deviance(total(parts).over(whole.columns))
     heldout = [
-        together - surprise(total([p for p in parts if p is not left]).over(whole.columns)) for left in parts
+        together - deviance(total([p for p in parts if p is not left]).over(whole.columns)) for left in parts
     ]
-    return Judged(found, whole, tuple(parts), surprise(whole), float(np.sum(heldout)), before)
+    return Judged(found, whole, tuple(parts), deviance(whole), float(np.sum(heldout)), before)

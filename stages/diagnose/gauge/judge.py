@@ -11,7 +11,7 @@ from pipeline.arrays import Bool, Float
 from stages.diagnose.effects.base import EffectModel, Shape
 from stages.diagnose.effects.nameless import Nameless
 from stages.diagnose.gauge.fit import Fit, evidence, fit
-from stages.diagnose.gauge.formula import adequacy, empirical, is_more, says_the_same, swings
+from stages.diagnose.gauge.formula import adequacy, describes_effects, empirical, may_need_pattern, swings
 from stages.diagnose.gauge.hypotheses import Judged, Regime, judged_of, regimes_of
 from stages.diagnose.gauge.run import GaugeRun, Term
 from stages.diagnose.gauge.scan import Scored, refined
@@ -20,11 +20,11 @@ from stages.diagnose.gauge.sets import (
     Cause,
     Member,
     Sets,
-    beforehand,
     believed,
     cause_of,
     key,
     members_of,
+    prior_deviance,
     terms_of,
 )
 from stages.diagnose.inference import Stated
@@ -43,7 +43,7 @@ class Unfitted:
 
     members: tuple[Member, ...]
     amplitudes: tuple[Float, ...]
-    surprise: float
+    deviance: float
     probability: float
 
     @property
@@ -156,8 +156,8 @@ def judge(
         if more is None:
             break
         judged.append(weighed(more))
-    surprise = np.array([*(j.surprise + j.beforehand for j in ranked), *(u.surprise for u in near)])
-    weight = np.where([*allowed, *(True for _ in near)], np.exp(-0.5 * (surprise - surprise[0])), 0.0)
+    deviance = np.array([*(j.deviance + j.prior_deviance for j in ranked), *(u.deviance for u in near)])
+    weight = np.where([*allowed, *(True for _ in near)], np.exp(-0.5 * (deviance - deviance[0])), 0.0)
     chance, count = weight / weight.sum(), len(ranked)
     each = (replace(u, probability=float(p)) for u, p in zip(near, chance[count:], strict=True))
     unfitted = tuple(sorted(each, key=lambda u: -u.probability))
@@ -179,17 +179,17 @@ def _ranked(run: GaugeRun, judged: Sequence[Judged], formula: Fit) -> tuple[tupl
     """
     nothing = next(j for j in judged if not j.fit.terms)
     allowed = np.array([j.heldout <= nothing.heldout and j.possible for j in judged])
-    surprise = np.array([j.surprise + j.beforehand for j in judged])
-    allowed &= ~_redundant(run, judged, _of(judged, formula), surprise)
-    order = np.lexsort((surprise, ~allowed))
+    deviance = np.array([j.deviance + j.prior_deviance for j in judged])
+    allowed &= ~_redundant(run, judged, _of(judged, formula), deviance)
+    order = np.lexsort((deviance, ~allowed))
     return tuple(judged[k] for k in order), np.asarray(allowed[order])
 
 
 def _better(run: GaugeRun, best: Judged, near: Sequence[Unfitted]) -> Fit | None:
     """Return the fit of the likeliest set of named effects, if it is likelier than all that was fitted."""
     named = [u for u in near if u.members and not any(m.nameless for m in u.members)]
-    first = min(named, key=lambda u: u.surprise, default=None)
-    if first is None or first.surprise > best.surprise + best.beforehand:
+    first = min(named, key=lambda u: u.deviance, default=None)
+    if first is None or first.deviance > best.deviance + best.prior_deviance:
         return None
     return refined(run, fit(run, best.fit.state, terms_of(first.members, best.fit)))
 
@@ -211,14 +211,14 @@ def _unfitted(sets: Sets, ranked: Sequence[Judged]) -> list[Unfitted]:
     here = sets.set_of(best.fit)
     if not here:
         return []
-    sets = sets.without_echoes(here)
+    sets = sets.without_describing_patterns(here)
     here, fitted = sets.set_of(best.fit), {key(j.fit.terms) for j in ranked}
-    offset = best.surprise + best.beforehand - sets.surprise(here)
+    offset = best.deviance + best.prior_deviance - sets.deviance(here)
     out = []
-    for chosen, surprise in sets.likely([here], MOST_EFFECTS).items():
-        members, far = sets.in_order(chosen), surprise + offset - best.surprise - best.beforehand
+    for chosen, deviance in sets.likely([here], MOST_EFFECTS).items():
+        members, far = sets.in_order(chosen), deviance + offset - best.deviance - best.prior_deviance
         if far < _FAR and key(members) not in fitted:
-            one = Unfitted(members, sets.amplitudes(chosen), surprise + offset, 0.0)
+            one = Unfitted(members, sets.amplitudes(chosen), deviance + offset, 0.0)
             out += [one] if one.possible else []
     return out
 
@@ -231,7 +231,7 @@ def _with_patterns(run: GaugeRun, best: Judged, left: float, stated: Stated) -> 
     if not best.named:
         return None
     swung = swings(run, best.fit, stated)
-    if not is_more(left, swung):
+    if not may_need_pattern(left, swung):
         return None
     both = empirical(run, best.fit, stated, swung)
     sizes = [shift_px(both, t) for t in both.terms]
@@ -239,18 +239,18 @@ def _with_patterns(run: GaugeRun, best: Judged, left: float, stated: Stated) -> 
     return both if max(sizes[own:], default=0.0) >= LEAST_SHARE * max(sizes[:own]) else None
 
 
-def _redundant(run: GaugeRun, judged: Sequence[Judged], formula: Judged, total_surprise: Float) -> Bool:
+def _redundant(run: GaugeRun, judged: Sequence[Judged], formula: Judged, total_deviance: Float) -> Bool:
     """Return (H,) True for the formula, where the likeliest named effects make the same pattern."""
     out = np.zeros(len(judged), bool)
     named = [k for k, j in enumerate(judged) if j.named]
     if named and formula.fit.terms:
-        best = judged[min(named, key=lambda k: float(total_surprise[k]))]
-        out[[j is formula for j in judged]] = says_the_same(run, formula.fit, best.fit)
+        best = judged[min(named, key=lambda k: float(total_deviance[k]))]
+        out[[j is formula for j in judged]] = describes_effects(run, formula.fit, best.fit)
     return out
 
 
 def _beforehand(run: GaugeRun, found: Fit, laws: int) -> float:
-    return beforehand(run, [(t.model, t.shape) for t in found.terms], laws)
+    return prior_deviance(run, [(t.model, t.shape) for t in found.terms], laws)
 
 
 def _distinct(fits: Sequence[Fit]) -> list[Fit]:

@@ -59,7 +59,7 @@ class Member:
 
     model: EffectModel
     shape: Shape
-    beforehand: float
+    prior_deviance: float
 
     @property
     def nameless(self) -> bool:
@@ -96,20 +96,20 @@ def believed(of: Evidence, alike: float) -> float:
     return float(max(_TEMPERED * alike, np.max(true / np.maximum(own, 1e-300), initial=1.0)))
 
 
-def beforehand(run: GaugeRun, terms: Sequence[tuple[EffectModel, Shape]], laws: int) -> float:
+def prior_deviance(run: GaugeRun, terms: Sequence[tuple[EffectModel, Shape]], laws: int) -> float:
     """Return −2 ln of a set's prior probability: 1 over the number of similar sets, including shapes."""
     unknown = any(isinstance(model, Nameless) for model, _ in terms)
-    each = sum(_one_beforehand(run, model, shape, laws) for model, shape in terms)
+    each = sum(_one_prior_deviance(run, model, shape, laws) for model, shape in terms)
     return float(each - 2 * np.log(NAMELESS) * unknown)
 
 
-def _one_beforehand(run: GaugeRun, model: EffectModel, shape: Shape, laws: int) -> float:
+def _one_prior_deviance(run: GaugeRun, model: EffectModel, shape: Shape, laws: int) -> float:
     """Return −2 ln of the prior probability of an effect or pattern among its kind."""
     if (model, shape) in PATTERNS:
         return float(2 * np.log(len(PATTERNS)))
     if isinstance(model, PatternInCourse):
         # As likely beside the effect as a steady pattern is beside a steady effect.
-        return _one_beforehand(run, model.like, shape, laws) + float(2 * np.log(len(PATTERNS) / laws))
+        return _one_prior_deviance(run, model.like, shape, laws) + float(2 * np.log(len(PATTERNS) / laws))
     courses = len(SEARCHED) if isinstance(model, Coursed) else 1
     return float(2 * np.log(laws * courses * max(len(model.shapes(*span(run))) / _PEAK, 1.0)))
 
@@ -143,7 +143,7 @@ def members_of(run: GaugeRun, found: Fit, scores: Sequence[Scored], laws: int) -
     known = [t for t in found.terms if not isinstance(t.model, Nameless)]
     as_found = [(p, t.shape) for t in known for p in patterns_in_course(t.model, pattern_of(t)[2])]
     each = dict.fromkeys((*asked, *PATTERNS, *as_found))
-    return tuple(Member(model, shape, _one_beforehand(run, model, shape, laws)) for model, shape in each)
+    return tuple(Member(model, shape, _one_prior_deviance(run, model, shape, laws)) for model, shape in each)
 
 
 def terms_of(members: Sequence[Member], found: Fit) -> tuple[Term, ...]:
@@ -195,9 +195,9 @@ class Sets:
         scaled = left.information * np.outer(sigma, sigma)
         return Sets(tuple(seen), tuple(place), scaled, left.right * sigma, sigma)
 
-    def surprise(self, chosen: Set) -> float:
+    def deviance(self, chosen: Set) -> float:
         """Return −2 ln of a set's posterior probability, up to a constant."""
-        before = sum(self.members[k].beforehand for k in chosen)
+        before = sum(self.members[k].prior_deviance for k in chosen)
         before -= 2 * np.log(NAMELESS) * any(self.members[k].nameless for k in chosen)
         if not chosen:
             return 0.0
@@ -223,7 +223,7 @@ class Sets:
         own = {(t.model.name, t.shape) for t in found.terms}
         return frozenset(k for k, m in enumerate(self.members) if (m.model.name, m.shape) in own)
 
-    def without_echoes(self, chosen: Set) -> Sets:
+    def without_describing_patterns(self, chosen: Set) -> Sets:
         """Return the sets without patterns that merely describe one of some effects: they are no rivals."""
         echoes = {
             k for k, member in enumerate(self.members)
@@ -242,8 +242,8 @@ class Sets:
         return float(1 - np.trace(np.linalg.lstsq(own, taken)[0]) / len(at))
 
     def likely(self, first: Collection[Set], most: int) -> dict[Set, float]:
-        """Return the surprise of all sets of up to ``most`` members visited from the ``first`` ones."""
-        met = {chosen: self.surprise(chosen) for chosen in first}
+        """Return the deviance of all sets of up to ``most`` members visited from the ``first`` ones."""
+        met = {chosen: self.deviance(chosen) for chosen in first}
         looked_at, grown = set[Set](), set[Set]()
         while len(looked_at) < _LOOKED_AT:
             best = min(met.values())
@@ -254,18 +254,18 @@ class Sets:
             looked_at.add(here)
             # Sets with one member added, dropped or exchanged.
             for rest in (here, *(here - {gone} for gone in here)):
-                met.setdefault(rest, self.surprise(rest))
+                met.setdefault(rest, self.deviance(rest))
                 if rest not in grown and len(rest) < most:
                     grown.add(rest)
-                    for more, surprise in self._grown(rest):
-                        met.setdefault(more, surprise)
+                    for more, deviance in self._grown(rest):
+                        met.setdefault(more, deviance)
         return met
 
     def _grown(self, rest: Set) -> Iterator[tuple[Set, float]]:
-        """Yield the set with each member added, and its surprise; a model that does not repeat once."""
+        """Yield the set with each member added, and its deviance; a model that does not repeat once."""
         taken = {self.members[k].model.name for k in rest if not self.members[k].model.repeats}
         free = [k for k, m in enumerate(self.members) if k not in rest and m.model.name not in taken]
-        first, taken_up, best = self.surprise(rest), *self._taken_up(rest)
+        first, taken_up, best = self.deviance(rest), *self._taken_up(rest)
         named = not any(self.members[k].nameless for k in rest)
         for size in {len(self.place[k]) for k in free}:
             alike = [k for k in free if len(self.place[k]) == size]
@@ -276,7 +276,7 @@ class Sets:
             pull = self.right[at] - np.einsum("rkq,r->kq", both, best)
             gain = np.einsum("kq,kq->k", pull, np.linalg.solve(own, pull[..., None])[..., 0])
             for k, more in zip(alike, np.linalg.slogdet(own)[1] - gain, strict=True):
-                before = self.members[k].beforehand
+                before = self.members[k].prior_deviance
                 before -= 2 * np.log(NAMELESS) * (named and self.members[k].nameless)
                 yield rest | {k}, float(first + before + more)
 

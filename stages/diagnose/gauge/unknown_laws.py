@@ -25,12 +25,12 @@ from pipeline.physics.effect import FixedTo
 from stages.diagnose.effects.base import EffectModel
 from stages.diagnose.effects.courses import SEARCHED, Coursed
 from stages.diagnose.effects.kinds import Drifting
+from stages.diagnose.gauge.altered_laws import other_course, other_growth
 from stages.diagnose.gauge.fit import evidence
 from stages.diagnose.gauge.hypotheses import Judged
-from stages.diagnose.gauge.otherwise import other_course, other_growth
 from stages.diagnose.gauge.run import GaugeRun, Term, behaviour, pattern_of
 from stages.diagnose.gauge.scan import span
-from stages.diagnose.gauge.sets import NAMELESS, beforehand, prior_sigma
+from stages.diagnose.gauge.sets import NAMELESS, prior_deviance, prior_sigma
 from stages.diagnose.inference import INSTRUMENT, Evidence, Stated, estimate, places_of
 
 # Size of the difference between an unknown law and the named one, relative to the latter: in equal steps of
@@ -89,7 +89,7 @@ def odds_of_unknown_laws(
     about = evidence(run, best.fit, asked, with_spread=False)[0].deflated(believed)
 
     def before(kept: Sequence[Term]) -> float:
-        return beforehand(run, [(t.model, t.shape) for t in kept], len(laws))
+        return prior_deviance(run, [(t.model, t.shape) for t in kept], len(laws))
 
     patterns = [pattern_of(t) for t in terms]
     laid_out = [(time, harmonic) for _, time, harmonic in patterns]
@@ -178,7 +178,7 @@ def _groups(pattern: Sequence[object]) -> Iterator[tuple[int, ...]]:
 
 
 def _surprise(about: Evidence, terms: Sequence[Term], other: str, apart: float, stated: Stated) -> float:
-    """Return the surprise of terms and of a law with another growth, if any."""
+    """Return the deviance of terms and of a law with another growth, if any."""
     keys = {(t.model.name, t.shape) for t in terms}
     over = about.over([
         c for c in about.columns if c.effect in (INSTRUMENT, other) or (c.effect, c.shape) in keys
@@ -187,4 +187,4 @@ def _surprise(about: Evidence, terms: Sequence[Term], other: str, apart: float, 
     own = over.over([c for c in over.columns if c.effect != other])
     before = np.full(len(grown), apart)
     before[~np.array(grown)] = prior_sigma(own, terms)
-    return estimate(over, stated, before).surprise
+    return estimate(over, stated, before).deviance

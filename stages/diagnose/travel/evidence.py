@@ -58,7 +58,7 @@ class TravelEstimate:
         Whether disjoint parts of the travel agree.
     where : tuple of int or None
         First and last index of the `Sight` between which it adds to the readings.
-    otherwise : float
+    other_courses : float
         Likelihood of unnamed courses in its place relative to it, on average.
     taken_off : float
         Part of the whole that another effect makes, so that ``value`` is the rest: set when recordings are
@@ -75,7 +75,7 @@ class TravelEstimate:
     alike: tuple[tuple[str, float], ...]
     agreements: tuple[Agreement, ...] = ()
     where: tuple[int, int] | None = None
-    otherwise: float = 0.0
+    other_courses: float = 0.0
     taken_off: float = field(default=0.0, metadata=NOT_STORED)
 
     @property
@@ -229,13 +229,13 @@ def _estimates(
         out.append(
             TravelEstimate(
                 name, quantity.name, value, sigma, allowed, p, _DETECTED * total, alike, again,
-                _where(fit.columns[:, k]), _goes_otherwise(fit, int(k)) if told and p < _REPORTED else 0.0,
+                _where(fit.columns[:, k]), _other_courses(fit, int(k)) if told and p < _REPORTED else 0.0,
             )
         )  # fmt: skip
     return tuple(out)
 
 
-def _goes_otherwise(fit: TravelFit, column: int) -> float:
+def _other_courses(fit: TravelFit, column: int) -> float:
     """Return the likelihood of unnamed courses in a smooth effect's place, relative to it.
 
     They depend on the distance, its square, the speed, its absolute value, or its sign; the effect's own is

@@ -21,7 +21,7 @@ _UNIT = np.sqrt(12) / np.pi
 
 
 @dataclass(frozen=True)
-class Otherwise(EffectModel):
+class AlteredLaw(EffectModel):
     """A law at a given size times an unknown change; it competes with a name and is never reported.
 
     Attributes
@@ -60,7 +60,7 @@ class Otherwise(EffectModel):
 
     def statement(self, shape: Shape, amplitude: Float) -> str:
         """Return what it is."""
-        return f"A law like {self.law_of.law} that goes otherwise."
+        return f"A law like {self.law_of.law} that has another growth or course."
 
     @abstractmethod
     def _change(self, points: ImagePoints, amplitude: Float) -> Float:
@@ -68,7 +68,7 @@ class Otherwise(EffectModel):
 
 
 @dataclass(frozen=True)
-class OtherGrowth(Otherwise):
+class OtherGrowth(AlteredLaw):
     """A law times a polynomial in the relative difference of the radius from a reference.
 
     Attributes
@@ -89,7 +89,7 @@ class OtherGrowth(Otherwise):
 
 
 @dataclass(frozen=True)
-class OtherCourse(Otherwise):
+class OtherCourse(AlteredLaw):
     """A law with a free course: a constant part, and waves of half a period over the run and more.
 
     Attributes

@@ -12,7 +12,7 @@ _MOST_ALIKE = 0.9
 """Largest correlation of neighbours that is used: a higher one cannot be estimated from so few frames."""
 
 
-def over_frames(fall: Float) -> tuple[float, float]:
+def significance_over_frames(fall: Float) -> tuple[float, float]:
     """Return by how many σ the mean of falls (F,), in order of time, is above 0, and the chance of that.
 
     Consecutive frames see the same wall: correlated falls count as fewer independent frames.
