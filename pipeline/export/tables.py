@@ -83,12 +83,13 @@ def write_trajectory(trajectory: Trajectory, folder: Path) -> None:
     """Write ``trajectory.csv``: the camera in P; rotation sigmas are those of a rotation vector in C."""
     sigma = np.sqrt(np.diagonal(trajectory.covariance, axis1=-2, axis2=-1))
     quaternion = quaternion_from_rotation(trajectory.T_pc[:, :3, :3])
-    values = np.column_stack([trajectory.time_s, trajectory.T_pc[:, :3, 3], quaternion, sigma])
+    values = np.column_stack([trajectory.T_pc[:, :3, 3], quaternion, sigma])
     with (folder / "trajectory.csv").open("w", newline="", encoding="utf-8") as stream:
         rows = csv.writer(stream, lineterminator="\n")
         rows.writerow([*_POSE, *_SIGMA])
         rows.writerows(
-            [int(f), *(f"{v:.9g}" for v in row)] for f, row in zip(trajectory.frame, values, strict=True)
+            [int(f), f"{t:.15g}", *(f"{v:.9g}" for v in row)]
+            for f, t, row in zip(trajectory.frame, trajectory.time_s, values, strict=True)
         )
 
 

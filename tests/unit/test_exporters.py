@@ -77,13 +77,15 @@ def test_rings_are_the_same_bytes_again(tmp_path: Path, random: np.random.Genera
     assert files[0] == files[1]
 
 
-def test_trajectory(tmp_path: Path, random: np.random.Generator) -> None:
+@pytest.mark.parametrize("start_s", [0.0, 1.7e9])
+def test_trajectory(tmp_path: Path, random: np.random.Generator, start_s: float) -> None:
+    """Of times since 1970, as in bags, all rows of a recording had the same one."""
     count = 20
     rotation = rotation_from_vector(random.normal(0, 0.5, (count, 3)))
     T_pc = from_parts(rotation, random.normal(0, 100, (count, 3)))
     half = random.normal(size=(count, 6, 6))
     covariance = half @ np.swapaxes(half, 1, 2)
-    time = np.arange(count) / 30
+    time = start_s + np.arange(count) / 30
     trajectory = Trajectory(np.arange(count) + 5, time, T_pc, covariance, axis(), 50.0, 1.0, 0.001, 0.001, ())
     write_trajectory(trajectory, tmp_path)
     with (tmp_path / "trajectory.csv").open() as stream:
@@ -91,7 +93,7 @@ def test_trajectory(tmp_path: Path, random: np.random.Generator) -> None:
     table = {name: np.array([float(r[name]) for r in rows]) for name in rows[0]}
     assert list(table)[:9] == ["frame", "time_s", "x_mm", "y_mm", "z_mm", "qw", "qx", "qy", "qz"]
     np.testing.assert_array_equal(table["frame"], trajectory.frame)
-    np.testing.assert_allclose(table["time_s"], time, rtol=1e-8)
+    np.testing.assert_allclose(table["time_s"], time, rtol=0, atol=1e-5)
     for k, name in enumerate(("x_mm", "y_mm", "z_mm")):
         np.testing.assert_allclose(table[name], T_pc[:, k, 3], rtol=1e-8)
     quaternion = np.stack([table[n] for n in ("qw", "qx", "qy", "qz")], -1)
