@@ -127,7 +127,7 @@ def describe(region: Region, depth: Depth, surface: Surface, scene: Scene) -> De
 def describe_line(region: Region, depth: Depth, surface: Surface, scene: Scene) -> Defect:
     """Return a dark line that only the photo shows as an unconfirmed crack, with the depth from the rings.
 
-    Its probability is NaN: nothing tells how probable it is that the line is a crack.
+    Its probability is NaN: the probability that the line is a crack is unknown.
     """
     shown = describe(region, depth, surface, scene)
     direction = features_of(surface.relief, region, depth).direction_rad

@@ -22,7 +22,7 @@ from stages.defects.noise_tail import NoiseTail
 from stages.defects.segment import Region
 from stages.defects.surface import MeasuredWall
 
-# A finding fixed to the image, or where the line ends, is as likely as not on the wall: nothing tells.
+# A finding fixed to the image, or where the line ends, is as likely as not on the wall: nothing decides it.
 _WALL_OR_NOT = 0.5
 _UNSURE = "Its depth is less than twice its σ, so that it may be zero"
 # A finding whose total σ exceeds this many times its depth is not confirmed. Chosen: a finding that a noise

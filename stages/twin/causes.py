@@ -281,8 +281,8 @@ def _flicker(cells: Cells, base: Float, light: str, ring: Ring) -> list[Mismatch
     spread = float(np.sqrt(max(product.sum() / max(frames - granted, 1), 0.0)))
     alike = min(float(product.mean() / max(parts[0].std() * parts[1].std(), 1e-12)), 1 - 1e-9)
     chance = float(t.sf(alike * np.sqrt((frames - 2) / (1 - alike**2)), frames - 2))
-    foretold = known + np.where(half == 0, parts[1][:, None], parts[0][:, None])
-    before, after = (float(cells.chi2(k).sum() / max(cells.counted.sum(), 1)) for k in (known, foretold))
+    predicted = known + np.where(half == 0, parts[1][:, None], parts[0][:, None])
+    before, after = (float(cells.chi2(k).sum() / max(cells.counted.sum(), 1)) for k in (known, predicted))
     name = "flicker" if light == "LEDs" else "laser_flicker"
     often = frames < _FEW or robust_spread(np.diff(parts.mean(0))) > _USUAL * np.sqrt(2) * spread
     if chance > FALSE_ALARM or spread < _LEAST[name] or after >= before or not often:

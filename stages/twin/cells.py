@@ -94,8 +94,8 @@ class CellsOfFrames:
         are compared by their whole light, as if the line had its twin's place and profile.
         """
         sums = self._sums(above, twin, white, sector, (Region.LINE_CORE, Region.LINE_FLANK))
-        own, pixels, light, foretold = sums[2:]
-        ratio = light / np.where(foretold > 0, foretold, np.inf)
+        own, pixels, light, predicted = sums[2:]
+        ratio = light / np.where(predicted > 0, predicted, np.inf)
         self.frame.append(frame)
         self.parts.append(np.stack([pixels + ratio**2 * own, ratio * own, own, pixels]))
 

@@ -87,10 +87,10 @@ def _judged(one: Suspected, again: Again) -> tuple[Mismatch, bool]:
         squares.append(_squares(shown, one.law(shown, numbers))[None])
         if one.measured is not None:
             sizes.append(one.measured(shown, numbers))
-    before, after, foretold, pixels = np.concatenate(squares).T
+    before, after, predicted, pixels = np.concatenate(squares).T
     seen = pixels >= _FEWEST_PIXELS
     fall = (before - after)[seen]
-    told, chance = _borne_out(fall, foretold[seen])
+    told, chance = _borne_out(fall, predicted[seen])
     total = max(float(pixels[seen].sum()), 1.0)
     chi2 = [float(squares[seen].sum()) / total for squares in (before, after)]
     found = replace(one.mismatch, chi2_before=chi2[0], chi2_after=chi2[1])
@@ -100,7 +100,7 @@ def _judged(one: Suspected, again: Again) -> tuple[Mismatch, bool]:
     return replace(found, probability=float(np.nanmax([chance, found.probability]))), True
 
 
-def _borne_out(fall: Float, foretold: Float) -> tuple[float, float]:
+def _borne_out(fall: Float, predicted: Float) -> tuple[float, float]:
     """Return by how many σ the falls (F,) of z² are above 0, and the chance of that.
 
     An effect that is ten times as strong in some frames as in others makes falls that are as unequal, which
@@ -108,9 +108,9 @@ def _borne_out(fall: Float, foretold: Float) -> tuple[float, float]:
     significant of both tests counts, with a chance doubled for two tries.
     """
     each = [significance_over_frames(fall)]
-    acts = foretold > _LEAST_FALL * np.median(foretold) if len(foretold) else foretold > 0
+    acts = predicted > _LEAST_FALL * np.median(predicted) if len(predicted) else predicted > 0
     if acts.sum() >= _FEWEST:
-        each.append(significance_over_frames(fall[acts] / foretold[acts]))
+        each.append(significance_over_frames(fall[acts] / predicted[acts]))
     told, chance = min(each, key=lambda e: e[1])
     return told, min(len(each) * chance, 1.0)
 

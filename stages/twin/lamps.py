@@ -30,7 +30,7 @@ significance in σ. Recordings with even lamps leave 0.002."""
 _LOSSES = np.linspace(0.1, 1.0, 19)
 """Losses for which the pattern is computed; it is nearly linear between them."""
 _OF_SECOND = 2.0
-"""Relative σ of the first harmonic, since the lobe is unknown; for the second harmonic it is twice that."""
+"""The relative σ of the second harmonic, because the lobe is unknown, over that of the first: order two."""
 _VARIES, _FEWEST_FRAMES = {"flicker": 0.02, "laser_flicker": 0.08}, 8
 """Spread of brightness from frame to frame above which flicker is named, twice the limit for compared frames,
 since the photo is made from the measured ones; fewest frames."""
@@ -55,9 +55,9 @@ def uneven_lamps(lamp: LampLight | None, scene: Scene, frame: Int) -> tuple[Susp
     dim, spread = _harmonics(lamp, scene)
     azimuth = float(np.angle(-first))
     lost = float(np.interp(abs(first), -dim[:, 0], _LOSSES))
-    foretold = float(np.interp(lost, _LOSSES, dim[:, 1])) * np.exp(2j * azimuth)
-    allowed = _LEFT + _OF_SECOND * spread * abs(foretold)
-    one = abs(first) < -(1 + 2 * spread) * dim[-1, 0] and abs(second - foretold) < allowed
+    predicted = float(np.interp(lost, _LOSSES, dim[:, 1])) * np.exp(2j * azimuth)
+    allowed = _LEFT + _OF_SECOND * spread * abs(predicted)
+    one = abs(first) < -(1 + 2 * spread) * dim[-1, 0] and abs(second - predicted) < allowed
     look, nan = scene.ring.at(int(frame[0]), azimuth), float("nan")
     at = NamedFigure("azimuth_deg", float(np.degrees(azimuth)), 180 / LED_AZIMUTHS, "deg")
     told = np.tile([lost if one else 0.0, azimuth], (len(frame), 1))
@@ -67,7 +67,7 @@ def uneven_lamps(lamp: LampLight | None, scene: Scene, frame: Int) -> tuple[Susp
         )
         said = f"In all frames, the LED at image azimuth {at.value:.0f}° sends {100 * lost:.0f} % less light"
         name = "led_dead"
-        if abs(foretold) < allowed:  # lamps that lean give the first harmonic alone
+        if abs(predicted) < allowed:  # lamps that lean give the first harmonic alone
             name, said = "led_dead or uneven_lamps", said + ", or the lamps lean or shine unevenly"
         found = Mismatch(name, "intensity", "image", (at,), (size,), nan, nan, nan, f"{said}.", look)
         return (Suspected(found, dim_led, frame, told),)

@@ -35,7 +35,7 @@ places, in radii of the line, over which it is measured. Chosen."""
 _NEAREST_RAD = 0.2
 """Least polar angle at which wall is seen: nearer to the axis no block is all wall."""
 _NOISY = 3.0
-"""Largest among some hundred sums of two normal errors, in medians of their size: 2.8, rounded up."""
+"""Largest of some hundred lengths of vectors of two normal errors, in medians of it: 2.8, rounded up."""
 
 
 def unnamed(

@@ -46,7 +46,7 @@ class FittedLaw:
         """The probability that chance makes frames support the law; consecutive frames see the same wall.
 
         A law that changes some frames ten times as much as others makes their falls as unequal, which looks
-        like chance; the shares that they show are alike. The more significant test counts.
+        like chance. The shares that frames show are alike, and are tested instead where they are known.
         """
         if self.shown is None:
             return significance_over_frames(self.fall)[1]

@@ -95,7 +95,7 @@ class Sums:
         return free & ~self._clipped[frame] if frame in self._clipped else free
 
     def on_window(self, samples: BlockSamples | None) -> tuple[Mismatch, ...]:
-        """Return what is on the window or the lens; places that other frames do not confirm are withdrawn."""
+        """Return what is on the window or the lens; places that other frames do not confirm are left out."""
         fixed_to = in_image(samples, tuple(w.place for w in self.window))
         judged = [w.judged(to) for w, to in zip(self.window, fixed_to, strict=True)]
         return without_duplicates([m for m in judged if m is not None])
@@ -110,7 +110,7 @@ class Sums:
         return (*lit.found(bent=bent), *laser.found(max(stray, default=0.0)))
 
     def cells(self) -> tuple[Cells | None, Cells | None]:
-        """Return the sectors of lit frames and of the line, None for one that may not be tested.
+        """Return the sectors of lit frames and of the line, twins having steady lamps and an even laser.
 
         The line has none where it is clipped, since it then hardly shows the laser's power.
         """

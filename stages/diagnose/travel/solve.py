@@ -71,7 +71,7 @@ def _free(columns: Float, held: tuple[int, ...]) -> Int:
 
 
 def starts(asked: Asked, delay_s: float, play_mm: float) -> list[tuple[tuple[int, ...], tuple[float, float]]]:
-    """Return what is held at 0, and the start of the rest: nothing held, each alone, and finally both."""
+    """Return what is held at 0, and where the rest starts: delay and play both held, then one, then none."""
     every = [
         ((DELAY, PLAY), (0.0, 0.0)),
         ((PLAY,), (0.0, 0.0)), ((PLAY,), (delay_s, 0.0)),
