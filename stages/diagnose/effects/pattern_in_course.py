@@ -11,13 +11,13 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from pipeline.arrays import Float
-from pipeline.physics.effect import CourseKind
+from pipeline.physics.catalogue import effect
+from pipeline.physics.effect import CourseKind, FixedTo
 from stages.diagnose.effects.base import Amplitude, EffectModel, Factored, ImagePoints, Product, Shape
 from stages.diagnose.effects.courses import factors, in_words
 from stages.diagnose.effects.free_profile import FREE_PROFILES
+from stages.diagnose.effects.kinds import Drifting
 from stages.diagnose.effects.nameless import GENERIC, STEADY, Moves, Nameless
-
-_MOVES = (Moves.LINE, Moves.OUTWARD)
 
 
 @dataclass(frozen=True)
@@ -51,8 +51,16 @@ class PatternInCourse(Nameless, Product):
 
 
 def patterns_in_course(like: EffectModel, harmonic: int | None) -> tuple[PatternInCourse, ...]:
-    """Return the patterns of a harmonic that move line or picture as an effect comes; none of what stays."""
+    """Return the patterns of a harmonic that come as an effect does and move what it does not.
+
+    Beside what moves the laser's line they move the picture, and the other way round: a law of the effect's
+    own kind that grows otherwise is weighed for itself (`stages.diagnose.gauge.unknown_laws`). There are none
+    beside what stays.
+    """
     if like.kind is CourseKind.CONSTANT:
         return ()
-    steady = (*(t for t in GENERIC if t.moves in _MOVES), *(profile for profile, _ in FREE_PROFILES))
-    return tuple(PatternInCourse(p, like) for p in steady if p.harmonic == harmonic)
+    law = effect(like.static.law if isinstance(like, Drifting) else like.law)
+    moves = Moves.OUTWARD if law.fixed_to is FixedTo.LASER else Moves.LINE
+    powers = [t for t in GENERIC if t.moves is moves and t.harmonic == harmonic]
+    free = [profile for profile, _ in FREE_PROFILES if profile.powers[0] in powers]
+    return tuple(PatternInCourse(p, like) for p in (*powers, *free))
