@@ -224,7 +224,7 @@ def compared_with(
     placed, beside = beside_sectors((*on_window, *of_wall), over_time, scene.ring)
     found: tuple[Mismatch, ...] = (
         *over_time, *placed, *photometry.pixels, *whole, *glints,
-        *clipped(rings, state.line_clipped, comparison.clipped_wall / max(comparison.lit, 1.0)),
+        *clipped(rings, state.line_clipped, comparison.clipped_share),
     )  # fmt: skip
     fall, unnamed_map = left_over(None if samples is None else samples.seen_through(state.gain_map))
     comparison.after[Region.WALL] -= fall
@@ -232,7 +232,7 @@ def compared_with(
     return Twin(
         np.array([v.frame for v in comparison.views]), frames.withheld is not None,
         (*noise_figures(state.noise), *pattern_figures(state.pattern)),
-        (*state_figures(state), *lamp_power(samples), *unnamed_map),
+        (*state_figures(state), *(() if comparison.wall_is_clipped else lamp_power(samples)), *unnamed_map),
         comparison.regions(), found,
         comparison.psnr_db(False), comparison.psnr_db(True), comparison.chi2_camera, comparison.stray_share,
         comparison.seen / max(comparison.view, 1.0), cannot_tell(state, comparison.silent),
@@ -290,7 +290,7 @@ PHOTOMETRY = Stage(
 )
 TWIN = Stage(
     "twin",
-    "39",
+    "40",
     TwinParameters,
     compare_with_twin,
     "recorded frames beside the same frames, re-rendered from what the run has measured",

@@ -11,9 +11,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from scipy.stats import norm, t
+from scipy.stats import norm
 
-from pipeline.adjustment.robust import robust_spread, spread_about_median
+from pipeline.adjustment.robust import spread_about_median
 from pipeline.arrays import Float, Int
 from pipeline.artefacts.twin import Mismatch, NamedFigure
 from pipeline.instrument.probe import Lighting
@@ -29,6 +29,7 @@ from stages.twin.cells import (
     sigmas,
     try_law,
 )
+from stages.twin.flicker import flicker
 from stages.twin.laws import LED_AZIMUTHS, SECTOR_STEP_DEG, line_laws, lit_laws, steps_of
 from stages.twin.locate import FALSE_ALARM
 from stages.twin.scene import Ring
@@ -37,9 +38,11 @@ _FEWEST_FRAMES, _ROUNDS, _BESIDE = 6, 3, 3
 """Least frames per light; most causes per light; frames on each side that show a step."""
 _SURE = 3.0
 """σ, by the spread from frame to frame, by which one law must fit better than another to be distinguished."""
-_LEAST = {"step": 0.02, "flicker": 0.01, "laser_flicker": 0.04, "led_dead": 0.2, "laser_sector": 0.25}
-"""Smallest sizes that are named. A photo errs by one or two per cent from frame to frame; for the laser's
+_LEAST = {"step": 0.02, "led_dead": 0.2, "lamp_sector": 0.1, "laser_sector": 0.25}
+"""Smallest sizes that are told. A photo errs by one or two per cent from frame to frame; for the laser's
 colour, the wall's reflectance errs by more, from place to place."""
+_AROUND = ("led_dead", "lamp_sector")
+"""Laws of lit frames that change one side of the picture from a frame on."""
 _LOBE = 0.15
 """Relative 1 σ of an LED's share of the light because its lobe is unknown: uniform emission and emission as
 the cosine differ by this much at the ring."""
@@ -48,12 +51,6 @@ _SHAPE, _NARROW_DEG, _OF_WIDTH = 0.03, 20.0, 0.08
 times width is measured, and widths are tried in steps of a quarter: relative 1 σ of the loss, half a step
 over √3."""
 _OWN_STEP = {"LEDs": "lamp_step", "laser": "laser_step"}
-_USUAL, _FEW = 0.4, 10
-"""For flicker, the robust spread of steps between frames must be at least this share of the plain spread: it
-is 1 for normal numbers, and more for a sine, but small where a weld or a joint changes the whole bore in a
-few frames. Tested from so many frames on. Chosen."""
-_HALF_SECTORS = 3
-"""Number of neighbouring sectors in one group, when one half of the picture is to predict the other."""
 
 
 def causes(lit: Cells | None, line: Cells | None, lighting: Lighting, ring: Ring) -> tuple[Mismatch, ...]:
@@ -86,7 +83,7 @@ def _chosen(
     for _ in range(_ROUNDS):
         tries = [try_law(cells, base, law, len(laws) * _places(law)) for law in laws]
         tries.sort(key=lambda f: -f.fall.sum())
-        best = _by_other_sectors(tries[0], cells, base)
+        best = _by_other_sectors(_simplest(tries), cells, base)
         size, led = size_of(best), best.law.name == "led_dead"
         most = 1.0 + _SURE * _size_sd(best) if led else np.inf  # no LED can lose more than all its light
         if not _LEAST[best.law.name] < size < most:
@@ -98,13 +95,30 @@ def _chosen(
             break
         rivals = [
             _OWN_STEP[light] if o.law.name == "step" else o.law.name
-            for o in tries[1:]
-            if o.probability < FALSE_ALARM and sigmas(best.fall - o.fall) < _SURE
+            for o in tries
+            if o.law.name not in (best.law.name, "lamp_sector")
+            and o.probability < FALSE_ALARM
+            and sigmas(best.fall - o.fall) < _SURE
         ]
+        if best.law.name == "lamp_sector":  # what came at once with it, and what comes next, is its misfit
+            chosen = [(c, r) for c, r in chosen if abs(_first(c) - _first(best)) > 1]
         if not any(_same_sector(best, earlier) for earlier, _ in chosen):
             chosen.append((best, rivals))
         base = np.concatenate([base, best.change[None]])
+        if best.law.name == "lamp_sector":
+            break
     return chosen, base, unsure
+
+
+def _simplest(tries: Sequence[Fitted]) -> Fitted:
+    """Return the law that fits best; one without a name only where no named law fits about as well."""
+    named = next(o for o in tries if o.law.name != "lamp_sector")
+    return named if sigmas(tries[0].fall - named.fall) < _SURE else tries[0]
+
+
+def _first(found: Fitted) -> int:
+    """Return the index of the first frame of a change of lit frames."""
+    return int(found.place[0 if found.law.name == "step" else 1])
 
 
 def _same_sector(one: Fitted, other: Fitted) -> bool:
@@ -125,7 +139,9 @@ def _at_once(step: Fitted, cells: Cells) -> float:
 
 def _places(law: Law) -> int:
     """Return how many independent places a law may have."""
-    return {"laser_sector": SECTORS, "led_dead": len(law.columns) // 3}.get(law.name, len(law.columns))
+    if law.name == "laser_sector":
+        return SECTORS
+    return len(law.columns) // 3 if law.name in _AROUND else len(law.columns)
 
 
 def _by_other_sectors(best: Fitted, cells: Cells, base: Float) -> Fitted:
@@ -155,13 +171,15 @@ def _size_sd(found: Fitted) -> float:
     more = replace(found, size=found.size + found.sd)
     narrow = found.law.name == "laser_sector" and found.place[1] < _NARROW_DEG
     of_shape = float(np.hypot(_SHAPE, _OF_WIDTH * size_of(found) * narrow))
-    beyond = {"led_dead": _LOBE * size_of(found), "laser_sector": of_shape}[found.law.name]
+    beyond = {"led_dead": _LOBE * size_of(found)}.get(found.law.name, of_shape)
     return float(np.hypot(size_of(more) - size_of(found), beyond))
 
 
 def _mismatch(best: Fitted, rivals: list[str], cells: Cells, ring: Ring) -> Mismatch:
     size = NamedFigure("lost", size_of(best), _size_sd(best), "share of the light")
     name = best.law.name
+    if name == "lamp_sector":
+        return _darker_side(best, size, cells, ring)
     if name == "led_dead":
         place = _of_led(best, cells)
         said = f"From frame {place[0].value:.0f} on, the LED at image azimuth {place[1].value:.0f}° has lost"
@@ -181,6 +199,19 @@ def _mismatch(best: Fitted, rivals: list[str], cells: Cells, ring: Ring) -> Mism
         " or ".join([name, *rivals]), "line" if fixed_to == "line" else "intensity", fixed_to, place, (size,),
         best.probability, best.chi2_before, best.chi2_after, said, look,
     )  # fmt: skip
+
+
+def _darker_side(best: Fitted, size: NamedFigure, cells: Cells, ring: Ring) -> Mismatch:
+    """Return a change of one side of the picture that no LED makes."""
+    place = _of_led(best, cells)
+    said = (
+        f"From frame {place[0].value:.0f} on, lit wall about image azimuth {place[1].value:.0f}° is up to "
+        f"{100 * size.value:.0f} % darker, otherwise than one LED of the probe makes it: several lamps have "
+        "failed, or something shades them or the window."
+    )
+    look = ring.at(cells.frame[int(best.place[1])], float(best.place[0]))
+    chi2 = best.chi2_before, best.chi2_after
+    return Mismatch("", "intensity", "time", place, (size,), best.probability, *chi2, said, look)
 
 
 def _when(frame: Int, first: int) -> NamedFigure:
@@ -242,21 +273,23 @@ def _flicker_or_else(
     cells: Cells, base: Float, unsure: Fitted | None, light: str, ring: Ring
 ) -> list[Mismatch]:
     """Return flicker; as "flicker or X" if it vanishes once the uncertain cause X is fitted."""
-    found = _flicker(cells, base, light, ring)
+    found = flicker(cells, base, light, ring)
     if not found or unsure is None or unsure.law.name == "laser_sector":  # a sector changes no frame alone
         return found
-    if _flicker(cells, np.concatenate([base, unsure.change[None]]), light, ring):
+    if flicker(cells, np.concatenate([base, unsure.change[None]]), light, ring):
         return found
-    what, name = "a step of brightness", _OWN_STEP[light]
+    what, name = "a step of brightness", f"{found[0].name} or {_OWN_STEP[light]}"
     place: tuple[NamedFigure, ...] = (_when(cells.frame, int(unsure.place[0])),)
-    if unsure.law.name == "led_dead":
+    if unsure.law.name in _AROUND:
         place = _of_led(unsure, cells)
-        what, name = f"an LED that fails at image azimuth {place[1].value:.0f}°", unsure.law.name
+        what, name = f"an LED that fails at image azimuth {place[1].value:.0f}°", "flicker or led_dead"
+    if unsure.law.name == "lamp_sector":
+        what, name = f"a side that darkens, about image azimuth {place[1].value:.0f}°,", ""
     said = (
         f"{found[0].statement} {len(cells.frame)} frames do not distinguish this from {what} from frame "
         f"{place[0].value:.0f} on. What to do: withhold more frames."
     )
-    return [replace(found[0], name=f"{found[0].name} or {name}", place=place, statement=said)]
+    return [replace(found[0], name=name, place=place, statement=said)]
 
 
 def _of_led(found: Fitted, cells: Cells) -> tuple[NamedFigure, NamedFigure]:
@@ -264,37 +297,3 @@ def _of_led(found: Fitted, cells: Cells) -> tuple[NamedFigure, NamedFigure]:
     where = half_turn(float(np.degrees(found.place[0])))
     at = NamedFigure("azimuth_deg", where, 180 / LED_AZIMUTHS, "deg")
     return _when(cells.frame, int(found.place[1])), at
-
-
-def _flicker(cells: Cells, base: Float, light: str, ring: Ring) -> list[Mismatch]:
-    """Return flicker: in a frame, the brightness of one half of the picture predicts that of the other."""
-    whole = np.ones(len(cells.frame), bool)
-    known = fitted(cells, base, whole)
-    half = np.arange(SECTORS) // _HALF_SECTORS % 2
-    rest = np.where(cells.usable, cells.log_ratio - known, 0.0)
-    parts = np.stack([
-        rest[:, half == h].sum(1) / np.maximum(cells.usable[:, half == h].sum(1), 1) for h in (0, 1)
-    ])  # fmt: skip
-    parts = parts - parts.mean(1, keepdims=True)
-    product, frames = parts[0] * parts[1], len(cells.frame)
-    granted = len(drift(frames))  # frames' changes that the drift absorbs
-    spread = float(np.sqrt(max(product.sum() / max(frames - granted, 1), 0.0)))
-    alike = min(float(product.mean() / max(parts[0].std() * parts[1].std(), 1e-12)), 1 - 1e-9)
-    chance = float(t.sf(alike * np.sqrt((frames - 2) / (1 - alike**2)), frames - 2))
-    predicted = known + np.where(half == 0, parts[1][:, None], parts[0][:, None])
-    before, after = (float(cells.chi2(k).sum() / max(cells.counted.sum(), 1)) for k in (known, predicted))
-    name = "flicker" if light == "LEDs" else "laser_flicker"
-    often = frames < _FEW or robust_spread(np.diff(parts.mean(0))) > _USUAL * np.sqrt(2) * spread
-    if chance > FALSE_ALARM or spread < _LEAST[name] or after >= before or not often:
-        return []
-    sd = float(product.std()) / np.sqrt(frames) / (2 * spread)
-    place = tuple(
-        NamedFigure(n, float(f), 0.0)
-        for n, f in (("frame_from", cells.frame[0]), ("frame_to", cells.frame[-1]))
-    )
-    return [Mismatch(
-        name, "intensity" if light == "LEDs" else "line", "time",
-        place, (NamedFigure("exposure", spread, sd, "relative"),), chance, before, after,
-        f"Frames lit by the {light} vary in brightness by {100 * spread:.1f} % (1 σ) from frame to frame.",
-        ring.whole(cells.frame[int(np.argmax(np.abs(parts.mean(0))))]),
-    )]  # fmt: skip

@@ -18,6 +18,8 @@ BLOCK_PX = 8
 """Side of the blocks, px, in which differences are sought that stay at one place of the image."""
 _LEVELS = (0, 10, 20, 40, 80, 120, 160, 200)
 _FULL_SCALE, _STRAY = 255.0, 5.0
+CLIPPED_WALL = 0.01
+"""Share of pixels of lit wall from which clipping is told."""
 _SILENT = 0.92
 """Share of pixels at one grey level from which on noise is below that of rounding, 1/√12: erf(√1.5)."""
 _LEAST_TEXTURE = 4.0
@@ -135,6 +137,16 @@ class Comparison:
     def silent(self) -> bool:
         """Whether dark pixels show no noise: it is cut off at black, or less than rounding."""
         return bool(self.clipped or self.still > _SILENT * self.pixels[Region.DARK])
+
+    @property
+    def clipped_share(self) -> float:
+        """Share of pixels of lit wall at the level where grey levels pile up."""
+        return self.clipped_wall / max(self.lit, 1.0)
+
+    @property
+    def wall_is_clipped(self) -> bool:
+        """Whether so much lit wall clips that it is told."""
+        return self.clipped_share > CLIPPED_WALL
 
     @property
     def chi2_camera(self) -> float:

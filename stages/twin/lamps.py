@@ -103,6 +103,15 @@ def separated_from_wall(
     return tuple(kept), tuple(withdrawn)
 
 
+def beside_response(uneven: Mismatch) -> Mismatch:
+    """Return uneven lamps that are withdrawn because brightness does not follow the light as it is."""
+    said = (
+        "The lamps look uneven around the picture, but brightness follows their light to another power than "
+        "1, which makes lamps that come nearer to one side look uneven, too: it cannot be told."
+    )
+    return replace(uneven, statement=said)
+
+
 def _of_wall(found: Mismatch, size: float, sd: float) -> Mismatch:
     """Return uneven lamps as withdrawn: wall seen at several places contradicts them or does not decide."""
     if size + _SURE_OF_WALL * sd < _MOSTLY:

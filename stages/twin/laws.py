@@ -14,6 +14,8 @@ from stages.twin.scene import Ring
 
 LED_AZIMUTHS, _FINE = 24, 5
 _SECTOR_WIDTHS_DEG, _SECTOR_LOSSES = (10, 13, 16, 20, 25, 32, 40, 50, 65, 80, 100, 120), (0.3, 0.7, 0.95)
+_SIDE_WIDTHS_DEG, _SIDE_LOSS = (40.0, 80.0, 160.0), 0.5
+"""Widths, and the loss, of a side of the picture that darkens; other losses are powers of it. Chosen."""
 SECTOR_STEP_DEG = 180 / SECTORS
 """Step, degrees, between azimuths at which a dim sector is tried: half a sector of the cells."""
 _LEAST_AHEAD = 0.05
@@ -34,7 +36,20 @@ def lit_laws(cells: Cells, lighting: Lighting, ring: Ring) -> tuple[Float, list[
     return base, [
         Law("step", steps, first[:, None]),
         Law("led_dead", columns.reshape(-1, frames, SECTORS), places),
+        _lamp_sector(azimuth, steps, first),
     ]
+
+
+def _lamp_sector(azimuth_rad: Float, steps: Float, first: Float) -> Law:
+    """Return the law of one side of the picture that darkens in a step, whatever makes it so.
+
+    Its places are image azimuth (rad), first frame, loss and width (deg).
+    """
+    away = np.abs(half_turn(np.degrees(sector_azimuth_rad() - azimuth_rad[:, None])))
+    shape = np.stack([np.exp(-np.log(2) * (2 * away / width) ** 2) for width in _SIDE_WIDTHS_DEG], 1)
+    columns = np.log1p(-_SIDE_LOSS * shape)[:, :, None, None] * steps[None, None, ..., :1]
+    places = [(a, f, _SIDE_LOSS, w) for a in azimuth_rad for w in _SIDE_WIDTHS_DEG for f in first]
+    return Law("lamp_sector", columns.reshape(-1, *steps.shape[1:]), np.array(places))
 
 
 def line_laws(cells: Cells) -> tuple[Float, list[Law]]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -10,6 +11,7 @@ from pipeline.arrays import Float, Int
 from pipeline.artefacts.measured import RingSamples, RingValidity
 from pipeline.artefacts.twin import Mismatch, NamedFigure
 from stages.twin.cells import centred, chance_of, sigmas
+from stages.twin.compare import CLIPPED_WALL
 from stages.twin.gate import Suspected
 from stages.twin.line_light import LineLight
 from stages.twin.locate import FALSE_ALARM
@@ -20,8 +22,8 @@ from stages.twin.scene import Ring
 from stages.twin.state import PhotometricState
 from stages.twin.switched import IN_FOCUS_PX, defocus, response, wide_line
 
-_CLIPPED, _CLIPPED_WALL = 0.05, 0.01
-"""Share of ring samples, and of pixels of lit wall, above which clipping is reported."""
+_CLIPPED = 0.05
+"""Share of ring samples above which clipping is reported."""
 _LEAST_POWER, _SURE_OF_POWER, _ALIKE = 0.06, 3.0, 0.3
 """Smallest reported departure of an exponent from 1 (a slightly blurred photo loses as much contrast), and
 its significance in σ. Share of the departure by which fine and coarse texture may differ."""
@@ -43,7 +45,7 @@ def clipped(rings: RingSamples, line_share: float, wall_share: float) -> tuple[M
     for share, least, what, where, of in (
         (lost, _CLIPPED, "The line is", "line", "of ring samples"),
         (line_share, _CLIPPED, "The line's colour is", "line", "of the pixels in its middle"),
-        (wall_share, _CLIPPED_WALL, "Lit wall is", "image", "of pixels of lit wall"),
+        (wall_share, CLIPPED_WALL, "Lit wall is", "image", "of pixels of lit wall"),
     ):
         if share > least:
             found.append(Mismatch(
@@ -52,6 +54,19 @@ def clipped(rings: RingSamples, line_share: float, wall_share: float) -> tuple[M
                 f"{what} clipped in {100 * share:.0f} % {of}.",
             ))  # fmt: skip
     return tuple(found)
+
+
+def beside_clipping(
+    named: Sequence[Mismatch],
+) -> tuple[tuple[Mismatch, ...], tuple[Mismatch, ...]]:
+    """Return what is named though lit wall clips, and the responses that are then withdrawn.
+
+    The photo is made from the same frames: where they clip, it is as flat as with another response.
+    """
+    unsure = tuple(m for m in named if "response" in m.names)
+    said = "{} But lit wall is clipped, and so is its photo, which looks alike: it cannot be told."
+    withdrawn = tuple(replace(m, statement=said.format(m.statement)) for m in unsure)
+    return tuple(m for m in named if m not in unsure), withdrawn
 
 
 def response_of(samples: BlockSamples | None, ring: Ring) -> tuple[Suspected, ...]:

@@ -248,13 +248,13 @@ def _banding(samples: BlockSamples) -> tuple[Mismatch, ...]:
     everywhere = np.ones(len(samples.change), bool)
     if samples.frame.max() + 1 < FEWEST_FRAMES or samples.fixed_to(everywhere) != "rows":
         return ()
-    mean, _ = map_of(samples, "rows", (int(samples.frame.max()) + 1, int(samples.row.max()) + 1))
-    size = float(np.nanstd(mean))
     frames = np.unique(samples.frame)
+    each = samples.common_in_rows()[frames]
+    size = float(np.sqrt(max(each.mean(), 0.0)))
     chance = float(t.sf(sigmas(samples.explained("rows", everywhere)[frames]), len(frames) - 1))
-    sd = float(np.nanstd(np.nanstd(mean, axis=1))) / np.sqrt(len(frames))
     if size < _LEAST_OF_ROWS:
         return ()
+    sd = float(each.std(ddof=1)) / np.sqrt(len(frames)) / (2 * size)
     nan = float("nan")
     return (
         Mismatch(

@@ -119,6 +119,16 @@ class BlockSamples:
         fall = self.change[use] ** 2 - (self.change[use] - predicted) ** 2
         return np.asarray(np.bincount(self.frame[use], fall, self.frame.max() + 1), float)
 
+    def common_in_rows(self) -> Float:
+        """Return the variance (F,) of brightness that both halves of the blocks share in rows of a frame."""
+        rows, frames = self.row.max() + 1, self.frame.max() + 1
+        cell = 2 * self.orders["rows"] + self._half
+        count, total = (np.bincount(cell, w, 2 * rows * frames).reshape(-1, 2) for w in (None, self.change))
+        known = (count > 0).all(1)
+        product, frame = (total[known] / count[known]).prod(1), np.flatnonzero(known) // rows
+        each = np.maximum(np.bincount(frame, minlength=frames), 1)
+        return np.asarray(np.bincount(frame, product, frames) / each)
+
     def seen_through(self, gain: Float32 | None) -> BlockSamples:
         """Return the blocks compared with a twin seen through a window of transmission ``gain`` (H, W)."""
         if gain is None:

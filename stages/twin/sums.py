@@ -18,9 +18,9 @@ from stages.twin.dead_led import dead_led
 from stages.twin.gate import Suspected, judged
 from stages.twin.glints import SpotsOfFrames
 from stages.twin.lamp_power import power_of_lamps
-from stages.twin.lamps import separated_from_wall, uneven_lamps
+from stages.twin.lamps import beside_response, separated_from_wall, uneven_lamps
 from stages.twin.locate import ImagePlace, without_duplicates
-from stages.twin.name import focus_of, response_of
+from stages.twin.name import beside_clipping, focus_of, response_of
 from stages.twin.picture import WholePictures
 from stages.twin.reference import BlockSamples, BlocksOfFrames, in_image
 from stages.twin.render import Renderer
@@ -132,14 +132,16 @@ class Sums:
         twice.
         """
         again = partial(self._shown, recording)
+        power = power_of_lamps(samples, self._scene.ring)
         lamps, of_wall = self._lamps(samples, led_failed)
-        first = (
-            *self.whole.suspected(self._state.sharpness),
-            *(() if self._state.black_in_photo else response_of(samples, self._scene.ring)),
-            *power_of_lamps(samples, self._scene.ring),
-            *lamps,
-        )
+        if power:  # how uneven lamps are was estimated by light that brightness does not follow
+            of_wall, lamps = (*of_wall, *(beside_response(one.mismatch) for one in lamps)), ()
+        contrast = () if self._state.black_in_photo else response_of(samples, self._scene.ring)
+        first = (*self.whole.suspected(self._state.sharpness), *contrast, *power, *lamps)
         kept, withdrawn = judged(first, again)
+        if self.comparison.wall_is_clipped:
+            kept, unsure = beside_clipping(kept)
+            withdrawn = (*withdrawn, *unsure)
         focus, not_focus = judged(focus_of(self._state, self.whole, kept), again)
         return (*kept, *focus), (*withdrawn, *not_focus, *of_wall)
 

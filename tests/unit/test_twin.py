@@ -94,6 +94,16 @@ def test_what_stays_in_the_image_on_the_wall_and_in_rows_is_told_apart():
     assert (bands.name, bands.fixed_to) == ("banding", "rows")
 
 
+def test_the_size_of_bands_holds_no_noise_of_the_rows():
+    """Bands of .071 were told as .076 ± .0005: what the wall's photo errs by in a row counted as bands."""
+    noise = np.repeat(0.08 * np.random.default_rng(8).standard_normal((8, 40, 30)), 2, 2).ravel()
+    bands = _samples(lambda f, r, c, s: 0.03 * np.sqrt(2) * np.sin(r / 3 + 2.1 * f) + noise)
+    (found,) = unnamed(bands, plain_bore(), 0.5, 1.1)
+    (size,) = found.parameters
+    assert found.name == "banding"
+    assert abs(size.value - 0.03) < 3 * size.sd < 0.004
+
+
 def test_a_drop_whose_fragments_change_from_frame_to_frame_is_not_fixed_to_rows():
     place = (ImagePlace(20.5 * BLOCK_PX, 20.5 * BLOCK_PX, 16.0, 0.2, 0.01, 0.0),)
     fragments = _samples(lambda f, r, c, s: _near(r, 20, c, 20) * np.where(f % 2, 1, -1))
@@ -217,7 +227,7 @@ def test_a_black_level_that_no_frame_tells_may_be_in_the_photo():
     black = black_of_photo([(0, None)])
     state = PhotometricState(None, None, None, *(np.zeros(1) for _ in range(5)), photo_black=black)
     assert state.black_in_photo
-    assert any("black level" in said and "is not known" in said for said in cannot_tell(state))
+    assert any("black level" in said and "is unknown" in said for said in cannot_tell(state))
 
 
 def test_a_line_clips_where_its_strongest_channel_does_whatever_its_grey():

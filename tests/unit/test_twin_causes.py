@@ -72,6 +72,18 @@ def test_an_led_that_fails_is_told_from_a_step():
     assert led.parameters[0].value == pytest.approx(1, abs=0.35)
 
 
+@pytest.mark.parametrize(("lost", "half_deg", "first"), [(0.3, 60, 6), (0.6, 100, 6), (0.9, 60, 9)])
+def test_a_side_that_darkens_otherwise_than_an_led_makes_it_has_no_name(lost, half_deg, first):
+    """Such sides were called flicker, a step of all lamps, or an LED that lost 204 % of its light."""
+    away = np.abs((AZIMUTH_DEG - 4 + 180) % 360 - 180)
+    lobe = np.cos(np.radians(np.minimum(away * 90 / half_deg, 90))) ** 2
+    (side,) = _found(np.log1p(-lost * lobe) * _step(first))
+    assert (side.name, side.fixed_to) == ("", "time")
+    assert side.place[0].value == 10 * first - 5
+    assert side.place[1].value == pytest.approx(4, abs=10)
+    assert side.parameters[0].value == pytest.approx(lost, abs=0.12)
+
+
 def test_few_frames_call_an_led_that_fails_either_that_or_flicker(monkeypatch):
     monkeypatch.setattr("tests.unit.test_twin_causes.FRAMES", 6)
     monkeypatch.setattr("tests.unit.test_twin_causes.NUMBER", NUMBER[:6])

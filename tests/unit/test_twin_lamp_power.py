@@ -5,6 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from pipeline.artefacts.twin import Mismatch
+from stages.twin import sums
 from stages.twin.compare import BLOCK_PX
 from stages.twin.gate import judged
 from stages.twin.lamp_power import lamp_power, power_of_lamps
@@ -98,3 +100,29 @@ def test_frames_rendered_again_with_the_power_bear_it_out():
     kept, withdrawn = judged([found], lambda frames: map(shown, frames))
     assert not withdrawn
     assert kept[0].chi2_after < 0.5 * kept[0].chi2_before
+
+
+@pytest.mark.parametrize(("clipped", "other_power"), [(False, False), (False, True), (True, True)])
+def test_neither_response_nor_uneven_lamps_are_named_where_something_else_looks_alike(
+    clipped, other_power, monkeypatch
+):
+    """Clipped lit wall was called a response, and under a response lamps were called uneven."""
+
+    def of(name):
+        return SimpleNamespace(mismatch=Mismatch(name, "intensity", "image", (), (), 0.0, 2.0, 1.0, "It is."))
+
+    named = {"power_of_lamps": (of("response"),) if other_power else (), "response_of": (), "focus_of": ()}
+    for function, told in named.items():
+        monkeypatch.setattr(sums, function, lambda *_, told=told: told)
+    monkeypatch.setattr(sums, "judged", lambda some, _: (tuple(one.mismatch for one in some), ()))
+    frames = SimpleNamespace(
+        _scene=SimpleNamespace(ring=None), _state=SimpleNamespace(sharpness=0.0, black_in_photo=False),
+        _shown=print, _lamps=lambda *_: ((of("uneven_lamps"),), ()),
+        whole=SimpleNamespace(suspected=lambda sharpness: ()),
+        comparison=SimpleNamespace(wall_is_clipped=clipped),
+    )  # fmt: skip
+    kept, withdrawn = sums.Sums.named(frames, None, None)
+    right = [] if clipped else ["response"] if other_power else ["uneven_lamps"]
+    assert [m.name for m in kept] == right
+    assert all("cannot be told" in m.statement for m in withdrawn)
+    assert len(withdrawn) == clipped + other_power

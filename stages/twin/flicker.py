@@ -1,0 +1,80 @@
+"""Flicker: brightness of whole frames that changes from frame to frame."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.stats import t
+
+from pipeline.adjustment.robust import robust_spread
+from pipeline.arrays import Float, Int
+from pipeline.artefacts.twin import Mismatch, NamedFigure
+from stages.twin.cells import SECTORS, Cells, drift, fitted
+from stages.twin.locate import FALSE_ALARM
+from stages.twin.scene import Ring
+
+_LEAST = {"flicker": 0.01, "laser_flicker": 0.04}
+"""Smallest sizes that are named. A photo errs by one or two per cent from frame to frame; for the laser's
+colour, the wall's reflectance errs by more, from place to place."""
+_USUAL, _FEW = 0.4, 10
+"""For flicker, the robust spread of steps between frames must be at least this share of the plain spread: it
+is 1 for normal numbers, and more for a sine, but small where a weld or a joint changes the whole bore in a
+few frames. Tested from so many frames on. Chosen."""
+_HALF_SECTORS = 3
+"""Number of neighbouring sectors in one group, when one half of the picture is to predict the other."""
+_COMMON = 0.5
+"""Least share of flicker that opposite halves of the picture must have in common: 1 if all of it changes
+alike, 0 if one side alone does. Chosen."""
+
+
+def flicker(cells: Cells, base: Float, light: str, ring: Ring) -> list[Mismatch]:
+    """Return flicker: in a frame, the brightness of one half of the picture predicts that of the other.
+
+    The halves are groups of sectors that alternate. Opposite sides of the picture must change alike as well:
+    where some lamps fail, or one side is shaded, only alternating groups do.
+    """
+    known, sector = fitted(cells, base, np.ones(len(cells.frame), bool)), np.arange(SECTORS)
+    rest = np.where(cells.usable, cells.log_ratio - known, 0.0)
+    half = sector // _HALF_SECTORS % 2
+    parts = _of_halves(cells, rest, half)
+    spread, name = _common(parts), "flicker" if light == "LEDs" else "laser_flicker"
+    chance = _chance(parts)
+    predicted = known + np.where(half == 0, parts[1][:, None], parts[0][:, None])
+    before, after = (float(cells.chi2(k).sum() / max(cells.counted.sum(), 1)) for k in (known, predicted))
+    sides = [(sector + turn) // (SECTORS // 2) % 2 for turn in (0, SECTORS // 4)]
+    alike = min(_common(_of_halves(cells, rest, side)) for side in sides) > _COMMON * spread
+    often = len(cells.frame) < _FEW or (robust_spread(np.diff(parts.mean(0))) > _USUAL * np.sqrt(2) * spread)
+    if chance > FALSE_ALARM or spread < _LEAST[name] or after >= before or not often or not alike:
+        return []
+    sd = float((parts[0] * parts[1]).std()) / np.sqrt(len(cells.frame)) / (2 * spread)
+    place = tuple(
+        NamedFigure(n, float(f), 0.0)
+        for n, f in (("frame_from", cells.frame[0]), ("frame_to", cells.frame[-1]))
+    )
+    return [Mismatch(
+        name, "intensity" if light == "LEDs" else "line", "time",
+        place, (NamedFigure("exposure", spread, sd, "relative"),), chance, before, after,
+        f"Frames lit by the {light} vary in brightness by {100 * spread:.1f} % (1 σ) from frame to frame.",
+        ring.whole(cells.frame[int(np.argmax(np.abs(parts.mean(0))))]),
+    )]  # fmt: skip
+
+
+def _of_halves(cells: Cells, rest: Float, half: Int) -> Float:
+    """Return the mean change (2, F) of each half of the sectors, 0 over all frames."""
+    parts = np.stack([
+        rest[:, half == h].sum(1) / np.maximum(cells.usable[:, half == h].sum(1), 1) for h in (0, 1)
+    ])  # fmt: skip
+    return np.asarray(parts - parts.mean(1, keepdims=True))
+
+
+def _common(parts: Float) -> float:
+    """Return the 1 σ of what both halves (2, F) have in common; what the drift absorbs is allowed for."""
+    frames = parts.shape[1]
+    return float(np.sqrt(max((parts[0] * parts[1]).sum() / max(frames - len(drift(frames)), 1), 0.0)))
+
+
+def _chance(parts: Float) -> float:
+    """Return the probability that halves (2, F) which have nothing in common agree so well."""
+    frames = parts.shape[1]
+    product = float((parts[0] * parts[1]).mean()) / max(float(parts[0].std() * parts[1].std()), 1e-12)
+    alike = min(product, 1 - 1e-9)
+    return float(t.sf(alike * np.sqrt((frames - 2) / (1 - alike**2)), frames - 2))
