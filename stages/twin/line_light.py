@@ -22,7 +22,7 @@ from stages.twin.scene import LineSight, Scene
 
 # The line's bell lies within this many widths (99.7 % of a Gaussian); light beyond it is the halo.
 _BELL_WIDTHS = 3.0
-_SECTORS = 36
+_SECTORS, _FINE = 36, 20
 PROFILE_WIDTHS = 6.0
 """The line's profile is described over this many widths to each side; light farther out is not modelled."""
 _CORE_WIDTHS, _MIDDLE_WIDTHS = 1.0, 0.4
@@ -85,6 +85,13 @@ class LineLight:
         reflectance = self.colour.astype(np.float32) @ sight.reflectance
         peak = self.level * np.exp(power) * reflectance * sheet_px / width
         return peak.astype(np.float32), width.astype(np.float32)
+
+    @property
+    def sector_power(self) -> Float:
+        """(36,) logarithm of the mean power over each sector: between their middles it is interpolated."""
+        each = (np.arange(_SECTORS * _FINE) + 0.5) / _FINE - 0.5
+        power = np.exp(map_coordinates(self.log_power, [each], order=1, mode="grid-wrap"))
+        return np.asarray(np.log(power.reshape(_SECTORS, _FINE).mean(1)))
 
     def line_and_slope(self, sight: LineSight, log_power: float) -> tuple[Float32, Float32]:
         """Return the grey levels (N,) that the line adds to pixels, and their slope per px across it."""

@@ -120,7 +120,7 @@ class Sums:
             lit = lit.on(-np.array([[state.lamp.gain.at(f)] for f in lit.frame]))
         if line is not None and state.line is not None:
             power = [[state.line.course.at(f)] for f in line.frame]
-            line = line.on(-np.array(power) - state.line.log_power)
+            line = line.on(-np.array(power) - state.line.sector_power)
         return lit, line
 
     def named(

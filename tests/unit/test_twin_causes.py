@@ -1,13 +1,19 @@
 """Causes over time and along the line, on made sums of frames: named where they are, and nothing else."""
 
+from dataclasses import replace
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
+from scipy.ndimage import map_coordinates
 
 from pipeline.instrument.probe import Lighting
 from stages.twin.causes import causes
 from stages.twin.cells import SECTORS, Cells, CellsOfFrames, sector_azimuth_rad, sectors_of
+from stages.twin.line_light import _plain_line
 from stages.twin.render import Region, TwinFrame
 from stages.twin.scene import Ring
+from stages.twin.sums import Sums
 
 RING, FRAMES = Ring((400.0, 300.0), 200.0, 50.0, 23.0), 18
 NUMBER = 10 * np.arange(FRAMES)
@@ -144,3 +150,22 @@ def test_a_displaced_line_is_no_darker():
         recorded = (80 * np.exp(-0.5 * (across - shift) ** 2)).astype(np.float32)
         taken.add_line(0, recorded, twin, np.inf, sector)
     np.testing.assert_allclose(taken.cells().log_ratio, np.log(0.8), atol=1e-3)
+
+
+def test_a_dim_sector_is_as_deep_and_wide_as_it_is_though_the_line_was_rendered_with_it():
+    """One of .8 over 20° was .988 ± .085 over 10°: its twin's power falls between the sectors' middles."""
+    degree = np.arange(-180.0, 180.0, 0.5) + 0.25
+    sector = np.tile((degree + 180).astype(int) // 10, (3, 1))
+    left = np.where(np.abs(degree - 60) < 10, 0.2, 1.0)
+    even = np.full(sector.shape, 100.0, np.float32)
+    line = replace(_plain_line(0.2, 0.8), log_power=np.log(left.reshape(SECTORS, -1).mean(1)))
+    power = map_coordinates(line.log_power, [(degree + 180) / 10 - 0.5], order=1, mode="grid-wrap")
+    level, unknown = (even * np.exp(power)).astype(np.float32), np.full(sector.shape, np.nan, np.float32)
+    region = np.full(sector.shape, Region.LINE_CORE, np.uint8)
+    taken = CellsOfFrames()
+    for frame in range(8):
+        twin = TwinFrame(level, np.full_like(level, 2.0), region, unknown, unknown)
+        taken.add_line(frame, (even * left).astype(np.float32), twin, np.inf, sector)
+    state = SimpleNamespace(line_is_clipped=False, lamp=None, line=line)
+    _, cells = Sums.cells(SimpleNamespace(_state=state, lit=CellsOfFrames(), line=taken))
+    np.testing.assert_allclose(cells.log_ratio[0], np.log(left.reshape(SECTORS, -1).mean(1)), atol=0.05)
