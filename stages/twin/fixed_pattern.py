@@ -45,10 +45,10 @@ def fixed_pattern(frames: Sequence[tuple[Float32, Float32, Bool]]) -> FixedPatte
     """
     few = (slice(None, None, _EVERY),) * 2
     fine = [(_detail(rest, use)[few], level[few]) for rest, level, use in frames]
-    told = [t for (a, x), (b, y) in combinations(fine, 2) if (t := _covariance(a * b, x * y)) is not None]
-    if len(told) < 3:
+    pairs = [t for (a, x), (b, y) in combinations(fine, 2) if (t := _covariance(a * b, x * y)) is not None]
+    if len(pairs) < 3:
         return None
-    each = np.array(told)
+    each = np.array(pairs)
     mean = each.mean(0)
     # A frame is part of several pairs: only as many pairs as frames are independent.
     sd = each.std(0, ddof=1) / np.sqrt(len(frames))

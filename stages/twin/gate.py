@@ -45,7 +45,7 @@ class Suspected:
         Returns a frame without and with the effect.
     frame : (F,) int
         Frames in which its size was measured, ascending.
-    told : (F, K)
+    sizes : (F, K)
         The sizes measured in each frame.
     size_of : callable
         Maps the mean (K,) of the measured sizes to the numbers that the law takes.
@@ -56,7 +56,7 @@ class Suspected:
     mismatch: Mismatch
     law: Law
     frame: Int
-    told: Float
+    sizes: Float
     size_of: Callable[[Float], Float] = np.asarray
     measured: Callable[[Shown, Float], float] | None = None
 
@@ -64,7 +64,7 @@ class Suspected:
         """Return the law's numbers from the half of the frames that does not contain this one."""
         half = np.arange(len(self.frame)) % 2
         own = half[int(np.searchsorted(self.frame, frame))]
-        return np.asarray(self.size_of(self.told[half != own].mean(0)), float)
+        return np.asarray(self.size_of(self.sizes[half != own].mean(0)), float)
 
     @property
     def judges(self) -> Int:
@@ -90,12 +90,12 @@ def _judged(one: Suspected, again: Again) -> tuple[Mismatch, bool]:
     before, after, predicted, pixels = np.concatenate(squares).T
     seen = pixels >= _FEWEST_PIXELS
     fall = (before - after)[seen]
-    told, chance = _borne_out(fall, predicted[seen])
+    sigma, chance = _borne_out(fall, predicted[seen])
     total = max(float(pixels[seen].sum()), 1.0)
     chi2 = [float(squares[seen].sum()) / total for squares in (before, after)]
     found = replace(one.mismatch, chi2_before=chi2[0], chi2_after=chi2[1])
-    if len(fall) < _FEWEST or told < _SURE or chance > FALSE_ALARM:
-        return _withdrawn(found, fall, told), False
+    if len(fall) < _FEWEST or sigma < _SURE or chance > FALSE_ALARM:
+        return _withdrawn(found, fall, sigma), False
     found = found if not sizes else replace(found, parameters=_with_size(found, sizes))
     return replace(found, probability=float(np.nanmax([chance, found.probability]))), True
 
@@ -111,8 +111,8 @@ def _borne_out(fall: Float, predicted: Float) -> tuple[float, float]:
     acts = predicted > _LEAST_FALL * np.median(predicted) if len(predicted) else predicted > 0
     if acts.sum() >= _FEWEST:
         each.append(significance_over_frames(fall[acts] / predicted[acts]))
-    told, chance = min(each, key=lambda e: e[1])
-    return told, min(len(each) * chance, 1.0)
+    sigma, chance = min(each, key=lambda e: e[1])
+    return sigma, min(len(each) * chance, 1.0)
 
 
 def _squares(shown: Shown, pair: Pair) -> Float:
@@ -148,10 +148,10 @@ _OF_PROFILE = 0.02
 """Relative 1 σ of a size measured through a profile: half of the variation of a line about its profile."""
 
 
-def _withdrawn(found: Mismatch, fall: Float, told: float) -> Mismatch:
+def _withdrawn(found: Mismatch, fall: Float, sigma: float) -> Mismatch:
     words = found.name.replace("_", " ") or "what has no name"
     why = (
-        f"{len(fall)} frames rendered again with it fit no better than by chance ({told:+.1f} σ)"
+        f"{len(fall)} frames rendered again with it fit no better than by chance ({sigma:+.1f} σ)"
         if len(fall) >= _FEWEST
         else f"only {len(fall)} frames could be rendered again with it"
     )

@@ -46,10 +46,10 @@ def lamp_power(samples: BlockSamples | None) -> tuple[NamedFigure, ...]:
     """Return the power by which brightness follows the lamps' light; nothing with too few frames."""
     if samples is None or samples.frame.max() + 1 < _FEWEST_FRAMES:
         return ()
-    told = _products(samples)
-    if told[:, 1].sum() < _LEAST_WANDER**2 * len(samples.change):
+    each = _products(samples)
+    if each[:, 1].sum() < _LEAST_WANDER**2 * len(samples.change):
         return ()
-    whole, without = told.sum(0), told.sum(0) - told
+    whole, without = each.sum(0), each.sum(0) - each
     power = float(_power(whole)[0])
     spread = float(left_out_sd(without[:, 0] / np.maximum(without[:, 1], 1e-12)))
     return (NamedFigure("lamp_power", power, float(np.linalg.norm([spread, _OF_LIGHT, _BY_COSINE]))),)
@@ -65,8 +65,8 @@ def power_of_lamps(samples: BlockSamples | None, ring: Ring) -> tuple[Suspected,
     figure = lamp_power(samples)
     if samples is None or not figure:
         return ()
-    told, power, sd = _products(samples), figure[0].value, figure[0].sd
-    chance = float(2 * t.sf(abs(power - 1) / max(sd, 1e-9), len(told) - 1))
+    each, power, sd = _products(samples), figure[0].value, figure[0].sd
+    chance = float(2 * t.sf(abs(power - 1) / max(sd, 1e-9), len(each) - 1))
     if abs(power - 1) < max(_LEAST, _SURE * sd) or chance > FALSE_ALARM:
         return ()
     nan, name = float("nan"), "response" if power > 1 else "response or interreflection"
@@ -80,7 +80,7 @@ def power_of_lamps(samples: BlockSamples | None, ring: Ring) -> tuple[Suspected,
         ring.whole(int(samples.number[0])),
     )  # fmt: skip
     law = partial(to_power, samples.number, by_block(samples, samples.light_and_brightness[0]))
-    return (Suspected(found, law, samples.number, told, _power),)
+    return (Suspected(found, law, samples.number, each, _power),)
 
 
 def _products(samples: BlockSamples) -> Float:
@@ -109,7 +109,7 @@ def by_block(samples: BlockSamples, values: Float) -> Float32:
     return out
 
 
-def to_power(number: Int, log_light: Float32, shown: Shown, told: Float) -> Pair:
+def to_power(number: Int, log_light: Float32, shown: Shown, size: Float) -> Pair:
     """Return a frame whose light, relative to that in its photo, is raised to a power.
 
     Parameters
@@ -119,9 +119,9 @@ def to_power(number: Int, log_light: Float32, shown: Shown, told: Float) -> Pair
     log_light : (F, rows, columns)
         Logarithm of the blocks' light over that in the photo.
     shown : Shown
-    told : (1,)
+    size : (1,)
         1 plus the power: 1 leaves the frame as it is.
     """
     level, own = shown.twin.level, int(np.searchsorted(number, shown.number))
     more = full_size(log_light[own], level.shape, 0.0)
-    return Pair(level, level * np.exp(np.float32(told[0] - 1) * more), shown.wall, "scale")
+    return Pair(level, level * np.exp(np.float32(size[0] - 1) * more), shown.wall, "scale")

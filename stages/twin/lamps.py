@@ -60,7 +60,7 @@ def uneven_lamps(lamp: LampLight | None, scene: Scene, frame: Int) -> tuple[Susp
     one = abs(first) < -(1 + 2 * spread) * dim[-1, 0] and abs(second - predicted) < allowed
     look, nan = scene.ring.at(int(frame[0]), azimuth), float("nan")
     at = NamedFigure("azimuth_deg", float(np.degrees(azimuth)), 180 / LED_AZIMUTHS, "deg")
-    told = np.tile([lost if one else 0.0, azimuth], (len(frame), 1))
+    sizes = np.tile([lost if one else 0.0, azimuth], (len(frame), 1))
     if one:
         size = NamedFigure(
             "lost", lost, float(np.hypot(spread, sd / abs(first))) * lost, "share of the light"
@@ -70,7 +70,7 @@ def uneven_lamps(lamp: LampLight | None, scene: Scene, frame: Int) -> tuple[Susp
         if abs(predicted) < allowed:  # lamps that lean give the first harmonic alone
             name, said = "led_dead or uneven_lamps", said + ", or the lamps lean or shine unevenly"
         found = Mismatch(name, "intensity", "image", (at,), (size,), nan, nan, nan, f"{said}.", look)
-        return (Suspected(found, dim_led, frame, told),)
+        return (Suspected(found, dim_led, frame, sizes),)
     size = NamedFigure("amplitude", abs(first), sd, "relative")
     said = (
         f"In all frames, the side at image azimuth {np.degrees(np.angle(first)):.0f}° is "
@@ -78,7 +78,7 @@ def uneven_lamps(lamp: LampLight | None, scene: Scene, frame: Int) -> tuple[Susp
         "or shine unevenly."
     )
     found = Mismatch("", "intensity", "image", (at,), (size,), nan, nan, nan, said, look)
-    return (Suspected(found, lamp_pattern, frame, told),)
+    return (Suspected(found, lamp_pattern, frame, sizes),)
 
 
 def separated_from_wall(
@@ -132,7 +132,7 @@ def _beside_wall(one: Suspected, lamp: LampLight, scene: Scene, samples: BlockSa
     theta, phi = seen_from(samples, scene)
     pattern = law = lamp.around(phi)
     if one.mismatch.name == "led_dead":  # without any pattern that is the same at every polar angle
-        lost, azimuth = one.told[0]
+        lost, azimuth = one.sizes[0]
         law = np.log1p(-np.float32(min(lost, 0.999)) * share_at(scene, float(azimuth), theta, phi))
     groups = samples.orders["wall"], samples.frame
     light = centred(samples.log_light, *groups)
@@ -180,10 +180,10 @@ def flicker_of_measured(
         ("flicker", "LEDs", "intensity", None if state.lamp is None else state.lamp.gain),
         ("laser_flicker", "laser", "line", None if clipped or state.line is None else state.line.course),
     )
-    told = {name for m in found for name in m.names}
+    named = {name for m in found for name in m.names}
     made = []
     for name, light, channel, course in courses:
-        if course is None or name in told or len(course.frame) < _FEWEST_FRAMES:
+        if course is None or name in named or len(course.frame) < _FEWEST_FRAMES:
             continue
         spread, nan = course.spread, float("nan")
         if spread < max(_VARIES[name], _SURE * float(np.median(course.sd))):

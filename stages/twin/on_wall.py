@@ -81,16 +81,16 @@ def _regions_of_wall(
         if together[label == k].max() < _FEWEST_CELLS:
             continue
         use = label[samples.along, samples.around] == k
-        size, told = min(
+        size, sigma = min(
             (_gloss_of(*s) for s in ((samples, use), _beside_image(samples, use))), key=_sureness
         )
-        shines = told > _SURE and size > _LEAST_SHINE
+        shines = sigma > _SURE and size > _LEAST_SHINE
         value, spread = (shine, shine_sd) if shines else (mean, sd)
         by_slope = _shine_of_slope(samples, use, line_rad) if shines else 1.0
         if _most(value, region) < tail * by_slope * slope_error(surface, samples, region, ring_step_mm):
             continue
         if shines or samples.fixed_to(use) == "wall":
-            gloss_sd = size / max(told, 1e-9) if shines else 0.0
+            gloss_sd = size / max(sigma, 1e-9) if shines else 0.0
             found.append(_on_wall(region, value, spread, cells, samples, use, gloss_sd))
     return tuple(found)
 
@@ -108,8 +108,8 @@ def _beside_image(samples: BlockSamples, use: Bool) -> tuple[BlockSamples, Bool]
     return replace(samples, change=samples.change - there[cell]), use & (count[cell] >= FEWEST_FRAMES)
 
 
-def _sureness(told: tuple[float, float]) -> float:
-    return told[1]
+def _sureness(gloss: tuple[float, float]) -> float:
+    return gloss[1]
 
 
 def _most(values: Float, cells: Int) -> float:
@@ -184,9 +184,9 @@ def _gloss_of(samples: BlockSamples, use: Bool) -> tuple[float, float]:
     slope = float(cross.sum() / own.sum())
     sd = float(np.sqrt(((cross - slope * own) ** 2).sum() * len(frames) / (len(frames) - 1)) / own.sum())
     halves = [cross[k::2].sum() / own[k::2].sum() for k in (0, 1)]
-    told = slope / max(sd, 1e-12)
-    sure = min(halves) > slope / 2 and t.sf(told, len(frames) - 1) < FALSE_ALARM
-    return slope, told if sure else 0.0
+    sigma = slope / max(sd, 1e-12)
+    sure = min(halves) > slope / 2 and t.sf(sigma, len(frames) - 1) < FALSE_ALARM
+    return slope, sigma if sure else 0.0
 
 
 def _shine_of_slope(samples: BlockSamples, use: Bool, line_rad: float) -> float:

@@ -210,9 +210,9 @@ class WholePictures:
             "motion_blur", "time", NamedFigure("blur", size, sd, "px"), chance, "blur",
             f"Frames are blurred by {size:.1f} px (1 σ) {way}, and less across: they move during exposure.",
         )  # fmt: skip
-        told, along = product[:, None], float(way == _ALONG)
+        sizes, along = product[:, None], float(way == _ALONG)
         return Suspected(
-            found, motion_blur, self.frames_of("blur"), told, lambda m: np.array([_blur_px(m[0]), along])
+            found, motion_blur, self.frames_of("blur"), sizes, lambda m: np.array([_blur_px(m[0]), along])
         )
 
     def _stray(self) -> Suspected | None:
@@ -273,11 +273,11 @@ def _brings_light(law: int, mean: Float, more: Float) -> bool:
     ``mean`` (F,) is predicted, ``more`` the wall's brightness beyond that; NaN in frames that see no place
     without wall, from which black is known. A pattern without light does not count: a codec leaves some.
     """
-    told = np.isfinite(more)
-    if told.sum() < 2:
+    known = np.isfinite(more)
+    if known.sum() < 2:
         return False
-    sd = float(np.std(more[told], ddof=1) / np.sqrt(told.sum()))
-    return abs(float(more[told].mean())) + _SURE * sd < _OF_MEAN[law] * abs(float(mean[told].mean()))
+    sd = float(np.std(more[known], ddof=1) / np.sqrt(known.sum()))
+    return abs(float(more[known].mean())) + _SURE * sd < _OF_MEAN[law] * abs(float(mean[known].mean()))
 
 
 def _size_beside_one(value: Float, column: Float) -> Float:

@@ -78,8 +78,8 @@ def second_ring(ring: Ring, profiles: Sequence[Float], frame: Int) -> Suspected 
         f"A second ring lies at {radius.value:.2f} radii of the line, {100 * share:.0f} % as bright: "
         "a ghost of window or lens, or a second sheet.", ring.whole(int(frame[0])),
     )  # fmt: skip
-    told = np.stack([each, np.full(len(each), ratio)], 1)
-    return Suspected(found, second_line, frame, told, measured=share_of_second)
+    sizes = np.stack([each, np.full(len(each), ratio)], 1)
+    return Suspected(found, second_line, frame, sizes, measured=share_of_second)
 
 
 def _without_gaps(values: Float) -> Float:

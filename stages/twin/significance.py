@@ -22,5 +22,5 @@ def significance_over_frames(fall: Float) -> tuple[float, float]:
     off = fall - fall.mean()
     alike = float(np.clip((off[1:] * off[:-1]).sum() / max(float((off**2).sum()), 1e-12), 0.0, _MOST_ALIKE))
     worth = (1 - alike) / (1 + alike)
-    told = sigmas(fall) * float(np.sqrt(worth))
-    return told, float(t.sf(told, len(fall) - 1))
+    sigma = sigmas(fall) * float(np.sqrt(worth))
+    return sigma, float(t.sf(sigma, len(fall) - 1))

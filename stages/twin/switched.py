@@ -96,14 +96,14 @@ class Pair:
 Law = Callable[[Shown, Float], Pair]
 
 
-def motion_blur(shown: Shown, told: Float) -> Pair:
-    """Return a frame that moved during its exposure; ``told`` is σ, px, and 1 for motion along the pipe."""
-    sigma, even = float(told[0]), shown.again(sharpness=None)
+def motion_blur(shown: Shown, size: Float) -> Pair:
+    """Return a frame that moved during its exposure; ``size`` is σ, px, and 1 for motion along the pipe."""
+    sigma, even = float(size[0]), shown.again(sharpness=None)
     phi = shown.scene.polar[1]
     made = np.empty_like(even)
     half = halves(even.shape)
     for h in (0, 1):
-        if told[1]:
+        if size[1]:
             c, s = np.cos(phi), np.sin(phi)
         else:
             angle = 0.5 * np.arctan2(shown.direction[1 - h, 1], shown.direction[1 - h, 0])
@@ -132,28 +132,28 @@ def halves(shape: tuple[int, ...]) -> Float32:
     return np.asarray((row[:, None] + column) % 2)
 
 
-def defocus(shown: Shown, told: Float) -> Pair:
-    """Return a frame blurred in all directions; ``told`` is half the blur's variance, px²."""
+def defocus(shown: Shown, size: Float) -> Pair:
+    """Return a frame blurred in all directions; ``size`` is half the blur's variance, px²."""
     plain = shown.again(sharpness=None)
-    sigma = float(np.sqrt(2 * max(told[0], 1e-3)))
+    sigma = float(np.sqrt(2 * max(size[0], 1e-3)))
     blurred = np.asarray(cv2.GaussianBlur(plain, (0, 0), sigma), np.float32)
     return Pair(plain, blurred, shown.wall, "scale")
 
 
-def response(shown: Shown, told: Float) -> Pair:
-    """Return a frame whose wall has the photo's contrast raised to the power ``told``."""
-    return Pair(shown.twin.level, shown.again(power=float(told[0])), shown.wall, "scale")
+def response(shown: Shown, size: Float) -> Pair:
+    """Return a frame whose wall has the photo's contrast raised to the power ``size``."""
+    return Pair(shown.twin.level, shown.again(power=float(size[0])), shown.wall, "scale")
 
 
 def stray(which: int) -> Law:
     """Return the law of the stray light with this index in `stray_lights`."""
 
-    def law(shown: Shown, told: Float) -> Pair:
+    def law(shown: Shown, size: Float) -> Pair:
         lit, line = shown.lit(), _dilated(on_line(shown.twin))
         column = stray_lights(shown.scene, shown.twin, lit)[which]
         use = _inner(~line & (lit.region == Region.WALL) & shown.free)
         level = shown.twin.level
-        return Pair(level, level + np.float32(told[which]) * column, use, "offset")
+        return Pair(level, level + np.float32(size[which]) * column, use, "offset")
 
     return law
 
@@ -188,15 +188,15 @@ def _at_angle(theta_rad: Float32, lit: TwinFrame) -> Float32:
     return np.maximum(at, 1.0).astype(np.float32)
 
 
-def bloom(shown: Shown, told: Float) -> Pair:
+def bloom(shown: Shown, size: Float) -> Pair:
     """Return a frame with the leak from clipped pixels along columns, beside as much isotropic glow.
 
-    ``told`` is what leaks along columns and along rows, grey levels.
+    ``size`` is what leaks along columns and along rows, grey levels.
     """
     along, across = leaked(shown.free)
     use = shown.free & ~np.isin(shown.twin.region, (Region.UNSEEN, Region.EDGE)) & (along + across > _NEAR)
-    level, even = shown.twin.level, np.float32(told.mean())
-    with_it = level + np.float32(told[0]) * along + np.float32(told[1]) * across
+    level, even = shown.twin.level, np.float32(size.mean())
+    with_it = level + np.float32(size[0]) * along + np.float32(size[1]) * across
     return Pair(level + even * (along + across), with_it, use)
 
 
@@ -209,20 +209,20 @@ def leaked(free: Bool) -> tuple[Float32, Float32]:
     return np.asarray(along, np.float32), np.asarray(across, np.float32)
 
 
-def second_line(shown: Shown, told: Float) -> Pair:
-    """Return a frame with the line repeated; ``told`` is its share and its radius over the line's."""
+def second_line(shown: Shown, size: Float) -> Pair:
+    """Return a frame with the line repeated; ``size`` is its share and its radius over the line's."""
     level = shown.twin.level
-    copy = _copied(shown, float(told[1]))
+    copy = _copied(shown, float(size[1]))
     use = shown.free & (copy > _ON_RING * copy.max()) & (shown.twin.region == Region.DARK)
-    return Pair(level, level + np.float32(told[0]) * copy, use)
+    return Pair(level, level + np.float32(size[0]) * copy, use)
 
 
-def share_of_second(shown: Shown, told: Float) -> float:
+def share_of_second(shown: Shown, size: Float) -> float:
     """Return the brightness of the second ring in a frame, relative to the line.
 
     Recorded frame and twin are fitted with the same profile, each free to be slightly displaced.
     """
-    copy, line = _copied(shown, float(told[1])), shown.twin.level
+    copy, line = _copied(shown, float(size[1])), shown.twin.level
     dark = shown.free & (shown.twin.region == Region.DARK) & (copy > _ON_RING * copy.max())
     own = shown.free & (shown.twin.region == Region.LINE_CORE)
     sizes = [_size_at_place(shown, basis, use) for basis, use in ((copy, dark), (line, own))]
@@ -248,16 +248,16 @@ def _copied(shown: Shown, ratio: float) -> Float32:
     return np.asarray(copy, np.float32)
 
 
-def lamp_pattern(shown: Shown, told: Float) -> Pair:
+def lamp_pattern(shown: Shown, size: Float) -> Pair:
     """Return a frame in the light of lamps that shine unevenly, beside one in even light."""
     return Pair(shown.again(lamp=_even), shown.twin.level, shown.wall, "scale")
 
 
-def dim_led(shown: Shown, told: Float) -> Pair:
-    """Return a frame whose LED at an azimuth sends less light, beside even light; ``told``: loss, azimuth."""
+def dim_led(shown: Shown, size: Float) -> Pair:
+    """Return a frame whose LED at an azimuth sends less light, beside even light; ``size``: loss, azimuth."""
     even, scene = shown.again(lamp=_even), shown.scene
-    share = share_at(scene, float(told[1]), *scene.polar[:2])
-    return Pair(even, even * (1 - np.float32(told[0]) * share), shown.wall, "scale")
+    share = share_at(scene, float(size[1]), *scene.polar[:2])
+    return Pair(even, even * (1 - np.float32(size[0]) * share), shown.wall, "scale")
 
 
 def share_at(scene: Scene, azimuth_rad: float, theta_rad: Float32, phi_rad: Float32) -> Float32:
@@ -275,7 +275,7 @@ def _even(lamp: LampLight) -> LampLight:
     return replace(lamp, pattern=np.zeros_like(lamp.pattern))
 
 
-def wide_line(shown: Shown, told: Float) -> Pair:
+def wide_line(shown: Shown, size: Float) -> Pair:
     """Return a frame with the line as wide as measured, beside one with the line of a lens in focus."""
     sharp = shown.again(line=_in_focus)
     return Pair(sharp, shown.twin.level, shown.free & on_line(shown.twin), "scale")

@@ -72,7 +72,7 @@ def test_the_power_is_as_unsure_as_the_lobe_of_lamps_makes_it(raised_by):
 
 def test_the_power_that_is_told_is_the_one_that_frames_are_judged_by():
     (found,) = power_of_lamps(_samples(1.6), RING)
-    assert found.size_of(found.told.mean(0))[0] == pytest.approx(found.mismatch.parameters[0].value)
+    assert found.size_of(found.sizes.mean(0))[0] == pytest.approx(found.mismatch.parameters[0].value)
 
 
 @pytest.mark.parametrize("wandering", [0.0, 1e-6])

@@ -257,7 +257,7 @@ def test_a_dim_led_is_told_without_a_roll_where_the_wall_comes_nearer(of):
     scene.probe = SimpleNamespace(lighting=wide)
     (suspected,) = uneven_lamps(lamp, scene, np.arange(8))
     assert suspected.mismatch.name == "led_dead"
-    lost, azimuth = suspected.told[0]
+    lost, azimuth = suspected.sizes[0]
 
     def change(at, on_wall, theta):
         of_lamps = np.log1p(-min(lost, 0.999) * share_at(scene, azimuth, theta, at))
