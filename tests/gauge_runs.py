@@ -203,7 +203,7 @@ def measured_run(run: GaugeRun, parameters: GaugeParameters = USUAL) -> Measured
         run.recording.encoder, run.gauge.radius_sigma_mm, LOOSE,
     )  # fmt: skip
     start = first_unknowns(T_pc, run.posed.index, run.gauge, measured, run.stated, parameters)
-    return MeasuredRun(start, measured, source, run.posed.index, np.zeros(0, np.int64))
+    return MeasuredRun(start, measured, source, run.posed.index, np.zeros(0, np.int64), 0)
 
 
 def in_sigma(run: GaugeRun, result: GaugeCalibration) -> dict[str, float]:

@@ -241,7 +241,11 @@ def _unexplained_travel(*recordings: Seen | None) -> list[_Untold]:
 
 
 def _global_p(field: Seen | None, gauge: Seen | None) -> float:
-    """Return the smallest p-value of all channels, times the number of channels that show anything."""
+    """Return the smallest p-value of all channels, times the number of channels that show anything.
+
+    The p-values of the line's profile leave out errors of image formation, so that only those count which
+    exceed these, too.
+    """
     each = []
     for seen in (field, gauge):
         if seen is None:
@@ -251,6 +255,6 @@ def _global_p(field: Seen | None, gauge: Seen | None) -> float:
         if seen.travel is not None:
             each.append(seen.travel.least_p)
         if seen.profile is not None:
-            each.append(min((f.p_value for f in seen.profile.findings), default=1.0))
+            each.append(min((f.p_value for f in seen.profile.findings if f.found), default=1.0))
     showing = [p for p in each if p < 1]
     return float(min(min(showing) * len(showing), 1.0)) if showing else 1.0

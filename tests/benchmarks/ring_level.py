@@ -97,7 +97,7 @@ def ring_level_run(
         gauge.radius_sigma_mm, LOOSE,
     )  # fmt: skip
     start = first_unknowns(first, posed, gauge, measured, truth.stated, parameters)
-    run = MeasuredRun(start, measured, source, posed, np.zeros(0, np.int64))
+    run = MeasuredRun(start, measured, source, posed, np.zeros(0, np.int64), 0)
     return RingLevelRun(run, _recording(truth, file), truth)
 
 

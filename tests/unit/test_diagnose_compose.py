@@ -225,3 +225,14 @@ def test_a_name_needs_pictures_on_which_names_were_counted(
     assert found.verdict is verdict
     assert (found.effects[0].probability > 0.8) is (verdict is Verdict.NAMED)
     assert bool(light.uncovered) is (verdict is Verdict.CLASS)
+
+
+def test_what_image_formation_may_show_in_the_line_is_not_told_as_improbable(real_probe: Probe) -> None:
+    """A sound probe was consistent, and "chance alone would show as much with probability 9e-8"."""
+    faint = finding("line_skew", 5.6, 3e-8, (Size("skewness", "", 0.1, 0.02),), "It is skewed.")
+    clear = replace(faint, z=20.0)
+    told = []
+    for skewed in (faint, clear):
+        light = ProfileEvidence("gauge", np.arange(3), (skewed,))
+        told.append(answer(real_probe, None, replace(seen("gauge"), profile=light)).global_p)
+    assert told == [1.0, pytest.approx(3e-8)]

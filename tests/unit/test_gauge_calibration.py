@@ -8,7 +8,6 @@ from dataclasses import replace
 import cv2
 import numpy as np
 import pytest
-from scipy.special import erf
 
 from pipeline.arrays import Image
 from pipeline.errors import InputError, UnusableError
@@ -16,7 +15,7 @@ from pipeline.geometry.rigid import inverse, transform
 from pipeline.recording.base import BoreSection, Illumination, Planes, Recording
 from stages.calibrate.gauge import premises
 from stages.calibrate.gauge.adjust import RingSource
-from stages.calibrate.gauge.edges import Sighting, find_fiducials, fit_steps
+from stages.calibrate.gauge.edges import Sighting, find_fiducials
 from stages.calibrate.gauge.geometry import BoreRings, Gauge, gauge_of
 from stages.calibrate.gauge.poses import first_pose, posed_frames
 from stages.calibrate.gauge.result import warn_of_misfit
@@ -41,28 +40,6 @@ from tests.quiet import quiet_context
 @pytest.fixture(scope="module")
 def run() -> GaugeRun:
     return made_run(1)
-
-
-def test_edge_is_found_where_it_is_and_as_well_as_it_says() -> None:
-    random = np.random.default_rng(3)
-    t = np.broadcast_to(np.linspace(-4, 4, 21), (400, 21)).copy()
-    place = random.uniform(-1, 1, 400)
-    step = 0.5 * (1 + erf((t - place[:, None]) / 0.8 / np.sqrt(2)))
-    grey = (20 + 90 * step) * (1 + 0.03 * t) + random.normal(0, 1.0, t.shape)
-    found, sigma = fit_steps(t, grey)
-    error = (found - place)[np.isfinite(found)]
-    assert len(error) > 390
-    assert abs(error.mean()) < 4 * error.std() / np.sqrt(len(error))
-    # beside noise, σ holds a floor for what blur leaves
-    noise = np.sqrt(np.nanmedian(sigma) ** 2 - 0.03**2)
-    assert 0.8 < error.std() / noise < 1.25
-
-
-def test_no_edge_where_there_is_none_or_where_bright_comes_before_dark() -> None:
-    t = np.broadcast_to(np.linspace(-4, 4, 21), (2, 21)).copy()
-    flat = np.full((1, 21), 60.0) + np.random.default_rng(0).normal(0, 1, (1, 21))
-    falling = 60 - 40 * (t[:1] > 0)
-    assert np.isnan(fit_steps(t, np.concatenate([flat, falling]))[0]).all()
 
 
 def _unknowns(run: GaugeRun) -> tuple[Unknowns, RingSource]:

@@ -50,6 +50,8 @@ class MeasuredRun:
         Places in the recording of the frames whose fiducials gave a pose.
     wrong_fiducials : (J,) int
         Places of fiducials that most frames outvote.
+    overexposed : int
+        Edges of fiducials that are left out, since the white beside them is overexposed.
     """
 
     start: Unknowns
@@ -57,6 +59,7 @@ class MeasuredRun:
     source: RingSource
     posed: Int
     wrong_fiducials: Int
+    overexposed: int
 
 
 def calibrate_gauge(
@@ -77,8 +80,9 @@ def calibrate_gauge(
     finding = _solved(run, parameters, partial(context.progress, 0, 1))
     numbers = np.union1d(gauge.ids[wrong], gauge.ids[finding.wrong_fiducials])
     finding = replace(
-        finding, wrong_fiducials=numbers, wrong_rings=recording.frames.frame[finding.wrong_rings]
-    )
+        finding, wrong_fiducials=numbers, wrong_rings=recording.frames.frame[finding.wrong_rings],
+        left_out=finding.left_out | {"edge of a fiducial beside overexposed white": run.overexposed},
+    )  # fmt: skip
     result = calibration_of(recording.name, recording.frames.frame, gauge, finding)
     _require_determined(result, parameters)
     warn_of_misfit(result, context)
@@ -116,11 +120,11 @@ def measure_gauge(
     source = RingSource(rings, frame_index(recording, rings.frame), gauge)
     on_bore = source.on_bore(T_pc, probe, parameters)
     _require_bores(on_bore, T_pc, probe, gauge, parameters)
-    edges = _edges(recording, posed, wrong, gauge, probe, parameters, context)
+    edges, overexposed = _edges(recording, posed, wrong, gauge, probe, parameters, context)
     time_s, encoder = recording.frames.time_s, recording.encoder
     measured = Measurements(edges, on_bore, time_s, encoder, gauge.radius_sigma_mm, LOOSE)
     start = first_unknowns(T_pc, posed.index, gauge, measured, probe, parameters)
-    return MeasuredRun(start, measured, source, posed.index, wrong)
+    return MeasuredRun(start, measured, source, posed.index, wrong, overexposed)
 
 
 def _solved(run: MeasuredRun, parameters: GaugeParameters, watch: Watch) -> Finding:
@@ -149,9 +153,9 @@ def _edges(
     probe: Probe,
     parameters: GaugeParameters,
     context: Context,
-) -> Edges:
-    """Measure the borders of the fiducials that fit, in all posed frames."""
-    parts = []
+) -> tuple[Edges, int]:
+    """Measure the borders of the fiducials that fit, in all posed frames; count those overexposed."""
+    parts, overexposed = [], 0
     images = recording.read(recording.frames.frame[posed.index], "grey")
     for k, (_, image) in enumerate(images):
         context.progress(len(posed.index) + k + 1, 2 * len(posed.index))
@@ -160,8 +164,12 @@ def _edges(
         sighting, pose = posed.sightings[k], posed.poses[k]
         marker = sighting.marker[pose.fits & ~np.isin(sighting.marker, wrong)]
         index = int(posed.index[k])
-        parts.append(measure_edges(image, index, marker, pose.T_pc, probe.camera, gauge, parameters))
-    return joined(parts)
+        edges, left_out = measure_edges(image, index, marker, pose.T_pc, probe.camera, gauge, parameters)
+        parts.append(edges)
+        overexposed += left_out
+    edges = joined(parts)
+    premises.warn_of_overexposed(overexposed, len(edges.uv), context)
+    return edges, overexposed
 
 
 def _require_bores(
@@ -193,5 +201,5 @@ def _calibrate_run(
 
 
 GAUGE = Stage(
-    "gauge", "3", GaugeParameters, _calibrate_run, "fiducials and rings on known bore to camera and sheet"
+    "gauge", "4", GaugeParameters, _calibrate_run, "fiducials and rings on known bore to camera and sheet"
 )

@@ -11,6 +11,7 @@ from pipeline.arrays import Float, Int
 from pipeline.errors import InputError, UnusableError
 from pipeline.geometry.rigid import inverse, transform
 from pipeline.instrument.camera import Camera
+from pipeline.machine.stage import Context
 from pipeline.recording.base import Illumination, Recording
 from stages.calibrate.gauge.edges import Sighting, detect, detector
 from stages.calibrate.gauge.geometry import Gauge, gauge_of
@@ -65,6 +66,16 @@ def require_fiducials(
         limit=f"{parameters.least_posed_frames} frames",
         hint="record a longer run with the wall lit, or correct the fiducials in recording.yaml",
     )  # fmt: skip
+
+
+def warn_of_overexposed(left_out: int, kept: int, context: Context) -> None:
+    """Warn that edges of fiducials are ``left_out`` for being overexposed, beside those ``kept``."""
+    if left_out:
+        context.warn(
+            f"{left_out} of {left_out + kept} edges of fiducials are left out, since the white beside them "
+            "is overexposed and seems to reach into the black. What to do: nothing, if the σ serves; else "
+            "expose less, or turn the LEDs down, where the bore is narrow"
+        )
 
 
 def require_poses(

@@ -26,9 +26,10 @@ DECENTRE_FLOOR = 0.05
 _SMOOTH_ORDER = 6
 _WIDTHS_DEG = (1.0, 2.0, 4.0, 8.0)
 _INDEPENDENT = 2.0
-# Errors of exponent and fall-off, because the pipe's reflectance may change along it, and LEDs are not
-# exactly Lambertian. Debt: data/debts.md.
-EXPONENT_FLOOR, FALLOFF_FLOOR = 0.05, 0.10
+# Errors of exponent and fall-off. The pipe's reflectance may change along it. LEDs shine as cos^m of the
+# angle from their axis, and no recording states m: with half of the light at 45° to 75° it is 2.0 to 0.5, by
+# which the lit wall falls off by k = -0.5 to +1.0 as against Lambert's m = 1. Debt: data/debts.md.
+EXPONENT_FLOOR, FALLOFF_FLOOR = 0.05, 0.50
 _LOW_DEG, _HIGH_DEG, _STEP_DEG = 24.0, 64.0, 1.0
 _FRAMES, _GROUPS, _EVERY_PX = 48, 8, 3
 _BRIGHT = 215.0

@@ -1,0 +1,86 @@
+"""Edges of fiducials in pictures: where they are, how sure that is, and which of them are left out."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import cv2
+import numpy as np
+import pytest
+from scipy.special import erf
+
+from pipeline.arrays import Float, Image
+from pipeline.geometry.rigid import inverse, transform
+from stages.calibrate.gauge import premises
+from stages.calibrate.gauge.edges import fit_steps, measure_edges
+from stages.calibrate.gauge.geometry import Gauge, gauge_of
+from tests.gauge_runs import USUAL, facts, stated_probe
+from tests.quiet import quiet_context
+
+
+def test_edge_is_found_where_it_is_and_as_well_as_it_says() -> None:
+    random = np.random.default_rng(3)
+    t = np.broadcast_to(np.linspace(-4, 4, 21), (400, 21)).copy()
+    place = random.uniform(-1, 1, 400)
+    step = 0.5 * (1 + erf((t - place[:, None]) / 0.8 / np.sqrt(2)))
+    grey = (20 + 90 * step) * (1 + 0.03 * t) + random.normal(0, 1.0, t.shape)
+    found, sigma = fit_steps(t, grey)
+    error = (found - place)[np.isfinite(found)]
+    assert len(error) > 390
+    assert abs(error.mean()) < 4 * error.std() / np.sqrt(len(error))
+    # beside noise, σ holds a floor for what blur leaves
+    noise = np.sqrt(np.nanmedian(sigma) ** 2 - 0.03**2)
+    assert 0.8 < error.std() / noise < 1.25
+
+
+def _black_squares(gauge: Gauge, marker: int, T_pc: Float, white: float) -> Image:
+    """Return a picture of a fiducial's black square on white wall, blurred; 235 is its brightest grey."""
+    camera = stated_probe().camera
+    u, v = camera.project(transform(inverse(T_pc), gauge.on_marker(np.array(marker), np.zeros(2)))).uv.astype(
+        int
+    )
+    column, row = np.meshgrid(np.arange(u - 99, u + 99), np.arange(v - 99, v + 99))
+    ray = camera.unproject(np.stack([column.ravel(), row.ravel()], -1).astype(float)).ray @ T_pc[:3, :3].T
+    near = gauge.fiducials.markers[marker]
+    radius = float(gauge.radius_mm[gauge.section(np.array(near.distance_mm))])
+    wall = T_pc[:3, 3] + ray * (radius / np.maximum(np.hypot(ray[:, 0], ray[:, 1]), 1e-9))[:, None]
+    turn = np.angle(np.exp(1j * (np.arctan2(wall[:, 1], wall[:, 0]) - np.radians(near.azimuth_deg))))
+    away = np.maximum(np.abs(turn) * radius, np.abs(wall[:, 2] - near.distance_mm))
+    grey = np.where(away < gauge.fiducials.size_mm / 2, 40.0, white).reshape(column.shape)
+    image = np.zeros((1200, 1600), np.uint8)
+    image[row, column] = np.clip(cv2.GaussianBlur(grey, (0, 0), 1.0), 0, 235)
+    return image
+
+
+@pytest.mark.parametrize("white", [200.0, 450.0])
+def test_edge_beside_overexposed_white_is_left_out_as_it_seems_to_lie_further_inside(white: float) -> None:
+    """It lay 0.1 to 0.4 px inside; so a sound probe's baseline was 7 σ off, without a warning."""
+    gauge, T_pc = gauge_of(facts(), facts().fiducials), np.eye(4)
+    T_pc[2, 3] = -12.0
+    image = _black_squares(gauge, 4, T_pc, white)
+    edges, left_out = measure_edges(image, 0, np.array([4]), T_pc, stated_probe().camera, gauge, USUAL)
+    if white > 235:
+        assert left_out >= 4 * USUAL.edge_samples - 2
+        assert not len(edges.uv)
+    else:
+        where = stated_probe().camera.project(transform(inverse(T_pc), edges.xyz_p)).uv
+        outside = np.einsum("mi,mi->m", edges.uv - where, edges.normal)
+        assert left_out == 0
+        assert len(outside) >= 4 * USUAL.edge_samples - 2
+        assert np.abs(outside).mean() < 0.1
+
+
+def test_overexposed_edges_are_told() -> None:
+    said: list[str] = []
+    context = replace(quiet_context(), warn=said.append)
+    premises.warn_of_overexposed(0, 900, context)
+    assert said == []
+    premises.warn_of_overexposed(100, 900, context)
+    assert "100 of 1000 edges of fiducials are left out" in said[0]
+
+
+def test_no_edge_where_there_is_none_or_where_bright_comes_before_dark() -> None:
+    t = np.broadcast_to(np.linspace(-4, 4, 21), (2, 21)).copy()
+    flat = np.full((1, 21), 60.0) + np.random.default_rng(0).normal(0, 1, (1, 21))
+    falling = 60 - 40 * (t[:1] > 0)
+    assert np.isnan(fit_steps(t, np.concatenate([flat, falling]))[0]).all()
