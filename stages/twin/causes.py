@@ -39,7 +39,7 @@ _FEWEST_FRAMES, _ROUNDS, _BESIDE = 6, 3, 3
 _SURE = 3.0
 """σ, by the spread from frame to frame, by which one law must fit better than another to be distinguished."""
 _LEAST = {"step": 0.02, "led_dead": 0.2, "lamp_sector": 0.1, "laser_sector": 0.25}
-"""Smallest sizes that are told. A photo errs by one or two per cent from frame to frame; for the laser's
+"""Smallest sizes that are reported. A photo errs by one or two per cent from frame to frame; for the laser's
 colour, the wall's reflectance errs by more, from place to place."""
 _AROUND = ("led_dead", "lamp_sector")
 """Laws of lit frames that change one side of the picture from a frame on."""

@@ -19,7 +19,7 @@ BLOCK_PX = 8
 _LEVELS = (0, 10, 20, 40, 80, 120, 160, 200)
 _FULL_SCALE, _STRAY = 255.0, 5.0
 CLIPPED_WALL = 0.01
-"""Share of pixels of lit wall from which clipping is told."""
+"""Share of pixels of lit wall above which clipping is reported."""
 _SILENT = 0.92
 """Share of pixels at one grey level from which on noise is below that of rounding, 1/√12: erf(√1.5)."""
 _LEAST_TEXTURE = 4.0
@@ -140,12 +140,12 @@ class Comparison:
 
     @property
     def clipped_share(self) -> float:
-        """Share of pixels of lit wall at the level where grey levels pile up."""
+        """Share of pixels of lit wall at the level where grey levels clip."""
         return self.clipped_wall / max(self.lit, 1.0)
 
     @property
     def wall_is_clipped(self) -> bool:
-        """Whether so much lit wall clips that it is told."""
+        """Whether so much lit wall clips that it is reported."""
         return self.clipped_share > CLIPPED_WALL
 
     @property

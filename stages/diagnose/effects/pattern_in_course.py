@@ -51,11 +51,11 @@ class PatternInCourse(Nameless, Product):
 
 
 def patterns_in_course(like: EffectModel, harmonic: int | None) -> tuple[PatternInCourse, ...]:
-    """Return the patterns of a harmonic that come as an effect does and move what it does not.
+    """Return the patterns of a harmonic that have an effect's course and displace what the effect does not.
 
-    Beside what moves the laser's line they move the picture, and the other way round: a law of the effect's
-    own kind that grows otherwise is weighed for itself (`stages.diagnose.gauge.unknown_laws`). There are none
-    beside what stays.
+    For an effect on the laser's line they displace the picture, and the other way round: a law of the
+    effect's own kind with another growth is tested separately (`stages.diagnose.gauge.unknown_laws`). There
+    are none for constant effects.
     """
     if like.kind is CourseKind.CONSTANT:
         return ()

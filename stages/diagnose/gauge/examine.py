@@ -41,12 +41,12 @@ _PARTS = 3
 # (`bench_diagnosis run FILE --mode nulls --count 60`, then `bench_diagnosis summary FILE`); p of the next 41
 # is uniform (KS .09; of too many small ones, .24).
 _APART = 0.265
-# Nothing was found, and yet there is something, where what repeats on other wall has more than so many times
-# the variance of noise. Codecs keep a part of a line's error at its place in the image from picture to
-# picture, which by that measure repeats. Sound runs come to 1.00 times the noise in all, wavering rows to
-# 2.2.
+# Although nothing was found, something is unexplained if the part of the residual that repeats on other wall
+# has more than this many times the variance of noise. Codecs keep a part of a line's error at its place in
+# the image from picture to picture, which counts as repeating: sound runs come to 1.00 times the noise in
+# all, wavering rows to 2.2.
 _REPEATS = 1.0
-# Its chance: of sound runs the s.d. is .03 of the noise, and this is more than 5 s.d. off.
+# Its probability by chance: the s.d. of sound runs is .03 of the noise, and this is more than 5 s.d. away.
 _NO_NOISE = 3e-7
 # Location of a residual that repeats at one place of the image.
 _OF_IMAGE = Location(str(Channel.RING), str(FixedTo.CAMERA), None)
