@@ -18,7 +18,6 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import t
 
-from pipeline.adjustment.robust import left_out_sd
 from pipeline.arrays import Float, Float32, Int
 from pipeline.artefacts.twin import Mismatch
 from stages.twin.cells import centred, half_turn
@@ -27,6 +26,7 @@ from stages.twin.laws import LED_AZIMUTHS
 from stages.twin.locate import FALSE_ALARM
 from stages.twin.reference import BlockSamples
 from stages.twin.scene import Scene
+from stages.twin.significance import ratio_over_frames
 from stages.twin.switched import share_at
 
 _LEAST, _SURE = 0.25, 3.0
@@ -146,12 +146,7 @@ class _Beside:
 
     def size(self, law: Float) -> tuple[float, float]:
         """Return the size of a law and its 1 σ, by leaving out parts of the frames in turn."""
-        each = self.products(law)
-        parts = np.arange(len(each)) * _PARTS // len(each)
-        sums = np.stack([np.bincount(parts, each[:, k], _PARTS) for k in (0, 1)], 1)
-        without = sums.sum(0) - sums
-        size, *others = (a[0] / max(a[1], 1e-12) for a in (sums.sum(0), *without))
-        return float(size), float(left_out_sd(np.array(others)))
+        return ratio_over_frames(self.products(law), _PARTS)
 
 
 def _hats(angle_rad: Float, step_rad: float) -> list[Float]:

@@ -16,13 +16,13 @@ import numpy as np
 from numpy.polynomial.polynomial import polyvander2d
 from scipy.stats import t
 
-from pipeline.adjustment.robust import left_out_sd
 from pipeline.arrays import Float, Float32, Int
 from pipeline.artefacts.twin import Mismatch, NamedFigure
 from stages.twin.gate import Suspected
 from stages.twin.locate import FALSE_ALARM, full_size
 from stages.twin.reference import BlockSamples
 from stages.twin.scene import Ring
+from stages.twin.significance import ratio_over_frames
 from stages.twin.switched import Pair, Shown
 
 _LEAST, _SURE = 0.25, 3.0
@@ -49,10 +49,8 @@ def lamp_power(samples: BlockSamples | None) -> tuple[NamedFigure, ...]:
     each = _products(samples)
     if each[:, 1].sum() < _LEAST_WANDER**2 * len(samples.change):
         return ()
-    whole, without = each.sum(0), each.sum(0) - each
-    power = float(_power(whole)[0])
-    spread = float(left_out_sd(without[:, 0] / np.maximum(without[:, 1], 1e-12)))
-    return (NamedFigure("lamp_power", power, float(np.linalg.norm([spread, _OF_LIGHT, _BY_COSINE]))),)
+    more, spread = ratio_over_frames(each, len(each))
+    return (NamedFigure("lamp_power", 1 + more, float(np.linalg.norm([spread, _OF_LIGHT, _BY_COSINE]))),)
 
 
 def _power(sums: Float) -> Float:

@@ -11,7 +11,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from pipeline.adjustment.robust import left_out_sd
 from pipeline.arrays import Float, Int
 from pipeline.artefacts.twin import Mismatch, NamedFigure
 from stages.twin.cells import SECTORS, centred, sector_azimuth_rad
@@ -21,6 +20,7 @@ from stages.twin.lamp_light import LampLight
 from stages.twin.laws import LED_AZIMUTHS, dim_share
 from stages.twin.reference import WALL_COLUMNS, BlockSamples
 from stages.twin.scene import Ring, Scene
+from stages.twin.significance import ratio_over_frames
 from stages.twin.state import PhotometricState
 from stages.twin.switched import dim_led, lamp_pattern, share_at
 
@@ -144,11 +144,8 @@ def _beside_wall(one: Suspected, lamp: LampLight, scene: Scene, samples: BlockSa
     within = float(np.mean((lamp.around(phi + step) - pattern) ** 2)) / 12
     if made @ made < _OVER_CELLS * within * len(made):
         return float("nan"), float("inf")
-    parts = samples.frame * _PARTS // (samples.frame.max() + 1)
-    sums = np.stack([np.bincount(parts, made * a, _PARTS) for a in (bright, made)], 1)
-    without = sums.sum(0) - sums
-    size, *others = ((a[0] / max(a[1], 1e-12)) for a in (sums.sum(0), *without))
-    return float(size), float(left_out_sd(np.array(others)))
+    sums = np.stack([np.bincount(samples.frame, made * a) for a in (bright, made)], 1).astype(float)
+    return ratio_over_frames(sums, _PARTS)
 
 
 def _harmonics(lamp: LampLight, scene: Scene) -> tuple[Float, float]:
