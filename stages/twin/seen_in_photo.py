@@ -39,13 +39,15 @@ def beside_sectors(
     """Return the findings that remain, and unnamed ones at the azimuth of a sector that the window may dim.
 
     Their photo was then made through what is there: wall that frames show beside it differs from its photo.
+    A displaced line remains: no photo shows it, and a drop both displaces the line and dims it.
     """
     reach = [
         (at["azimuth_deg"], (at["width_deg"] + SECTOR_STEP_DEG) / 2)
         for at in ({p.name: p.value for p in m.place} for m in sectors if "window_scatter" in m.names)
         if "width_deg" in at
     ]
-    left = [m for m in found if not m.name and any(_looks_at(m, *r, ring) for r in reach)]
+    by_photo = [m for m in found if not m.name and m.channel != "line"]
+    left = [m for m in by_photo if any(_looks_at(m, *r, ring) for r in reach)]
     said = "{} But the photo may have been made through what dims the line at that azimuth."
     withdrawn = tuple(replace(m, statement=said.format(m.statement)) for m in left)
     return tuple(m for m in found if m not in left), withdrawn

@@ -10,6 +10,7 @@ from pipeline.recording.base import Illumination
 from stages.twin.fixed_line import on_line
 from stages.twin.glints import Spot, SpotsOfFrames
 from stages.twin.scene import Ring
+from stages.twin.seen_in_photo import beside_sectors
 
 _RING = Ring((400.0, 300.0), 200.0, 50.0, 22.0)
 
@@ -73,3 +74,12 @@ def test_wall_from_elsewhere_that_a_drop_shows_is_no_glint():
     assert spots.found()
     assert not spots.found(bent=[_at(400.0, 500.0, 60.0)])
     assert spots.found(bent=[_at(100.0, 500.0, 60.0)])
+
+
+def test_a_displaced_line_remains_beside_a_sector_that_the_same_drop_dims():
+    """It was withdrawn as if its photo had made it, and with it the sign that something is on the window."""
+    bent = on_line(_fixed(), _rings(), _RING, ())
+    place = (NamedFigure("azimuth_deg", 91.0, 1.0), NamedFigure("width_deg", 8.0, 2.0))
+    sector = Mismatch("laser_sector or window_scatter", "line", "line", place, (), 0.0, 2.0, 1.0, "")
+    assert len(bent) == 1
+    assert beside_sectors(bent, (sector,), _RING) == (bent, ())
