@@ -39,6 +39,9 @@ from stages.diagnose.inference import INSTRUMENT, Evidence, Stated, estimate, pl
 # %, 50 % and 90 % quantile) and by .29, 2.1 and 9.8 in the second. Courses of the library (constant, with
 # distance, its sign, all searched in time) differ from each other's best size by .32, .70 and 2.6 of it.
 _APART = (0.3, 1.0, 3.0)
+# Periods of a swing that a run must hold before its return is seen more than once. A sheet that hung to one
+# side of the pipe while the probe rolled by 300° passed for one that rocks once during the run, at .994.
+_LEAST_PERIODS = 2.0
 # More effects of one harmonic than this can together imitate almost any law: a shifted optical axis that was
 # not in the library was named a tilted sheet beside two others (`bench_diagnosis --mode leftout`, case 3002).
 _AS_ANY = 2
@@ -96,8 +99,20 @@ def odds_of_unknown_laws(
     growth = odds_in(about, terms, [o.name for o in grown], laid_out, before, stated)
     around = [t.model.name if p[2] is None else p[2] for t, p in zip(terms, patterns, strict=True)]
     course = odds_in(about, terms, [o.name for o in moved], around, before, stated, as_one=False)
+    duration = span(run)[0]
     each = zip(growth, course, best.library_terms, strict=True)
-    return tuple(Unknown(g * known_alike(t.model, library), c) for g, c, t in each)
+    return tuple(
+        Unknown(g * known_alike(t.model, library), c + odds_of_slow_course(t, duration)) for g, c, t in each
+    )
+
+
+def odds_of_slow_course(term: Term, duration_s: float) -> float:
+    """Return the odds that a swing is a slow course of another kind: even where the run holds few periods.
+
+    Such a course may go with the probe's roll (what hangs down, for instance), which no law here does.
+    """
+    frequency = term.model.course(*term.at(term.amplitude)).get("frequency_hz")
+    return float(frequency is not None and frequency * duration_s < _LEAST_PERIODS)
 
 
 def known_alike(model: EffectModel, library: Mapping[str, EffectModel]) -> float:
