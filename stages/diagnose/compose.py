@@ -43,7 +43,9 @@ def composed(
     of_profile, of_travel = _unexplained_profile(field, gauge), _unexplained_travel(field, gauge)
     unnamed = len(known) < len(every) or any(not u.by_slip for u in of_travel)
     doubtful = (SLIP,) if any(u.by_slip for u in of_travel) else ()
-    said = _said(examined, known, unnamed, bool(of_profile), doubtful)
+    own = [c for c in claims_of(None, gauge, probe.shutter.exposure_s) if c.name not in without]
+    rings = verdict_of_rings(examined, own)
+    said = _said(examined, rings, known, unnamed, bool(of_profile), doubtful)
     asked = said.members if said.members else [e.name for e in said.effects]
     nameless = _IN_PROFILE if of_profile else of_travel[0].location if of_travel else None
     location = _location(examined, every, asked) or nameless
@@ -65,7 +67,7 @@ def composed(
         feasibility=examined.feasibility if examined is not None else (),
         candidates=of_gauge.candidates(examined) if examined is not None else (),
         shortcomings=tuple(s for seen in (field, gauge) if seen is not None for s in seen.shortcomings),
-        remainder=Remainder(rest, None, said.members, identifiable) if partly else None,
+        remainder=Remainder(rest, _of_rest(examined, rings), said.members, identifiable) if partly else None,
     )
     return found.not_knowing(without)
 
@@ -81,15 +83,14 @@ class _Said:
 
 
 def _said(
-    examined: Examined | None, known: Sequence[Claim], unnamed: bool, unexplained: bool,
+    examined: Examined | None, rings: Verdict, known: Sequence[Claim], unnamed: bool, unexplained: bool,
     doubtful: Sequence[str],
 ) -> _Said:  # fmt: skip
-    """Return the verdict of rings and fiducials, and then of the claims beyond them.
+    """Return the verdict of ``rings`` and fiducials, and then of the claims beyond them.
 
     What is certain is named, whatever is left beside it; what is left is a class, or unexplained. Names in
     ``doubtful`` may be no effect at all.
     """
-    rings = verdict_of_rings(examined, bool(known))
     of_rings = of_gauge.effects_found(examined) if examined is not None else ()
     claims = _beyond(known, of_rings)
     every = (*of_rings, *(c.found for c in claims))
@@ -137,17 +138,29 @@ def _is_nameless(examined: Examined | None, rings: Verdict) -> bool:
     return rings is Verdict.UNEXPLAINED or (rings is Verdict.PARTLY and best is not None and not best.named)
 
 
-def verdict_of_rings(examined: Examined | None, claimed: bool) -> Verdict:
-    """Return the verdict of rings and fiducials of a gauge run, given what other channels claim, if anything.
+def verdict_of_rings(examined: Examined | None, own: Sequence[Claim]) -> Verdict:
+    """Return the verdict of rings and fiducials of a gauge run, given what its ``own`` other channels claim.
 
     Where rings deviate but "no effect" is still the likeliest explanation, the claimed effect is taken to be
-    the cause: play or a slip disturbs the poses, too.
+    the cause: play or a slip disturbs the poses, too. What repeats at one place of the image on other wall is
+    no error of poses: only the line's profile may be its cause.
     """
     if examined is None:
         return Verdict.NOT_IDENTIFIABLE
     verdict = of_gauge.verdict_of(examined)
-    patternless = examined.best is None or not examined.best.names
-    return Verdict.CONSISTENT if claimed and patternless and verdict is Verdict.UNEXPLAINED else verdict
+    if verdict is not Verdict.UNEXPLAINED:
+        return verdict
+    if examined.best is None:
+        explained = any(c.location.channel == Channel.PROFILE for c in own)
+    else:
+        explained = bool(own) and not examined.best.names
+    return Verdict.CONSISTENT if explained else verdict
+
+
+def _of_rest(examined: Examined | None, rings: Verdict) -> Location | None:
+    """Return where rings show something unexplained although nothing was found in them."""
+    repeats = rings is Verdict.UNEXPLAINED and examined is not None and examined.best is None
+    return examined.location if repeats and examined is not None else None
 
 
 def _next(said: _Said, asked: Sequence[str]) -> str:

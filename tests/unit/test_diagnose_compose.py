@@ -12,9 +12,10 @@ import pytest
 from pipeline.instrument.probe import Probe
 from stages.diagnose.compose import verdict_of_rings
 from stages.diagnose.correct import encoder_effects
+from stages.diagnose.gauge.examine import Examined
 from stages.diagnose.profile.evidence import Condition, ProfileEvidence
 from stages.diagnose.profile.finding import Size, finding
-from stages.diagnose.result import Verdict
+from stages.diagnose.result import FitQuality, Location, Verdict
 from stages.diagnose.rocking import rocking_excluded
 from stages.diagnose.travel.events import with_events
 from tests.diagnosed import AGREES, DIFFERS, PLAY, SCALE, SLIP, SWING, answer, of_gauge, seen
@@ -211,7 +212,31 @@ def test_what_touches_rings_without_a_pattern_is_the_doing_of_what_motion_shows(
 ) -> None:
     best = SimpleNamespace(named=False, names=names, library_terms=())
     rings = SimpleNamespace(best=best, verdicts=SimpleNamespace(adequacy=0.5), confirmed=(), unsplit=())
-    assert verdict_of_rings(cast(Any, rings), claimed) is verdict
+    own = [cast(Any, SimpleNamespace(location=Location("motion", None, None)))] * claimed
+    assert verdict_of_rings(cast(Any, rings), own) is verdict
+
+
+@pytest.mark.parametrize("slipped_in", ["field", "gauge"])
+def test_what_repeats_in_the_gauge_run_is_told_beside_a_slip_of_either_recording(
+    real_probe: Probe, slipped_in: str
+) -> None:
+    """A slip of the inspection's encoder was named, and .28 px in the gauge run, noise .13, was not told."""
+    searched = cast(Any, SimpleNamespace(steps=(SimpleNamespace(by_chance=0.5),)))
+    where = Location("ring", "camera", None)
+    quality = FitQuality("px", 0.31, 0.3, 0.29, 0.284, 0.126)
+    rings = Examined(searched, None, (), (), quality=quality, location=where)
+    sure = replace(SLIP, agreements=(AGREES,))
+    field, gauge = (seen(n, slips=(sure,) * (n == slipped_in)) for n in ("field", "gauge"))
+    found = answer(real_probe, field, replace(gauge, geometry=rings))
+    assert found.verdict is Verdict.PARTLY
+    assert [e.name for e in found.effects] == ["encoder_slip"]
+    assert found.remainder is not None
+    assert found.remainder.verdict is Verdict.UNEXPLAINED
+    assert found.remainder.location == where
+    assert "0.28 px" in found.identifiable
+    assert answer(
+        real_probe, replace(field, travel=None), replace(gauge, geometry=rings, travel=None)
+    ).verdict is (Verdict.UNEXPLAINED)
 
 
 @pytest.mark.parametrize(("width_px", "verdict"), [(1.5, Verdict.NAMED), (9.0, Verdict.CLASS)])
