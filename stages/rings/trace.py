@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.ndimage import median_filter
 
-from pipeline.adjustment.robust import basis_of, ring_harmonics
 from pipeline.arrays import Bool, Byte, Float
 from pipeline.artefacts.measured import RingValidity
 from stages.rings.chain import Choice, choose_line
 from stages.rings.noise import dark_response, noise_response
+from stages.rings.other_light import other_light
 from stages.rings.profile import ProfileFit, Response, fit_line
 from stages.rings.search import BAND_WIDTHS, Candidates, Image, detection_limit, find_ring, search_band
 from stages.rings.sectors import Sectors
@@ -34,10 +34,6 @@ _LOST = 0.1
 # Sectors of the running median, as for outliers (`stages.rings.validity`): five or more that leave it are
 # wall.
 _EXPECTED_SECTORS = 9
-# Light that is farther from the ring's own course than a band is wide is the line where it is brighter than
-# what all but one in a hundred rays show there besides the line. One sector of four is looked at: beside each
-# other they share pixels, and of 1440 sectors 360 tell the one in a hundred.
-_OTHER_LIGHT, _OTHER_EVERY = 0.99, 4
 
 
 @dataclass(frozen=True)
@@ -169,28 +165,9 @@ def _search_rays(
 
 
 def _without_other_light(trace: RingTrace, image: Image, sectors: Sectors) -> RingTrace:
-    """Return a ring with the samples rejected that may as well be any other light of the image.
-
-    Where the line is too faint to be seen, texture of the lit wall, the end of the light far down the pipe or
-    a reflection is all that a ray shows. How bright such light is, is told by the rays that show the line.
-    """
-    valid = trace.validity == RingValidity.VALID
-    radius, band = np.where(valid, trace.fit.radius_px, np.nan), BAND_WIDTHS * trace.width_px
-    basis = basis_of(sectors.azimuth_rad)
-    course = ring_harmonics(radius[None], basis)[0] @ basis.T
-    aside = np.abs(radius - course) > band
-    told = np.flatnonzero(np.abs(radius - course) <= band)[::_OTHER_EVERY]
-    if not aside.any() or not len(told):
-        return trace
-    looked_at = aside.copy()
-    looked_at[told] = True
-    low = np.where(looked_at, 4 * trace.width_px, np.nan)
-    high = np.where(looked_at, float(sectors.radius_px.max()), np.nan)
-    peaks = search_band(image, sectors, low, high, trace.width_px, trace.response.dark_noise)
-    other = np.where(np.abs(peaks.radius_px - course[:, None]) > band, peaks.score, 0.0).max(1)
-    its_own = np.abs(peaks.radius_px - radius[:, None]) <= trace.width_px
-    score = np.where(its_own, peaks.score, 0.0).max(1)
-    lost = aside & (score <= np.quantile(other[told], _OTHER_LIGHT))
+    """Return a ring with the samples rejected that may as well be any other light of the image."""
+    radius = np.where(trace.validity == RingValidity.VALID, trace.fit.radius_px, np.nan)
+    lost = other_light(radius, trace.width_px, trace.response.dark_noise, image, sectors)
     return replace(trace, validity=np.where(lost, RingValidity.GHOST, trace.validity))
 
 

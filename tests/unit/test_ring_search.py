@@ -144,15 +144,77 @@ def lit(gone, seed):
     return exposed(line + rim + np.clip(60 + texture, 0, None) * (away > 42), random)
 
 
+@pytest.mark.parametrize("half_gone_rad", [0.15, 0.5, 1.0])
 @pytest.mark.parametrize("followed", [False, True])
-def test_where_the_line_is_gone_no_other_light_of_a_lit_pipe_is_taken_for_it(sectors, followed):
+def test_where_the_line_is_gone_no_other_light_of_a_lit_pipe_is_taken_for_it(
+    sectors, followed, half_gone_rad
+):
     """The end of the light far down the pipe, seen in three rings running, was a deposit of 12 mm at .98."""
     ring = off_centre(150.0, 6.0)(sectors.azimuth_rad)
 
     def gone(psi):
-        return np.abs(psi - 1.0) < 0.15
+        return np.abs(psi - 1.0) < half_gone_rad
 
     before = trace_ring(lit(lambda psi: psi > 9, 0), sectors, 255.0) if followed else None
     error = errors(trace_ring(lit(gone, 1), sectors, 255.0, before), ring)
     assert np.isfinite(error[~gone(sectors.azimuth_rad)]).mean() > 0.9
     assert (np.abs(error) > 15.0).sum() <= 1, "one in a hundred, which its neighbours contradict later"
+
+
+def stepped(psi):
+    """A bore that is wider on 36 % of the way round."""
+    return np.where(np.abs(psi + 1.5) < 1.13, 180.0, 150.0)
+
+
+def holed(psi):
+    """A hole of 23 degrees."""
+    return np.where(np.abs(psi + 1.5) < 0.2, 180.0, 150.0)
+
+
+def glint():
+    v, u = np.mgrid[: SIZE[1], : SIZE[0]]
+    away = np.hypot(u - CENTRE[0] + 45.8, v - CENTRE[1] - 100.0)
+    return 230 * np.exp(-0.5 * (away / 4.0) ** 2)
+
+
+def reflection():
+    return ring_light(
+        SIZE,
+        CENTRE,
+        lambda psi: np.full_like(psi, 95.0),
+        1.5,
+        lambda psi: 60.0 * (np.abs(psi - 1.2) < 0.05),
+    )
+
+
+def mirrored():
+    return ring_light(SIZE, CENTRE, lambda psi: np.full_like(psi, 95.0), 1.5, 50.0)
+
+
+def texture():
+    v, u = np.mgrid[: SIZE[1], : SIZE[0]]
+    spots = cv2.GaussianBlur(np.random.default_rng(3).normal(size=SIZE[::-1]), (0, 0), 2.0) * 40
+    return np.clip(60 + spots, 0, None) * (np.hypot(u - CENTRE[0], v - CENTRE[1]) > 42)
+
+
+@pytest.mark.parametrize("followed", [False, True])
+@pytest.mark.parametrize("other", [glint, reflection, mirrored, texture])
+@pytest.mark.parametrize("wall", [stepped, holed])
+def test_no_other_light_takes_a_step_or_a_hole_of_the_wall_away(sectors, wall, other, followed):
+    """One glint of σ 4 px took all samples of a step of the bore from a ring."""
+    psi = sectors.azimuth_rad
+    line = ring_light(SIZE, CENTRE, wall, 1.5, lambda p: np.where(wall(p) > 150, 45.0, 60.0))
+    before = trace_ring(image_of(line, 4), sectors, 255.0) if followed else None
+    trace = trace_ring(image_of(line + other(), 5), sectors, 255.0, before)
+    off = (wall(psi) > 150) & (wall(psi - 0.03) > 150) & (wall(psi + 0.03) > 150)
+    assert (np.abs(errors(trace, wall(psi)))[off] < 2.0).mean() > 0.8, "but for the ends of an arc"
+
+
+@pytest.mark.parametrize("half_gone_rad", [0.15, 0.5, 1.0])
+def test_light_that_goes_on_beyond_where_the_line_is_gone_is_not_the_line(sectors, half_gone_rad):
+    line = ring_light(
+        SIZE, CENTRE, off_centre(150.0, 6.0), 1.5, lambda p: 60.0 * (np.abs(p - 1.0) > half_gone_rad)
+    )
+    trace = trace_ring(image_of(line + mirrored(), 1), sectors, 255.0)
+    error = errors(trace, off_centre(150.0, 6.0)(sectors.azimuth_rad))
+    assert not (np.abs(error) > 15.0).any()
