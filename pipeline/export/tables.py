@@ -88,7 +88,7 @@ def write_trajectory(trajectory: Trajectory, folder: Path) -> None:
         rows = csv.writer(stream, lineterminator="\n")
         rows.writerow([*_POSE, *_SIGMA])
         rows.writerows(
-            [int(f), f"{t:.15g}", *(f"{v:.9g}" for v in row)]
+            [int(f), f"{t:.6f}", *(f"{v:.9g}" for v in row)]
             for f, t, row in zip(trajectory.frame, trajectory.time_s, values, strict=True)
         )
 
