@@ -12,6 +12,9 @@ from pipeline.machine.stage import Context
 from stages.accumulate.grid import MapGrid
 from stages.accumulate.survey import RingsOnWall, some_at_a_time
 
+# A bound on memory alone.
+_ROWS_AT_ONCE = 512
+
 
 def warn_of_left_out(rings: RingSamples, told: RingSamples, context: Context) -> None:
     """Warn of samples of ``rings`` that are not in those told by the probe's roll."""
@@ -45,7 +48,18 @@ def shared_on_wall(rings: RingsOnWall, grid: MapGrid, gap_mm: float, scratch: Sc
         size = np.abs(moved_px[rows][of]) * per_px
         row = np.rint((samples.distance_mm[of] - grid.distance_mm[0]) / step).astype(np.int64)
         column = np.rint((samples.azimuth_rad[of] + np.pi) / (2 * np.pi) * shared.shape[1]).astype(np.int64)
-        cell = np.clip(row, 0, len(shared) - 1), column % shared.shape[1]
-        np.maximum.at(shared, cell, size.astype(np.float32))
-    reach = 2 * int(np.ceil(gap_mm / step)) + 1, 3
-    return np.asarray(maximum_filter(shared, reach, output=shared, mode=("constant", "wrap")))
+        on_map = (row >= 0) & (row < len(shared))
+        cell = row[on_map], column[on_map] % shared.shape[1]
+        np.maximum.at(shared, cell, size[on_map].astype(np.float32))
+    return _widened(shared, int(np.ceil(gap_mm / step)), scratch)
+
+
+def _widened(size_mm: Float32, rows: int, scratch: Scratch) -> Float32:
+    """Return the largest sizes (S, A) within so many rows and one column, some rows at a time."""
+    out = scratch.zeros(size_mm.shape, np.float32)
+    for first in range(0, len(size_mm), _ROWS_AT_ONCE):
+        above = min(rows, first)
+        near = size_mm[first - above : first + _ROWS_AT_ONCE + rows]
+        wide = maximum_filter(near, (2 * rows + 1, 3), mode=("constant", "wrap"))
+        out[first : first + _ROWS_AT_ONCE] = wide[above : above + _ROWS_AT_ONCE]
+    return out

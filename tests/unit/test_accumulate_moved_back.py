@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import tracemalloc
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,7 +14,10 @@ from pipeline.artefacts.measured import RingSamples, Trajectory, Wall
 from pipeline.artefacts.moved_back import told_by_roll
 from pipeline.geometry.axis import straight_axis
 from pipeline.geometry.rigid import from_parts, rotation_from_vector
+from pipeline.machine.scratch import Scratch
 from stages.accumulate import AccumulateParameters, accumulate_wall
+from stages.accumulate.grid import MapGrid
+from stages.accumulate.moved_back import shared_on_wall
 from stages.rings.behind_dirt import set_right
 from stages.triangulate import TriangulateParameters, triangulate_rings
 from tests.drawn_run import BASELINE, RADIUS, rings_on_wall, round_wall, small_probe
@@ -98,3 +103,40 @@ def test_points_of_the_wall_are_those_of_the_rings_told_by_roll(roll_rad: float)
     told = told_by_roll(put_right(run, rim_px=RIM_PX), run)
     points = np.bincount(measured(roll_rad, rim_px=RIM_PX).cloud.frame, minlength=RINGS)
     np.testing.assert_array_equal(points, told.valid.sum(1))
+
+
+def shared(distance_mm: Float, rows: int, columns: int) -> Float:
+    """Return what is shared on a map of rows of 1 mm, with samples moved by 1 mm at azimuth −π."""
+    sample = distance_mm[:, None]
+    one = np.ones_like(sample)
+    samples = SimpleNamespace(valid=one > 0, distance_mm=sample, azimuth_rad=-np.pi * one, sigma_mm=0.1 * one)
+    rings = SimpleNamespace(
+        rings=SimpleNamespace(moved_px=one, sigma_px=0.1 * one),
+        samples=lambda which: SimpleNamespace(**{k: v[which] for k, v in vars(samples).items()}),
+    )
+    grid = MapGrid(np.arange(float(rows)), 2 * np.pi * np.arange(columns) / columns - np.pi)
+    got = shared_on_wall(rings, grid, 3.0, Scratch())
+    assert got is not None
+    return got
+
+
+def test_what_is_shared_reaches_as_far_everywhere_and_not_from_beyond_the_map() -> None:
+    """A sample beyond the map was taken for one on its first or last row."""
+    got = shared(np.array([-40.0, 0.0, 508.0, 512.0, 515.0, 1500.0]), 1200, 8)
+    row, column = np.nonzero(got)
+    assert np.unique(column).tolist() == [0, 1, 7]
+    assert np.unique(row).tolist() == [0, 1, 2, 3, *range(505, 519)]
+    assert got.max() == pytest.approx(1.0)
+
+
+def test_a_long_map_of_what_is_shared_stays_on_the_disk() -> None:
+    """All of it was copied into memory: 2.3 GB for 100 m of pipe."""
+    rows, columns = 12_000, 720
+    assert rows * columns * 4 > 1 << 25  # smaller ones are kept in memory
+    tracemalloc.start()
+    try:
+        shared(np.array([5.0]), rows, columns)
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert peak < rows * columns * 4 / 4
