@@ -77,7 +77,7 @@ def _resolution(walls: WallPair, pair: PairedWalls) -> Resolution:
 REGISTER = Stage(
     "register", "3", RegisterParameters, register_walls, "Lay an earlier run's wall on a later one's."
 )
-COMPARE = Stage("compare", "3", CompareParameters, compare_findings, "Tell what became of every finding.")
+COMPARE = Stage("compare", "4", CompareParameters, compare_findings, "Tell what became of every finding.")
 COMPARISON: tuple[Stage, ...] = (REGISTER, COMPARE)
 
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -63,10 +64,11 @@ class PairedWalls:
     now: WallMap
     registration: Registration
 
-    @property
+    @cached_property
     def radius_mm(self) -> float:
-        """Median radius of the later wall."""
-        return float(np.nanmedian(self._thinned(self.now.radius_mm)))
+        """Median radius of both walls, so that it is known where the later one was hardly seen."""
+        rows = [self._thinned(wall.radius_mm) for wall in (self.now, self.earlier)]
+        return float(np.nanmedian(np.concatenate([r.ravel() for r in rows])))
 
     @property
     def calibration_mm(self) -> float:

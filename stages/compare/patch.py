@@ -87,7 +87,7 @@ class Cutter:
     def patch(self, outlines: Sequence[Float], random: np.random.Generator) -> Patch:
         """Return the patch about outlines (V, 2) of the later run."""
         wall = self.pair.now
-        radius = float(np.nanmedian(wall.radius_mm[wall.row(float(outlines[0][0, 0]))]))
+        radius = self.pair.radius_mm
         corner = np.concatenate(outlines)
         rows = self._rows(corner)
         columns, first = self._columns(corner, _MARGIN_MM / radius)
@@ -164,7 +164,6 @@ def at_its_peak(mask: Bool, peak: tuple[int, int]) -> Bool:
 def outline_mask(outlines: list[Float], pair: PairedWalls) -> Bool:
     """Return the cells (S, A) of the later wall within `_FOOT_MM` of an outline or inside of one."""
     wall = pair.now
-    radius = float(np.nanmedian(wall.radius_mm))
     mask = np.zeros((len(wall.distance_mm), len(wall.azimuth_rad)), np.uint8)
     for outline in outlines:
         row = (outline[:, 0] - wall.distance_mm[0]) / wall.step_mm
@@ -172,7 +171,7 @@ def outline_mask(outlines: list[Float], pair: PairedWalls) -> Bool:
         for turn in (-1, 0, 1):
             point = np.stack([column + turn * mask.shape[1], row], -1)
             cv2.fillPoly(mask, [np.round(point).astype(np.int32)], 1)
-    rows, columns = (int(_FOOT_MM / cell) for cell in (wall.step_mm, wall.step_rad * radius))
+    rows, columns = (int(_FOOT_MM / cell) for cell in (wall.step_mm, wall.step_rad * pair.radius_mm))
     around = cv2.copyMakeBorder(mask, 0, 0, columns, columns, cv2.BORDER_WRAP)
     wide = cv2.dilate(around, np.ones((2 * rows + 1, 2 * columns + 1), np.uint8))
     return np.asarray(wide[:, columns : columns + mask.shape[1]].astype(bool))

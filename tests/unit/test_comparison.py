@@ -10,7 +10,7 @@ from pipeline.artefacts.comparison import FAMILY_ERROR, Fate
 from pipeline.errors import UnusableError
 from stages.compare import changes, holm, put_together
 from stages.compare.paired import PairedWalls
-from stages.compare.patch import outline_mask
+from stages.compare.patch import Cutter, outline_mask
 from stages.compare.registration.by_marks import register
 from tests.two_walls import (
     COLUMNS,
@@ -155,3 +155,17 @@ def test_the_foot_of_a_finding_reaches_across_the_seam_as_far_as_it_reaches_else
     assert counts[1] == pytest.approx(counts[0], abs=2)
     wide_mm = counts[0].max() * 2 * np.pi * radius_mm / COLUMNS
     assert wide_mm == pytest.approx(10 + 2 * 2.0, abs=1.5)  # the finding, and 2 mm of foot on either side
+
+
+def test_where_the_later_wall_was_not_seen_a_finding_has_no_coverage_there():
+    """Its radius, NaN, was made a number of cells, which ended the comparison."""
+    wall = PIPE.surface((), 3).wall
+    unknown = wall.radius_mm.copy()
+    unknown[wall.rows(40.0, 70.0)] = np.nan
+    now = replace(wall, radius_mm=unknown)
+    pair = PairedWalls(wall, now, register(PIPE.surface((), 3), later((), 4), NO_WELDS, SAME))
+    outline = np.array([(s, psi) for s, psi in ((50, -0.1), (60, -0.1), (60, 0.1), (50, 0.1))])
+    cutter = Cutter(pair, outline_mask([outline], pair))
+    assert cutter.patch([outline], np.random.default_rng(0)).coverage[0] == 0
+    nowhere = replace(pair, now=replace(wall, radius_mm=np.full_like(wall.radius_mm, np.nan)))
+    assert (outline_mask([outline], nowhere) == cutter.defective).all()
