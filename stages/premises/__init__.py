@@ -293,6 +293,6 @@ def _report(pictures: Pictures, radius_mm: float, changes: Changes, context: Con
 
 
 PREMISES = Stage(
-    "premises", "27", PremisesParameters, check_premises,
+    "premises", "28", PremisesParameters, check_premises,
     "lights, times, encoder and diameter as stated, held against the pictures and mended",
 )  # fmt: skip

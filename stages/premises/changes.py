@@ -42,6 +42,11 @@ class Changes:
         """(F,) true where the time is another than stated."""
         return np.asarray(self.time_s != self.frames.time_s)
 
+    @property
+    def rows_later(self) -> Int:
+        """(F,) how many rows of the table later than its own a frame belongs to; negative: earlier."""
+        return self.row - np.arange(len(self.row))
+
     def lost(self) -> list[tuple[int, int]]:
         """Return (frame, number) wherever pictures were lost before a frame."""
         skipped = np.diff(self.row, prepend=-1) - 1
@@ -56,11 +61,12 @@ def warn_of_frames(
     if lost:
         context.warn(
             f"{_pictures(sum(n for _, n in lost))} lost that the times in frames.csv do not show: before "
-            f"{_listed([f'frame {f} ({n})' for f, n in lost])}. The {changes.retimed.sum()} frames after "
-            "them now have the times and lights of the rows that belong to them. What to do: nothing, if the "
-            "recorder is known to drop frames; else correct frames.csv"
+            f"{_listed([f'frame {f} ({n})' for f, n in lost])}. "
+            f"The {(changes.rows_later > 0).sum()} frames after them now have the times and lights of the "
+            "rows that belong to them. What to do: nothing, if the recorder is known to drop frames; else "
+            "correct frames.csv"
         )
-    wrong = frame[changes.relabelled & ~changes.retimed]
+    wrong = frame[changes.relabelled & (changes.rows_later == 0)]
     if wrong.size:
         context.warn(
             f"{_pictures(len(wrong))} in another light than frames.csv states: frame {_listed(wrong)}. What "
@@ -74,7 +80,7 @@ def warn_of_frames(
             f"the video ends early: it lacks the last {left} of the {len(table.frame)} frames in frames.csv. "
             "Only what was filmed is measured. What to do: copy the video again, it may be cut off"
         )
-    earlier = 0 if lost else int((changes.retimed & ~repeats).sum())
+    earlier = int(((changes.rows_later < 0) & ~repeats).sum())
     hint = (
         f"see whether the recorder puts pictures in: the {earlier} frames after them now have the times of "
         "earlier rows; else correct frames.csv"
