@@ -16,6 +16,10 @@ from stages.diagnose.profile.measure import LineProfiles
 # data/debts.md.
 SCALE_FLOOR, EXPOSURE2_FLOOR = 0.03, 2e-5
 _LEAST_SCALE_SPREAD = 0.05
+# 1 σ of the growth of blur² from the optical axis to the edge of the picture, relative to blur² (chosen:
+# lenses are less sharp at their edge, and no data sheet of a probe says by how much). A finding needs 6 σ:
+# blur that is twice as wide at the edge, three times the variance more, makes none. Debt: data/debts.md.
+_EDGE_BLUR = 0.5
 # Apparent pixel locking by pixel integration, rounding and compression, px. Debt: data/debts.md.
 LOCKING_FLOOR_PX = 1.5e-3
 # Apparent gains by speckle on a wall at rest; those by compression are measured. Debt: data/debts.md.
@@ -34,7 +38,8 @@ def width_findings(cells: Cells, geometry: LineGeometry, probe: Probe) -> tuple[
     """Return the findings of `gamma` and `albedo_bias`: width² = blur² + s (stated σ · px per mm)².
 
     A response I^γ divides all widths² by γ; a wider sheet than stated changes only s. The blur is not stated,
-    so that both look the same here.
+    so that both look the same here. Its growth towards the edge of the picture is not stated either, and as
+    the scale changes with the place in the picture as well, s is no surer than that.
     """
     stated = stated_variance(geometry, probe)
     fit = scale_law(cells, geometry, probe)
@@ -43,7 +48,8 @@ def width_findings(cells: Cells, geometry: LineGeometry, probe: Probe) -> tuple[
         why = "The line is seen at one scale only: its own width and the image's blur look the same."
         return untestable("gamma", why), untestable("albedo_bias", why)
     scale = float(fit.coefficient[0])
-    test = tested(scale - 1, float(fit.sigma[0]), SCALE_FLOOR, fit.groups)
+    floor = float(np.hypot(SCALE_FLOOR, _scale_by_edge_blur(float(fit.coefficient[1]), geometry, probe)))
+    test = tested(scale - 1, float(fit.sigma[0]), floor, fit.groups)
     sigma = test.sigma
     safe = max(scale, 0.05)
     exponent = Size("exponent", "", 1 / safe, sigma / safe**2)
@@ -59,6 +65,15 @@ def width_findings(cells: Cells, geometry: LineGeometry, probe: Probe) -> tuple[
 def stated_variance(geometry: LineGeometry, probe: Probe) -> Float:
     """Return the stated line's variance in the image (F, S), px²."""
     return np.asarray((probe.laser.line_sigma_mm * geometry.px_per_mm) ** 2)
+
+
+def _scale_by_edge_blur(blur_px2: float, geometry: LineGeometry, probe: Probe) -> float:
+    """Return 1 σ of (σ / stated)² by blur that grows towards the picture's edge by an unknown amount."""
+    stated, edge_px = stated_variance(geometry, probe), min(probe.camera.image_size) / 2
+    grown = _EDGE_BLUR * max(blur_px2, 0.0) * (geometry.radius_px / edge_px) ** 2
+    known = np.isfinite(stated) & np.isfinite(grown) & np.isfinite(geometry.width_px)
+    around = stated[known] - stated[known].mean()
+    return float(abs(around @ grown[known]) / (around @ around))
 
 
 def scale_law(cells: Cells, geometry: LineGeometry, probe: Probe) -> Regression:
