@@ -14,7 +14,8 @@ from stages.diagnose import residual
 from stages.diagnose.channels import Seen
 from stages.diagnose.effects.courses import Coursed
 from stages.diagnose.effects.library import LIBRARY
-from stages.diagnose.field import answer, left
+from stages.diagnose.field import answer
+from stages.diagnose.field import unexplained as left
 from stages.diagnose.field.against_gauge import _same_step, met_in_field, not_refuted
 from stages.diagnose.field.answer import (
     _alone,
@@ -33,7 +34,7 @@ from stages.diagnose.gauge.run import Term
 from stages.diagnose.gauge.scan import Scored
 from stages.diagnose.gauge.search import prepare
 from stages.diagnose.inference import INSTRUMENT, Column, Evidence, Score, Stated, stated_belief
-from stages.diagnose.result import Confirmation, Diagnosis, EffectFound, Value, Verdict
+from stages.diagnose.result import Confirmation, Diagnosis, EffectFound, Location, Value, Verdict
 from tests.gauge_runs import made_run, measured_run, stated_probe
 
 NOTHING_STATED = Stated((), np.zeros((0, 0)))
@@ -281,6 +282,29 @@ def test_what_the_likeliest_cause_leaves_most_of_is_not_explained(
     found = _alone(Diagnosis("field", "gauge", Verdict.CONSISTENT, 1.0), answer, shown, field, True, doubt)
     assert found.verdict is (Verdict.UNEXPLAINED if unexplained else Verdict.CLASS)
     assert ("no effect of the library" in found.identifiable) is unexplained
+
+
+@pytest.mark.parametrize(("repeats", "verdict"), [(True, Verdict.UNEXPLAINED), (False, Verdict.CLASS)])
+def test_a_gauge_run_with_something_unexplained_gets_no_class_from_the_inspection(
+    repeats, verdict, monkeypatch
+):
+    """It was a class of the inspection's, and "the gauge run shows none of it"."""
+    monkeypatch.setattr(answer, "why_unexplained", lambda field, cause: "")
+    monkeypatch.setattr(answer, "not_refuted", lambda shown, gauge, stated: shown)
+    monkeypatch.setattr(answer, "location_in_field", lambda field, shown: None)
+    where = Location("ring", "camera", None)
+    before = Diagnosis(
+        "field", "gauge", verdict if repeats else Verdict.CONSISTENT, 0.5, where, identifiable="It repeats."
+    )
+    field = replace(field_with(2.0 * WAVE @ [0.3, 0.4]), run=SimpleNamespace())
+    gauge = SimpleNamespace(geometry=SimpleNamespace(best=None, repeats=repeats))
+    found = with_field(before, SimpleNamespace(field=field, travel=None), gauge, (), stated_probe(), LIBRARY)
+    assert found.verdict is verdict
+    assert bool(found.members) is not repeats
+    assert any("none of it" in note for note in found.notes) is not repeats
+    assert "It repeats." in found.identifiable
+    assert "tilted" in found.identifiable
+    assert (found.location == where) is repeats
 
 
 def test_what_the_gauge_refutes_is_unexplained_and_says_what_it_looks_like():

@@ -13,6 +13,7 @@ from stages.diagnose.agreement import same
 from stages.diagnose.channels import Seen
 from stages.diagnose.effects.base import EffectModel
 from stages.diagnose.field.against_gauge import met_in_field, not_refuted
+from stages.diagnose.field.beside import beside, in_words, nameless, union
 from stages.diagnose.field.evidence import FieldEvidence, travels
 from stages.diagnose.field.unexplained import why_unexplained
 from stages.diagnose.gauge.scan import Scored
@@ -23,7 +24,6 @@ from stages.diagnose.result import (
     Diagnosis,
     EffectFound,
     Location,
-    Remainder,
     Value,
     Verdict,
     classes_of,
@@ -182,8 +182,12 @@ def with_field(
         names = [t.model.law for t in examined.best.fit.terms]
         return _met(found, dict(zip(names, met, strict=True)))
     if alone.shown:
-        possible = alone.shown if examined is None else not_refuted(alone.shown, examined, stated)
+        repeats = examined is not None and examined.repeats
+        asked = examined if not repeats else None
+        possible = alone.shown if asked is None else not_refuted(alone.shown, asked, stated)
         doubt = why_unexplained(seen, possible[0]) if possible else ""
+        if repeats:
+            return in_words(found, doubt or _BY_FIELD + alone.identifiable)
         left = replace(alone, shown=() if doubt else possible)
         return _alone(found, alone, left, seen, gauge is not None, doubt)
     if found.verdict is Verdict.NOT_IDENTIFIABLE and gauge is None and travels(field.field.run):
@@ -237,23 +241,7 @@ def _met(found: Diagnosis, met: Mapping[str, Confirmation | None]) -> Diagnosis:
     note = "The inspection contradicts what the gauge run names: see the second predictions of each effect."
     found = replace(found, identifiable="; ".join(e.statement for e in withdrawn), notes=(*found.notes, note))
     kept = tuple(e for e in effects if e.name not in against)
-    return _beside(replace(found, effects=kept or effects), kept, classes_of([e.name for e in withdrawn]))
-
-
-def _beside(found: Diagnosis, certain: Sequence[EffectFound], members: Sequence[str]) -> Diagnosis:
-    """Return the answer with one more class: a remainder beside what is certain, or the answer itself."""
-    before = found.remainder
-    every = _union(members, before.members if before is not None else found.members)
-    if not certain:
-        return replace(
-            found, verdict=Verdict.CLASS, members=every, remainder=None, record_next=record_next(every)
-        )
-    # What is unexplained stays so: a class does not contain it.
-    nameless = before is not None and before.verdict is Verdict.UNEXPLAINED
-    left = Remainder(
-        Verdict.UNEXPLAINED if nameless else Verdict.CLASS, None, every, before.formula if before else ""
-    )
-    return replace(found, verdict=Verdict.PARTLY, members=(), remainder=left, record_next=record_next(every))
+    return beside(replace(found, effects=kept or effects), kept, classes_of([e.name for e in withdrawn]))
 
 
 def _confirmed(effect: EffectFound, met: Confirmation | None) -> EffectFound:
@@ -281,24 +269,12 @@ def _alone(
     if where is not None and not possible.shown:
         # What the refuted causes would be fixed to was not measured.
         where = replace(where, fixed_to=None, time=None)
-    found = _beside(found, certain, _union(possible.members, names)) if possible.shown else _nameless(found)
+    found = beside(found, certain, union(possible.members, names)) if possible.shown else nameless(found)
     following = possible.next if possible.shown or not with_gauge else AGAIN
     found = replace(found, identifiable="; ".join(said), record_next=following, notes=(*found.notes, *notes))
     if found.remainder is None:
         return replace(found, location=where)
     return replace(found, remainder=replace(found.remainder, location=where))
-
-
-def _nameless(found: Diagnosis) -> Diagnosis:
-    """Return the answer with something unexplained, alone or beside what is certain: no class contains it."""
-    if found.verdict in (Verdict.NAMED, Verdict.PARTLY):
-        before = found.remainder or Remainder(Verdict.UNEXPLAINED)
-        return replace(found, verdict=Verdict.PARTLY, remainder=replace(before, verdict=Verdict.UNEXPLAINED))
-    return replace(found, verdict=Verdict.UNEXPLAINED, members=(), effects=())
-
-
-def _union(first: Sequence[str], second: Sequence[str]) -> tuple[str, ...]:
-    return tuple(dict.fromkeys((*first, *second)))
 
 
 def _both(first: float, second: float) -> float:
