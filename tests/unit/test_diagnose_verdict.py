@@ -13,9 +13,9 @@ from stages.diagnose.gauge import answer
 from stages.diagnose.gauge.confirm import passes_again
 from stages.diagnose.gauge.examine import Examined
 from stages.diagnose.gauge.hypotheses import Judged
-from stages.diagnose.gauge.judge import Unfitted
+from stages.diagnose.gauge.judge import Instead, Unfitted, Verdicts
 from stages.diagnose.gauge.run import Term
-from stages.diagnose.gauge.sets import Member
+from stages.diagnose.gauge.sets import PATTERNS, Member
 from stages.diagnose.gauge.unknown_laws import Unknown
 from stages.diagnose.result import Confirmation, FitQuality, Location, Verdict
 
@@ -37,11 +37,12 @@ def examined(
         named=bool(library) and not patterns_px, library_terms=library, fit=fit, heldout=0.0
     )
     rival = SimpleNamespace(named=True, library_terms=terms[:1], laws=("cone",), heldout=rival_heldout)
+    other = unknown / (1 + unknown)
     verdicts = SimpleNamespace(
         adequacy=left,
         judged=(best, rival),
         chance_of=lambda term: chance / (1 + unknown),
-        patterns_beside=lambda term: {"image outward": unknown / (1 + unknown)},
+        instead_of=lambda term: Instead({"image outward": other}, other, 1 - chance / (1 + unknown) - other),
     )
     each = (unsplit, *[()] * (len(library) - 1)) if library else ()
     quality = FitQuality("px", 1.0, 0.1, 1.0, heldout, 0.1)
@@ -66,9 +67,61 @@ def test_patterns_that_are_unlikely_each_leave_a_name_unexplained_unless_other_n
     monkeypatch.setattr(answer, "shift_px", lambda fit, term: term.shift_px)
     seen = examined(unsplit=())
     seen.verdicts.chance_of = lambda term: chance
-    seen.verdicts.patterns_beside = lambda term: {"image outward: a θ^1": 0.008, "image outward: a(θ)": 0.006}
+    patterns = {"image outward: a θ^1": 0.008, "image outward: a(θ)": 0.006}
+    seen.verdicts.instead_of = lambda term: Instead(patterns, 0.014, 1 - chance - 0.014)
     assert answer.verdict_of(seen) is verdict
     assert answer.unknown_rivals(seen)[:1] == ("image outward: a θ^1",) * (verdict is Verdict.UNEXPLAINED)
+
+
+def hypotheses(fitted, weighed):
+    """Return verdicts on sets of effects and of patterns, by name and by number, each with a probability."""
+    models = {name: (LIBRARY[name], ()) for name in ("laser_cone", "baseline")} | dict(enumerate(PATTERNS))
+    judged = []
+    for of, _ in fitted:
+        terms = tuple(Term(*models[k], np.zeros(len(models[k][0].amplitudes))) for k in of)
+        judged.append(Judged(cast(Any, SimpleNamespace(terms=terms)), cast(Any, None), (), 0.0, 0.0, 0.0))
+    unfitted = tuple(Unfitted(tuple(Member(*models[k], 0.0) for k in of), (), 0.0, p) for of, p in weighed)
+    chance = np.array([p for _, p in fitted])
+    return Verdicts((), tuple(judged), chance, 1.0, cast(Any, None), 1.0, unfitted)
+
+
+CONE = ("laser_cone",)
+
+
+@pytest.mark.parametrize(
+    ("fitted", "weighed", "nameless", "named", "doubts"),
+    [
+        # Another name that needs two patterns is a name.
+        ([(CONE, 0.6)], [(("baseline", 0, 1), 0.4)], 0.0, 0.4, 0),
+        # A formula that was fitted is of patterns, and no effect at all is neither.
+        ([(CONE, 0.51), ((0,), 0.3)], [((k,), 0.0095) for k in range(1, 21)], 0.49, 0.0, 21),
+        ([(CONE, 0.51), ((), 0.3), (("baseline",), 0.1)], [((1,), 0.09)], 0.09, 0.1, 1),
+        # Sets of two patterns count once.
+        ([(CONE, 0.55), (("baseline",), 0.25)], [((k, k + 20), 0.01) for k in range(20)], 0.2, 0.25, 0),
+        (
+            [(CONE, 0.975), (("baseline",), 0.013)],
+            [((k, k + 20), 0.0012) for k in range(10)],
+            0.012,
+            0.013,
+            0,
+        ),
+    ],
+)
+def test_each_set_counts_once_with_the_patterns_or_with_other_names(fitted, weighed, nameless, named, doubts):
+    """Two patterns beside another name of .4 made .8 of patterns, and −.4 of names."""
+    verdicts = hypotheses(fitted, weighed)
+    instead = verdicts.instead_of(verdicts.judged[0].fit.terms[0])
+    assert instead.nameless == pytest.approx(nameless)
+    assert instead.named == pytest.approx(named)
+    seen = cast(Any, SimpleNamespace(best=verdicts.judged[0], verdicts=verdicts))
+    assert len(answer.unknown_rivals(seen)) == doubts
+
+
+def test_the_pattern_that_is_the_likelier_beside_any_name_comes_first():
+    seen = examined((1.0, 1.0))
+    each = iter([{"a": 0.3, "b": 0.2}, {"a": 0.02, "b": 0.2}])
+    seen.verdicts.instead_of = lambda term: Instead(next(each), 0.3, 0.0)
+    assert answer.unknown_rivals(seen) == ("a", "b")
 
 
 @pytest.mark.parametrize(

@@ -107,11 +107,11 @@ def unknown_rivals(examined: Examined) -> tuple[str, ...]:
         return ()
     doubted = dict[str, float]()
     for term in best.library_terms:
-        beside = verdicts.patterns_beside(term)
-        together = sum(beside.values())
-        names = 1 - verdicts.chance_of(term) - together
-        least = 0.0 if together > max(1 - SURE, names) else 1 - SURE
-        doubted |= {formula: p for formula, p in beside.items() if p > least}
+        instead = verdicts.instead_of(term)
+        least = 0.0 if instead.nameless > max(1 - SURE, instead.named) else 1 - SURE
+        for formula, p in instead.patterns.items():
+            if p > least:
+                doubted[formula] = max(p, doubted.get(formula, 0.0))
     return tuple(sorted(doubted, key=lambda formula: -doubted[formula]))
 
 

@@ -60,6 +60,24 @@ class Unfitted:
 
 
 @dataclass(frozen=True)
+class Instead:
+    """What may be in an effect's place.
+
+    Attributes
+    ----------
+    patterns : dict of str to float
+        Patterns without a cause that stand there without any name, the likeliest first, each with the
+        probability of all sets that contain it.
+    nameless, named : float
+        Probability of all sets of patterns alone, each counted once, and of all with other names.
+    """
+
+    patterns: dict[str, float]
+    nameless: float
+    named: float
+
+
+@dataclass(frozen=True)
 class Verdicts:
     """All hypotheses, the likeliest first, with the probability of each.
 
@@ -87,41 +105,46 @@ class Verdicts:
 
     def chance_of(self, term: Term) -> float:
         """Return the probability that a term's law is among the causes, with whatever course."""
-        return sum(p for p, causes, _ in self._each() if cause_of(term.model, term.shape) in causes)
+        return sum(p for p, causes, _, _ in self._each() if cause_of(term.model, term.shape) in causes)
 
     def chance_of_course(self, term: Term) -> float:
         """Return the probability of a term's course if its law is among the causes."""
-        both = sum(p for p, _, names in self._each() if term.model.name in names)
+        both = sum(p for p, _, names, _ in self._each() if term.model.name in names)
         return min(both / max(self.chance_of(term), 1e-300), 1.0)
 
     def likely_laws(self, sure: float) -> tuple[str, ...]:
         """Return the laws of the likeliest hypotheses that together reach the probability ``sure``."""
         each = sorted(self._each(), key=lambda one: -one[0])
-        before = np.cumsum([p for p, _, _ in each]) - [p for p, _, _ in each]
-        likely = (
-            causes for (_, causes, _), sum_before in zip(each, before, strict=True) if sum_before < sure
-        )
+        chance = np.array([p for p, *_ in each])
+        before = np.cumsum(chance) - chance
+        likely = (causes for (_, causes, *_), so_far in zip(each, before, strict=True) if so_far < sure)
         return tuple(dict.fromkeys(law for causes in likely for law, _ in sorted(causes)))
 
-    def patterns_beside(self, term: Term) -> dict[str, float]:
-        """Return the probability of each pattern that may be in a term's place, the likeliest first."""
-        cause, found = cause_of(term.model, term.shape), dict[str, float]()
-        for one in self.unfitted:
-            if cause not in {m.cause for m in one.members}:
-                for m in one.members:
-                    if isinstance(m.model, Nameless):
-                        formula = m.model.formula(m.shape)
-                        found[formula] = found.get(formula, 0.0) + one.probability
-        return dict(sorted(found.items(), key=lambda pair: -pair[1]))
+    def instead_of(self, term: Term) -> Instead:
+        """Return the hypotheses without a term's law that explain the run otherwise."""
+        cause, found, of_patterns, of_names = cause_of(term.model, term.shape), dict[str, float](), 0.0, 0.0
+        for p, causes, _, patterns in self._each():
+            if cause in causes:
+                continue
+            of_names += p if causes else 0.0
+            of_patterns += p if patterns and not causes else 0.0
+            for formula in () if causes else patterns:
+                found[formula] = found.get(formula, 0.0) + p
+        return Instead(dict(sorted(found.items(), key=lambda pair: -pair[1])), of_patterns, of_names)
 
-    def _each(self) -> Iterator[tuple[float, set[Cause], set[str]]]:
-        """Yield every hypothesis' probability, its causes, and the names of its effects."""
+    def _each(self) -> Iterator[tuple[float, set[Cause], set[str], set[str]]]:
+        """Yield every hypothesis' probability, its causes, its effects' names, and its patterns' formulas."""
         for p, j in zip(self.probability, self.judged, strict=True):
-            terms = j.library_terms
-            yield float(p), {cause_of(t.model, t.shape) for t in terms}, {t.model.name for t in terms}
+            yield float(p), *_named_and_nameless(j.fit.terms)
         for one in self.unfitted:
-            named = [m for m in one.members if not m.nameless]
-            yield one.probability, {m.cause for m in named}, {m.model.name for m in named}
+            yield one.probability, *_named_and_nameless(one.members)
+
+
+def _named_and_nameless(of: Sequence[Term | Member]) -> tuple[set[Cause], set[str], set[str]]:
+    """Return the causes and names of the effects of a hypothesis, and the formulas of its patterns."""
+    named = [m for m in of if not isinstance(m.model, Nameless)]
+    patterns = {m.model.formula(m.shape) for m in of if isinstance(m.model, Nameless)}
+    return {cause_of(m.model, m.shape) for m in named}, {m.model.name for m in named}, patterns
 
 
 def judge(
