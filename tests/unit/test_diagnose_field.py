@@ -204,6 +204,21 @@ def test_a_field_that_cannot_tell_says_so_and_changes_no_verdict():
     assert "too little of outside_index" in found.shortcomings[0]
 
 
+def test_an_inspection_that_was_not_asked_about_a_swing_does_not_show_too_little_of_it(monkeypatch):
+    rocking = Term(LIBRARY["laser_rocking"], (1.2,), np.ones(4))
+    glass = Term(LIBRARY["outside_index"], (), np.ones(1))
+    best = SimpleNamespace(fit=SimpleNamespace(terms=(rocking, glass)))
+    monkeypatch.setattr(answer, "field_answer", lambda *_: SimpleNamespace(global_p=1.0))
+    field = SimpleNamespace(field=SimpleNamespace(run=SimpleNamespace()), travel=None)
+    before = Diagnosis("field", "gauge", Verdict.CLASS, 1e-9)
+    gauge = SimpleNamespace(geometry=SimpleNamespace(best=best))
+    found = with_field(before, field, gauge, (None, None), stated_probe(), LIBRARY)
+    of_rocking, of_glass = found.shortcomings
+    assert "laser_rocking" in of_rocking
+    assert "was not asked" in of_rocking
+    assert "shows too little of outside_index" in of_glass
+
+
 def evidence_of(model, shape, size):
     """Evidence of one effect whose 1 σ is a hundredth of its plausible size."""
     (amplitude,) = model.amplitudes

@@ -105,10 +105,20 @@ def met_in_field(
     return tuple(out)
 
 
+def is_asked(model: EffectModel) -> bool:
+    """Return whether an inspection is asked about an effect of the gauge run.
+
+    It is not where the effect comes at times of the gauge run alone; only a step is sought at other times.
+    """
+    return not of_own_clock(model) or model.kind is CourseKind.STEP
+
+
 def _met(term: Term, covariance: Float, found: FieldEvidence, stated: Stated) -> Confirmation | None:
-    if not of_own_clock(term.model):
-        return confirm_in_field(term.model, term.shape, term.amplitude, covariance, found, stated)
-    return _same_step(term, covariance, found, stated) if term.model.kind is CourseKind.STEP else None
+    if not is_asked(term.model):
+        return None
+    if term.model.kind is CourseKind.STEP:
+        return _same_step(term, covariance, found, stated)
+    return confirm_in_field(term.model, term.shape, term.amplitude, covariance, found, stated)
 
 
 def _same_step(term: Term, covariance: Float, found: FieldEvidence, stated: Stated) -> Confirmation | None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,7 +12,7 @@ from pipeline.physics.catalogue import EFFECTS
 from stages.diagnose.agreement import same
 from stages.diagnose.channels import Seen
 from stages.diagnose.effects.base import EffectModel
-from stages.diagnose.field.against_gauge import met_in_field, not_refuted
+from stages.diagnose.field.against_gauge import is_asked, met_in_field, not_refuted
 from stages.diagnose.field.beside import beside, in_words, nameless, union
 from stages.diagnose.field.evidence import FieldEvidence, travels
 from stages.diagnose.field.unexplained import why_unexplained
@@ -39,6 +39,11 @@ _ALMOST, _APART = 0.1, 20.0
 _OTHER_ENCODER = (
     "The inspection's own readings and pictures do not show the encoder off by so much: it counted otherwise "
     "in the gauge run, or the inspection cannot tell."
+)
+_TOO_LITTLE = "The inspection alone shows too little of {} to confirm or to contradict it."
+_UNASKED = (
+    "The size of {} changes at times of the gauge run alone: the inspection was not asked to confirm or to "
+    "contradict it."
 )
 _SHOWN = 4
 _SCALE = "encoder_scale"
@@ -179,8 +184,9 @@ def with_field(
     examined = gauge.geometry if gauge is not None else None
     found = replace(found, global_p=_both(found.global_p, alone.global_p))
     if examined is not None and examined.best is not None and examined.best.fit.terms:
-        names = [t.model.law for t in examined.best.fit.terms]
-        return _met(found, dict(zip(names, met, strict=True)))
+        terms = examined.best.fit.terms
+        unasked = [t.model.law for t in terms if not is_asked(t.model)]
+        return _met(found, dict(zip([t.model.law for t in terms], met, strict=True)), unasked)
     if alone.shown:
         repeats = examined is not None and examined.repeats
         asked = examined if not repeats else None
@@ -226,13 +232,16 @@ def _knowing_encoder(field: Seen, scale: Value | None, stated: Stated) -> tuple[
     return field.field.with_encoder(scale.value), replace(stated, information=information)
 
 
-def _met(found: Diagnosis, met: Mapping[str, Confirmation | None]) -> Diagnosis:
-    """Return the answer with the inspection's confirmations, or less certain where it contradicts them."""
+def _met(
+    found: Diagnosis, met: Mapping[str, Confirmation | None], unasked: Collection[str] = ()
+) -> Diagnosis:
+    """Return the answer with the inspection's confirmations, or less certain where it contradicts them.
+
+    It was not asked about the effects in ``unasked``.
+    """
     effects = tuple(_confirmed(e, met.get(e.name)) for e in found.effects)
     silent = [name for name, each in met.items() if each is None and name in EFFECTS]
-    missing = tuple(
-        f"The inspection alone shows too little of {name} to confirm or to contradict it." for name in silent
-    )
+    missing = tuple((_UNASKED if name in unasked else _TOO_LITTLE).format(name) for name in silent)
     found = replace(found, effects=effects, shortcomings=(*found.shortcomings, *missing))
     against = {name for name, each in met.items() if each is not None and not each.agrees}
     withdrawn = [e for e in effects if e.name in against]
