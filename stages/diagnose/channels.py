@@ -219,7 +219,7 @@ def examine_gauge(
             library = _of_geometry(library_without(without), light)
             geometry = examine(run, library, probe, progress=context.progress)
             travel = gauge_travel(recording, run, geometry.searched.found.state, without)
-            missing += travel.shortcomings
+            missing += (*geometry.shortcomings, *travel.shortcomings)
         except UnusableError as error:
             problem = error.problem
     if problem:
