@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from pipeline.errors import InputError
+from pipeline.physics.catalogue import effect
 from pipeline.physics.effect import COURSES, Course, CourseKind
 from pipeline.simulator.effects import switch_on
 from pipeline.simulator.effects.switch import parse_switch, parse_switches, switches_from_mapping
@@ -13,6 +14,7 @@ from pipeline.simulator.laws import bench_truth
 from pipeline.simulator.prior import Concealable, draw_pair, read_prior
 from stages.diagnose.effects.courses import SEARCHED, Coursed, shape_alike, with_courses
 from stages.diagnose.effects.library import LIBRARY, columns, ring_shift_px, texture_shift_px, without
+from stages.diagnose.effects.pattern_in_course import patterns_in_course
 from stages.diagnose.gauge.answer import _in_the_end
 from stages.diagnose.gauge.confirm import Sized
 from stages.diagnose.gauge.run import Term
@@ -204,12 +206,61 @@ def test_a_law_that_settles_under_no_name_of_its_own_is_told_by_its_growth_at_fi
 @pytest.mark.parametrize(
     ("name", "shape", "sigma", "words"),
     [
-        ("baseline_drift", (3.5,), 0.0013, " Its final value is 0.301 ± 0.001 mm."),
-        ("baseline_drift", (51.2,), 0.2, ""),
-        ("baseline_drift", (51.2,), np.nan, ""),
+        ("baseline_drift", (3.5,), 0.0013, "0.301 mm nearer to the camera than stated, ± 0.001 mm."),
+        (
+            "focal_drift",
+            (3.5,),
+            0.0013,
+            "30.100% shorter than stated, and the image that much smaller, ± 0.1%.",
+        ),
+        (
+            "pixel_aspect, exponential",
+            (3.5,),
+            0.0013,
+            "30.100% narrower against its height than stated, ± 0.1%.",
+        ),
+        ("baseline_drift", (3.5,), 0.2, ""),
+        ("baseline_drift", (3.5,), np.nan, ""),
+        ("baseline_drift", (8.1,), 0.0013, ""),
         ("baseline", (), 0.0013, ""),
     ],
 )
 def test_what_a_drift_comes_to_is_told_with_its_sigma_where_it_is_known(name, shape, sigma, words):
-    term = Term(LIBRARY[name], shape, np.array([-0.301]))
-    assert _in_the_end(Sized(term, np.array([[sigma**2]]))) == words
+    term = Term(with_courses(LIBRARY)[name], shape, np.array([-0.301]))
+    told = _in_the_end(Sized(term, np.array([[sigma**2]])), duration_s=8.0)
+    assert told.startswith(" In the end, the ") is bool(words)
+    assert told.endswith(words)
+    assert bool(told) is bool(words)
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("baseline_drift", "by 0.00190 mm in the first 60 s, with a time constant of 600.0 s"),
+        ("centre_drift", "by 0.00190 px in the first 60 s, with a time constant of 600.0 s"),
+        ("laser_cone, exponential", "lean 0.002° more forward"),
+    ],
+)
+def test_a_drift_of_ten_minutes_is_not_told_as_nothing(name, words):
+    """A baseline that grew by .02 mm in ten minutes got longer "by 0.0000 mm in the first second"."""
+    model = with_courses(LIBRARY)[name]
+    size = np.array([0.02, 0.0])[: len(model.amplitudes)]
+    assert words in model.statement((600.0,), size)
+    assert "in the first 60 s" in model.statement((600.0,), size)
+
+
+@pytest.mark.parametrize(
+    ("like", "goes_with"),
+    [
+        ("laser_rocking", ("camera", "periodic")),
+        ("focal_drift", ("time", "drift")),
+        ("laser_tilt, step", ("camera", "event")),
+        ("laser_tilt, speed", ("camera", "speed")),
+    ],
+)
+def test_a_pattern_in_a_course_behaves_as_the_course_does(like, goes_with):
+    model = with_courses(LIBRARY)[like]
+    harmonic = effect(model.law).harmonic
+    for pattern in patterns_in_course(model, harmonic):
+        fixed_to, time, order = pattern.goes_with((1.2,))
+        assert (str(fixed_to), time, order) == (*goes_with, harmonic)

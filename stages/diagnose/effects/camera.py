@@ -129,8 +129,8 @@ class BaselineDrift(Drifting):
     static = Baseline()
     amplitudes = one(name, 0.05)
     words = (
-        "The baseline gets [longer|shorter], by {at_first:.4f} mm in the first second, with a time constant "
-        "of {time_s:.1f} s."
+        "The baseline gets [longer|shorter], by {at_first:#.3g} mm in the first {first}, with a time "
+        "constant of {time_s:.1f} s."
     )
 
 
@@ -141,7 +141,7 @@ class FocalDrift(Drifting):
     static = FocalScale()
     amplitudes = one(name, 1e-3)
     words = (
-        "The focal length gets [longer|shorter], by {at_first:.4%} in the first second, with a time "
+        "The focal length gets [longer|shorter], by {at_first:.4%} in the first {first}, with a time "
         "constant of {time_s:.1f} s."
     )
 
@@ -153,8 +153,8 @@ class CentreDrift(Drifting):
     static = PrincipalPoint()
     amplitudes = along_x_and_y(name, 0.5)
     words = (
-        "The optical axis drifts toward {direction_deg:.1f}°, by {at_first:.4f} px in the first second, with "
-        "a time constant of {time_s:.1f} s."
+        "The optical axis drifts toward {direction_deg:.1f}°, by {at_first:#.3g} px in the first {first}, "
+        "with a time constant of {time_s:.1f} s."
     )
 
 

@@ -15,7 +15,7 @@ from pipeline.arrays import Bool, Float
 from pipeline.physics.catalogue import effect
 from pipeline.physics.effect import COURSES, Course, CourseKind
 from stages.diagnose.effects.base import Amplitude, EffectModel, Factored, ImagePoints, Product, Shape
-from stages.diagnose.effects.kinds import Drifting
+from stages.diagnose.effects.kinds import Drifting, beginning
 
 # Laws of parts that a knock, heat or play can move during a recording, each with its shapes.
 _MOVABLE: Mapping[str, tuple[Shape, ...]] = {
@@ -51,12 +51,18 @@ _STANDS, _ABOUT_S, _STILL = 0.1, 0.4, 0.01
 _WORDS: Mapping[CourseKind, str] = {
     CourseKind.STEP: "a step at {time_s:.2f} s: before that it is absent",
     CourseKind.RAMP: "growing evenly from nothing at the first frame to this at {time_s:.1f} s",
-    CourseKind.EXPONENTIAL: "grown in the first second, with a time constant of {time_s:.1f} s",
+    CourseKind.EXPONENTIAL: "grown in the first {first}, with a time constant of {time_s:.1f} s",
     CourseKind.SINUSOID: "the amplitude of a swing at {frequency_hz:.2f} Hz",
     CourseKind.SPEED: "at a speed of {speed_mm_s:.0f} mm/s, and in proportion to the speed",
     CourseKind.REVERSAL: "while the probe travels forward, and the opposite while it travels backward",
     CourseKind.DISTANCE: "at a distance of {distance_mm:.0f} mm, and in proportion to the distance",
 }
+# How an effect with such a course behaves in time.
+IN_TIME: Mapping[CourseKind, str] = {
+    CourseKind.CONSTANT: "static", CourseKind.STEP: "event", CourseKind.RAMP: "drift",
+    CourseKind.EXPONENTIAL: "drift", CourseKind.SINUSOID: "periodic", CourseKind.SPEED: "speed",
+    CourseKind.REVERSAL: "reversal", CourseKind.DISTANCE: "static",
+}  # fmt: skip
 _FORMULAS: Mapping[CourseKind, str] = {
     CourseKind.STEP: "0 before time_s, 1 from then on", CourseKind.RAMP: "t / time_s",
     CourseKind.EXPONENTIAL: "1 − exp(−t / time_s)", CourseKind.SINUSOID: "sin(2π frequency_hz t + phase)",
@@ -141,10 +147,12 @@ class Coursed(Product):
 
     def statement(self, shape: Shape, amplitude: Float) -> str:
         """Return the law's sentence, followed by its course."""
-        words, size = _WORDS[self.kind].format(**self.course(shape, amplitude)), self._size(amplitude)
+        first, size = "", self._size(amplitude)
         if self.kind is CourseKind.EXPONENTIAL:
             # What it comes to in the end, a short run only continues.
-            size = size * Course(self.kind, shape).factor(1.0, 0.0, 0.0)
+            beginning_s, first = beginning(shape[0])
+            size = size * Course(self.kind, shape).factor(beginning_s, 0.0, 0.0)
+        words = _WORDS[self.kind].format(first=first, **self.course(shape, amplitude))
         return f"{self.static.statement(self.own, size).rstrip('.')} ({words})."
 
     def equation(self, shape: Shape, amplitude: Float) -> str:

@@ -13,6 +13,10 @@ from pipeline.physics.catalogue import effect
 from pipeline.physics.effect import CourseKind, Quantity
 from stages.diagnose.effects.base import Amplitude, EffectModel, Factored, ImagePoints, Product, Shape
 
+# A drift is told by its growth in the first second, or, where its time constant is longer than this, in a
+# tenth of that: of .02 mm in 600 s, the first second has .00003. The recording lasts longer than a tenth: at
+# least about a sixth of the time constant, see `Drifting.shapes`.
+_SLOW_S = 60.0
 _EITHER = re.compile(r"\[([^|]*)\|([^]]*)\]")
 
 
@@ -28,16 +32,17 @@ class Worded(EffectModel):
 
     def statement(self, shape: Shape, amplitude: Float) -> str:
         """Return a sentence that states the effect with its size."""
-        quantities, signed = self.told(shape, amplitude), effect(self.name).quantities[0].name
+        told, signed = self.told(shape, amplitude), effect(self.name).quantities[0].name
         if "[" in self.words:
-            word = 2 if quantities[signed] < 0 else 1
-            sizes = {**quantities, signed: abs(quantities[signed])}
-            return _EITHER.sub(lambda either: either[word], self.words).format(**sizes)
-        return self.words.format(**quantities)
+            size = self.quantities(shape, amplitude)[signed]
+            word = 2 if size < 0 else 1
+            told = {**told, signed: abs(size)}
+            return _EITHER.sub(lambda either: either[word], self.words).format(**told)
+        return self.words.format(**told)
 
-    def told(self, shape: Shape, amplitude: Float) -> dict[str, float]:
+    def told(self, shape: Shape, amplitude: Float) -> dict[str, float | str]:
         """Return the quantities in the sentence, by name."""
-        return self.quantities(shape, amplitude)
+        return {**self.quantities(shape, amplitude)}
 
 
 class Scalar(Worded):
@@ -88,15 +93,17 @@ class Drifting(Worded, Product):
         """Return the fraction of the final size that is reached, and the static law."""
         return (self.reached(points.time_s, shape),), self.static, ()
 
-    def told(self, shape: Shape, amplitude: Float) -> dict[str, float]:
-        """Return the quantities, and the growth in the first second.
+    def told(self, shape: Shape, amplitude: Float) -> dict[str, float | str]:
+        """Return the quantities, the growth in its `beginning`, and how long that lasts, in words.
 
         For a drift slower than its recording the latter is well determined, while the final size is
         extrapolated.
         """
         quantities = self.quantities(shape, amplitude)
         final = abs(quantities[effect(self.name).quantities[0].name])
-        return quantities | {"at_first": final * float(self.reached(np.ones(1), shape)[0])}
+        beginning_s, first = beginning(shape[0])
+        grown = final * float(self.reached(np.array([beginning_s]), shape)[0])
+        return {**quantities, "at_first": grown, "first": first}
 
     def quantities(self, shape: Shape, amplitude: Float) -> dict[str, float]:
         """Return the final size and the time constant."""
@@ -136,6 +143,14 @@ class Periodic(Worded):
             "frequency_hz": shape[0],
             "direction_deg": float(np.degrees(np.arctan2(axes[1, 0], axes[0, 0]))),
         }
+
+
+def beginning(time_s: float) -> tuple[float, str]:
+    """Return for how long the growth of a drift with such a time constant is told, s, and that in words."""
+    if time_s <= _SLOW_S:
+        return 1.0, "second"
+    beginning_s = round(time_s / 10)
+    return float(beginning_s), f"{beginning_s} s"
 
 
 def _within(quantity: Quantity, grid: Float) -> tuple[Shape, ...]:

@@ -14,7 +14,7 @@ from pipeline.arrays import Float
 from pipeline.physics.catalogue import effect
 from pipeline.physics.effect import CourseKind, FixedTo
 from stages.diagnose.effects.base import Amplitude, EffectModel, Factored, ImagePoints, Product, Shape
-from stages.diagnose.effects.courses import factors, in_words
+from stages.diagnose.effects.courses import IN_TIME, factors, in_words
 from stages.diagnose.effects.free_profile import FREE_PROFILES
 from stages.diagnose.effects.kinds import Drifting
 from stages.diagnose.effects.nameless import GENERIC, STEADY, Moves, Nameless
@@ -40,6 +40,12 @@ class PatternInCourse(Nameless, Product):
     def factored(self, points: ImagePoints, shape: Shape) -> Factored:
         """Return the effect's course, and the pattern."""
         return factors(self.like.kind, points, shape), self.steady, STEADY
+
+    def goes_with(self, shape: Shape) -> tuple[FixedTo, str, int | None]:
+        """Return what the pattern is fixed to, or time where it drifts, with the behaviour of its course."""
+        time = IN_TIME[self.like.kind]
+        fixed_to, _, harmonic = self.steady.goes_with(STEADY)
+        return FixedTo.TIME if time == "drift" else fixed_to, time, harmonic
 
     def quantities(self, shape: Shape, amplitude: Float) -> dict[str, float]:
         """Return the root sum of squares of all amplitudes."""

@@ -10,6 +10,8 @@ import numpy as np
 from pipeline.physics.catalogue import effect
 from pipeline.physics.effect import CourseKind
 from stages.diagnose.agreement import TELLING
+from stages.diagnose.effects.courses import Coursed
+from stages.diagnose.effects.kinds import Drifting
 from stages.diagnose.gauge.confirm import Sized, course_of, quantities
 from stages.diagnose.gauge.examine import Examined
 from stages.diagnose.gauge.formula import ADEQUATE
@@ -41,8 +43,9 @@ def effects_found(examined: Examined) -> tuple[EffectFound, ...]:
     best, verdicts = examined.best, examined.verdicts
     if best is None or verdicts is None:
         return ()
+    duration_s = float(np.ptp(examined.searched.run.time_s))
     each = zip(best.library_terms, examined.sizes, examined.confirmed, chances(examined), strict=False)
-    return tuple(_found(verdicts, *one) for one in each)
+    return tuple(_found(verdicts, duration_s, *one) for one in each)
 
 
 def chances(examined: Examined) -> tuple[float, ...]:
@@ -136,24 +139,30 @@ def beyond_line(examined: Examined) -> tuple[bool, ...]:
 
 
 def _found(
-    verdicts: Verdicts, term: Term, sized: Sized, confirmed: tuple[Confirmation, ...], chance: float
-) -> EffectFound:
+    verdicts: Verdicts, duration_s: float, term: Term, sized: Sized,
+    confirmed: tuple[Confirmation, ...], chance: float,
+) -> EffectFound:  # fmt: skip
     model, shape = term.model, term.shape if sized.time_s is None else (sized.time_s.value,)
     return EffectFound(
         model.law, chance, quantities(sized),
-        model.statement(shape, term.amplitude) + _in_the_end(sized), model.equation(shape, term.amplitude),
+        model.statement(shape, term.amplitude) + _in_the_end(sized, duration_s),
+        model.equation(shape, term.amplitude),
         confirmed, replace(course_of(sized), probability=verdicts.chance_of_course(term)),
     )  # fmt: skip
 
 
-def _in_the_end(sized: Sized) -> str:
-    """Return a sentence on the final value of a drift; empty where it is only extrapolated."""
-    size = next(iter(quantities(sized).values()), Value(0.0, 0.0))
-    if sized.term.model.kind is not CourseKind.EXPONENTIAL or not size.sd < TELLING * abs(size.value):
+def _in_the_end(sized: Sized, duration_s: float) -> str:
+    """Return a sentence on the final value of a drift; empty where the run only extrapolates to it."""
+    model, size = sized.term.model, next(iter(quantities(sized).values()), Value(0.0, 0.0))
+    if not isinstance(model, Drifting | Coursed) or model.kind is not CourseKind.EXPONENTIAL:
         return ""
-    unit = effect(sized.term.model.law).quantities[0].unit
-    words = f" Its final value is {abs(size.value):.3g} ± {size.sd:.1g} {unit}"
-    return f"{words.rstrip()}."
+    if sized.term.shape[0] > duration_s or not size.sd < TELLING * abs(size.value):
+        return ""
+    own = model.own if isinstance(model, Coursed) else ()
+    words = model.static.statement(own, sized.term.amplitude).rstrip(".")
+    known = effect(model.law).quantities[0]
+    scale, unit = (100.0, "%") if known.name == "relative" else (1.0, f" {known.unit}".rstrip())
+    return f" In the end, {words[0].lower()}{words[1:]}, ± {scale * size.sd:.1g}{unit}."
 
 
 def candidates(examined: Examined) -> tuple[Candidate, ...]:

@@ -3,27 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, fields
-from types import MappingProxyType
 
 from pipeline.adjustment.levenberg_marquardt import Watch, unwatched
 from pipeline.adjustment.rows import Rows
 from pipeline.arrays import Float
 from pipeline.files.codec import NOT_STORED
 from pipeline.physics.catalogue import EFFECTS
-from pipeline.physics.effect import CourseKind
 from pipeline.recording.base import Encoder
 from stages.calibrate.gauge.edges import Edges
 from stages.calibrate.gauge.geometry import BoreRings
 from stages.diagnose.effects.base import Amplitude, EffectModel, ImagePoints, Shape, Travel
-from stages.diagnose.effects.courses import Coursed
+from stages.diagnose.effects.courses import IN_TIME, Coursed
 from stages.diagnose.effects.nameless import Nameless
 from stages.diagnose.gauge.elimination import Equations
-
-_IN_TIME = MappingProxyType({
-    CourseKind.CONSTANT: "static", CourseKind.STEP: "event", CourseKind.RAMP: "drift",
-    CourseKind.EXPONENTIAL: "drift", CourseKind.SINUSOID: "periodic", CourseKind.SPEED: "speed",
-    CourseKind.REVERSAL: "reversal", CourseKind.DISTANCE: "static",
-})  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -116,4 +108,4 @@ def pattern_of(term: Term) -> tuple[str, str, int | None]:
 
 def behaviour(model: EffectModel) -> str:
     """Return how an effect of the library behaves in time."""
-    return _IN_TIME[model.kind] if isinstance(model, Coursed) else EFFECTS[model.law].time
+    return IN_TIME[model.kind] if isinstance(model, Coursed) else EFFECTS[model.law].time
