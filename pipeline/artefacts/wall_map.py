@@ -78,7 +78,7 @@ class FixedPlace:
         Where in the image it departs most, and how far it reaches around.
     departure_mm, departure_sd_mm : float
         The largest departure, positive into the wall, and its 1 σ: what clear places depart by over as long
-        a way.
+        a way, and what a wide one loses because rings are fitted with a smooth shape.
     length_mm : float
         Length of pipe over which it stays.
     frame_from, frame_to : int

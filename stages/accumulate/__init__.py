@@ -272,7 +272,7 @@ def _report(context: Context, wall: Wall, spread: CalibrationSpread) -> None:
 
 ACCUMULATE = Stage(
     "accumulate",
-    "16",
+    "17",
     AccumulateParameters,
     accumulate_wall,
     "point cloud and radius map about the pipe's own axis, with σ",

@@ -37,6 +37,11 @@ _COVERED = 0.8
 _FOUND, _REACHED = 8.0, 3.0
 # A block shows a place where it departs itself by half of what the blocks about it do.
 _SHOWN = 0.5
+# Of a departure, 1 σ of the share that a ring's smooth fit takes for shape, for each radian of its width; the
+# departure is also the largest of its place. Of 294 drawn bumps of 6 to 120° and .08 to 1.5 mm in noise of
+# .02 to .1 mm the true height lay off by .7 σ r.m.s. where this is counted, by 1.0 at widths about 1 rad;
+# without, by 1.8 and 2.9.
+_TAKEN_FOR_SHAPE = 0.2
 # Share of the circle that a ring must show.
 _LEAST_SEEN = 0.3
 # On the probe or on the wall: that one is taken in which the place scatters so many times less.
@@ -185,7 +190,9 @@ def _described(
     deepest = int(np.argmax(np.abs(steady[row, sector])))
     rings = np.concatenate([blocks.rings[b] for b in np.unique(row)])
     width = len(np.unique(sector)) * step
+    departure = float(steady[row, sector][deepest])
+    sd = float(np.hypot(spread, _TAKEN_FOR_SHAPE * width * departure))
     return FixedPlace(
-        (sector[deepest] + 0.5) * step - np.pi, width, float(steady[row, sector][deepest]), spread,
+        (sector[deepest] + 0.5) * step - np.pi, width, departure, sd,
         blocks.length_mm(np.unique(row)), int(frame[rings.min()]), int(frame[rings.max()]), on_probe,
     )  # fmt: skip

@@ -13,6 +13,7 @@ from pipeline.artefacts.wall_map import FixedPlace
 from pipeline.geometry.axis import straight_axis
 from pipeline.geometry.rigid import from_parts, rotation_from_vector
 from stages.accumulate import AccumulateParameters, accumulate_wall
+from stages.accumulate.fixed import _TAKEN_FOR_SHAPE
 from stages.triangulate import TriangulateParameters, triangulate_rings
 from tests.drawn_run import BASELINE, RADIUS, rings_on_wall, round_wall, small_probe
 from tests.quiet import quiet_context
@@ -78,9 +79,27 @@ def test_a_departure_is_known_as_well_as_clear_places_are() -> None:
 
     true, drawn = place(1e-4, 0).departure_mm, [place(0.05, seed) for seed in (1, 2)]
     error = np.array([p.departure_mm - true for p in drawn])
-    sd = np.array([p.departure_sd_mm for p in drawn])
+    shape = np.array([_TAKEN_FOR_SHAPE * p.width_rad * p.departure_mm for p in drawn])
+    sd = np.sqrt(np.array([p.departure_sd_mm for p in drawn]) ** 2 - shape**2)
     assert sd == pytest.approx(0.019, rel=0.2)
     assert np.sqrt(np.mean((error / sd) ** 2)) < 2.5  # two normal errors are as large once in 500 times
+
+
+@pytest.mark.parametrize(("width_deg", "height_mm"), [(90, 1.0), (100, 1.5)])
+def test_sigma_of_a_wide_departure_holds_what_the_smooth_fit_takes_of_it(
+    width_deg: float, height_mm: float
+) -> None:
+    """Of 1 mm over 90° .78 ± .06 mm was told, of 1.5 mm over 100° 1.17 ± .08 mm."""
+
+    def ridge(s: Float, psi: Float) -> Float:
+        turn = np.clip(psi / np.radians(width_deg), -0.5, 0.5)
+        return RADIUS - height_mm * np.cos(turn * np.pi) ** 2
+
+    fixed = measured(0.0, ridge).fixed
+    assert fixed is not None
+    (place,) = fixed.places
+    assert abs(place.departure_mm + height_mm) < 2 * place.departure_sd_mm
+    assert place.departure_sd_mm < 0.3 * height_mm
 
 
 def test_without_roll_droplet_and_seam_cannot_be_told_apart() -> None:
