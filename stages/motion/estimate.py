@@ -81,7 +81,8 @@ def estimate_motion(
     trajectory = lay_route(trajectory, joined.turn_variance, recording, probe, context)
     events = find_events(recording.frames, trajectory, run.texture.poses, joined.slip, has_encoder)
     if run.encoder is not None:
-        warn_of_slips(events, trajectory, probe.encoder_scale_sigma, run.encoder.sigma_mm, context)
+        sigmas = probe.encoder_scale_sigma, run.encoder.sigma_mm
+        warn_of_slips(events, trajectory, joined.slip, *sigmas, context)
     seen = SeenCentres(run.circles.centre_c, probe.laser.baseline_mm)
     shakes = camera_trembles(trajectory, run.texture.poses, seen)
     doubted = shakes or run.texture.poses.much_lost

@@ -44,9 +44,9 @@ _TOLD_SIGMAS = 5.0
 """A slip is reported from so many σ on, with the σ over the slip's own way."""
 _TOLD_MM = 3.0
 """Smaller slips are not reported (chosen): rings bridge them, and a wheel at rest has some play."""
-_ONE_SENSE = 2.0
+_ONE_SENSE = 3.0
 """Small slips are reported together where their sum exceeds so many times the root of the sum of their
-squares, as one in twenty sums of random signs does. Those of a probe that jerks cancel."""
+squares, as one in 400 sums of random signs does. Those of a probe that jerks cancel."""
 _WHAT_SLIPPED = (
     ": the wheel slipped or hung, readings stop, or a filter against noise held the texture back. Distances "
     "there follow laser and texture. What to do: see that the wheel is pressed to the wall and turns, and "
@@ -82,15 +82,18 @@ def find_events(
 def warn_of_slips(
     events: tuple[MotionEvent, ...],
     trajectory: Trajectory,
+    slip: Float,
     scale_sigma: float,
     reading_sigma_mm: float,
     context: Context,
 ) -> None:
     """Warn where encoder and texture disagree by more than the encoder's σ and its clock explain.
 
-    Each slip is held against the 1 σ of the encoder's scale (1) over the slip's own way, that of two
-    readings, mm, and the way of a usual frame, by which the clocks of encoder and pictures may differ. So is
-    the sum of all where none of them alone is worth telling.
+    ``slip`` (N,) is the encoder's accumulated slip, mm. Each event is held against the 1 σ of the encoder's
+    scale (1) over its own way, that of two readings, mm, and the way of a usual frame, by which the clocks
+    of encoder and pictures may differ. So is
+    the sum of all where none of them alone is worth telling, as far as the encoder did not make up for it
+    between them.
     """
     z = distance_along(trajectory.axis, trajectory.T_pc)
     frame_mm = float(np.percentile(np.abs(np.diff(z)), _CRUISE_PERCENT)) if len(z) > 1 else 0.0
@@ -101,7 +104,7 @@ def warn_of_slips(
     way = np.abs(z[last] - z[first]) + np.abs(size)
     sigma = np.sqrt((scale_sigma * way) ** 2 + 2 * reading_sigma_mm**2 + frame_mm**2)
     told = np.flatnonzero(_is_told(np.abs(size), sigma))
-    whole = abs(float(size.sum()))
+    whole = _kept_sum(size, float(slip[last[-1]] - slip[first[0]])) if len(slips) else 0.0
     whole_sigma = np.sqrt(
         scale_sigma**2 * way.sum() ** 2 + 2 * len(slips) * reading_sigma_mm**2 + frame_mm**2
     )
@@ -114,10 +117,20 @@ def warn_of_slips(
         )
     elif _is_told(whole, whole_sigma) and whole > _ONE_SENSE * np.linalg.norm(size):
         context.warn(
-            f"encoder and wall's texture disagree {len(slips)} times by less than {_TOLD_MM:.0f} mm, and by "
-            f"{whole:.1f} mm in all between frame {slips[0].frame_from} and {slips[-1].frame_to}"
-            f"{_WHAT_SLIPPED}"
+            f"encoder and wall's texture disagree {len(slips)} times by up to {np.abs(size).max():.1f} mm, "
+            f"each too small to be certain alone, and by {whole:.1f} mm in all between frame "
+            f"{slips[0].frame_from} and {slips[-1].frame_to}{_WHAT_SLIPPED}"
         )
+
+
+def _kept_sum(size_mm: Float, net_mm: float) -> float:
+    """Return the sum of slips (K,), mm, or the net slip from first to last where that is less; 0 if opposed.
+
+    A probe that starts suddenly and runs out slowly, read by a late clock, slips in one sense only at its
+    starts.
+    """
+    total = float(size_mm.sum())
+    return min(abs(total), abs(net_mm)) if total * net_mm > 0 else 0.0
 
 
 def _is_told(size_mm: Float | float, sigma_mm: Float | float) -> Bool:
