@@ -6,6 +6,7 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
+from stages.diagnose import channels
 from stages.diagnose.compose import verdict_of_rings
 from stages.diagnose.effects.library import LIBRARY
 from stages.diagnose.field.run import warn_of_knock
@@ -222,3 +223,23 @@ def test_rings_that_jump_in_an_inspection_are_told_as_a_knock_where_they_may_be_
     warn_of_knock(cast(Any, knock), cast(Any, SimpleNamespace(warn=warned.append)))
     assert len(warned) == (told or ambiguous)
     assert all("at 4.67 s (frame 140)" in w and "0.28 mm" in w and words in w for w in warned)
+
+
+def test_a_gauge_run_too_short_to_be_asked_what_repeats_says_so(monkeypatch):
+    short = FitQuality("px", 0.3, 0.3, np.nan, np.nan, 0.1)
+    found = SimpleNamespace(state=None)
+    searched = cast(Any, SimpleNamespace(steps=(SimpleNamespace(by_chance=0.5),), found=found))
+    monkeypatch.setattr(channels, "examine", lambda *_, **__: Examined(searched, None, (), (), quality=short))
+    monkeypatch.setattr(channels, "gauge_travel", lambda *_: SimpleNamespace(shortcomings=()))
+    recording = SimpleNamespace(name="gauge")
+    seen = channels.examine_gauge(
+        cast(Any, recording),
+        cast(Any, SimpleNamespace(applied_to=lambda recording: recording)),
+        cast(Any, SimpleNamespace(limits=(), known_light=lambda without: None)),
+        cast(Any, SimpleNamespace(run=SimpleNamespace(), problem="")),
+        cast(Any, None),
+        parameters=cast(Any, SimpleNamespace(without=())),
+        context=cast(Any, SimpleNamespace(progress=None)),
+    )
+    (told,) = seen.shortcomings
+    assert "too short" in told
