@@ -85,7 +85,7 @@ class Exposure:
         if found.effect != _EXPOSURE or not found.sizes or fit is None or self._has_time(fit, found.sizes[0]):
             return ""
         apart = f"{1e3 * fit.sight.frame_time_s:.1f} ms"
-        return f", for which no picture has time: the next one begins after {apart}."
+        return f", for which no picture has time: the next begins after {apart}."
 
     def alike(self, found: TravelEstimate, travel: TravelEvidence) -> tuple[str, ...]:
         """Return ``motion_blur`` where a longer exposure may be the reason why readings seem late.
