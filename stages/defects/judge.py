@@ -28,7 +28,10 @@ _UNSURE = "Its depth is less than twice its σ, so that it may be zero"
 # A finding whose total σ exceeds this many times its depth is not confirmed. Chosen: a finding that a noise
 # filter or a codec flattened to a third is still confirmed, with a lower bound of its depth.
 _VAGUE = 4.0
-_IS_VAGUE = "The σ of its depth is more than four times the measured depth"
+_IS_VAGUE = (
+    "The σ of its depth is more than four times the measured depth, as pictures that repeat parts of earlier "
+    "ones may have taken off so much"
+)
 _AT_LEAST = (
     "This depth is a lower bound, with ± {:.2f} mm from noise. The rest of σ is what pictures that repeat "
     "parts of earlier ones may have taken off the depth."
@@ -77,7 +80,9 @@ class Found:
 
     @property
     def vague(self) -> bool:
-        """Whether next to nothing is known of its depth."""
+        """Whether flattening leaves next to nothing known of its depth; single deep rings do not count."""
+        if self.contradicted_mm is not None:
+            return False
         return self.defect.depth_sigma_mm > _VAGUE * abs(self.defect.depth_mm)
 
     def with_probability(self, probability: float, counts: bool) -> Defect:

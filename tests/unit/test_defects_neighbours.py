@@ -47,10 +47,12 @@ def test_a_pit_that_many_rings_show_in_a_wider_patch_has_its_depth(step_mm, patc
     assert "at least" not in finding.statement
 
 
-@pytest.mark.parametrize(("step_mm", "wide_mm"), [(1.0, 1.8), (0.5, 1.2)])
-def test_a_pit_that_one_ring_shows_is_within_the_depth_told(step_mm, wide_mm):
+@pytest.mark.parametrize(
+    ("step_mm", "wide_mm", "pit_mm"), [(1.0, 1.8, 1.7), (0.5, 1.2, 1.7), (1.0, 1.8, 3.2)]
+)
+def test_a_pit_that_one_ring_shows_is_within_the_depth_told(step_mm, wide_mm, pit_mm):
     """2.2 mm was told as 0.63 ± 0.03: it may as well be a glint, and the corrosion stays confirmed."""
-    finding, true = patch_with_pit(step_mm, 0.6, 1.7, wide_mm, seed=5)
+    finding, true = patch_with_pit(step_mm, 0.6, pit_mm, wide_mm, seed=5)
     assert abs(finding.depth_mm - true) < 1.96 * finding.depth_sigma_mm
 
 
