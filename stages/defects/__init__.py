@@ -221,5 +221,5 @@ def _defects_of_run(
 
 
 DEFECTS = Stage(
-    "defects", "50", DefectParameters, _defects_of_run, "defects as instances with depth, clock and kind"
+    "defects", "51", DefectParameters, _defects_of_run, "defects as instances with depth, clock and kind"
 )

@@ -63,13 +63,14 @@ def _most_held(shown: Float, lower_mm: float) -> float:
     """Return the largest possible share of each cell that the next one retains, in either direction.
 
     If each cell retains a share of the one before, then after k cells at least its k-th power is left. The
-    profile ``shown`` (H,), NaN where unseen, may be too low by ``lower_mm``.
+    profile ``shown`` (H,), NaN where unseen, may be too low by ``lower_mm``. Cells below 0 belong to a rim or
+    a groove beside the finding, and tell nothing.
     """
 
     def most(profile: Float) -> float:
         share = 1.0
         for k in range(1, min(len(profile), _FLANK)):
-            out = (profile[:-k] > lower_mm) & np.isfinite(profile[k:])
+            out = (profile[:-k] > lower_mm) & (profile[k:] > 0)
             left = np.maximum(profile[k:] + lower_mm, 0.0)[out] / profile[:-k][out]
             share = min(share, float(left.min(initial=1.0)) ** (1 / k))
         return share

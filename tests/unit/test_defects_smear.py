@@ -114,6 +114,15 @@ def test_what_falls_off_on_both_sides_was_not_held_over_long_ways(bell_mm: float
     assert told_sigma(bell[bell > 0.2], HeldOver(likeness)) < 0.6
 
 
+def test_cells_below_the_wall_at_both_ends_do_not_tell_that_nothing_was_held_over() -> None:
+    """One such cell at either end, as a rim leaves, and no part was held over: σ was that of noise alone."""
+    bell = np.exp(-0.5 * (np.arange(-200, 201) * 0.5 / 2.0) ** 2)
+    seen = lfilter([0.1], [1, -0.9], bell)
+    found = seen[seen > 0.2 * seen.max()]
+    rimmed = np.r_[-0.2, found[1:-1], -0.2]
+    assert 1 - found.max() < 1.5 * told_sigma(rimmed, HeldOver(0.9 ** np.arange(12)))
+
+
 def test_a_wide_patch_tells_by_all_its_columns_how_fast_it_falls_off() -> None:
     """Of corrosion of .43 mm, 17 mm wide on a rough wall, .60 ± 2.92 mm was told."""
     drawn = DrawnDefect("pit", 40.0, 1.0, 8.0, 17.0, 0.6)
