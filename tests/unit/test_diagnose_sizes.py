@@ -165,3 +165,10 @@ def test_a_fit_is_not_kept_for_what_far_steps_of_its_poses_only_promised(monkeyp
     monkeypatch.setattr(fitting, "_prior", lambda *_: (np.zeros((1, 1)), np.zeros(1), np.zeros(1)))
     monkeypatch.setattr(fitting, "_still", lambda found: found.state != "promised")
     assert fitting.fit(cast(Any, None), cast(Any, "promised"), ()).state == "best"
+
+
+def test_the_numbers_of_a_formula_stand_under_its_letters_with_units() -> None:
+    """The page said "amplitude = 0.47983, frequency_hz = 0.15075 mm" below a formula in a and f."""
+    rocking = next(s for s in SWINGS if s.harmonic == 1)
+    told = rocking.equation((0.1512,), np.array([0.3, 0.0, 0.4, 0.0]))
+    assert told == "δr = a (r/50)^2 cos 1(ψ − ψ₀) sin(2πft + φ), a = 0.5 mm, f = 0.151 Hz"

@@ -45,9 +45,16 @@ class Nameless(EffectModel):
         return FixedTo.TIME, "static", self.harmonic
 
     def equation(self, shape: Shape, amplitude: Float) -> str:
-        """Return the formula with its numbers."""
-        numbers = (f"{name} = {value:.5g}" for name, value in self.quantities(shape, amplitude).items())
-        return f"{self.formula(shape)}, {', '.join(numbers)} {self.amplitudes[0].unit}"
+        """Return the formula with its numbers, each under its letter and with its unit."""
+        letters = {
+            "amplitude": ("a", f" {self.amplitudes[0].unit}"), "frequency_hz": ("f", " Hz"),
+            "direction_deg": ("ψ₀", "°"),
+        }  # fmt: skip
+        numbers = []
+        for name, value in self.quantities(shape, amplitude).items():
+            letter, unit = letters.get(name, (name, ""))
+            numbers.append(f"{letter} = {value:.3g}{unit}")
+        return f"{self.formula(shape)}, {', '.join(numbers)}"
 
     def statement(self, shape: Shape, amplitude: Float) -> str:
         """Return a sentence that states a pattern without a known cause, with its formula."""
