@@ -19,6 +19,12 @@ from stages.defects.surface import MeasuredWall, Surface
 _MOST_LEFT_OUT = 4
 
 
+def is_measured(surface: Surface, region: Region) -> bool:
+    """Return whether any cell of a region has a surface: between rings far apart some have none."""
+    shown = region.cut(surface.all_mm if region.all_round else surface.local_mm)
+    return bool(np.isfinite(shown[region.mask]).any())
+
+
 @dataclass(frozen=True)
 class Measured:
     """A region's ``depth`` from a ``surface``; ``here`` is the region with rows counted from it."""
@@ -62,8 +68,7 @@ class Measurer:
         None where no cell of it has a surface, as between rings that are far apart.
         """
         surface, here = self.wall.surface_about(region, every_point, without)
-        shown = here.cut(surface.all_mm if region.all_round else surface.local_mm)
-        if not np.isfinite(shown[here.mask]).any():
+        if not is_measured(surface, here):
             return None
         return Measured(here, surface, self._depth(region, here, surface))
 

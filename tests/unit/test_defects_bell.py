@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from pipeline.artefacts.measured import PointCloud
-from stages.defects import _is_measured
 from stages.defects.clean import CleanWall
 from stages.defects.depth import Noise, fit_bell, measure_depth
+from stages.defects.measure import is_measured
 from stages.defects.relief import Relief, Typical
 from stages.defects.segment import Region
 from stages.defects.surface import DeviationPoints, Surface
@@ -83,9 +83,9 @@ def test_a_find_between_rings_without_any_surface_is_not_measured() -> None:
     cloud = PointCloud(*[np.zeros((0, 3), np.float32)] * 2, *[np.zeros(0, np.float32)] * 4, np.zeros(0, int))
     unseen = np.full((_ROWS, _COLUMNS), np.nan)
     row = Region(14, 350, np.ones((1, 7), bool), -1.0)
-    assert not _is_measured(Surface(relief(), unseen, unseen, unseen, cloud, points(0.0)), row)
+    assert not is_measured(Surface(relief(), unseen, unseen, unseen, cloud, points(0.0)), row)
     unseen[14, 353] = 0.1
-    assert _is_measured(Surface(relief(), unseen, unseen, unseen, cloud, points(0.0)), row)
+    assert is_measured(Surface(relief(), unseen, unseen, unseen, cloud, points(0.0)), row)
 
 
 def test_where_the_map_is_less_sure_noise_adds_more_to_a_depth() -> None:
