@@ -47,6 +47,7 @@ class DiagnosisInputs:
         given = [(role, r) for role, r in (("field", self.field), ("gauge", self.gauge)) if r is not None]
         about: dict[str, Json] = {role: recording_record(r) for role, r in given}
         warnings: list[Json] = [w for _, r in given for w in r.warnings]
+        warnings += [self.noticed] if self.noticed else []
         return about | {"probe": probe_record(self.file), "reader_warnings": warnings}
 
 

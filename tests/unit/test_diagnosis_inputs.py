@@ -1,0 +1,37 @@
+"""What a diagnosis is given: a gauge run of another probe is left out, and its user is told."""
+
+from __future__ import annotations
+
+import re
+import shutil
+from pathlib import Path
+
+from pipeline.api.diagnosis.inputs import open_inputs
+from tests.shared_data import PROJECT_ROOT
+
+SAMPLE = PROJECT_ROOT / "data" / "sample"
+
+
+def copied(folder: Path, baseline_mm: float) -> Path:
+    """Return a copy of the sample recording whose probe states another baseline."""
+    shutil.copytree(SAMPLE, folder)
+    probe = folder / "probe.yaml"
+    text, count = re.subn(r"(?<=baseline_mm: )[\d.]+", str(baseline_mm), probe.read_text(), count=1)
+    assert count == 1
+    probe.write_text(text)
+    return folder
+
+
+def test_a_gauge_run_of_another_probe_is_left_out_with_a_warning(tmp_path: Path) -> None:
+    """It stood on the page alone: the terminal said "consistent", as though the gauge run bore that out."""
+    inputs = open_inputs(SAMPLE, copied(tmp_path / "gauge", 99.0), None)
+    assert inputs.gauge is None
+    said = str(inputs.record()["reader_warnings"])
+    assert "of another probe" in said
+    assert "baseline_mm 99 against" in said
+
+
+def test_a_gauge_run_of_the_same_probe_is_kept_and_nothing_is_said() -> None:
+    inputs = open_inputs(SAMPLE, SAMPLE, None)
+    assert inputs.gauge is not None
+    assert inputs.record()["reader_warnings"] == []
