@@ -155,12 +155,15 @@ def _described(
     here, surface, depth = kept.here, kept.surface, kept.allowed
     cut = abs(whole.depth.depth_mm) - abs(depth.depth_mm)
     widened = flattened(depth, here, surface, scene.seen_by.held, measurer.wall.ways_mm)
+    without_them_mm = widened.sigma_mm
     if cut > 0 and whole.rings.may_be_a_pit:
         widened = replace(widened, sigma_mm=float(np.hypot(widened.sigma_mm, cut)))
     told = describe(here, widened, surface, scene)
     by_noise = replace(told, depth_sigma_mm=depth.sigma_mm)
-    contradicted_mm = whole.depth.depth_mm if cut > 0 else None
-    return Found(region, told, by_noise, evidence, measurer.chance_of_bead(region), contradicted_mm)
+    bead = measurer.chance_of_bead(region)
+    if cut <= 0:
+        return Found(region, told, by_noise, evidence, bead)
+    return Found(region, told, by_noise, evidence, bead, whole.depth.depth_mm, without_them_mm)
 
 
 def _lines(measurer: Measurer, found: Sequence[Found], scene: Scene, context: Context) -> Iterator[Defect]:
@@ -221,5 +224,5 @@ def _defects_of_run(
 
 
 DEFECTS = Stage(
-    "defects", "51", DefectParameters, _defects_of_run, "defects as instances with depth, clock and kind"
+    "defects", "52", DefectParameters, _defects_of_run, "defects as instances with depth, clock and kind"
 )

@@ -57,6 +57,8 @@ class Found:
         Probability that it is not a step of the bore.
     contradicted_mm : float, optional
         The larger depth shown by rings that their neighbours contradict; None where there are none.
+    sigma_without_them_mm : float, optional
+        1 σ of the depth before these rings widen it; None where there are none.
     """
 
     region: Region
@@ -65,6 +67,7 @@ class Found:
     evidence: Evidence
     bead: float
     contradicted_mm: float | None = None
+    sigma_without_them_mm: float | None = None
 
     @property
     def step(self) -> bool:
@@ -81,9 +84,10 @@ class Found:
     @property
     def vague(self) -> bool:
         """Whether flattening leaves next to nothing known of its depth; single deep rings do not count."""
-        if self.contradicted_mm is not None:
-            return False
-        return self.defect.depth_sigma_mm > _VAGUE * abs(self.defect.depth_mm)
+        sigma_mm = self.sigma_without_them_mm
+        if sigma_mm is None:
+            sigma_mm = self.defect.depth_sigma_mm
+        return sigma_mm > _VAGUE * abs(self.defect.depth_mm)
 
     def with_probability(self, probability: float, counts: bool) -> Defect:
         """Return it with its probability and, if it counts, a sentence where its depth is a lower bound."""

@@ -88,3 +88,11 @@ def test_a_pit_that_two_rings_show_has_a_depth_as_sure_as_what_lies_between_them
     finding, _ = patch_with_pit(step_mm, 0.6, pit_mm, wide_mm, 5, shift)
     assert abs(finding.depth_mm - fine_mean(0.6, pit_mm, wide_mm)) < 1.96 * finding.depth_sigma_mm
     assert finding.depth_sigma_mm < 0.35 * finding.depth_mm
+
+
+@pytest.mark.parametrize(("sigma_mm", "vague"), [(0.3, False), (5.0, True)])
+def test_one_rings_glint_neither_makes_a_depth_vague_nor_excuses_one_that_is(sigma_mm, vague):
+    """A deep ring that others contradict had made a finding of any σ certain enough to be confirmed."""
+    defect = SimpleNamespace(depth_mm=0.6, depth_sigma_mm=float(np.hypot(sigma_mm, 2.6)))
+    found = Found(None, defect, None, None, 1.0, contradicted_mm=3.2, sigma_without_them_mm=sigma_mm)
+    assert found.vague is vague
