@@ -126,8 +126,8 @@ def warn_of_slips(
 def _kept_sum(size_mm: Float, net_mm: float) -> float:
     """Return the sum of slips (K,), mm, or the net slip from first to last where that is less; 0 if opposed.
 
-    A probe that starts suddenly and runs out slowly, read by a late clock, slips in one sense only at its
-    starts.
+    The net slip matters where the encoder's clock is late: each sudden start of the probe then looks like a
+    slip in one sense, and its slow stop makes up for it in steps too small to be slips.
     """
     total = float(size_mm.sum())
     return min(abs(total), abs(net_mm)) if total * net_mm > 0 else 0.0
