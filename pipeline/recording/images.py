@@ -23,6 +23,8 @@ from pipeline.recording.base import Planes, ascending, decoded_ahead
 
 # Luma weights (red, blue) of ITU-R BT.709 and BT.601; swscale takes 601 where a stream names none.
 _BT709, _BT601 = (0.2126, 0.0722), (0.299, 0.114)
+# Luma of black and of white in limited range (ITU-R BT.601 and BT.709), and of white in full range.
+_LIMITED_BLACK, _LIMITED_WHITE, _WHITE = 16, 235, 255
 # Planar formats of 8 bits whose chroma is as fine as their luma.
 FULL_CHROMA = ("yuv444p", "yuvj444p")
 
@@ -54,6 +56,14 @@ def _luma(frame: av.VideoFrame) -> Image:
         return np.asarray(cv2.cvtColor(frame.to_ndarray(format="bgr24"), cv2.COLOR_BGR2GRAY), np.uint8)
     planar = name.startswith(("yuv", "nv")) and bits == 8
     return plane_of((frame if planar else frame.reformat(format="yuv420p")).planes[0])
+
+
+def luma_of_white(luma: Image, bgr: Image) -> int:
+    """Return the luma of white from one frame read both ways: 235 in limited range, else 255."""
+    full = cv2.cvtColor(bgr, cv2.COLOR_BGR2GRAY).astype(float)
+    limited = _LIMITED_BLACK + full * (_LIMITED_WHITE - _LIMITED_BLACK) / _WHITE
+    is_limited = np.abs(luma - limited).mean() < np.abs(luma - full).mean()
+    return _LIMITED_WHITE if is_limited else _WHITE
 
 
 def plane_of(plane: av.video.plane.VideoPlane) -> Image:

@@ -269,7 +269,7 @@ def _of_geometry(
 
 LINE_PROFILE = Stage("line_profile", "3", Parameters, examine_line, "what the line's light says of effects")
 FIDUCIALS = Stage(
-    "fiducials", "2", GaugeParameters, measure_fiducials, "a gauge run's rings and fiducials", "gauge"
+    "fiducials", "3", GaugeParameters, measure_fiducials, "a gauge run's rings and fiducials", "gauge"
 )
 FREE_MOTION = Stage(
     "free_motion", "2", MotionParameters, adjust_freely, "an inspection's motion without encoder", "motion"

@@ -6,6 +6,7 @@ import pytest
 
 from pipeline.errors import InputError
 from pipeline.recording import open_recording
+from pipeline.recording.images import luma_of_white
 from pipeline.recording.video import VideoSource, open_video
 from tests.made_recording import COUNT, HEIGHT, WIDTH, picture, write_folder, write_video
 
@@ -50,6 +51,14 @@ def test_every_codec_shows_the_pictures_in_order(tmp_path: Path, name: str) -> N
             red = image[30:, :10, 2].astype(float).mean()
             assert abs(red - picture(number)[30:, :10, 2].mean()) < 7
     assert len(images) == COUNT
+
+
+@pytest.mark.parametrize("name", ENCODINGS)
+def test_luma_of_white_is_that_of_the_range_of_the_video(tmp_path: Path, name: str) -> None:
+    source = _made(tmp_path, name)
+    (_, grey), (_, bgr) = (next(source.read([2], planes)) for planes in ("grey", "bgr"))
+    full = "MJPEG" in name or "grey" in name or "bgr0" in ENCODINGS[name]
+    assert luma_of_white(grey, bgr) == (255 if full else 235)
 
 
 @pytest.mark.parametrize("name", ENCODINGS)

@@ -18,6 +18,7 @@ from pipeline.instrument.probe import Probe
 from pipeline.machine.stage import Context, Stage
 from pipeline.recording.base import Illumination, Recording
 from pipeline.recording.checks import CheckedFrames
+from pipeline.recording.images import luma_of_white
 from stages.calibrate.gauge import premises
 from stages.calibrate.gauge.adjust import Finding, Measurements, RingSource, first_unknowns, solve
 from stages.calibrate.gauge.edges import Edges, Sighting, find_fiducials, joined, measure_edges
@@ -156,20 +157,31 @@ def _edges(
 ) -> tuple[Edges, int]:
     """Measure the borders of the fiducials that fit, in all posed frames; count those overexposed."""
     parts, overexposed = [], 0
-    images = recording.read(recording.frames.frame[posed.index], "grey")
-    for k, (_, image) in enumerate(images):
+    frames = recording.frames.frame[posed.index]
+    white = _brightest_grey(recording, frames)
+    for k, (_, image) in enumerate(recording.read(frames, "grey")):
         context.progress(len(posed.index) + k + 1, 2 * len(posed.index))
         if image is None:
             continue
         sighting, pose = posed.sightings[k], posed.poses[k]
         marker = sighting.marker[pose.fits & ~np.isin(sighting.marker, wrong)]
         index = int(posed.index[k])
-        edges, left_out = measure_edges(image, index, marker, pose.T_pc, probe.camera, gauge, parameters)
+        edges, left_out = measure_edges(
+            image, index, marker, pose.T_pc, probe.camera, gauge, parameters, white
+        )
         parts.append(edges)
         overexposed += left_out
     edges = joined(parts)
     premises.warn_of_overexposed(overexposed, len(edges.uv), context)
     return edges, overexposed
+
+
+def _brightest_grey(recording: Recording, frames: Int) -> int:
+    """Return the luma of white, as the first of the ``frames`` that can be read tells it."""
+    both = zip(recording.read(frames, "grey"), recording.read(frames, "bgr"), strict=True)
+    return next(
+        luma_of_white(grey, bgr) for (_, grey), (_, bgr) in both if grey is not None and bgr is not None
+    )
 
 
 def _require_bores(
@@ -201,5 +213,5 @@ def _calibrate_run(
 
 
 GAUGE = Stage(
-    "gauge", "4", GaugeParameters, _calibrate_run, "fiducials and rings on known bore to camera and sheet"
+    "gauge", "5", GaugeParameters, _calibrate_run, "fiducials and rings on known bore to camera and sheet"
 )

@@ -29,9 +29,8 @@ _SPAN = 0.7
 # below this part of the step, and its blur in this range, px. With half and twice of each, at most 2 % of
 # 3703 edges of open-1's gauge run are left out.
 _LEAST_STEP_GREY, _INSIDE, _MOST_NOISE, _BLUR_PX = 8.0, 0.6, 0.12, (0.3, 2.5)
-# Grey level from which the white beside an edge counts as overexposed: luma of limited range ends at 235, and
-# compression takes a few levels off. In full range, some white is left out without need.
-_OVEREXPOSED_GREY = 230
+# White counts as overexposed so few grey levels below the brightest, of which compression takes a few off.
+_BELOW_WHITE_GREY = 5
 # Least σ, and the part of the border over which a profile reaches. Debt: data/debts.md.
 _LEAST_SIGMA_PX, _OF_BORDER = 0.03, 0.85
 # Markers are drawn in cells; the outermost is black all round.
@@ -137,8 +136,11 @@ def measure_edges(
     camera: Camera,
     gauge: Gauge,
     parameters: GaugeParameters,
+    white: int,
 ) -> tuple[Edges, int]:
     """Measure the borders of fiducials (M,) in an image of the frame ``index``, near where they should be.
+
+    ``white`` is the brightest grey level that the video's range allows.
 
     Returned beside the edges is how many are left out because the white beside them is overexposed: its blur
     is cut off at the brightest level, so that the edge seems to lie inside of the black square.
@@ -154,7 +156,7 @@ def measure_edges(
         image, at[..., 0].astype(np.float32), at[..., 1].astype(np.float32), cv2.INTER_CUBIC
     ).astype(float)
     offset, sigma = fit_steps(t, grey)
-    overexposed = (grey >= _OVEREXPOSED_GREY).any(1)
+    overexposed = (grey >= white - _BELOW_WHITE_GREY).any(1)
     uv = predicted.uv + offset[:, None] * predicted.normal
     measured = Edges(**(vars(predicted) | {"uv": uv, "sigma_px": sigma}))
     clear = np.isfinite(offset)
