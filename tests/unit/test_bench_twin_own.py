@@ -17,7 +17,9 @@ def test_scenes_as_shipped_and_dulled_ones_are_not_taken_for_each_other(
     monkeypatch.setattr(bench_twin_own, "answer", lambda dull, folder: {"dull": dull})
     told = []
     for shipped in (False, True):
-        given = Namespace(out=tmp_path, only="nothing", nulls=2, as_shipped=shipped, frames=9, seed=1)
+        given = Namespace(
+            out=tmp_path, only="nothing", nulls=2, as_shipped=shipped, frames=9, seed=1, draws=1
+        )
         told.append([answer["dull"] for _, _, answer in bench_twin_own.answers(given)])
     assert told == [[True, True], [False, False]]
 
@@ -30,3 +32,24 @@ def test_a_ghost_that_is_asked_for_lies_beside_the_line():
     forward_mm = scene.pipe.diameter_mm * math.tan(laser.sheet.cone_rad)
     assert laser.ghost_relative == case.numbers[0]
     assert forward_mm > 8
+
+
+def test_a_case_is_never_scored_again_by_an_answer_to_its_own_effect():
+    """With one case, or three, the third one after it was the case itself: the same counts, as if it held."""
+    dust, dim = (c for c in bench_twin_own.CASES if c.effect in ("dust", "laser_sector"))
+    for cases in ([dust], [dust, dust, dust], [dust, dim, dust], [dust, dim]):
+        answered = [(case, {"found": case.effect}, (0.0, 0.0)) for case in cases]
+        exchanged = bench_twin_own.exchanged(answered)
+        assert len(exchanged) == (0 if dim not in cases else len(cases))
+        assert all(told["found"] != case.effect for case, told, _ in exchanged)
+
+
+@pytest.mark.parametrize("case", bench_twin_own.CASES, ids=lambda c: c.effect)
+def test_drawn_sizes_differ_by_a_third_at_most_and_are_possible(case):
+    drawn = [case.drawn(seed) for seed in range(20)]
+    assert drawn[0] == case.drawn(0)
+    assert len({c.numbers for c in drawn}) == 20
+    assert all(0.74 < c.numbers[0] / case.numbers[0] < 1.34 for c in drawn)
+    if case.size is not None:
+        assert all(c.true_size == case.size * c.numbers[0] <= 1 for c in drawn)
+    bench_twin_own.scene_of("straight-4-inch", drawn[1], 4, drawn[1].seed)
