@@ -27,6 +27,10 @@ from stages.diagnose.travel.events import SLIP
 _SAME_FREQUENCY_HZ = 0.15
 _IN_PROFILE = Location(str(Channel.PROFILE), None, None)
 _UNKNOWN = "a cause that the library does not have, such as {}"
+_BY_LIGHT = (
+    "Rings of the gauge run deviate by less than the size of {} is uncertain: whether anything else "
+    "moves them was not decided."
+)
 _OF_ENCODER = "an error of the encoder that depends on distance or speed in another way"
 
 
@@ -45,6 +49,8 @@ def composed(
     doubtful = (SLIP,) if any(u.by_slip for u in of_travel) else ()
     own = [c for c in claims_of(None, gauge, probe.shutter.exposure_s) if c.name not in without]
     rings = verdict_of_rings(examined, own)
+    of_light = _by_light(examined, rings, known)
+    rings = Verdict.CONSISTENT if of_light else rings
     said = _said(examined, rings, known, unnamed, bool(of_profile), doubtful)
     asked = said.members if said.members else [e.name for e in said.effects]
     nameless = _IN_PROFILE if of_profile else of_travel[0].location if of_travel else None
@@ -66,7 +72,10 @@ def composed(
         record_next=_next(said, asked),
         feasibility=examined.feasibility if examined is not None else (),
         candidates=of_gauge.candidates(examined) if examined is not None else (),
-        shortcomings=tuple(s for seen in (field, gauge) if seen is not None for s in seen.shortcomings),
+        shortcomings=(
+            *(s for seen in (field, gauge) if seen is not None for s in seen.shortcomings),
+            *of_light,
+        ),
         remainder=Remainder(rest, _of_rest(examined, rings), said.members, identifiable) if partly else None,
     )
     return found.not_knowing(without)
@@ -155,6 +164,15 @@ def verdict_of_rings(examined: Examined | None, own: Sequence[Claim]) -> Verdict
     else:
         explained = bool(own) and not examined.best.names
     return Verdict.CONSISTENT if explained else verdict
+
+
+def _by_light(examined: Examined | None, rings: Verdict, known: Sequence[Claim]) -> tuple[str, ...]:
+    """Return in words which certain effect on the line's light may have made the class that rings show."""
+    if examined is None or rings is not Verdict.CLASS:
+        return ()
+    lights = (c for c in known if c.sure and effect(c.name).family == "photometric" and c.parameters)
+    each = ((c.name, next(iter(c.parameters.values()))) for c in lights)
+    return tuple(_BY_LIGHT.format(name) for name, size in each if of_gauge.may_be_light(examined, size))[:1]
 
 
 def _of_rest(examined: Examined | None, rings: Verdict) -> Location | None:

@@ -12,10 +12,11 @@ import pytest
 from pipeline.instrument.probe import Probe
 from stages.diagnose.compose import verdict_of_rings
 from stages.diagnose.correct import encoder_effects
+from stages.diagnose.gauge import answer as of_rings
 from stages.diagnose.gauge.examine import Examined
 from stages.diagnose.profile.evidence import Condition, ProfileEvidence
 from stages.diagnose.profile.finding import Size, finding
-from stages.diagnose.result import FitQuality, Location, Verdict
+from stages.diagnose.result import EffectFound, FitQuality, Location, Verdict
 from stages.diagnose.rocking import rocking_excluded
 from stages.diagnose.travel.events import with_events
 from tests.diagnosed import AGREES, DIFFERS, PLAY, SCALE, SLIP, SWING, answer, of_gauge, seen
@@ -261,3 +262,33 @@ def test_what_image_formation_may_show_in_the_line_is_not_told_as_improbable(rea
         light = ProfileEvidence("gauge", np.arange(3), (skewed,))
         told.append(answer(real_probe, None, replace(seen("gauge"), profile=light)).global_p)
     assert told == [1.0, pytest.approx(3e-8)]
+
+
+@pytest.mark.parametrize(
+    ("moved_px", "sd_mm", "verdict"),
+    [(0.07, 0.03, Verdict.NAMED), (0.3, 0.03, Verdict.PARTLY), (0.07, 0.002, Verdict.PARTLY)],
+)
+def test_rings_that_move_by_less_than_the_light_of_a_named_effect_is_known_to_are_no_remainder(
+    real_probe: Probe, monkeypatch: pytest.MonkeyPatch, moved_px: float, sd_mm: float, verdict: Verdict
+) -> None:
+    """A line beside which a wall glows was "partly", with a class of 13 names for a drift of .07 px."""
+    monkeypatch.setattr(of_rings, "ring_shift_alone_px", lambda fit, term: term.shift_px)
+    monkeypatch.setattr(of_rings, "verdict_of", lambda examined: Verdict.CLASS)
+    drift = EffectFound("baseline_drift", 0.5, {}, "The baseline gets longer.", "", ())
+    monkeypatch.setattr(of_rings, "effects_found", lambda examined: (drift,))
+    monkeypatch.setattr(of_rings, "members", lambda examined: ("laser_cone", "baseline_drift"))
+    monkeypatch.setattr(of_rings, "candidates", lambda examined: ())
+    monkeypatch.setattr(of_rings, "unknown_law_descriptions", lambda examined: ())
+    best = SimpleNamespace(fit=SimpleNamespace(terms=(SimpleNamespace(shift_px=moved_px),)), names=("a",))
+    run = SimpleNamespace(width_px=np.full(9, 1.7))
+    rings = SimpleNamespace(
+        best=best, searched=SimpleNamespace(run=run), location=None, quality=None, feasibility=(),
+        global_p=0.0, shortcomings=(), verdicts=None,
+    )  # fmt: skip
+    glow = finding("subsurface", 20.0, 1e-12, (Size("transport_mm", "mm", 0.3, sd_mm),), "The wall glows.")
+    light = ProfileEvidence("gauge", np.arange(3), (replace(glow, agreements=(AGREES,)),))
+    found = answer(real_probe, None, replace(seen("gauge"), profile=light, geometry=cast(Any, rings)))
+    assert found.verdict is verdict
+    assert [e.name for e in found.effects] == ["subsurface"]
+    told = any("less than the size of subsurface is uncertain" in s for s in found.shortcomings)
+    assert told is (verdict is Verdict.NAMED)

@@ -18,7 +18,7 @@ from stages.diagnose.gauge.formula import ADEQUATE
 from stages.diagnose.gauge.hypotheses import Judged
 from stages.diagnose.gauge.judge import Verdicts
 from stages.diagnose.gauge.run import Term
-from stages.diagnose.gauge.search import shift_px
+from stages.diagnose.gauge.search import ring_shift_alone_px, shift_px
 from stages.diagnose.gauge.unknown_laws import Unknown
 from stages.diagnose.inference import SURE, UNKNOWN
 from stages.diagnose.result import Candidate, Confirmation, EffectFound, Value, Verdict
@@ -136,6 +136,16 @@ def beyond_line(examined: Examined) -> tuple[bool, ...]:
     best = examined.best
     width_px = float(np.median(examined.searched.run.width_px))
     return tuple(shift_px(best.fit, t) > width_px for t in best.library_terms) if best is not None else ()
+
+
+def may_be_light(examined: Examined, size: Value) -> bool:
+    """Return whether all that rings show may be the line's own light, whose effect has this size.
+
+    It moves the line within its width, which is as well known as the size is, and fiducials not at all.
+    """
+    best, share = examined.best, min(size.sd / max(abs(size.value), 1e-300), 1.0)
+    most_px = share * float(np.median(examined.searched.run.width_px))
+    return best is not None and all(ring_shift_alone_px(best.fit, t) < most_px for t in best.fit.terms)
 
 
 def _found(

@@ -243,11 +243,22 @@ def alike(scores: Sequence[Scored]) -> float:
 
 def shift_px(found: Fit, term: Term) -> float:
     """Return the RMS shift, px, of rings and fiducials by a term."""
+    return max(_shifts_px(found, term))
+
+
+def ring_shift_alone_px(found: Fit, term: Term) -> float:
+    """Return the RMS shift, px, of rings by a term; infinite where it also shifts fiducials."""
+    ring, edge = _shifts_px(found, term)
+    return np.inf if edge > 0 else ring
+
+
+def _shifts_px(found: Fit, term: Term) -> tuple[float, float]:
+    """Return the RMS shifts, px, of rings and of fiducials by a term."""
     ring = ring_shift_px(term.model, found.linearised.rings, term.shape, term.amplitude)
     edge = np.linalg.norm(
         texture_shift_px(term.model, found.linearised.edges, term.shape, term.amplitude), axis=1
     )
-    return float(max(np.sqrt(np.nanmean(ring**2)), np.sqrt(np.nanmean(edge**2))))
+    return float(np.sqrt(np.nanmean(ring**2))), float(np.sqrt(np.nanmean(edge**2)))
 
 
 def _extended(
