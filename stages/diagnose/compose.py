@@ -152,7 +152,7 @@ def verdict_of_rings(examined: Examined | None, own: Sequence[Claim]) -> Verdict
 
     Where rings deviate but "no effect" is still the likeliest explanation, the claimed effect is taken to be
     the cause: play or a slip disturbs the poses, too. What repeats at one place of the image on other wall is
-    no error of poses: only the line's profile may be its cause.
+    no error of poses: only the line's light may be its cause, if the light can move the line so far.
     """
     if examined is None:
         return Verdict.NOT_IDENTIFIABLE
@@ -160,7 +160,10 @@ def verdict_of_rings(examined: Examined | None, own: Sequence[Claim]) -> Verdict
     if verdict is not Verdict.UNEXPLAINED:
         return verdict
     if examined.best is None:
-        explained = any(c.location.channel == Channel.PROFILE for c in own)
+        of_line = (c for c in own if c.location.channel == Channel.PROFILE)
+        explained = any(
+            of_gauge.may_be_light(examined, next(iter(c.parameters.values()), None)) for c in of_line
+        )
     else:
         explained = bool(own) and not examined.best.names
     return Verdict.CONSISTENT if explained else verdict

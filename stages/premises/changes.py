@@ -150,7 +150,7 @@ class LeftOut:
         )  # fmt: skip
         warn_of(
             frame[self.copy],
-            "left out, since the recorder hung and showed the one before again",
+            "left out, since the recorder hung, or the codec held the one before",
             "nothing, if the wall that was passed meanwhile need not be seen", context,
         )  # fmt: skip
 

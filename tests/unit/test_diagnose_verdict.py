@@ -18,7 +18,7 @@ from stages.diagnose.gauge.judge import Instead, Unfitted, Verdicts
 from stages.diagnose.gauge.run import Term
 from stages.diagnose.gauge.sets import PATTERNS, Member
 from stages.diagnose.gauge.unknown_laws import Unknown
-from stages.diagnose.result import Confirmation, FitQuality, Location, Verdict
+from stages.diagnose.result import Confirmation, FitQuality, Location, Value, Verdict
 
 AGREES, DIFFERS = Confirmation("1", "1", True), Confirmation("1", "2", False)
 
@@ -136,7 +136,8 @@ def test_the_pattern_that_is_the_likelier_beside_any_name_comes_first():
 )
 def test_what_repeats_on_other_wall_is_not_consistent_though_nothing_was_found(heldout_px, floor_px, verdict):
     """Rows that wavered left .28 px in a gauge run alone, where noise made .13: "consistent"."""
-    searched = cast(Any, SimpleNamespace(steps=(SimpleNamespace(by_chance=0.5),)))
+    run = SimpleNamespace(width_px=np.full(9, 1.7))
+    searched = cast(Any, SimpleNamespace(steps=(SimpleNamespace(by_chance=0.5),), run=run))
     quality = FitQuality("px", 0.31, 0.3, 0.29, heldout_px, floor_px)
     seen = Examined(searched, None, (), (), quality=quality)
     assert answer.verdict_of(seen) is verdict
@@ -144,12 +145,17 @@ def test_what_repeats_on_other_wall_is_not_consistent_though_nothing_was_found(h
     assert (seen.global_p == pytest.approx(1 / 16)) is (verdict is Verdict.UNEXPLAINED)
     assert bool(seen.shortcomings) is bool(np.isnan([heldout_px, floor_px]).any())
     assert ("0.28 px" in answer.formula(seen)) is (verdict is Verdict.UNEXPLAINED)
-    # It may be the doing of the line's profile, but not of what disturbs only poses.
-    by_motion, by_profile = (
-        cast(Any, SimpleNamespace(location=Location(c, None, None))) for c in ("motion", "profile")
-    )
+    # It may be the doing of the line's light where that can move the line so far, but not of what disturbs
+    # only poses.
+    by_motion, vague, known = (
+        cast(Any, SimpleNamespace(location=Location(channel, None, None), parameters={"skewness": size}))
+        for channel, size in (
+            ("motion", Value(1.0, 0.5)), ("profile", Value(1.0, 0.5)), ("profile", Value(1.0, 0.1))
+        )
+    )  # fmt: skip
     assert verdict_of_rings(seen, [by_motion]) is verdict
-    assert verdict_of_rings(seen, [by_motion, by_profile]) is Verdict.CONSISTENT
+    assert verdict_of_rings(seen, [by_motion, known]) is verdict
+    assert verdict_of_rings(seen, [known, vague]) is Verdict.CONSISTENT
 
 
 @pytest.mark.parametrize(

@@ -138,14 +138,17 @@ def beyond_line(examined: Examined) -> tuple[bool, ...]:
     return tuple(shift_px(best.fit, t) > width_px for t in best.library_terms) if best is not None else ()
 
 
-def may_be_light(examined: Examined, size: Value) -> bool:
+def may_be_light(examined: Examined, size: Value | None) -> bool:
     """Return whether all that rings show may be the line's own light, whose effect has this size.
 
     It moves the line within its width, which is as well known as the size is, and fiducials not at all.
     """
-    best, share = examined.best, min(size.sd / max(abs(size.value), 1e-300), 1.0)
+    best, quality = examined.best, examined.quality
+    share = min(size.sd / max(abs(size.value), 1e-300), 1.0) if size is not None else 1.0
     most_px = share * float(np.median(examined.searched.run.width_px))
-    return best is not None and all(ring_shift_alone_px(best.fit, t) < most_px for t in best.fit.terms)
+    if best is not None:
+        return all(ring_shift_alone_px(best.fit, t) < most_px for t in best.fit.terms)
+    return quality is None or quality.heldout_after**2 - quality.noise_floor**2 < most_px**2
 
 
 def _found(
