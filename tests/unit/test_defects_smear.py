@@ -74,12 +74,15 @@ def test_rings_that_share_as_much_as_usual_widen_nothing() -> None:
     assert usual.depth_sigma_mm == none.depth_sigma_mm
 
 
-def told_sigma(seen_mm: Float, held: HeldOver, ways_mm: Float = EVERY_HALF_MM) -> float:
+def told_sigma(
+    seen_mm: Float, held: HeldOver, ways_mm: Float = EVERY_HALF_MM, finding: slice = slice(None)
+) -> float:
     """Return the σ that a depth of ± .03 mm gets, of which ``seen_mm`` (H,) is seen every .5 mm.
 
-    So far (F,) the probe went from ring to ring.
+    Its ``finding`` is what stands out of the wall. So far (F,) the probe went from ring to ring.
     """
-    region = Region(0, 0, np.ones((len(seen_mm), 1), bool), 1.0)
+    first, last, _ = finding.indices(len(seen_mm))
+    region = Region(first, 0, np.ones((last - first, 1), bool), 1.0)
     surface = SimpleNamespace(
         local_mm=seen_mm[:, None],
         relief=SimpleNamespace(cell_mm=(0.5, 0.5), radius_mm=RADIUS, typical=SimpleNamespace(sigma_mm=0.01)),
@@ -121,6 +124,40 @@ def test_cells_below_the_wall_at_both_ends_do_not_tell_that_nothing_was_held_ove
     found = seen[seen > 0.2 * seen.max()]
     rimmed = np.r_[-0.2, found[1:-1], -0.2]
     assert 1 - found.max() < 1.5 * told_sigma(rimmed, HeldOver(0.9 ** np.arange(12)))
+
+
+def rimmed_pit(across_mm: float, rim: float) -> Float:
+    """Return a pit of 1 mm with a rim on both sides, of ``rim`` times its depth, every .5 mm."""
+    x = np.arange(-100, 100.25, 0.5) / across_mm
+    pit = np.exp(-0.5 * x**2) - rim * np.exp(-0.5 * ((np.abs(x) - 2.2) / 0.7) ** 2)
+    return np.asarray(pit / pit.max())
+
+
+def standing_out(seen_mm: Float) -> slice:
+    """Return the cells about the deepest that are more than a fifth as deep."""
+    top = int(seen_mm.argmax())
+    low = np.flatnonzero(seen_mm < 0.2 * seen_mm[top])
+    return slice(int(low[low < top].max()) + 1, int(low[low > top].min()))
+
+
+@pytest.mark.parametrize("across_mm", [1.0, 2.0, 3.0])
+@pytest.mark.parametrize("rim", [0.1, 0.3, 0.5])
+@pytest.mark.parametrize("share", [0.6, 0.8, 0.9, 0.95])
+def test_sigma_holds_what_a_pit_with_a_rim_lost(across_mm: float, rim: float, share: float) -> None:
+    """The rim's steeper flanks told of little held over: up to seven σ were lost."""
+    seen = lfilter([1 - share], [1, -share], rimmed_pit(across_mm, rim))
+    lost = 1 - float(seen.max())
+    sigma = told_sigma(seen, HeldOver(share ** np.arange(12)), finding=standing_out(seen))
+    assert lost < 1.3 * sigma
+    assert sigma < 1.3 * lost + 0.03
+
+
+@pytest.mark.parametrize("rim", [0.3, 0.5])
+def test_a_sharp_pit_with_a_rim_was_not_held_over_long_ways(rim: float) -> None:
+    """As its bell would be the narrowest one, ± 18 and ± 24 mm could be told of it."""
+    seen = rimmed_pit(2.0, rim)
+    likeness = HeldOver(np.r_[1.0, 0.33 * 0.98 ** np.arange(16)])
+    assert told_sigma(seen, likeness, finding=standing_out(seen)) < 1.5
 
 
 def test_a_wide_patch_tells_by_all_its_columns_how_fast_it_falls_off() -> None:
