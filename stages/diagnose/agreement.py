@@ -25,11 +25,24 @@ _DRAWS = 400
 
 @dataclass(frozen=True)
 class Part:
-    """An effect as measured in one part of the data: name of the part, description, and numbers (Q,)."""
+    """An effect as measured in one part of the data.
+
+    Attributes
+    ----------
+    where, words : str
+        Name of the part, and the numbers in words.
+    value, covariance : (Q,), (Q, Q)
+    """
 
     where: str
     words: str
     value: Float
+    covariance: Float
+
+    @classmethod
+    def of(cls, where: str, words: str, value: float, sigma: float) -> Part:
+        """Return a part that measures one number with this 1 σ."""
+        return cls(where, words, np.array([value]), np.array([[sigma**2]]))
 
 
 @dataclass(frozen=True)
@@ -48,23 +61,29 @@ class Agreement:
     ratio: float
 
 
-def agreement(first: Part, second: Part, own: tuple[Float, Float], gap: Float) -> Agreement | None:
+def agreement(
+    first: Part, second: Part, gap: Float | None = None, size: float | None = None, rarest: float = AGREE
+) -> Agreement | None:
     """Return whether two parts agree; None when either is too uncertain.
 
     Parameters
     ----------
-    own : two of (Q, Q)
-        Each part's covariance.
-    gap : (Q, Q)
-        Covariance of their difference: less than the sum where they share unknowns.
+    gap : (Q, Q), optional
+        Covariance of their difference where that is less than the sum, because they share unknowns.
+    size, optional
+        Of the effect, in their unit; else the larger of both.
+    rarest
+        Probability below which a difference is not attributed to noise.
     """
-    square = max(float(first.value @ first.value), float(second.value @ second.value))
-    telling = all(np.all(np.isfinite(c)) and np.trace(c) <= TELLING**2 * square for c in own)
+    own = first.covariance, second.covariance
+    gap = own[0] + own[1] if gap is None else gap
+    size = max(float(np.linalg.norm(p.value)) for p in (first, second)) if size is None else size
+    telling = all(np.all(np.isfinite(c)) and np.trace(c) <= (TELLING * size) ** 2 for c in own)
     if not telling or not np.all(np.isfinite(gap)):
         return None
-    count, size = len(first.value), float(np.sqrt(square))
-    agrees = same(first.value, second.value, gap, size)
-    unrelated = own[1] + square / count * np.eye(count)
+    count = len(first.value)
+    agrees = same(first.value, second.value, gap, size, rarest)
+    unrelated = own[1] + size**2 / count * np.eye(count)
     like = stats.multivariate_normal(np.zeros(count), _spread(gap, size)).logpdf(second.value - first.value)
     unlike = stats.multivariate_normal(np.zeros(count), unrelated).logpdf(second.value)
     told = Confirmation(f"{first.where}: {first.words}", f"{second.where}: {second.words}", agrees)

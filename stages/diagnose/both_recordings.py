@@ -6,7 +6,6 @@ from collections.abc import Iterable, Mapping
 
 import numpy as np
 
-from pipeline.arrays import Float
 from stages.diagnose.agreement import Agreement, Part, agreement
 from stages.diagnose.result import Value
 
@@ -21,16 +20,15 @@ def agreements(
     for name, value in sizes.items():
         if name not in others or name in _OF_ONE_RECORDING:
             continue
-        first, second = _part(where, name, value, of), _part(elsewhere, name, others[name], of)
-        found = agreement(first[0], second[0], (first[1], second[1]), first[1] + second[1])
+        found = agreement(_part(where, name, value, of), _part(elsewhere, name, others[name], of))
         if found is not None:
             yield found
 
 
-def _part(where: str, name: str, value: Value, of: str) -> tuple[Part, Float]:
-    """Return a quantity with its covariance; an azimuth is given as a unit vector."""
+def _part(where: str, name: str, value: Value, of: str) -> Part:
+    """Return a quantity as measured in a recording; an azimuth is given as a unit vector."""
     words = f"{of}{name} {value.value:.4g} (± {value.sd:.2g})"
     if not name.endswith("azimuth_deg"):
-        return Part(where, words, np.array([value.value])), np.array([[value.sd**2]])
+        return Part.of(where, words, value.value, value.sd)
     angle = np.radians(value.value)
-    return Part(where, words, np.array([np.cos(angle), np.sin(angle)])), np.radians(value.sd) ** 2 * np.eye(2)
+    return Part(where, words, np.array([np.cos(angle), np.sin(angle)]), np.radians(value.sd) ** 2 * np.eye(2))

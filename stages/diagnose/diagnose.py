@@ -221,11 +221,10 @@ def against_rings(found: Finding, sheet: SheetByRings) -> Agreement | None:
     """
     value = np.array([size.value for size in found.confirms])
     covariance = np.diag([size.sigma**2 for size in found.confirms])
-    parts = (
-        Part("rings of the gauge", _words(sheet.value), sheet.value),
-        Part("place of the second line", _words(value), value),
+    return agreement(
+        Part("rings of the gauge", _words(sheet.value), sheet.value, sheet.covariance),
+        Part("place of the second line", _words(value), value, covariance),
     )
-    return agreement(*parts, (sheet.covariance, covariance), sheet.covariance + covariance)
 
 
 def compared_with_rings(seen: Seen, sheet: SheetByRings) -> Seen:

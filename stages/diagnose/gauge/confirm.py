@@ -10,7 +10,8 @@ import numpy as np
 
 from pipeline.arrays import Float
 from pipeline.physics.effect import CourseKind
-from stages.diagnose.agreement import TELLING, drawn, same, sized
+from stages.diagnose.agreement import Part as Measured
+from stages.diagnose.agreement import agreement, drawn, sized
 from stages.diagnose.effects.base import Shape
 from stages.diagnose.effects.library import ring_shift_px
 from stages.diagnose.gauge.elimination import EDGE, RING, Part
@@ -28,15 +29,6 @@ from stages.diagnose.result import Confirmation, CourseFound, Value
 _AGREE = 2e-4
 _LEAST_FRAMES = 8
 _BORE = "bore"
-
-
-@dataclass(frozen=True)
-class Partial:
-    """Amplitudes (Q,) of a term, with covariance, from one part of the measurements."""
-
-    where: str
-    amplitude: Float
-    covariance: Float
 
 
 def confirmations(
@@ -78,8 +70,8 @@ def passes_again(run: GaugeRun, T_pc: Float, step_s: float) -> bool:
     return bool(min((shared & after).sum(), (shared & ~after).sum()) >= _LEAST_FRAMES)
 
 
-def partial_of(where: str, part: Evidence, judged: Judged, term: Term, stated: Stated) -> Partial | None:
-    """Return the term's estimate from a part of the measurements, with the other terms free."""
+def partial_of(where: str, part: Evidence, judged: Judged, term: Term, stated: Stated) -> Measured | None:
+    """Return the term's amplitudes from a part of the measurements, with the other terms free."""
     result = estimate(part, stated, 10 * prior_sigma(part, judged.fit.terms))
     wanted = [(term.model.name, a.name, term.shape) for a in term.amplitudes]
     keys = [(c.effect, c.amplitude, c.shape) for c in part.columns]
@@ -90,7 +82,7 @@ def partial_of(where: str, part: Evidence, judged: Judged, term: Term, stated: S
     ratio = np.diag(part.score_covariance)[at] / np.diag(part.information)[at]
     inflation = np.sqrt(np.maximum(ratio, 1.0))
     covariance = result.covariance[np.ix_(at, at)] * np.outer(inflation, inflation)
-    return Partial(where, result.value[at], covariance)
+    return Measured(where, "", result.value[at], covariance)
 
 
 def _by_bore(regimes: Sequence[Regime]) -> list[tuple[str, Part]]:
@@ -120,26 +112,24 @@ def _by_half(run: GaugeRun, term: Term) -> list[tuple[str, Part]]:
     return [("first half", Part(begun & early)), ("second half", Part(begun & ~early))]
 
 
-def _pairs(found: Sequence[Partial]) -> list[tuple[Partial, Partial]]:
+def _pairs(found: Sequence[Measured]) -> list[tuple[Measured, Measured]]:
     """Return the parts to be compared: each bore with the next, forward with backward, half with half."""
-    by_kind: dict[str, list[Partial]] = {}
+    by_kind: dict[str, list[Measured]] = {}
     for p in found:
         kind = _BORE if p.where.startswith(_BORE) else p.where.split()[-1]
         by_kind.setdefault(kind, []).append(p)
     return [(a, b) for group in by_kind.values() for a, b in itertools.pairwise(group)]
 
 
-def _compared(first: Partial, second: Partial, term: Term) -> Confirmation | None:
+def _compared(first: Measured, second: Measured, term: Term) -> Confirmation | None:
     """Return whether two estimates agree in sign and size; None when either is too uncertain."""
     size = float(np.linalg.norm(term.amplitude))
-    if max(np.sqrt(np.trace(p.covariance)) for p in (first, second)) > TELLING * size:
-        return None
-    gap = first.covariance + second.covariance
-    return Confirmation(
-        f"{first.where}: {sized(term.model, term.shape, first.amplitude, first.covariance)}",
-        f"{second.where}: {sized(term.model, term.shape, second.amplitude, second.covariance)}",
-        same(first.amplitude, second.amplitude, gap, size, _AGREE),
-    )
+    found = agreement(_told(first, term), _told(second, term), size=size, rarest=_AGREE)
+    return found.confirmation if found is not None else None
+
+
+def _told(part: Measured, term: Term) -> Measured:
+    return replace(part, words=sized(term.model, term.shape, part.value, part.covariance))
 
 
 def _by_kind(

@@ -61,13 +61,12 @@ def _halves_agree(
     whole: Finding, first: Mapping[str, Finding], second: Mapping[str, Finding]
 ) -> tuple[Agreement, ...]:
     """Return whether the halves agree on the first quantity; nothing where either is too uncertain."""
-    each = [half[whole.effect].sizes[:1] for half in (first, second) if whole.effect in half]
-    sizes = [size for sizes in each for size in sizes]
+    sizes = [s for half in (first, second) if whole.effect in half for s in half[whole.effect].sizes[:1]]
     if len(sizes) < 2:
         return ()
-    parts = [Part(where, _words(s), np.array([s.value])) for where, s in zip(_HALVES, sizes, strict=True)]
-    variance = [np.array([[s.sigma**2]]) for s in sizes]
-    out = agreement(parts[0], parts[1], (variance[0], variance[1]), variance[0] + variance[1])
+    each = zip(_HALVES, sizes, strict=True)
+    first_part, second_part = (Part.of(where, _words(s), s.value, s.sigma) for where, s in each)
+    out = agreement(first_part, second_part)
     return () if out is None else (out,)
 
 

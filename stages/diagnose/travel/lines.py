@@ -72,14 +72,12 @@ def swing_agreements(time_s: Float, xy_mm: Float, lit: Bool, frequency_hz: float
         (("pictures of the lit wall", lit), ("pictures of the laser's ring alone", ~lit)),
     )
     found = [[_part(time_s, xy_mm, frequency_hz, *p) for p in pair] for pair in pairs]
-    each = [_compared(*a, *b) for a, b in found if a is not None and b is not None]
+    each = [agreement(a, b) for a, b in found if a is not None and b is not None]
     return tuple(a for a in each if a is not None)
 
 
-def _part(
-    time_s: Float, xy_mm: Float, frequency_hz: float, where: str, use: Bool
-) -> tuple[Part, Float] | None:
-    """Return the oscillation in these pictures, with its covariance (4, 4); None if they show none."""
+def _part(time_s: Float, xy_mm: Float, frequency_hz: float, where: str, use: Bool) -> Part | None:
+    """Return the oscillation in these pictures; None if they show none."""
     t = time_s[use]
     if use.sum() < LEAST_SAMPLES / 2 or not shows_apart(t, frequency_hz):
         return None
@@ -89,11 +87,7 @@ def _part(
     size = float(np.linalg.norm(both, 2))
     phase = float(np.degrees(np.arctan2(*np.linalg.svd(both)[2][0][::-1]))) % 180
     words = f"±{size:.4g} mm (± {sigma:.2g} mm) at phase {phase:.0f}° of {frequency_hz:.2f} Hz"
-    return Part(where, words, both.ravel()), sigma**2 * np.eye(4)
-
-
-def _compared(first: Part, own: Float, second: Part, other: Float) -> Agreement | None:
-    return agreement(first, second, (own, other), own + other)
+    return Part(where, words, both.ravel(), sigma**2 * np.eye(4))
 
 
 @dataclass(frozen=True)

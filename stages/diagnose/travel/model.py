@@ -277,13 +277,10 @@ def _compared(
     covariance = covariance + allowed**2 * np.eye(2)
     if not np.all(np.isfinite(covariance)):
         return None
-    parts = [
-        Part(name, _words(column, v, float(np.sqrt(variance))), np.array([v]))
-        for name, v, variance in zip(where, value, np.diag(covariance), strict=True)
-    ]
+    each = zip(where, value, np.sqrt(np.diag(covariance)), strict=True)
+    one, other = (Part.of(name, _words(column, v, sigma), v, sigma) for name, v, sigma in each)
     gap = covariance[0, 0] + covariance[1, 1] - 2 * covariance[0, 1]
-    own = (covariance[:1, :1], covariance[1:, 1:])
-    return agreement(parts[0], parts[1], own, np.array([[gap]]))
+    return agreement(one, other, np.array([[gap]]))
 
 
 def split(fit: TravelFit, column: int, first: Bool) -> tuple[Float, Float]:

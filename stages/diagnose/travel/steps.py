@@ -47,15 +47,11 @@ def _told_by_reading(lasting_mm: float, sigma_mm: float, jump: float, sigma: flo
     """Return whether the reading's own jump, with 1 σ, equals what it has gained on the pictures since."""
     if not np.isfinite(sigma):
         return None
-    lasting = Part(
-        "what the reading has gained on the pictures ever since",
-        f"{lasting_mm:+.3f} mm (± {sigma_mm:.2g} mm)", np.array([lasting_mm]),
-    )  # fmt: skip
-    alone = Part(
-        "jump of the reading against its own motion", f"{jump:+.3f} mm (± {sigma:.2g} mm)", np.array([jump])
+    lasting, alone = (f"{v:+.3f} mm (± {sd:.2g} mm)" for v, sd in ((lasting_mm, sigma_mm), (jump, sigma)))
+    return agreement(
+        Part.of("what the reading has gained on the pictures ever since", lasting, lasting_mm, sigma_mm),
+        Part.of("jump of the reading against its own motion", alone, jump, sigma),
     )
-    own = np.array([[sigma_mm**2]]), np.array([[sigma**2]])
-    return agreement(lasting, alone, own, own[0] + own[1])
 
 
 def reading_jump(encoder: Encoder, at: int) -> tuple[float, float]:
