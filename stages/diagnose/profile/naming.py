@@ -2,22 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from pipeline.instrument.probe import Probe
 from stages.diagnose.profile.cells import Cells, LineGeometry
-from stages.diagnose.profile.finding import Finding, Size, finding, untestable, withdrawn
+from stages.diagnose.profile.finding import Finding, Regression, Size, finding, untestable, withdrawn
 from stages.diagnose.profile.ghost import SecondLine, bounced, copied
 from stages.diagnose.profile.line_spread import Fitted, Shape, explanations, line_spread, without_mean_shape
 from stages.diagnose.profile.matched_filter import responses
-from stages.diagnose.profile.shape import WIDTH_FLOOR, skew_findings
+from stages.diagnose.profile.shape import OF_A_TAIL, skew_findings
 from stages.diagnose.profile.width import scale_law, width_findings
 
 UNEXPLAINED = "unexplained"
 _CLEARLY = 3.0
+# Change of (line σ / stated)² that image formation may cause across the scales of the image. Debt:
+# data/debts.md.
+WIDTH_FLOOR = 0.05
+_SMALLEST_BLUR_PX2 = 1 / 12
 # Relative error of the mean path of scattered light, because the form of its profile is unknown. Debt:
 # data/debts.md.
 _FORM = 0.1
@@ -51,14 +55,15 @@ def shape_findings(cells: Cells, geometry: LineGeometry, probe: Probe) -> tuple[
     widths_off = tuple(withdrawn(f) for f in widths)
     if not fitting:
         return (withdrawn(ring), *(withdrawn(f) for f in all_round), *widths_off, _unexplained(clearest))
-    names = _names(fitting, all_round, cells, geometry, probe)
-    return (ring, *(_renamed(f, names, clearest, fitting) for f in all_round), *widths_off)
+    stated_mm = probe.laser.line_sigma_mm
+    names = _names(fitting, scale_law(cells, geometry, probe), stated_mm)
+    return (ring, *(_renamed(f, names, clearest, stated_mm) for f in all_round), *widths_off)
 
 
 def _asymmetries(cells: Cells, geometry: LineGeometry, probe: Probe) -> list[Finding]:
     """Return the finding of `ghost_ring`, and after it all that are constant all round."""
     ring, copy = ghost_findings(cells, geometry, probe)
-    return [ring, *skew_findings(cells, geometry, probe), copy]
+    return [ring, *skew_findings(cells), copy]
 
 
 def _told_apart(
@@ -81,55 +86,83 @@ def _clearest(findings: Sequence[Finding]) -> Finding | None:
     return min((f for f in findings if f.found), key=lambda f: f.p_value, default=None)
 
 
-def _names(
-    fitting: Sequence[Fitted],
-    all_round: Sequence[Finding],
-    cells: Cells,
-    geometry: LineGeometry,
-    probe: Probe,
-) -> tuple[str, ...]:
-    """Return the effects whose shapes fit; the line's width separates light in the wall from the sheet."""
-    shapes = {f.shape: f for f in fitting}
-    names = ["tube_ghost"] if Shape.COPY in shapes else []
-    if Shape.TAIL in shapes:
-        left = [f.effect for f in all_round[:2] if f.found]
-        names += left or ["line_skew", "subsurface"]
-    if Shape.HALO in shapes:
-        stated = _core_as_stated(shapes[Shape.HALO], cells, geometry, probe)
-        names += ["subsurface"] if stated else ["line_skew", "subsurface"]
-    return tuple(names)
+def _names(fitting: Sequence[Fitted], law: Regression, stated_mm: float) -> dict[str, Fitted]:
+    """Return the effects whose shapes fit, each with the one that fits best; ``law`` as of `scale_law`."""
+    named = dict[str, Fitted]()
+    for fitted in fitting:
+        copy = fitted.shape is Shape.COPY
+        for name in ("tube_ghost",) if copy else _of_sheet_or_wall(fitted, law, stated_mm):
+            named.setdefault(name, fitted)
+    return named
 
 
-def _core_as_stated(halo: Fitted, cells: Cells, geometry: LineGeometry, probe: Probe) -> bool:
-    """Return whether the line without the blurred light has the stated width of the sheet."""
-    law = scale_law(cells, geometry, probe)
-    scale, sigma = halo.core * float(law.coefficient[0]), halo.core * float(law.sigma[0])
-    return bool(abs(scale - 1) < _CLEARLY * np.hypot(sigma, WIDTH_FLOOR))
+def _of_sheet_or_wall(fitted: Fitted, law: Regression, stated_mm: float) -> tuple[str, ...]:
+    """Return whether sheet or wall makes light on one side, as far as the line's width separates them.
+
+    A skewed sheet has the stated 1 σ together with its tail; light that returns from within the wall comes in
+    addition to a sheet of the stated 1 σ.
+    """
+    of_tail = (fitted.way_mm / stated_mm) ** 2
+    skewed = fitted.shape is Shape.TAIL and _allows(fitted.core, law, 1 - of_tail)
+    each = zip(OF_A_TAIL, (skewed, _allows(fitted.core, law, 1.0)), strict=True)
+    return tuple(name for name, allowed in each if allowed) or OF_A_TAIL
 
 
-def _renamed(found: Finding, names: tuple[str, ...], clearest: Finding, fitting: Sequence[Fitted]) -> Finding:
-    """Return a finding with the names of the shapes that fit."""
-    name = found.effect
-    if name not in names:
+def _allows(core: float, law: Regression, scale: float) -> bool:
+    """Return whether the widths allow (σ / stated)² = ``scale`` of the line without the light beside it.
+
+    The blur that is left for the lens is at least that of a pixel.
+    """
+    found, blur_px2 = core * law.coefficient[:2]
+    covariance = core**2 * law.covariance[:2, :2]
+    variance = max(float(covariance[0, 0]), 1e-300)
+    off = abs(found - scale) / np.hypot(np.sqrt(variance), WIDTH_FLOOR)
+    rate = float(covariance[0, 1]) / variance
+    left = blur_px2 + rate * (scale - found)
+    spread = np.sqrt(max(float(covariance[1, 1]) - rate**2 * variance, 0.0))
+    # 0.05 px² at least (chosen): a pixel's own variance, 1/12 px², is known no better.
+    return bool(off < _CLEARLY and left > _SMALLEST_BLUR_PX2 - _CLEARLY * max(spread, 0.05))
+
+
+def _renamed(found: Finding, names: Mapping[str, Fitted], clearest: Finding, stated_mm: float) -> Finding:
+    """Return a finding with the size of the shape that fits it, or withdrawn if none does."""
+    if found.effect not in names:
         return withdrawn(found)
-    rivals = tuple(n for n in names if n != name)
-    shape = next(f for f in fitting if (f.shape is Shape.COPY) == (name == "tube_ghost"))
+    shape, rivals = names[found.effect], tuple(n for n in names if n != found.effect)
+    if shape.shape is Shape.COPY:
+        return replace(found, z=clearest.z, p_value=clearest.p_value, alike=rivals)
+    size = _sizes(found, shape, stated_mm)
+    return finding(found.effect, clearest.z, clearest.p_value, size, _in_words(shape), alike=rivals)
+
+
+def _sizes(found: Finding, shape: Fitted, stated_mm: float) -> tuple[Size, ...]:
+    """Return the size of light on one side; the skewness of a sheet only from a tail, forward positive.
+
+    Skewness grows as the third power of a tail's length, so that a third of its relative error is that of the
+    length.
+    """
+    way = abs(shape.way_mm)
+    of_tail = float(np.hypot(SCALE_FLOOR, 1 / (3 * max(abs(found.z), 1))))
+    share = _FORM if shape.shape is Shape.HALO else of_tail
+    sigma = float(np.hypot(shape.way_sigma_mm, share * way))
+    if found.effect == "subsurface":
+        return (Size("transport_mm", "mm", way, sigma),)
     if shape.shape is Shape.HALO:
-        return _halo(name, shape, clearest, rivals)
-    return replace(found, z=clearest.z, p_value=clearest.p_value, alike=rivals)
+        return ()
+    skewness = 2 * float(np.sign(shape.way_mm)) * (way / stated_mm) ** 3
+    return (Size("skewness", "", skewness, 3 * abs(skewness) * sigma / max(way, 1e-9)),)
 
 
-def _halo(name: str, halo: Fitted, clearest: Finding, rivals: tuple[str, ...]) -> Finding:
-    """Return the finding of blurred light beside the line."""
-    sigma = float(np.hypot(halo.way_sigma_mm, _FORM * halo.way_mm))
-    size = () if name == "line_skew" else (Size("transport_mm", "mm", abs(halo.way_mm), sigma),)
-    return finding(
-        name, clearest.z, clearest.p_value, size,
-        f"Beside the line there is light of {100 * halo.relative:.0f} % of its height, {halo.way_mm:+.2f} mm "
-        f"from it along the axis and wider than the line by {halo.spread_mm:.2f} mm (1 σ). This shape leaves "
-        f"{100 * halo.left:.1f} % of the misfit.",
-        alike=rivals,
-    )  # fmt: skip
+def _in_words(shape: Fitted) -> str:
+    left = f"This shape leaves {100 * shape.left:.1f} % of the misfit."
+    if shape.shape is Shape.TAIL:
+        # Forward along the axis is inward in the image.
+        side = "inside" if shape.way_mm > 0 else "outside"
+        return f"The line has an exponential tail of {abs(shape.way_mm):.3f} mm on its {side}. {left}"
+    return (
+        f"Beside the line there is light of {100 * shape.relative:.0f} % of its height, {shape.way_mm:+.2f} "
+        f"mm from it along the axis and wider than the line by {shape.spread_mm:.2f} mm (1 σ). {left}"
+    )
 
 
 def _unexplained(clearest: Finding) -> Finding:
