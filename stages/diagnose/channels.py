@@ -275,8 +275,8 @@ FREE_MOTION = Stage(
     "free_motion", "2", MotionParameters, adjust_freely, "an inspection's motion without encoder", "motion"
 )
 GAUGE_EVIDENCE = Stage(
-    "evidence", "45", DiagnosisParameters, examine_gauge, "what a gauge run shows of effects", "diagnosis"
+    "evidence", "46", DiagnosisParameters, examine_gauge, "what a gauge run shows of effects", "diagnosis"
 )
 FIELD_EVIDENCE = Stage(
-    "evidence", "23", DiagnosisParameters, examine_field, "what an inspection shows of effects", "diagnosis"
+    "evidence", "24", DiagnosisParameters, examine_field, "what an inspection shows of effects", "diagnosis"
 )

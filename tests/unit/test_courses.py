@@ -13,8 +13,8 @@ from pipeline.simulator.effects.switch import parse_switch, parse_switches, swit
 from pipeline.simulator.laws import bench_truth
 from pipeline.simulator.prior import Concealable, draw_pair, read_prior
 from stages.diagnose.effects.courses import SEARCHED, Coursed, shape_alike, with_courses
+from stages.diagnose.effects.free_profile import patterns_in_course
 from stages.diagnose.effects.library import LIBRARY, columns, ring_shift_px, texture_shift_px, without
-from stages.diagnose.effects.pattern_in_course import patterns_in_course
 from stages.diagnose.gauge.answer import _in_the_end
 from stages.diagnose.gauge.confirm import Sized
 from stages.diagnose.gauge.run import Term

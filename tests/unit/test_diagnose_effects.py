@@ -10,6 +10,7 @@ from pipeline.instrument.camera.fisheye import KannalaBrandt
 from pipeline.instrument.laser import LaserSheet
 from pipeline.instrument.probe import Probe
 from pipeline.physics.catalogue import EFFECTS
+from pipeline.physics.effect import CourseKind
 from stages.diagnose.effects.base import Travel
 from stages.diagnose.effects.library import (
     LIBRARY,
@@ -21,7 +22,7 @@ from stages.diagnose.effects.library import (
     texture_shift_px,
     without,
 )
-from stages.diagnose.effects.nameless import GENERIC, Moves
+from stages.diagnose.effects.nameless import GENERIC, STEADY, Moves, PatternInCourse
 from tests.unit.wall_points import Bore, plain_probe, ring_points, texture_points
 
 # What a position or reading effect leaves alone.
@@ -255,7 +256,9 @@ def test_vignetting_draws_the_line_inward_by_its_variance():
 def generic_columns(points, wanted, of_line):
     """Columns of the generic terms of the line or of the image, constant and linear in time."""
     terms = [term for term in GENERIC if (term.moves is Moves.LINE) is of_line]
-    return np.concatenate([wanted(t, points, s) for t in terms for s in t.shapes(0.0, 0.0)], axis=-1)
+    growing = [(PatternInCourse(term, CourseKind.RAMP), (10.0,)) for term in terms]
+    each = [*((term, STEADY) for term in terms), *growing]
+    return np.concatenate([wanted(model, points, shape) for model, shape in each], axis=-1)
 
 
 def test_the_generic_basis_mimics_a_tilted_sheet_and_not_all_there_is():

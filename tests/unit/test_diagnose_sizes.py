@@ -171,4 +171,4 @@ def test_the_numbers_of_a_formula_stand_under_its_letters_with_units() -> None:
     """The page said "amplitude = 0.47983, frequency_hz = 0.15075 mm" below a formula in a and f."""
     rocking = next(s for s in SWINGS if s.harmonic == 1)
     told = rocking.equation((0.1512,), np.array([0.3, 0.0, 0.4, 0.0]))
-    assert told == "δr = a (r/50)^2 cos 1(ψ − ψ₀) sin(2πft + φ), a = 0.5 mm, f = 0.151 Hz"
+    assert told == "(δr = a (r/50)^2 cos 1(ψ − ψ₀)) × (sin(2π 0.151 Hz t + phase)), a = 0.5 mm"

@@ -8,6 +8,7 @@ true minus stated: where the measurement is found, minus where the stated instru
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TypeAlias
@@ -240,34 +241,48 @@ class EffectModel(ABC):
         return all(low <= found[name] <= high for name, (low, high) in ranges.items() if name in found)
 
 
+# A law, its shape and its amplitudes, and the fraction (M,) of its shift at each point.
+Share: TypeAlias = tuple[Float, EffectModel, Shape, Float]
 # Fractions (M,) of the size at each point, a law, and its shape: the factors of a `Product`.
 Factored: TypeAlias = tuple[tuple[Float, ...], EffectModel, Shape]
 
 
-class Product(EffectModel):
+class SumOfLaws(EffectModel):
+    """Shifts by other laws, each times a fraction at each point."""
+
+    @abstractmethod
+    def shares(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Sequence[Share]:
+        """Return the laws with their fractions."""
+
+    def image_shift_px(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
+        """Return the sum of the laws' shifts, px."""
+        each = self.shares(points, shape, amplitude)
+        return np.asarray(sum(p[:, None] * law.image_shift_px(points, own, a) for p, law, own, a in each))
+
+    def sheet_shift_mm(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
+        """Return the sum of the laws' shifts, mm."""
+        each = self.shares(points, shape, amplitude)
+        return np.asarray(sum(p * law.sheet_shift_mm(points, own, a) for p, law, own, a in each))
+
+    def line_shift_px(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
+        """Return the sum of the laws' shifts, px."""
+        each = self.shares(points, shape, amplitude)
+        return np.asarray(sum(p * law.line_shift_px(points, own, a) for p, law, own, a in each))
+
+    def wall_shift_mm(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
+        """Return the sum of the laws' shifts, mm."""
+        each = self.shares(points, shape, amplitude)
+        return np.asarray(sum(p * law.wall_shift_mm(points, own, a) for p, law, own, a in each))
+
+
+class Product(SumOfLaws):
     """A law multiplied by a function of time, speed or place; it has the law's amplitudes once per factor."""
 
     @abstractmethod
     def factored(self, points: ImagePoints, shape: Shape) -> Factored:
         """Return the fractions (M,) of the size at each point, the law, and its shape."""
 
-    def image_shift_px(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
-        """Return the law's shift times the fraction of the size at each point, px."""
-        each = self._each(points, shape, amplitude)
-        return np.asarray(sum(p[:, None] * law.image_shift_px(points, own, a) for p, law, own, a in each))
-
-    def sheet_shift_mm(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
-        """Return the law's shift times the fraction of the size at each point, mm."""
-        each = self._each(points, shape, amplitude)
-        return np.asarray(sum(p * law.sheet_shift_mm(points, own, a) for p, law, own, a in each))
-
-    def wall_shift_mm(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
-        """Return the law's shift times the fraction of the size at each point, mm."""
-        each = self._each(points, shape, amplitude)
-        return np.asarray(sum(p * law.wall_shift_mm(points, own, a) for p, law, own, a in each))
-
-    def _each(
-        self, points: ImagePoints, shape: Shape, amplitude: Float
-    ) -> list[tuple[Float, EffectModel, Shape, Float]]:
+    def shares(self, points: ImagePoints, shape: Shape, amplitude: Float) -> list[Share]:
+        """Return the law once per factor."""
         parts, law, own = self.factored(points, shape)
         return [(p, law, own, a) for p, a in zip(parts, np.split(amplitude, len(parts)), strict=True)]

@@ -7,7 +7,8 @@ import numpy as np
 from pipeline.arrays import Float
 from pipeline.instrument.camera import Camera
 from stages.diagnose.effects.base import EffectModel, ImagePoints, Shape
-from stages.diagnose.effects.kinds import Directed, Drifting, Scalar, along_x_and_y, one
+from stages.diagnose.effects.courses import Drifting
+from stages.diagnose.effects.kinds import Directed, Scalar, along_x_and_y, one
 from stages.diagnose.effects.laser import Baseline
 
 _NEAR_AXIS = 1e-4

@@ -15,7 +15,7 @@ from pipeline.arrays import Bool, Float
 from pipeline.physics.catalogue import effect
 from pipeline.physics.effect import COURSES, Course, CourseKind
 from stages.diagnose.effects.base import Amplitude, EffectModel, Factored, ImagePoints, Product, Shape
-from stages.diagnose.effects.kinds import Drifting, beginning
+from stages.diagnose.effects.kinds import FREQUENCY_STEP_HZ, Worded, frequencies, within
 
 # Laws of parts that a knock, heat or play can move during a recording, each with its shapes.
 _MOVABLE: Mapping[str, tuple[Shape, ...]] = {
@@ -41,7 +41,13 @@ _TIMES = 32
 # Share of the recording at either end in which no step is searched: half a second of 7 s has 8 rings at 15
 # per second; with fewer, the scatter of their common errors is unknown.
 _EDGE = 1 / 14
-_SHARES = (0.1, 0.2, 0.4, 0.8, 1.6)
+# Time constants that are searched, in recordings: from the shortest, a step at the start, to the longest, of
+# the catalogue's own drifts nearly a straight line.
+_SHARES, _DRIFT_SHARES = (0.1, 0.2, 0.4, 0.8, 1.6), (0.1, 0.2, 0.4, 0.8, 1.6, 3.2, 6.4)
+# A drift is told by its growth in the first second, or, where its time constant is longer than this, in a
+# tenth of that: of .02 mm in 600 s, the first second has .00003. The recording lasts longer than a tenth: at
+# least about a sixth of the time constant, see `_DRIFT_SHARES`.
+_SLOW_S = 60.0
 _SPEED_MM_S, _DISTANCE_MM = 20.0, 100.0
 # A probe counts as standing if for so many seconds before and after it is slower than a tenth of its top
 # speed: after a sudden stop, `rates` of `stages.diagnose.gauge.points`, taken over a third of a second or
@@ -70,12 +76,58 @@ _FORMULAS: Mapping[CourseKind, str] = {
 }  # fmt: skip
 
 
-@dataclass(frozen=True)
-class Coursed(Product):
-    """A law of the library, at one shape of its own, with a course; its shape is the parameter of the course.
+class InCourse(Product):
+    """A law, at one shape of its own, with a course in time; its shape is the parameter of the course.
 
     A swing has every amplitude twice: for its sine, then for its cosine.
     """
+
+    static: EffectModel
+    own: Shape = ()
+
+    def shape_step(self, shape: Shape) -> float | None:
+        """Return a fraction of the time constant, or a frequency step; None if nothing is continuous."""
+        steps = {CourseKind.EXPONENTIAL: 0.3 * sum(shape), CourseKind.SINUSOID: FREQUENCY_STEP_HZ}
+        return steps.get(self.kind)
+
+    def factored(self, points: ImagePoints, shape: Shape) -> Factored:
+        """Return the course's factor (for a swing those of sine and cosine), and the law."""
+        return factors(self.kind, points, shape), self.static, self.own
+
+
+class Drifting(Worded, InCourse):
+    """An effect of the catalogue that grows as 1 − exp(−t/t₀); the shape is t₀ in s."""
+
+    kind = CourseKind.EXPONENTIAL
+
+    def shapes(self, duration_s: float, frame_rate: float) -> tuple[Shape, ...]:
+        """Return the time constants within the catalogue's range."""
+        return within(effect(self.name).quantity("time_s"), duration_s * np.array(_DRIFT_SHARES))
+
+    def course(self, shape: Shape, amplitude: Float) -> dict[str, float]:
+        """Return the time constant."""
+        return {"time_s": shape[0]}
+
+    def told(self, shape: Shape, amplitude: Float) -> dict[str, float | str]:
+        """Return the quantities, the growth in its `beginning`, and how long that lasts, in words.
+
+        For a drift slower than its recording the latter is well determined, while the final size is
+        extrapolated.
+        """
+        quantities = self.quantities(shape, amplitude)
+        final = abs(quantities[effect(self.name).quantities[0].name])
+        beginning_s, first = beginning(shape[0])
+        return {**quantities, "at_first": final * reached(beginning_s, shape), "first": first}
+
+    def quantities(self, shape: Shape, amplitude: Float) -> dict[str, float]:
+        """Return the final size and the time constant."""
+        first, *following = self.static.quantities(self.own, amplitude).items()
+        return {effect(self.name).quantities[0].name: first[1], **dict(following), "time_s": shape[0]}
+
+
+@dataclass(frozen=True)
+class Coursed(InCourse):
+    """A law of the library with a course."""
 
     static: EffectModel
     own: Shape
@@ -108,20 +160,11 @@ class Coursed(Product):
         if self.kind is CourseKind.EXPONENTIAL:
             return tuple((duration_s * share,) for share in _SHARES)
         if self.kind is CourseKind.SINUSOID:
-            step = 0.5 / duration_s
-            return tuple((float(f),) for f in np.arange(2 * step, frame_rate / 2 + step / 2, step))
+            return tuple((float(f),) for f in frequencies(duration_s, frame_rate))
         reference = {
             CourseKind.RAMP: duration_s, CourseKind.SPEED: _SPEED_MM_S, CourseKind.DISTANCE: _DISTANCE_MM
         }  # fmt: skip
         return ((reference[self.kind],),) if self.kind in reference else ((),)
-
-    def shape_step(self, shape: Shape) -> float | None:
-        """Return a fraction of the time constant, or a frequency step; None if nothing is continuous."""
-        return {CourseKind.EXPONENTIAL: 0.3 * sum(shape), CourseKind.SINUSOID: 0.05}.get(self.kind)
-
-    def factored(self, points: ImagePoints, shape: Shape) -> Factored:
-        """Return the course's factor (for a swing those of sine and cosine), and the law."""
-        return factors(self.kind, points, shape), self.static, self.own
 
     def _swing(self, amplitude: Float) -> tuple[Float, float]:
         """Return the law's amplitudes (Q,) along the longer axis of a swing's ellipse, and the phase, deg."""
@@ -151,7 +194,7 @@ class Coursed(Product):
         if self.kind is CourseKind.EXPONENTIAL:
             # What it comes to in the end, a short run only continues.
             beginning_s, first = beginning(shape[0])
-            size = size * Course(self.kind, shape).factor(beginning_s, 0.0, 0.0)
+            size = size * reached(beginning_s, shape)
         words = _WORDS[self.kind].format(first=first, **self.course(shape, amplitude))
         return f"{self.static.statement(self.own, size).rstrip('.')} ({words})."
 
@@ -160,6 +203,19 @@ class Coursed(Product):
         known = self.quantities(shape, amplitude) | self.course(shape, amplitude)
         numbers = ", ".join(f"{name} = {value:.5g}" for name, value in known.items())
         return f"({effect(self.law).law}) × ({_FORMULAS[self.kind]}), {numbers}"
+
+
+def beginning(time_s: float) -> tuple[float, str]:
+    """Return for how long the growth of a drift with such a time constant is told, s, and that in words."""
+    if time_s <= _SLOW_S:
+        return 1.0, "second"
+    beginning_s = round(time_s / 10)
+    return float(beginning_s), f"{beginning_s} s"
+
+
+def reached(time_s: float, shape: Shape) -> float:
+    """Return the fraction of the final size that a drift reaches at a time, s."""
+    return float(Course(CourseKind.EXPONENTIAL, shape).factor(time_s, 0.0, 0.0))
 
 
 def of_own_clock(model: EffectModel) -> bool:
@@ -180,8 +236,10 @@ def factors(kind: CourseKind, points: ImagePoints, shape: Shape) -> tuple[Float,
 
 def in_words(kind: CourseKind, shape: Shape) -> str:
     """Return a course as a formula with its numbers; of a swing its phase is left open."""
-    numbers = ", ".join(f"{q.name} = {v:.3g}" for q, v in zip(COURSES[kind], shape, strict=False))
-    return f"{_FORMULAS[kind]}, {numbers}" if numbers else _FORMULAS[kind]
+    words = _FORMULAS[kind]
+    for quantity, value in zip(COURSES[kind], shape, strict=False):
+        words = words.replace(quantity.name, f"{value:.3g} {quantity.unit}")
+    return words
 
 
 def with_courses(
@@ -218,9 +276,9 @@ def shape_alike(
         return (duration_s,) if ramps else None
     if not (isinstance(model, Drifting) and isinstance(other, Coursed) and other.kind is CourseKind.RAMP):
         return None
-    reached, end = amplitude * duration_s / shape[0], np.array(duration_s)
+    final = amplitude * duration_s / shape[0]
     slowest_first = reversed(model.shapes(duration_s, 0.0) if model.static.law == other.law else ())
-    return next((s for s in slowest_first if model.possible(s, reached / model.reached(end, s))), None)
+    return next((s for s in slowest_first if model.possible(s, final / reached(duration_s, s))), None)
 
 
 def _stands(time_s: Float, speed: Float) -> Bool:

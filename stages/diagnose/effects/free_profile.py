@@ -7,13 +7,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.arrays import Float
-from pipeline.physics.effect import FixedTo
-from stages.diagnose.effects.base import Amplitude, ImagePoints, Shape
-from stages.diagnose.effects.nameless import GENERIC, STEADY, GenericTerm, Moves, Nameless
+from pipeline.physics.catalogue import effect
+from pipeline.physics.effect import CourseKind, FixedTo
+from stages.diagnose.effects.base import Amplitude, EffectModel, ImagePoints, Shape, Share, SumOfLaws
+from stages.diagnose.effects.courses import Drifting
+from stages.diagnose.effects.nameless import GENERIC, STEADY, GenericTerm, Moves, Nameless, PatternInCourse
 
 
 @dataclass(frozen=True)
-class FreeProfile(Nameless):
+class FreeProfile(Nameless, SumOfLaws):
     """The patterns of one harmonic with all powers of the radius or of θ, each with amplitudes of its own."""
 
     name: str
@@ -21,15 +23,10 @@ class FreeProfile(Nameless):
     powers: tuple[GenericTerm, ...]
     amplitudes: tuple[Amplitude, ...]
 
-    def wall_shift_mm(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
-        """Return the sum of the patterns' shifts."""
-        each = self._each(amplitude)
-        return np.asarray(sum(term.wall_shift_mm(points, STEADY, a) for term, a in each))
-
-    def image_shift_px(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
-        """Return the sum of the patterns' shifts."""
-        each = self._each(amplitude)
-        return np.asarray(sum(term.image_shift_px(points, STEADY, a) for term, a in each))
+    def shares(self, points: ImagePoints, shape: Shape, amplitude: Float) -> list[Share]:
+        """Return the patterns, each in full."""
+        each = zip(self.powers, np.split(np.asarray(amplitude), len(self.powers)), strict=True)
+        return [(np.ones(len(points.uv)), term, STEADY, a) for term, a in each]
 
     def quantities(self, shape: Shape, amplitude: Float) -> dict[str, float]:
         """Return the root of the sum of squares of all amplitudes."""
@@ -43,9 +40,6 @@ class FreeProfile(Nameless):
         """Return the pattern as a formula."""
         wave = f" cos {self.harmonic}(ψ − ψ₀)" if self.harmonic else ""
         return f"δr = a(r){wave}" if self.powers[0].moves is Moves.LINE else f"image: a(θ){wave} outward"
-
-    def _each(self, amplitude: Float) -> zip[tuple[GenericTerm, Float]]:
-        return zip(self.powers, np.split(np.asarray(amplitude), len(self.powers)), strict=True)
 
 
 def _profile(moves: Moves, harmonic: int) -> FreeProfile:
@@ -61,3 +55,19 @@ FREE_PROFILES: tuple[tuple[FreeProfile, Shape], ...] = tuple(
     for moves in (Moves.LINE, Moves.OUTWARD)
     for harmonic in sorted({t.harmonic for t in GENERIC})
 )
+
+
+def patterns_in_course(like: EffectModel, harmonic: int | None) -> tuple[PatternInCourse, ...]:
+    """Return the patterns of a harmonic that have an effect's course and displace what the effect does not.
+
+    For an effect on the laser's line they displace the picture, and the other way round: a law of the
+    effect's own kind with another growth is tested separately (`stages.diagnose.gauge.unknown_laws`). There
+    are none for constant effects.
+    """
+    if like.kind is CourseKind.CONSTANT:
+        return ()
+    law = effect(like.static.law if isinstance(like, Drifting) else like.law)
+    moves = Moves.OUTWARD if law.fixed_to is FixedTo.LASER else Moves.LINE
+    powers = [t for t in GENERIC if t.moves is moves and t.harmonic == harmonic]
+    free = [profile for profile, _ in FREE_PROFILES if profile.powers[0] in powers]
+    return tuple(PatternInCourse(p, like.kind, like) for p in (*powers, *free))

@@ -1,4 +1,4 @@
-"""Common bases of effects: one signed size, a size with a direction, and courses in time."""
+"""Common bases of effects: one signed size, a size with a direction, and an oscillation."""
 
 from __future__ import annotations
 
@@ -11,12 +11,10 @@ import numpy as np
 from pipeline.arrays import Float
 from pipeline.physics.catalogue import effect
 from pipeline.physics.effect import CourseKind, Quantity
-from stages.diagnose.effects.base import Amplitude, EffectModel, Factored, ImagePoints, Product, Shape
+from stages.diagnose.effects.base import Amplitude, EffectModel, Shape
 
-# A drift is told by its growth in the first second, or, where its time constant is longer than this, in a
-# tenth of that: of .02 mm in 600 s, the first second has .00003. The recording lasts longer than a tenth: at
-# least about a sixth of the time constant, see `Drifting.shapes`.
-_SLOW_S = 60.0
+# Uncertainty of a frequency between two that are searched: the resolution of a recording of 20 s.
+FREQUENCY_STEP_HZ = 0.05
 _EITHER = re.compile(r"\[([^|]*)\|([^]]*)\]")
 
 
@@ -66,52 +64,6 @@ class Directed(Worded):
         }
 
 
-class Drifting(Worded, Product):
-    """A static effect that grows as 1 − exp(−t/t₀); the shape is t₀ in s."""
-
-    static: EffectModel
-    kind = CourseKind.EXPONENTIAL
-
-    def shapes(self, duration_s: float, frame_rate: float) -> tuple[Shape, ...]:
-        """Return time constants from the shortest, a step at the start, to the longest, nearly linear."""
-        parts = np.array([0.1, 0.2, 0.4, 0.8, 1.6, 3.2, 6.4])
-        return _within(effect(self.name).quantity("time_s"), duration_s * parts)
-
-    def shape_step(self, shape: Shape) -> float:
-        """Return a fraction of the time constant."""
-        return 0.3 * shape[0]
-
-    def course(self, shape: Shape, amplitude: Float) -> dict[str, float]:
-        """Return the time constant."""
-        return {"time_s": shape[0]}
-
-    def reached(self, time_s: Float, shape: Shape) -> Float:
-        """Return the fraction (M,) of the final size that is reached."""
-        return np.asarray(-np.expm1(-time_s / shape[0]))
-
-    def factored(self, points: ImagePoints, shape: Shape) -> Factored:
-        """Return the fraction of the final size that is reached, and the static law."""
-        return (self.reached(points.time_s, shape),), self.static, ()
-
-    def told(self, shape: Shape, amplitude: Float) -> dict[str, float | str]:
-        """Return the quantities, the growth in its `beginning`, and how long that lasts, in words.
-
-        For a drift slower than its recording the latter is well determined, while the final size is
-        extrapolated.
-        """
-        quantities = self.quantities(shape, amplitude)
-        final = abs(quantities[effect(self.name).quantities[0].name])
-        beginning_s, first = beginning(shape[0])
-        grown = final * float(self.reached(np.array([beginning_s]), shape)[0])
-        return {**quantities, "at_first": grown, "first": first}
-
-    def quantities(self, shape: Shape, amplitude: Float) -> dict[str, float]:
-        """Return the final size and the time constant."""
-        _, *following = self.static.quantities((), amplitude).items()
-        first = next(iter(self.static.quantities((), amplitude).values()))
-        return {effect(self.name).quantities[0].name: first, **dict(following), "time_s": shape[0]}
-
-
 class Periodic(Worded):
     """A directed effect at one frequency; the amplitudes are (x, y) of its sine, then of its cosine.
 
@@ -126,14 +78,12 @@ class Periodic(Worded):
         return {"frequency_hz": shape[0]}
 
     def shapes(self, duration_s: float, frame_rate: float) -> tuple[Shape, ...]:
-        """Return frequencies half a resolution cell apart, up to half the frame rate."""
-        step = 0.5 / duration_s
-        frequencies = np.arange(2 * step, frame_rate / 2 + step / 2, step)
-        return _within(effect(self.name).quantity("frequency_hz"), frequencies)
+        """Return the `frequencies` within the catalogue's range."""
+        return within(effect(self.name).quantity("frequency_hz"), frequencies(duration_s, frame_rate))
 
     def shape_step(self, shape: Shape) -> float:
-        """Return the step of the frequency: the resolution of a recording of this duration."""
-        return 0.05
+        """Return the step of the frequency."""
+        return FREQUENCY_STEP_HZ
 
     def quantities(self, shape: Shape, amplitude: Float) -> dict[str, float]:
         """Return the ellipse's semi-major axis, its direction, and the frequency."""
@@ -145,15 +95,13 @@ class Periodic(Worded):
         }
 
 
-def beginning(time_s: float) -> tuple[float, str]:
-    """Return for how long the growth of a drift with such a time constant is told, s, and that in words."""
-    if time_s <= _SLOW_S:
-        return 1.0, "second"
-    beginning_s = round(time_s / 10)
-    return float(beginning_s), f"{beginning_s} s"
+def frequencies(duration_s: float, frame_rate: float) -> Float:
+    """Return frequencies, Hz, half a resolution cell apart, up to half the frame rate."""
+    step = 0.5 / duration_s
+    return np.arange(2 * step, frame_rate / 2 + step / 2, step)
 
 
-def _within(quantity: Quantity, grid: Float) -> tuple[Shape, ...]:
+def within(quantity: Quantity, grid: Float) -> tuple[Shape, ...]:
     """Return the shapes of the grid within the catalogue's range."""
     return tuple((float(x),) for x in grid if quantity.low <= x <= quantity.high)
 

@@ -2,25 +2,23 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
 import numpy as np
 
 from pipeline.arrays import Float
-from pipeline.physics.effect import FixedTo
-from stages.diagnose.effects.base import Amplitude, EffectModel, Factored, ImagePoints, Product, Shape
-from stages.diagnose.effects.kinds import cosine, sine_and_cosine_at
+from pipeline.physics.effect import CourseKind, FixedTo
+from stages.diagnose.effects.base import Amplitude, EffectModel, ImagePoints, Shape
+from stages.diagnose.effects.courses import IN_TIME, InCourse, in_words
+from stages.diagnose.effects.kinds import cosine, frequencies
 
 _REFERENCE_MM = 50.0
 _HARMONICS = (0, 1, 2, 3, 4)
 _EXPONENTS = (0, 1, 2, 3)
+STEADY: Shape = ()
 # Reference values for the units of a pattern's size; any would do.
 _REFERENCE_S, _REFERENCE_MM_S = 10.0, 20.0
-# Shapes of a term: the coordinate that its size is proportional to.
-STEADY, WITH_TIME, WITH_SPEED, WITH_DISTANCE = (0.0,), (1.0,), (2.0,), (3.0,)
-_COURSES = ("", " t/10", " v/20", " s/50")
-_IN_TIME = ("static", "drift", "speed", "static")
 
 
 class Nameless(EffectModel):
@@ -44,16 +42,16 @@ class Nameless(EffectModel):
         """Return what the pattern is fixed to, its behaviour in time, and its harmonic."""
         return FixedTo.TIME, "static", self.harmonic
 
+    @property
+    def radial_exponent(self) -> float | None:
+        """Exponent of a line's displacement in the radius of the wall; None for other patterns."""
+        return None
+
     def equation(self, shape: Shape, amplitude: Float) -> str:
         """Return the formula with its numbers, each under its letter and with its unit."""
-        letters = {
-            "amplitude": ("a", f" {self.amplitudes[0].unit}"), "frequency_hz": ("f", " Hz"),
-            "direction_deg": ("ψ₀", "°"),
-        }  # fmt: skip
-        numbers = []
-        for name, value in self.quantities(shape, amplitude).items():
-            letter, unit = letters.get(name, (name, ""))
-            numbers.append(f"{letter} = {value:.3g}{unit}")
+        letters = {"amplitude": ("a", f" {self.amplitudes[0].unit}"), "direction_deg": ("ψ₀", "°")}
+        each = ((*letters[name], v) for name, v in self.quantities(shape, amplitude).items())
+        numbers = [f"{letter} = {value:.3g}{unit}" for letter, unit, value in each]
         return f"{self.formula(shape)}, {', '.join(numbers)}"
 
     def statement(self, shape: Shape, amplitude: Float) -> str:
@@ -75,55 +73,6 @@ def growth(points: ImagePoints, exponent: float) -> Float:
     return np.asarray((points.radius_mm / _REFERENCE_MM) ** exponent)
 
 
-@dataclass(frozen=True)
-class SwingTerm(Nameless, Product):
-    """One oscillating harmonic of the line with one power of the radius; amplitudes: sine, cosine."""
-
-    name: str
-    harmonic: int
-    exponent: int
-    amplitudes: tuple[Amplitude, ...]
-
-    def shapes(self, duration_s: float, frame_rate: float) -> tuple[Shape, ...]:
-        """Return frequencies half a resolution cell apart, up to half the frame rate."""
-        step = 0.5 / duration_s
-        return tuple((float(f),) for f in np.arange(2 * step, frame_rate / 2 + step / 2, step))
-
-    def shape_step(self, shape: Shape) -> float:
-        """Return the step of the frequency: the resolution of the recording's duration."""
-        return 0.05
-
-    def factored(self, points: ImagePoints, shape: Shape) -> Factored:
-        """Return sine and cosine, and the steady pattern."""
-        steady = _term(Moves.LINE, self.harmonic, self.exponent)
-        return sine_and_cosine_at(points.time_s, shape[0]), steady, STEADY
-
-    def quantities(self, shape: Shape, amplitude: Float) -> dict[str, float]:
-        """Return the amplitude and the frequency."""
-        return {"amplitude": float(np.linalg.norm(amplitude)), "frequency_hz": shape[0]}
-
-    def goes_with(self, shape: Shape) -> tuple[FixedTo, str, int | None]:
-        """Return the laser: the line moves relative to the fiducials, which the camera does not affect."""
-        return FixedTo.LASER, "periodic", self.harmonic
-
-    def formula(self, shape: Shape) -> str:
-        """Return the pattern as a formula."""
-        wave = f" cos {self.harmonic}(ψ − ψ₀)" if self.harmonic else ""
-        return f"δr = a (r/50)^{self.exponent}{wave} sin(2πft + φ)"
-
-
-def _swing(harmonic: int, exponent: int) -> SwingTerm:
-    parts = ("along x", "along y") if harmonic else ("size",)
-    amplitudes = tuple(
-        Amplitude(f"{wave} {part}", "mm", 0.05) for wave in ("sine", "cosine") for part in parts
-    )
-    return SwingTerm(f"generic_swing_{harmonic}_{exponent}", harmonic, exponent, amplitudes)
-
-
-# A sheet that moves along the axis, or rocks.
-SWINGS: tuple[SwingTerm, ...] = (_swing(0, 1), _swing(1, 2))
-
-
 class Moves(StrEnum):
     """What a generic term displaces: the line on the wall, images outward or around, or the wall itself."""
 
@@ -143,7 +92,7 @@ _FIXED_TO = {
 
 @dataclass(frozen=True)
 class GenericTerm(Nameless):
-    """One harmonic with one power of the radius (line) or of θ (image); the shape is its course."""
+    """One harmonic with one power of the radius (line), of θ (image), or of the distance (wall)."""
 
     name: str
     moves: Moves
@@ -151,58 +100,108 @@ class GenericTerm(Nameless):
     exponent: int
     amplitudes: tuple[Amplitude, ...]
 
-    def shapes(self, duration_s: float, frame_rate: float) -> tuple[Shape, ...]:
-        """Return constant, and linear in time."""
-        return ((0.0,), (1.0,))
-
-    def factored(self, points: ImagePoints, shape: Shape) -> Factored | None:
-        """Return the course and the steady pattern."""
-        return None if shape == STEADY else ((self._course(points, shape),), self, STEADY)
+    @property
+    def radial_exponent(self) -> float | None:
+        """See `Nameless.radial_exponent`."""
+        return float(self.exponent) if self.moves is Moves.LINE else None
 
     def wall_shift_mm(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
-        """Return a (r/50)^p cos m(ψ − ψ₀) on the line, or the wall's own a cos m(ψ_P − ψ₀), mm."""
+        """Return a (r/50)^p cos m(ψ − ψ₀) on the line, or the wall's own a (s/50)^p cos m(ψ_P − ψ₀), mm."""
         if self.moves is Moves.WALL:
-            parts = np.array([*amplitude, 0.0])[:2]
-            return self._course(points, shape) * cosine(points.azimuth_p_rad, parts, self.harmonic)
+            return _along(points, self.exponent) * self._wave(points.azimuth_p_rad, amplitude)
         if self.moves is not Moves.LINE or not points.on_line:
             return np.zeros(len(points.uv))
-        return np.asarray(growth(points, self.exponent) * self._pattern(points, shape, amplitude))
+        return np.asarray(growth(points, self.exponent) * self._wave(points.azimuth_rad, amplitude))
 
     def image_shift_px(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
         """Return a θ^p cos m(ψ − ψ₀) outward or around, px."""
         if self.moves in (Moves.LINE, Moves.WALL):
             return np.zeros((len(points.uv), 2))
         heading = points.outward if self.moves is Moves.OUTWARD else points.outward[:, ::-1] * [-1.0, 1.0]
-        size = points.theta**self.exponent * self._pattern(points, shape, amplitude)
+        size = points.theta**self.exponent * self._wave(points.azimuth_rad, amplitude)
         return np.asarray(size[:, None] * heading)
 
     def formula(self, shape: Shape) -> str:
         """Return the pattern as a formula."""
         wave = f" cos {self.harmonic}(ψ − ψ₀)" if self.harmonic else ""
-        course = _COURSES[int(shape[0])]
         if self.moves is Moves.WALL:
-            return f"wall: a cos {self.harmonic}(ψ_P − ψ₀){course}"
+            return f"wall: a cos {self.harmonic}(ψ_P − ψ₀){' s/50' * self.exponent}"
         if self.moves is Moves.LINE:
-            return f"δr = a (r/50)^{self.exponent}{wave}{course}"
-        return f"image {self.moves}: a θ^{self.exponent}{wave}{course}"
+            return f"δr = a (r/50)^{self.exponent}{wave}"
+        return f"image {self.moves}: a θ^{self.exponent}{wave}"
 
     def goes_with(self, shape: Shape) -> tuple[FixedTo, str, int | None]:
-        """Return what it displaces, or time where it grows with time."""
-        time = _IN_TIME[int(shape[0])]
-        return FixedTo.TIME if time == "drift" else _FIXED_TO[self.moves], time, self.harmonic
+        """Return what it displaces."""
+        return _FIXED_TO[self.moves], "static", self.harmonic
 
-    def _pattern(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
-        parts = np.array([*amplitude, 0.0])[:2]
-        return self._course(points, shape) * cosine(points.azimuth_rad, parts, self.harmonic)
+    def _wave(self, azimuth_rad: Float, amplitude: Float) -> Float:
+        return cosine(azimuth_rad, np.array([*amplitude, 0.0])[:2], self.harmonic)
 
-    def _course(self, points: ImagePoints, shape: Shape) -> Float:
-        if shape == WITH_TIME:
-            return points.time_s / _REFERENCE_S
-        if shape == WITH_SPEED:
-            return points.speed_mm_s / _REFERENCE_MM_S
-        if shape == WITH_DISTANCE and points.distance_mm is not None:
-            return points.distance_mm / _REFERENCE_MM
-        return np.full(len(points.uv), float(shape == STEADY))
+
+def _along(points: ImagePoints, exponent: int) -> Float:
+    """Return the power (M,) of the wall point's distance, 1 at 50 mm; 0 where the distance is unknown."""
+    if not exponent:
+        return np.ones(len(points.uv))
+    known = points.distance_mm
+    return np.zeros(len(points.uv)) if known is None else np.asarray((known / _REFERENCE_MM) ** exponent)
+
+
+@dataclass(frozen=True)
+class PatternInCourse(Nameless, InCourse):
+    """A steady pattern with a course, which may be that of an effect; the shape is the course's.
+
+    A slow change of the focal length that was not in the library was once named a cone of the sheet at .996:
+    the alternatives were patterns of the picture that are constant or grow evenly, and none that settles as
+    it did.
+
+    Attributes
+    ----------
+    static : Nameless
+    kind : CourseKind
+    like : EffectModel or None
+        The effect whose course it is.
+    """
+
+    static: Nameless
+    kind: CourseKind
+    like: EffectModel | None = None
+    name: str = field(init=False)
+    harmonic: int = field(init=False)
+    amplitudes: tuple[Amplitude, ...] = field(init=False)
+
+    def __post_init__(self) -> None:
+        waves = ("sine ", "cosine ") if self.kind is CourseKind.SINUSOID else ("",)
+        each = tuple(replace(a, name=wave + a.name) for wave in waves for a in self.static.amplitudes)
+        course = f" as {self.like.name}" if self.like is not None else f", {self.kind}"
+        object.__setattr__(self, "name", f"{self.static.name}{course}")
+        object.__setattr__(self, "harmonic", self.static.harmonic)
+        object.__setattr__(self, "amplitudes", each)
+
+    @property
+    def radial_exponent(self) -> float | None:
+        """See `Nameless.radial_exponent`."""
+        return self.static.radial_exponent
+
+    def shapes(self, duration_s: float, frame_rate: float) -> tuple[Shape, ...]:
+        """Return the `frequencies` of a swing."""
+        swings = self.kind is CourseKind.SINUSOID
+        return tuple((float(f),) for f in frequencies(duration_s, frame_rate)) if swings else ((),)
+
+    def goes_with(self, shape: Shape) -> tuple[FixedTo, str, int | None]:
+        """Return what the pattern is fixed to, or time where it drifts, with the behaviour of its course."""
+        time = IN_TIME[self.kind]
+        fixed_to, _, harmonic = self.static.goes_with(STEADY)
+        return FixedTo.TIME if time == "drift" else fixed_to, time, harmonic
+
+    def quantities(self, shape: Shape, amplitude: Float) -> dict[str, float]:
+        """Return the root sum of squares of all amplitudes; of a pattern with one wave its direction, too."""
+        if self.kind is CourseKind.SINUSOID:
+            return {"amplitude": float(np.linalg.norm(amplitude))}
+        return self.static.quantities(STEADY, amplitude)
+
+    def formula(self, shape: Shape) -> str:
+        """Return the pattern and the course as a formula."""
+        return f"({self.static.formula(STEADY)}) × ({in_words(self.kind, shape)})"
 
 
 @dataclass(frozen=True)
@@ -266,11 +265,20 @@ GENERIC: tuple[GenericTerm, ...] = tuple(
 
 
 def _vocabulary() -> tuple[tuple[Nameless, Shape], ...]:
-    courses = {Moves.LINE: (STEADY, WITH_TIME, WITH_SPEED), Moves.OUTWARD: (STEADY, WITH_TIME)}
-    moving = [(t, course) for t in GENERIC for course in courses.get(t.moves, (STEADY,))]
-    wall = [(_term(Moves.WALL, m, 0), course) for m in (1, 2, 3, 4) for course in (STEADY, WITH_DISTANCE)]
-    return (*moving, *wall, (RowTerm(), STEADY), (FractionTerm(), STEADY))
+    with_time, with_speed = (CourseKind.RAMP, (_REFERENCE_S,)), (CourseKind.SPEED, (_REFERENCE_MM_S,))
+    courses = {Moves.LINE: (with_time, with_speed), Moves.OUTWARD: (with_time,)}
+    out: list[tuple[Nameless, Shape]] = []
+    for term in GENERIC:
+        out.append((term, STEADY))
+        out += [(PatternInCourse(term, kind), shape) for kind, shape in courses.get(term.moves, ())]
+    out += [(_term(Moves.WALL, m, power), STEADY) for m in (1, 2, 3, 4) for power in (0, 1)]
+    return (*out, (RowTerm(), STEADY), (FractionTerm(), STEADY))
 
 
 # The patterns that empirical formulas are built from, in (r, ψ, t, s, speed, row).
 VOCABULARY: tuple[tuple[Nameless, Shape], ...] = _vocabulary()
+# A sheet that moves along the axis, or rocks.
+SWINGS: tuple[PatternInCourse, ...] = tuple(
+    PatternInCourse(_term(Moves.LINE, harmonic, exponent), CourseKind.SINUSOID)
+    for harmonic, exponent in ((0, 1), (1, 2))
+)

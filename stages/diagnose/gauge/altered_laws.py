@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from pipeline.arrays import Float
-from stages.diagnose.effects.base import Amplitude, EffectModel, ImagePoints, Shape
+from stages.diagnose.effects.base import Amplitude, EffectModel, ImagePoints, Shape, Share, SumOfLaws
 from stages.diagnose.gauge.run import Linearised, Term
 
 _POWERS = (1, 2)
@@ -21,7 +21,7 @@ _UNIT = np.sqrt(12) / np.pi
 
 
 @dataclass(frozen=True)
-class AlteredLaw(EffectModel):
+class AlteredLaw(SumOfLaws):
     """A law at a given size times an unknown change; it competes with a name and is never reported.
 
     Attributes
@@ -37,22 +37,9 @@ class AlteredLaw(EffectModel):
     own: Shape
     size: Float = field(compare=False)
 
-    def image_shift_px(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
-        """Return the law's shift times the change, px."""
-        change = self._change(points, amplitude)
-        return change[:, None] * self.law_of.image_shift_px(points, self.own, self.size)
-
-    def sheet_shift_mm(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
-        """Return the law's shift times the change, mm."""
-        return self._change(points, amplitude) * self.law_of.sheet_shift_mm(points, self.own, self.size)
-
-    def line_shift_px(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
-        """Return the law's shift times the change, px."""
-        return self._change(points, amplitude) * self.law_of.line_shift_px(points, self.own, self.size)
-
-    def wall_shift_mm(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
-        """Return the law's shift times the change, mm."""
-        return self._change(points, amplitude) * self.law_of.wall_shift_mm(points, self.own, self.size)
+    def shares(self, points: ImagePoints, shape: Shape, amplitude: Float) -> list[Share]:
+        """Return the law at its size times the change."""
+        return [(self._change(points, amplitude), self.law_of, self.own, self.size)]
 
     def quantities(self, shape: Shape, amplitude: Float) -> dict[str, float]:
         """Return nothing: it is never reported."""

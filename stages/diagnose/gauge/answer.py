@@ -10,8 +10,7 @@ import numpy as np
 from pipeline.physics.catalogue import effect
 from pipeline.physics.effect import CourseKind
 from stages.diagnose.agreement import TELLING
-from stages.diagnose.effects.courses import Coursed
-from stages.diagnose.effects.kinds import Drifting
+from stages.diagnose.effects.courses import Coursed, Drifting
 from stages.diagnose.gauge.confirm import Sized, course_of, quantities
 from stages.diagnose.gauge.examine import Examined
 from stages.diagnose.gauge.formula import ADEQUATE

@@ -17,7 +17,7 @@ from pipeline.physics.effect import Channel, CourseKind, FixedTo
 from stages.calibrate.gauge import MeasuredRun
 from stages.diagnose.effects.base import EffectModel
 from stages.diagnose.effects.courses import SEARCHED, with_courses
-from stages.diagnose.effects.nameless import GenericTerm, Moves
+from stages.diagnose.effects.nameless import Nameless
 from stages.diagnose.gauge.confirm import Sized, confirmations, sizes_of
 from stages.diagnose.gauge.feasible import ability, feasibility, not_told_apart
 from stages.diagnose.gauge.fit import fit
@@ -86,8 +86,8 @@ def _exponent(
 
 def _own_exponent(term: Term) -> float | None:
     """Return the law's own exponent."""
-    if isinstance(term.model, GenericTerm):
-        return float(term.model.exponent) if term.model.moves is Moves.LINE else None
+    if isinstance(term.model, Nameless):
+        return term.model.radial_exponent
     known = EFFECTS.get(term.model.law)
     return known.radial_exponent if known is not None else None
 

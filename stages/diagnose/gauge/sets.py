@@ -20,9 +20,8 @@ from pipeline.arrays import Float, Int
 from pipeline.physics.effect import CourseKind
 from stages.diagnose.effects.base import EffectModel, Shape
 from stages.diagnose.effects.courses import SEARCHED, Coursed
-from stages.diagnose.effects.free_profile import FREE_PROFILES
-from stages.diagnose.effects.nameless import VOCABULARY, Nameless
-from stages.diagnose.effects.pattern_in_course import PatternInCourse, patterns_in_course
+from stages.diagnose.effects.free_profile import FREE_PROFILES, patterns_in_course
+from stages.diagnose.effects.nameless import VOCABULARY, Nameless, PatternInCourse
 from stages.diagnose.gauge.fit import Fit
 from stages.diagnose.gauge.run import GaugeRun, Term, pattern_of
 from stages.diagnose.gauge.scan import Scored, span
@@ -107,7 +106,7 @@ def _one_prior_deviance(run: GaugeRun, model: EffectModel, shape: Shape, laws: i
     """Return −2 ln of the prior probability of an effect or pattern among its kind."""
     if (model, shape) in PATTERNS:
         return float(2 * np.log(len(PATTERNS)))
-    if isinstance(model, PatternInCourse):
+    if isinstance(model, PatternInCourse) and model.like is not None:
         # As likely beside the effect as a steady pattern is beside a steady effect.
         return _one_prior_deviance(run, model.like, shape, laws) + float(2 * np.log(len(PATTERNS) / laws))
     courses = len(SEARCHED) if isinstance(model, Coursed) else 1

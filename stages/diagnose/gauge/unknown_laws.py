@@ -23,8 +23,7 @@ import numpy as np
 from pipeline.physics.catalogue import effect
 from pipeline.physics.effect import FixedTo
 from stages.diagnose.effects.base import EffectModel
-from stages.diagnose.effects.courses import SEARCHED, Coursed
-from stages.diagnose.effects.kinds import Drifting
+from stages.diagnose.effects.courses import SEARCHED, Coursed, Drifting
 from stages.diagnose.gauge.altered_laws import other_course, other_growth
 from stages.diagnose.gauge.fit import evidence
 from stages.diagnose.gauge.hypotheses import Judged
