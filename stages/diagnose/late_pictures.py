@@ -105,42 +105,30 @@ def how_late(
 ) -> tuple[dict[str, Value], str]:
     """Return an effect's size, for an exposure with the delay of its pictures, and a sentence to add.
 
-    ``own_delay`` says whether the encoder has a certain delay of its own, with half of the exposure
-    subtracted.
-    """
-    if own_delay:
-        return with_half_exposure(size), ""
-    return with_shown_delay(size, recordings), later_than_exposed(size, recordings)
-
-
-def with_shown_delay(size: dict[str, Value], recordings: Iterable[Seen | None]) -> dict[str, Value]:
-    """Return an effect's size; for an exposure, with the delay of its pictures that an encoder shows.
-
     Stamps may refer to the exposure's middle, so that half of it need not delay a picture relative to its
     stamp. Of two recordings, the first that can distinguish half of the exposure from zero is used; where
     none can, the delay is unknown. Any further delay of the encoder may or may not be due to the exposure: it
-    is included in σ.
+    is included in σ. With ``own_delay`` the encoder has a certain delay of its own, from which half of the
+    exposure was subtracted.
     """
-    if "exposure_s" not in size or (shown := _shown(size["exposure_s"], recordings)) is None:
-        return size
-    half = _half(size["exposure_s"])
+    if "exposure_s" not in size:
+        return size, ""
+    exposure = size["exposure_s"]
+    half = Value(exposure.value / 2, exposure.sd / 2)
+    if own_delay:
+        return size | {"late_s": Value(half.value, float(np.hypot(half.sd, half.value * _BY_STAMPS)))}, ""
+    shown = _shown(exposure, recordings)
+    if shown is None:
+        return size, ""
     if not is_found(shown.p_value):
-        return size | {"late_s": Value(0.0, shown.size_sigma)}
-    value = min(max(shown.value, 0.0), half.value)
-    sd = max(shown.size_sigma, half.sd * (value == half.value), shown.value - half.value)
-    return size | {"late_s": Value(value, sd)}
-
-
-def later_than_exposed(size: dict[str, Value], recordings: Iterable[Seen | None]) -> str:
-    """Return a sentence on an encoder later than half of an exposure explains; else an empty string."""
-    if "exposure_s" not in size or (shown := _shown(size["exposure_s"], recordings)) is None:
-        return ""
-    half = _half(size["exposure_s"])
-    beyond, sigma = shown.value - half.value, float(np.hypot(shown.size_sigma, half.sd))
-    if not is_found(shown.p_value) or beyond <= _SURE * sigma:
-        return ""
-    size_ms = f"{1e3 * beyond:.1f} ms (± {1e3 * sigma:.1f})"
-    return f" The encoder is later than the exposure accounts for, by {size_ms}."
+        return size | {"late_s": Value(0.0, shown.size_sigma)}, ""
+    value, beyond = min(max(shown.value, 0.0), half.value), shown.value - half.value
+    late = Value(value, max(shown.size_sigma, half.sd * (value == half.value), beyond))
+    sigma = float(np.hypot(shown.size_sigma, half.sd))
+    if beyond <= _SURE * sigma:
+        return size | {"late_s": late}, ""
+    by = f"{1e3 * beyond:.1f} ms (± {1e3 * sigma:.1f})"
+    return size | {"late_s": late}, f" The encoder is later than the exposure accounts for, by {by}."
 
 
 def _shown(exposure: Value, recordings: Iterable[Seen | None]) -> TravelEstimate | None:
@@ -149,10 +137,6 @@ def _shown(exposure: Value, recordings: Iterable[Seen | None]) -> TravelEstimate
     each = [e for t in travels if (e := t.estimate(_DELAY)) is not None and np.isfinite(e.size_sigma)]
     telling = (e for e in each if is_found(e.p_value) or _SURE * e.size_sigma < exposure.value / 2)
     return next(telling, min(each, key=lambda e: e.size_sigma, default=None))
-
-
-def _half(exposure: Value) -> Value:
-    return Value(exposure.value / 2, exposure.sd / 2)
 
 
 def whole_size(late: TravelEstimate) -> Value:
@@ -166,14 +150,6 @@ def whole_size(late: TravelEstimate) -> Value:
 def own_size(late: TravelEstimate) -> Value:
     """Return a size with a σ that includes the uncertain reference of time stamps in what was subtracted."""
     return Value(late.value, float(np.hypot(late.size_sigma, late.taken_off * _BY_STAMPS)))
-
-
-def with_half_exposure(size: dict[str, Value]) -> dict[str, Value]:
-    """Return an effect's size; for an exposure, with its half, subtracted from the encoder's own delay."""
-    if "exposure_s" not in size:
-        return size
-    half = size["exposure_s"].value / 2
-    return size | {"late_s": Value(half, float(np.hypot(size["exposure_s"].sd / 2, half * _BY_STAMPS)))}
 
 
 def _less_half(late: TravelEstimate, longer: Size, fit: TravelFit | None) -> TravelEstimate:

@@ -15,7 +15,7 @@ from pipeline.recording.base import Encoder, Recording
 from stages.diagnose.agreement import Agreement
 from stages.diagnose.channels import Seen
 from stages.diagnose.correct import with_true_readings
-from stages.diagnose.late_pictures import Exposure, with_shown_delay
+from stages.diagnose.late_pictures import Exposure, how_late
 from stages.diagnose.profile.evidence import ProfileEvidence
 from stages.diagnose.profile.finding import Size, finding
 from stages.diagnose.result import Diagnosis, Value, Verdict
@@ -213,9 +213,9 @@ def test_without_an_encoder_nothing_is_told_of_how_late_an_exposure_makes_pictur
 ) -> None:
     """It had been 0 ± .5 ms, "as the encoder shows"."""
     size = {"exposure_s": Value(0.016, 0.001)}
-    assert with_shown_delay(size, (None, None)) == size
+    assert how_late(size, (None, None), own_delay=False) == (size, "")
     unknown = late("gauge", thirty_a_second, 0.0, None, sigma_s=np.inf)
-    assert with_shown_delay(size, (unknown,)) == size
+    assert how_late(size, (unknown,), own_delay=False) == (size, "")
     found = answer(real_probe, None, late("gauge", thirty_a_second, None, (16.0, 1.0)))
     assert "late_s" not in found.effects[0].parameters
 
@@ -224,15 +224,17 @@ def test_how_late_pictures_are_is_as_unsure_as_the_encoder_tells_it(thirty_a_sec
     """An encoder known to 10 ms had shown 0 ± .5 ms, and hidden the 8 ± 1 ms of the other recording."""
     size = {"exposure_s": Value(0.020, 0.001)}
     unsure = late("field", thirty_a_second, 0.004, None, sigma_s=0.010)
-    shown = with_shown_delay(size, (unsure, None))["late_s"]
+    shown = how_late(size, (unsure, None), own_delay=False)[0]["late_s"]
     assert (shown.value, shown.sd) == pytest.approx((0.0, np.hypot(0.010, 0.001)))
     sure = late("gauge", thirty_a_second, 0.008, None)
     # Later than half of the exposure, pictures are so late by no more than that: as unsure as either.
     for exposure_sd, sd in ((0.001, np.hypot(0.0002, 0.001)), (0.004, 0.002)):
-        shown = with_shown_delay({"exposure_s": Value(0.015, exposure_sd)}, (sure,))["late_s"]
+        size = {"exposure_s": Value(0.015, exposure_sd)}
+        shown = how_late(size, (sure,), own_delay=False)[0]["late_s"]
         assert (shown.value, shown.sd) == pytest.approx((0.0075, sd))
+    size = {"exposure_s": Value(0.020, 0.001)}
     for both in ((unsure, sure), (sure, unsure)):
-        shown = with_shown_delay(size, both)["late_s"]
+        shown = how_late(size, both, own_delay=False)[0]["late_s"]
         assert (shown.value, shown.sd) == pytest.approx((0.008, np.hypot(0.0002, 0.001)))
 
 
