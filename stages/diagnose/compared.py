@@ -16,8 +16,8 @@ from stages.diagnose.effects.base import EffectModel, Shape
 from stages.diagnose.effects.courses import of_own_clock
 from stages.diagnose.field.run import FieldRun
 from stages.diagnose.gauge.examine import Examined
+from stages.diagnose.gauge.run import Term
 from stages.diagnose.residual import (
-    GaugeResiduals,
     RingResidual,
     azimuths_rad,
     rings_against_fiducials,
@@ -69,14 +69,16 @@ def compared(
     """
     try:
         of_gauge = _of_gauge(gauge, examined) if gauge is not None and examined is not None else None
-        linear = _beyond_probe(examined, correction)
-        if field is None:
-            return _gauge_alone(of_gauge, examined) if of_gauge is not None else None
         terms = examined.best.fit.terms if examined is not None and examined.best is not None else ()
-        if of_gauge is not None and any(of_own_clock(t.model) for t in terms):
-            # An event of the gauge run need not happen in the inspection: the held-out rings of the gauge run
-            # itself are used.
-            return _gauge_alone(of_gauge, examined)
+        # An event of the gauge run need not happen in the inspection: the held-out rings of the gauge run
+        # itself are used.
+        alone = field is None or any(of_own_clock(t.model) for t in terms)
+        if of_gauge is not None and examined is not None and alone:
+            # The quality of fit comes from parts of the run held out in turn.
+            return Compared(*of_gauge, examined.quality)
+        if field is None:
+            return None
+        linear = _beyond_probe(terms, correction)
         return _in_field(field, corrected or field, linear, of_gauge, encoder_share)
     except np.linalg.LinAlgError:
         return None
@@ -118,35 +120,28 @@ def _of_readings(fit: TravelFit) -> FitQuality:
     )
 
 
-def _of_gauge(gauge: Recording, examined: Examined) -> GaugeResiduals:
+def _of_gauge(gauge: Recording, examined: Examined) -> tuple[RingResidual, RingResidual]:
     searched = examined.searched
     terms = examined.best.fit.terms if examined.best is not None else ()
     return rings_against_fiducials(searched.run, searched.nothing.state, terms, gauge.frames.frame)
 
 
-def _gauge_alone(of: GaugeResiduals, examined: Examined | None) -> Compared:
-    """Return the gauge run's residuals; the quality of fit comes from parts of the run held out in turn."""
-    return Compared(of.before, of.after, examined.quality if examined is not None else None)
-
-
 def _in_field(
-    field: FieldRun, corrected: FieldRun, linear: Linear, of: GaugeResiduals | None, encoder_share: float
-) -> Compared:
+    field: FieldRun, corrected: FieldRun, linear: Linear, of_gauge: tuple[RingResidual, RingResidual] | None,
+    encoder_share: float,
+) -> Compared:  # fmt: skip
     """Return the inspection's residuals; all of it is held out, since the correction did not use it."""
     before = rings_against_texture(field)
     after = rings_against_texture(corrected, linear, encoder_share)
-    every = (of.before.rms_px, of.after.rms_px) if of is not None else (before.rms_px, after.rms_px)
-    return Compared(before, after, FitQuality("px", *every, before.rms_px, after.rms_px, after.floor_px))
+    learned = of_gauge or (before, after)
+    every = [r.rms_px for r in (*learned, before, after)]
+    return Compared(before, after, FitQuality("px", *every, after.floor_px))
 
 
-def _beyond_probe(examined: Examined | None, correction: Correction | None) -> Linear:
+def _beyond_probe(terms: Sequence[Term], correction: Correction | None) -> Linear:
     """Return the effects found that a probe file cannot express."""
-    best = examined.best if examined is not None else None
-    if best is None or correction is None:
-        return ()
-    return tuple(
-        (t.model, t.shape, t.amplitude) for t in best.fit.terms if t.model.name in correction.inexpressible
-    )
+    beyond = correction.inexpressible if correction is not None else ()
+    return tuple((t.model, t.shape, t.amplitude) for t in terms if t.model.name in beyond)
 
 
 @dataclass(frozen=True)

@@ -119,18 +119,10 @@ def _mean(row: Int, column: Int, values: Float, rows: int) -> Float:
     return np.where(count > 0, total / np.maximum(count, 1), np.nan)
 
 
-@dataclass(frozen=True)
-class GaugeResiduals:
-    """Residuals without and with the effects."""
-
-    before: RingResidual
-    after: RingResidual
-
-
 def rings_against_fiducials(
     run: GaugeRun, start: Unknowns, terms: Sequence[Term], frames: Int
-) -> GaugeResiduals:
-    """Return the rings' residuals with poses from fiducials and encoder.
+) -> tuple[RingResidual, RingResidual]:
+    """Return the rings' residuals without and with effects, with poses from fiducials and encoder.
 
     Parameters
     ----------
@@ -145,7 +137,7 @@ def rings_against_fiducials(
     relaxed = replace(run, ring_weight=_GAUGE_RELAXED * run.ring_weight)
     before = _gauge_residual(run, fit(relaxed, start, ()), frames)
     after = _gauge_residual(run, fit(relaxed, start, terms), frames) if terms else before
-    return GaugeResiduals(before, after)
+    return before, after
 
 
 def _gauge_residual(run: GaugeRun, found: Fit, frames: Int) -> RingResidual:

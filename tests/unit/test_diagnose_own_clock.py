@@ -34,7 +34,7 @@ def test_what_goes_with_the_motion_is_not(kind):
 @pytest.mark.parametrize("model", SAME_DRIFT)
 def test_how_well_a_drift_fits_is_told_by_its_own_gauge_run(model, monkeypatch):
     """The inspection need not drift again: with the gauge's drift taken out, its rings would fit worse."""
-    own = SimpleNamespace(before="gauge before", after="gauge after")
+    own = ("gauge before", "gauge after")
     monkeypatch.setattr(module, "rings_against_fiducials", lambda *args: own)
     monkeypatch.setattr(module, "_in_field", lambda *args: pytest.fail("asked of the inspection"))
     terms = (Term(model, (3.0,), np.array([0.2])),)

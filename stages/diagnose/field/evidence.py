@@ -39,77 +39,48 @@ _LEAST_ROLL_RAD = np.radians(5.0)
 
 def shortcomings_of(run: FieldRun) -> tuple[str, ...]:
     """Return sentences on what this inspection cannot show."""
-    return (*_diameter(run), *_length(run), *_texture(run), *_sweep(run), *_one_bore())
-
-
-def _diameter(run: FieldRun) -> tuple[str, ...]:
     nominal, found = run.recording.pipe.nominal_diameter_mm, 2 * float(run.state.globals[0])
-    if abs(found / nominal - 1) < _DIAMETER_SHARE:
-        return ()
-    return (
-        f"The rings show a pipe of {found:.1f} mm, not of {nominal:.1f} mm as stated: the stated diameter, "
-        "the baseline or the lens is wrong; an inspection alone cannot tell which.",
+    lost, T = run.measured.tracks.poses.lost[1:], run.trajectory.T_pc
+    lost_share = float(np.mean(lost)) if len(lost) else 1.0
+    across = float(np.sqrt(np.mean(np.var(T[:, :2, 3], axis=0))))
+    roll = float(np.ptp(np.unwrap(np.arctan2(T[:, 1, 0], T[:, 0, 0]))))
+    told = (
+        (abs(found / nominal - 1) >= _DIAMETER_SHARE,
+         f"The rings show a pipe of {found:.1f} mm, not of {nominal:.1f} mm as stated: the stated diameter, "
+         "the baseline or the lens is wrong; an inspection alone cannot tell which."),
+        (_lit(run) < _FEWEST_LIT,
+         f"Only {_lit(run)} pictures show the lit wall, where {_FEWEST_LIT} are needed to follow the probe: "
+         "drift and relief of the wall look like errors of the instrument."),
+        (_lit(run) >= _FEWEST_LIT and not travels(run),
+         f"The probe travels only {_way_mm(run):.0f} mm: relief of the wall looks like errors of the "
+         "instrument, and a drift of the instrument like the pipe's own shape."),
+        (lost_share >= _LOST_SHARE,
+         f"In {100 * lost_share:.0f} % of the lit frames there is too little texture: poses rest on the "
+         "rings there and follow what a tilted or decentred sheet does to these, so that it hardly shows."),
+        (across < _LEAST_OFFSET_MM,
+         f"The probe moves across the pipe by only {across:.2f} mm (1 σ): a shifted image looks nearly "
+         "like a tilted or decentred sheet."),
+        (roll < _LEAST_ROLL_RAD,
+         f"The probe rolls by only {np.degrees(roll):.1f}°: an error with two waves around "
+         "the ring looks like an oval pipe."),
+        (True,
+         "In one pipe of unknown diameter, errors of cone, focal length, pupil and windows look alike, and "
+         "an error of the baseline shows only against encoder and texture."),
     )  # fmt: skip
+    return tuple(sentence for holds, sentence in told if holds)
 
 
 def travels(run: FieldRun) -> bool:
-    """Return whether the probe travels far enough for an agreement to be meaningful."""
-    return not _length(run)
+    """Return whether the probe is followed far enough for an agreement to be meaningful."""
+    return _lit(run) >= _FEWEST_LIT and _way_mm(run) > _SHORTEST_MM
+
+
+def _lit(run: FieldRun) -> int:
+    return len(run.measured.tracks.poses.frames)
 
 
 def _way_mm(run: FieldRun) -> float:
     return float(np.abs(np.diff(run.trajectory.T_pc[:, 2, 3])).sum())
-
-
-def _length(run: FieldRun) -> tuple[str, ...]:
-    way, lit = _way_mm(run), len(run.measured.tracks.poses.frames)
-    if lit < _FEWEST_LIT:
-        return (
-            f"Only {lit} pictures show the lit wall, where {_FEWEST_LIT} are needed to follow the probe: "
-            "drift and relief of the wall look like errors of the instrument.",
-        )  # fmt: skip
-    if way > _SHORTEST_MM:
-        return ()
-    return (
-        f"The probe travels only {way:.0f} mm: relief of the wall looks like errors of the "
-        "instrument, and a drift of the instrument like the pipe's own shape.",
-    )  # fmt: skip
-
-
-def _texture(run: FieldRun) -> tuple[str, ...]:
-    is_lost = run.measured.tracks.poses.lost[1:]
-    lost = float(np.mean(is_lost)) if len(is_lost) else 1.0
-    if lost < _LOST_SHARE:
-        return ()
-    return (
-        f"In {100 * lost:.0f} % of the lit frames there is too little texture: poses rest on the rings there "
-        "and follow what a tilted or decentred sheet does to these, so that it hardly shows.",
-    )  # fmt: skip
-
-
-def _sweep(run: FieldRun) -> tuple[str, ...]:
-    out = []
-    T = run.trajectory.T_pc
-    across = float(np.sqrt(np.mean(np.var(T[:, :2, 3], axis=0))))
-    if across < _LEAST_OFFSET_MM:
-        out.append(
-            f"The probe moves across the pipe by only {across:.2f} mm (1 σ): a shifted image looks nearly "
-            "like a tilted or decentred sheet."
-        )
-    roll = np.unwrap(np.arctan2(T[:, 1, 0], T[:, 0, 0]))
-    if float(np.ptp(roll)) < _LEAST_ROLL_RAD:
-        out.append(
-            f"The probe rolls by only {np.degrees(np.ptp(roll)):.1f}°: an error with two waves around "
-            "the ring looks like an oval pipe."
-        )
-    return tuple(out)
-
-
-def _one_bore() -> tuple[str, ...]:
-    return (
-        "In one pipe of unknown diameter, errors of cone, focal length, pupil and windows look alike, and an "
-        "error of the baseline shows only against encoder and texture.",
-    )
 
 
 @dataclass(frozen=True)
