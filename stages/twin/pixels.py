@@ -8,13 +8,17 @@ import cv2
 import numpy as np
 
 from pipeline.adjustment.robust import robust_spread
-from pipeline.arrays import Bool, Byte, Int
+from pipeline.arrays import Bool, Byte, Float, Int
 from pipeline.artefacts.twin import Look, Mismatch, NamedFigure
 
 _LEAST_GREY, _AROUND_PX, _MOST_PIXELS, _FEWEST_FRAMES = 12, 5, 3, 6
 """Grey levels by which a pixel must differ from the median of five by five around it, in every frame: wall
 moves and noise changes. Most adjacent pixels of a defect; more are dirt, a scratch or text. Fewest lit
 frames. Chosen."""
+_BROAD_PX, _SPREAD_PIXELS = 15, 9
+"""Side of the surroundings, px, beside which a defect's own pixels are counted: more than a scratch is wide.
+Most pixels about a defect that differ by half as much as it does: colour filters and codecs spread one pixel
+over three by three."""
 _BEYOND = 6.0
 """By how many spreads of the pixels' constant offsets a defective one must stand out: of normal offsets,
 which are no defect, one pixel in 10⁹ does."""
@@ -26,14 +30,18 @@ def defective_pixels(images: Sequence[Byte], lit: Sequence[bool], seen: Bool) ->
         return ()
     most = np.iinfo(np.int16).max
     more, less = (np.full(seen.shape, most, np.int16) for _ in range(2))
-    total = np.zeros(seen.shape, np.int32)
+    total, sums = np.zeros(seen.shape, np.int32), np.zeros((2, *seen.shape), np.int32)
     for image, shows_wall in zip(images, lit, strict=True):
         beyond = image.astype(np.int16) - np.asarray(cv2.medianBlur(image, _AROUND_PX), np.int16)
         total += beyond
+        sums += np.stack([image, image * np.uint8(shows_wall)])
         more = np.minimum(more, beyond)
         less = np.minimum(less, -beyond) if shows_wall else less
     kept = robust_spread(total[seen] / len(images)) if seen.any() else 0.0
-    hot, dead = (_single((a >= max(_LEAST_GREY, _BEYOND * kept)) & seen) for a in (more, less))
+    hot, dead = (
+        _alone(_single((a >= max(_LEAST_GREY, _BEYOND * kept)) & seen), way * mean)
+        for a, way, mean in ((more, 1, sums[0] / len(images)), (less, -1, sums[1] / sum(lit)))
+    )
     both = np.concatenate([hot, dead])
     if not len(both):
         return ()
@@ -50,3 +58,21 @@ def _single(differs: Bool) -> Int:
     count, _, stats, centre = cv2.connectedComponentsWithStats(differs.astype(np.uint8))
     small = [k for k in range(1, count) if stats[k, cv2.CC_STAT_AREA] <= _MOST_PIXELS]
     return np.asarray(np.round(centre[small])[:, ::-1], int).reshape(-1, 2)
+
+
+def _alone(places: Int, mean: Float) -> Int:
+    """Return the places (N, 2) about which only a few pixels of a mean picture (H, W) are as bright.
+
+    Parts of a scratch or of a burnt-in line may differ from their narrow surroundings by as much as a pixel.
+    """
+    level = mean.astype(np.float32)
+    reach = _BROAD_PX // 2
+    kept = []
+    for row, column in places:
+        corner = max(row - reach, 0), max(column - reach, 0)
+        near = level[corner[0] : row + reach + 1, corner[1] : column + reach + 1]
+        own = near[row - corner[0], column - corner[1]] - np.median(near)
+        label = cv2.connectedComponents((near - np.median(near) > own / 2).astype(np.uint8))[1]
+        group = label == label[row - corner[0], column - corner[1]]
+        kept.append(own > 0 and group.sum() <= _SPREAD_PIXELS)
+    return places[np.array(kept, bool)]

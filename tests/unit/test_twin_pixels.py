@@ -2,6 +2,7 @@
 
 import cv2
 import numpy as np
+import pytest
 
 from stages.twin.pixels import defective_pixels
 
@@ -45,3 +46,16 @@ def test_the_tail_of_a_dark_pattern_is_no_defect_and_a_hot_pixel_in_it_is():
     assert defective_pixels(*_frames(pattern=5.0)) == ()
     (found,) = defective_pixels(*_frames([(20, 30)], pattern=5.0))
     assert found.statement.startswith("1 single pixels are too bright in all frames, 0 too dark")
+
+
+@pytest.mark.parametrize("azimuth_deg", [4, 20, 88, 120])
+def test_a_thin_scratch_on_the_window_is_no_row_of_dead_pixels(azimuth_deg):
+    """A scratch as narrow as a defect differs from five pixels about it in some places only: single ones."""
+    v, u = np.mgrid[0 : SHAPE[0], 0 : SHAPE[1]]
+    along = np.radians(azimuth_deg)
+    across = (u - 80) * np.sin(along) - (v - 60) * np.cos(along)
+    images, lit, seen = _frames(dead=[(30, 20)])
+    clear = 1 - 0.5 * np.exp(-0.5 * (across / 0.8) ** 2)
+    images = [np.clip(16 + (i - 16.0) * clear, 0, 255).astype(np.uint8) for i in images]
+    (found,) = defective_pixels(images, lit, seen)
+    assert found.statement.startswith("0 single pixels are too bright in all frames, 1 too dark")
