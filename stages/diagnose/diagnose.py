@@ -188,46 +188,32 @@ def diagnosis_stages(with_field: bool, with_gauge: bool) -> tuple[Stage, ...]:
     return (*of_field, *of_gauge, *of_both, DIAGNOSIS)
 
 
-@dataclass(frozen=True)
-class SheetByRings:
-    """The laser sheet as the rings of a gauge run determine it.
+def sheet_by_rings(gauge: Seen | None, correction: Correction | None, probe: Probe) -> Part | None:
+    """Return tilt along x and y and cone of the sheet, deg, true minus stated, from a gauge run's rings.
 
-    Attributes
-    ----------
-    value : (3,)
-        Tilt along x, along y, and cone, deg, true minus stated.
-    covariance : (3, 3)
+    None where they leave open what displaced them.
     """
-
-    value: Float
-    covariance: Float
-
-
-def sheet_by_rings(gauge: Seen | None, correction: Correction | None, probe: Probe) -> SheetByRings | None:
-    """Return the sheet from a gauge run's rings; None where they leave open what displaced them."""
     if gauge is None or gauge.geometry is None or correction is None:
         return None
     if verdict_of(gauge.geometry) not in (Verdict.CONSISTENT, Verdict.NAMED):
         return None
     at = [probe.parameter_names.index(name) for name in _SHEET]
     moved = np.degrees(correction.probe.parameters[at] - probe.parameters[at])
-    return SheetByRings(moved, np.degrees(np.degrees(correction.probe.covariance[np.ix_(at, at)])))
+    covariance = np.degrees(np.degrees(correction.probe.covariance[np.ix_(at, at)]))
+    return Part("rings of the gauge", _words(moved), moved, covariance)
 
 
-def against_rings(found: Finding, sheet: SheetByRings) -> Agreement | None:
+def against_rings(found: Finding, sheet: Part) -> Agreement | None:
     """Return whether the sheet implied by the place of a second line agrees with that of the rings.
 
     None where either determines the sheet too poorly.
     """
     value = np.array([size.value for size in found.confirms])
     covariance = np.diag([size.sigma**2 for size in found.confirms])
-    return agreement(
-        Part("rings of the gauge", _words(sheet.value), sheet.value, sheet.covariance),
-        Part("place of the second line", _words(value), value, covariance),
-    )
+    return agreement(sheet, Part("place of the second line", _words(value), value, covariance))
 
 
-def compared_with_rings(seen: Seen, sheet: SheetByRings) -> Seen:
+def compared_with_rings(seen: Seen, sheet: Part) -> Seen:
     """Return a recording's evidence with its second line confirmed by the rings, or withdrawn.
 
     A faint line whose place implies a sheet that the rings exclude is not light bounced across the bore.

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.stats import binned_statistic_2d
 
 from pipeline.arrays import Bool, Float, Int
 from pipeline.recording.base import Illumination
@@ -86,15 +87,13 @@ class RingResidual:
         """Return the mean residual, mm, over (F, `AZIMUTHS`) frames and azimuth in C; NaN where none is."""
         inside = self.usable & np.isin(self.frame, frames)
         row = np.searchsorted(frames, self.frame[inside])
-        column = _column(self.azimuth_c_rad[inside])
-        return _mean(row, column, self.residual_mm[inside], len(frames))
+        return _mean(row, self.azimuth_c_rad[inside], self.residual_mm[inside], len(frames))
 
     def over_wall(self, distance_mm: Float) -> Float:
         """Return the mean residual, mm, over (S, `AZIMUTHS`) distance and azimuth in P; NaN where none is."""
         row = np.round((self.distance_mm - distance_mm[0]) / WALL_STEP_MM).astype(np.int64)
         inside = self.usable & (row >= 0) & (row < len(distance_mm))
-        column = _column(self.azimuth_p_rad[inside])
-        return _mean(row[inside], column, self.residual_mm[inside], len(distance_mm))
+        return _mean(row[inside], self.azimuth_p_rad[inside], self.residual_mm[inside], len(distance_mm))
 
 
 def azimuths_rad() -> Float:
@@ -108,15 +107,11 @@ def wall_distances_mm(residual: RingResidual) -> Float:
     return np.arange(np.floor(low), high + WALL_STEP_MM, WALL_STEP_MM)
 
 
-def _column(azimuth_rad: Float) -> Int:
-    return np.asarray(np.floor((azimuth_rad + np.pi) / (2 * np.pi) * AZIMUTHS).astype(np.int64) % AZIMUTHS)
-
-
-def _mean(row: Int, column: Int, values: Float, rows: int) -> Float:
-    total, count = np.zeros((rows, AZIMUTHS)), np.zeros((rows, AZIMUTHS))
-    np.add.at(total, (row, column), values)
-    np.add.at(count, (row, column), 1)
-    return np.where(count > 0, total / np.maximum(count, 1), np.nan)
+def _mean(row: Int, azimuth_rad: Float, values: Float, rows: int) -> Float:
+    """Return the means (``rows``, `AZIMUTHS`) of values (M,); NaN where there are none."""
+    inside = (-0.5, rows - 0.5), (-np.pi, np.pi)
+    bins = [rows, AZIMUTHS]
+    return np.asarray(binned_statistic_2d(row, azimuth_rad, values, "mean", bins, inside).statistic)
 
 
 def rings_against_fiducials(

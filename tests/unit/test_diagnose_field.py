@@ -16,7 +16,8 @@ from stages.diagnose.effects.courses import Coursed
 from stages.diagnose.effects.library import LIBRARY
 from stages.diagnose.field import answer
 from stages.diagnose.field import unexplained as left
-from stages.diagnose.field.against_gauge import _same_step, met_in_field, not_refuted
+from stages.diagnose.field.against_gauge import _met as met_of
+from stages.diagnose.field.against_gauge import met_in_field, not_refuted
 from stages.diagnose.field.answer import (
     _alone,
     _knowing_encoder,
@@ -371,7 +372,7 @@ def field_with_step(at_s, size):
 def test_a_step_of_the_gauge_run_is_borne_out_by_the_same_step_at_another_time_and_by_no_other(size, told):
     tilt = Coursed(LIBRARY["laser_tilt"], (), CourseKind.STEP)
     term = Term(tilt, (2.6,), np.array([0.3, 0.0]))
-    found = _same_step(term, 0.01**2 * np.eye(2), field_with_step(7.1, size), NOTHING_STATED)
+    found = met_of(term, 0.01**2 * np.eye(2), field_with_step(7.1, size), NOTHING_STATED)
     assert (found is not None and found.agrees) is told
     if found is not None:
         assert "at 7." in found.measured

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from pipeline.adjustment.robust import robust_spreads
-from stages.diagnose.diagnose import SheetByRings, against_rings
+from stages.diagnose.agreement import Part
+from stages.diagnose.diagnose import against_rings
 from stages.diagnose.profile.cells import Cells
 from stages.diagnose.profile.finding import FOUND_P, FOUND_Z, Size, finding
 from stages.diagnose.profile.ghost import bounced
@@ -80,7 +81,7 @@ def ghost(tilt_x: float, tilt_y: float, cone: float):
 
 def rings(tilt_x: float, tilt_y: float, cone: float):
     """What the rings of a gauge say of the sheet: true minus stated, deg, with 0.01° each."""
-    return SheetByRings(np.array([tilt_x, tilt_y, cone]), 1e-4 * np.eye(3))
+    return Part("rings", "", np.array([tilt_x, tilt_y, cone]), 1e-4 * np.eye(3))
 
 
 def test_rings_bear_a_second_line_out():

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
+from scipy.stats import binomtest
 
 from pipeline.physics.catalogue import EFFECTS
 from stages.diagnose.drill.answer import Answer, Concealed, NamedEffect
@@ -125,10 +126,8 @@ class Rate:
         """95 % interval."""
         if not self.of:
             return 0.0, 1.0
-        z2 = _95**2 / self.of
-        middle = (self.share + z2 / 2) / (1 + z2)
-        half = _95 * np.sqrt(self.share * (1 - self.share) / self.of + z2 / (4 * self.of)) / (1 + z2)
-        return float(max(middle - half, 0.0)), float(min(middle + half, 1.0))
+        both = binomtest(self.count, self.of).proportion_ci(method="wilson")
+        return float(both.low), float(both.high)
 
 
 def rate(hits: Iterable[bool]) -> Rate:

@@ -18,7 +18,7 @@ from stages.diagnose.gauge.examine import Examined
 from stages.diagnose.gauge.fit import evidence
 from stages.diagnose.gauge.run import Term
 from stages.diagnose.gauge.scan import Scored
-from stages.diagnose.inference import Evidence, Score, Stated, places_of, score
+from stages.diagnose.inference import Score, Stated, places_of, score
 from stages.diagnose.result import Confirmation
 
 # Inspection and gauge run confirm or refute each other only where the 1 σ of one is below this share of the
@@ -59,33 +59,6 @@ def _in_every_recording(scored: Scored) -> bool:
     return known.family in _PARTS_OF_THE_PROBE and known.time == "static" and known.name not in _OF_THE_MEDIUM
 
 
-def confirm_in_field(
-    model: EffectModel,
-    shape: Shape,
-    amplitude: Float,
-    covariance: Float,
-    found: FieldEvidence,
-    stated: Stated,
-) -> Confirmation | None:
-    """Return whether the inspection alone agrees with the gauge run on an effect; None if too uncertain.
-
-    The inspection's estimate uses nothing of the gauge run except the encoder's scale, where that is named:
-    poses come from texture, in a pipe of unknown size, with the stated instrument within its uncertainty.
-    ``amplitude`` (Q,) and ``covariance`` (Q, Q) are the gauge run's.
-    """
-    if found.run is None:
-        return None
-    own = _own_score(model, shape, found, stated)
-    size = float(np.linalg.norm(amplitude))
-    if own is None or np.sqrt(np.trace(own.covariance)) > TELLING * size:
-        return None
-    return Confirmation(
-        f"in the inspection, by the gauge run: {sized(model, shape, amplitude, covariance)}",
-        f"inspection alone: {sized(model, shape, own.amplitude, own.covariance)}",
-        same(amplitude, own.amplitude, own.covariance + covariance, size),
-    )
-
-
 def met_in_field(
     examined: Examined, found: FieldEvidence, stated: Stated
 ) -> tuple[Confirmation | None, ...]:  # fmt: skip
@@ -114,47 +87,44 @@ def is_asked(model: EffectModel) -> bool:
 
 
 def _met(term: Term, covariance: Float, found: FieldEvidence, stated: Stated) -> Confirmation | None:
-    if not is_asked(term.model):
-        return None
-    if term.model.kind is CourseKind.STEP:
-        return _same_step(term, covariance, found, stated)
-    return confirm_in_field(term.model, term.shape, term.amplitude, covariance, found, stated)
+    """Return whether the inspection alone agrees with the gauge run on an effect; None if too uncertain.
 
-
-def _same_step(term: Term, covariance: Float, found: FieldEvidence, stated: Stated) -> Confirmation | None:
-    """Return a confirmation that the inspection has the same step at a time of its own; None without one.
-
-    An event of a gauge run need not happen in another recording, so that nothing can contradict it.
+    The inspection's estimate uses nothing of the gauge run except the encoder's scale, where that is named:
+    poses come from texture, in a pipe of unknown size, with the stated instrument within its uncertainty. A
+    step is sought at all times of the inspection; it need not happen there, so that nothing contradicts it.
+    ``covariance`` (Q, Q) is that of the term's amplitudes.
     """
-    if found.run is None:
+    seen = _own_score(term, found, stated) if is_asked(term.model) else None
+    if seen is None:
         return None
-    duration = float(np.ptp(found.run.measured.time_s))
-    shapes = term.model.shapes(duration, found.run.recording.frame_rate)
-    whole = found.about([(term.model, shape) for shape in shapes])
-    if whole is None:
-        return None
-    scores = [(shape, score(whole, stated, places_of(whole, term.model, shape))) for shape in shapes]
-    seen = [(shape, own) for shape, own in scores if own is not None]
-    shape, own = max(seen, key=lambda pair: pair[1].statistic, default=((), None))
+    (shape, own), is_step = seen, term.model.kind is CourseKind.STEP
     size = float(np.linalg.norm(term.amplitude))
-    if own is None or np.sqrt(np.trace(own.covariance)) > _SEARCHED * size:
+    agrees = same(term.amplitude, own.amplitude, own.covariance + covariance, size)
+    telling = np.sqrt(np.trace(own.covariance)) <= (_SEARCHED if is_step else TELLING) * size
+    if not telling or (is_step and not agrees):
         return None
-    if not same(term.amplitude, own.amplitude, own.covariance + covariance, size):
-        return None
+    alone = f"inspection alone, at {shape[0]:.1f} s" if is_step else "inspection alone"
     return Confirmation(
         f"in the inspection, by the gauge run: {sized(term.model, term.shape, term.amplitude, covariance)}",
-        f"inspection alone, at {shape[0]:.1f} s: {sized(term.model, shape, own.amplitude, own.covariance)}",
-        True,
-    )  # fmt: skip
+        f"{alone}: {sized(term.model, shape, own.amplitude, own.covariance)}",
+        agrees,
+    )
 
 
-def _own_score(model: EffectModel, shape: Shape, found: FieldEvidence, stated: Stated) -> Score | None:
-    whole: Evidence | None = found.whole
-    assert whole is not None
-    place = places_of(whole, model, shape)
-    if not len(place):
-        whole = found.about([(model, shape)])
-        if whole is None:
-            return None
-        place = places_of(whole, model, shape)
-    return score(whole, stated, place)
+def _own_score(term: Term, found: FieldEvidence, stated: Stated) -> tuple[Shape, Score] | None:
+    """Return the inspection's own score of an effect and its shape there: of a step at the best time."""
+    if found.run is None:
+        return None
+    shapes, whole = (term.shape,), None
+    if term.model.kind is CourseKind.STEP:
+        duration = float(np.ptp(found.run.measured.time_s))
+        shapes = term.model.shapes(duration, found.run.recording.frame_rate)
+    elif len(places_of(found.whole, term.model, term.shape)):
+        whole = found.whole
+    if whole is None:
+        whole = found.about([(term.model, shape) for shape in shapes])
+    if whole is None:
+        return None
+    each = ((shape, score(whole, stated, places_of(whole, term.model, shape))) for shape in shapes)
+    seen = [(shape, own) for shape, own in each if own is not None]
+    return max(seen, key=lambda pair: pair[1].statistic, default=None)

@@ -28,26 +28,27 @@ from stages.diagnose.result import Confirmation, CourseFound, Value
 # effect is compared about five times, and noise may contradict it once in a thousand cases.
 _AGREE = 2e-4
 _LEAST_FRAMES = 8
-_BORE = "bore"
 
 
 def confirmations(
     run: GaugeRun, judged: Judged, regimes: Sequence[Regime], terms: Sequence[Term], stated: Stated
 ) -> tuple[tuple[Confirmation, ...], ...]:
     """Return, for each term, whether disjoint parts of the run agree, each part against all the others."""
-    shared = [*_by_bore(regimes), *_by_direction(run, judged)]
-    parts = [[*shared, *_by_half(run, term)] for term in terms]
+    shared = [_by_bore(regimes), _by_direction(run, judged)]
+    parts = [[*shared, _by_half(run, term)] for term in terms]
     everything = np.ones(len(run.time_s), bool)
-    distinct = {(where, p.frames.tobytes()): p for each in parts for where, p in each}
+    distinct = {(where, p.frames.tobytes()): p for groups in parts for each in groups for where, p in each}
     kinds = [Part(everything, (EDGE,)), Part(everything, (EDGE, RING))]
     _, edges, both, *said = evidence(run, judged.fit, (), [*kinds, *distinct.values()])
     known = dict(zip(distinct, said, strict=True))
     out = []
-    for term, each in zip(terms, parts, strict=True):
-        of_parts = [(where, known[where, p.frames.tobytes()]) for where, p in each]
-        partial = [partial_of(where, e, judged, term, stated) for where, e in of_parts]
-        pairs = _pairs([p for p in partial if p is not None])
-        compared = [_compared(a, b, term) for a, b in pairs]
+    for term, groups in zip(terms, parts, strict=True):
+        compared = []
+        for each in groups:
+            of_parts = [(where, known[where, p.frames.tobytes()]) for where, p in each]
+            partial = [partial_of(where, e, judged, term, stated) for where, e in of_parts]
+            pairs = itertools.pairwise(p for p in partial if p is not None)
+            compared += [_compared(a, b, term) for a, b in pairs]
         compared.append(_by_kind(edges, both, judged, term, stated))
         told = term.model.kind is not CourseKind.STEP or passes_again(
             run, judged.fit.state.T_pc, term.shape[0]
@@ -90,7 +91,7 @@ def _by_bore(regimes: Sequence[Regime]) -> list[tuple[str, Part]]:
     out = []
     for section in sorted({r.section for r in regimes}):
         mask = np.any([r.part.frames for r in regimes if r.section == section], axis=0)
-        out.append((f"{_BORE} {section + 1}", Part(mask)))
+        out.append((f"bore {section + 1}", Part(mask)))
     return out
 
 
@@ -110,15 +111,6 @@ def _by_half(run: GaugeRun, term: Term) -> list[tuple[str, Part]]:
         return []
     early = run.time_s < np.median(run.time_s[begun])
     return [("first half", Part(begun & early)), ("second half", Part(begun & ~early))]
-
-
-def _pairs(found: Sequence[Measured]) -> list[tuple[Measured, Measured]]:
-    """Return the parts to be compared: each bore with the next, forward with backward, half with half."""
-    by_kind: dict[str, list[Measured]] = {}
-    for p in found:
-        kind = _BORE if p.where.startswith(_BORE) else p.where.split()[-1]
-        by_kind.setdefault(kind, []).append(p)
-    return [(a, b) for group in by_kind.values() for a, b in itertools.pairwise(group)]
 
 
 def _compared(first: Measured, second: Measured, term: Term) -> Confirmation | None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -178,14 +177,16 @@ def examine(
     try:
         # More threads gain nothing on blocks this small, and stall on a busy machine.
         with threadpool_limits(1):
-            measurements, start = prepare(run, partial(progress, 0, _PARTS))
+            # The watch of the run, which all fits share, reports the parts that are done.
+            done = [0]
+            measurements, start = prepare(run, lambda: progress(done[0], _PARTS))
             nothing = fit(measurements, start, ())
             about, shapes = ability(measurements, nothing, library)
             table = feasibility(about, shapes, library, stated)
             coursed = with_courses(library, courses)
-            nothing = nothing.watched(partial(progress, 1, _PARTS))
-            searched = search(nothing.run, nothing, coursed, stated)
-            searched = searched.watched(partial(progress, 2, _PARTS))
+            done[0] = 1
+            searched = search(measurements, nothing, coursed, stated)
+            done[0] = 2
             # Effects that are not in the library also shift rings and fiducials.
             swung = swings(searched.run, searched.nothing, stated)
             beyond = patterns_by_chance(searched.nothing, stated, swung)

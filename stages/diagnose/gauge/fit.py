@@ -9,7 +9,6 @@ from functools import cached_property
 import numpy as np
 from scipy.linalg import block_diag
 
-from pipeline.adjustment.levenberg_marquardt import Watch
 from pipeline.adjustment.rows import Rows
 from pipeline.arrays import Float, Int
 from pipeline.geometry.rigid import from_parts, rotation_from_vector
@@ -63,12 +62,6 @@ class Fit:
     state: Unknowns
     terms: tuple[Term, ...]
     cost: float
-
-    def watched(self, watch: Watch) -> Fit:
-        """Return the fit with another watch in its run; cached results are kept."""
-        made = replace(self, run=replace(self.run, watch=watch))
-        vars(made).update({k: v for k, v in vars(self).items() if k in ("linearised", "reduced")})
-        return made
 
     @cached_property
     def linearised(self) -> Linearised:

@@ -159,13 +159,6 @@ class Search:
     steps: tuple[Step, ...]
     alike: float
 
-    def watched(self, watch: Watch) -> Search:
-        """Return the outcome with another watch in all of its fits."""
-        return replace(
-            self, run=replace(self.run, watch=watch), nothing=self.nothing.watched(watch),
-            found=self.found.watched(watch), rivals=tuple(f.watched(watch) for f in self.rivals),
-        )  # fmt: skip
-
 
 def search(run: GaugeRun, start: Fit, library: Mapping[str, EffectModel], stated: Stated) -> Search:
     """Add effects while the data require them; whether another set is better is decided in `judge`."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -152,11 +152,10 @@ class Cells:
     def of_blocks(self, first: int, end: int) -> Cells:
         """Return only the cells of blocks ``first`` up to, but not including, ``end``."""
         k = (self.block >= first) & (self.block < end)
-        return Cells(
-            self.offset_px, self.block[k] - first, self.sector[k], self.profile[k], self.centre_px[k],
-            self.width_px[k], self.rest[k], self.whole[k], self.azimuth_rad[k], self.px_per_mm[k],
-            self.radius_mm[k], self.height[k], self.frames[first:end],
-        )  # fmt: skip
+        shared = ("offset_px", "frames")
+        own = {f.name: getattr(self, f.name)[k] for f in fields(self) if f.name not in shared}
+        own["block"] = own["block"] - first
+        return replace(self, **own, frames=self.frames[first:end])
 
     def block_of_frames(self, count: int) -> Int:
         """Return the block (F,) of each of ``count`` frames; −1 for frames in no block."""
