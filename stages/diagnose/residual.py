@@ -181,8 +181,6 @@ def rings_against_texture(
     residual = rings_after(rings, reduced(relaxed, len(run.state.T_pc)), to)
     points = field_points(run)
     assert points.distance_mm is not None
-    by_pixel = run.probe.triangulate_jacobian(points.uv)[0]
-    mm_per_px = np.einsum("mi,mij,mj->m", points.normal_c, by_pixel, points.outward)
     frame, weight = run.recording.frames.frame[run.measured.rings.frame], run.equations.rings.weight
     usable = weight > _OUTLIER * np.median(weight)
     lit = run.recording.frames.of(Illumination.LED, Illumination.BOTH)
@@ -190,5 +188,5 @@ def rings_against_texture(
     residual = residual - np.mean(residual[usable])
     return RingResidual(
         "field", frame, points.azimuth_rad, points.azimuth_p_rad, points.distance_mm, points.uv,
-        residual, residual / mm_per_px, usable,
+        residual, residual / ring_mm_per_px(points), usable,
     )  # fmt: skip

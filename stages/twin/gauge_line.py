@@ -36,8 +36,8 @@ from stages.calibrate.gauge import MeasuredRun
 from stages.calibrate.gauge.adjust import adjust
 from stages.calibrate.gauge.state import GaugeParameters
 from stages.diagnose.channels import GaugeMeasured
-from stages.diagnose.gauge_scene import gauge_scene
 from stages.twin.cells import sigmas
+from stages.twin.gauge_scene import gauge_scene
 from stages.twin.line_blocks import BlockLight, LineBlocks, blocks_of, light_of, squares
 
 _SOLVE, _SLOPE_PX, _FARTHEST_PX, _SETTLED_PX = 5, 0.5, 6.0, 0.02
@@ -179,11 +179,11 @@ def scene_with(
     measured = replace(run.measured, rings=no_rings, smooth_sigma=smooth)
     edges = run.measured.edges
     for _ in range(_PLACE_ROUNDS):
-        scene = switch_on(gauge_scene(recording, start.stated, start.stated, state.T_pc), effects)
+        scene = switch_on(gauge_scene(recording, start.stated, state.T_pc), effects)
         shifted = replace(edges, uv=edges.uv - _shift_px(scene, edges.frame, edges.xyz_p))
         for _ in range(_PLACE_STEPS):
             state = adjust(state, replace(measured, edges=shifted), parameters).state
-    return switch_on(gauge_scene(recording, start.stated, start.stated, state.T_pc), effects)
+    return switch_on(gauge_scene(recording, start.stated, state.T_pc), effects)
 
 
 def _shift_px(scene: SceneTruth, frame: Int, xyz_p: Float) -> Float:

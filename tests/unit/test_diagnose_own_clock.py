@@ -58,7 +58,7 @@ def test_a_drift_is_held_out_in_blocks_by_turns_under_both_its_names(model, bloc
     monkeypatch.setattr(heldout, "total", lambda parts: parts)
     monkeypatch.setattr(heldout, "_rms_px", lambda run, judged, parts, rules: held_out.append(parts) or 0.1)
     early = np.arange(40) < 20
-    regimes = [Regime(f"bore 1, stretch {n}", Part(frames), 0) for n, frames in enumerate((early, ~early))]
+    regimes = [Regime(Part(frames), 0) for frames in (early, ~early)]
     found = SimpleNamespace(terms=(Term(model, (1.0,), np.zeros(1)),))
     judged = SimpleNamespace(fit=found, by_regime=("first", "second"))
     heldout.fit_quality(SimpleNamespace(time_s=np.arange(40)), judged, judged, regimes, None)

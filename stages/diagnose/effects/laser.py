@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from pipeline.arrays import Float
@@ -167,13 +165,16 @@ class BeamDecentre(Directed):
         return cosine(points.azimuth_rad, amplitude)
 
 
-@dataclass(frozen=True)
-class SheetWaviness(EffectModel):
+class SheetWaviness(Directed):
     """The inclination of the sheet's rays varies m times around the ring; the shape is m."""
 
     name = "sheet_waviness"
     repeats = True
     amplitudes = (Amplitude("cosine", "mrad", 0.3), Amplitude("sine", "mrad", 0.3))
+    words = (
+        "The laser sheet is wavy: its rays rise and fall by {amplitude_mrad:.2f} mrad {order:.0f} times "
+        "around the ring, with a crest at azimuth {direction_deg:.1f}°."
+    )
 
     def shapes(self, duration_s: float, frame_rate: float) -> tuple[Shape, ...]:
         """Return the orders."""
@@ -186,19 +187,9 @@ class SheetWaviness(EffectModel):
 
     def quantities(self, shape: Shape, amplitude: Float) -> dict[str, float]:
         """Return amplitude, order and direction of a crest."""
-        crest = np.degrees(np.arctan2(amplitude[1], amplitude[0])) / shape[0]
-        return {
-            "amplitude_mrad": float(np.hypot(*amplitude)),
-            "order": shape[0],
-            "direction_deg": float(crest),
-        }
-
-    def statement(self, shape: Shape, amplitude: Float) -> str:
-        """Return a sentence that states the effect with its size."""
-        return (
-            "The laser sheet is wavy: its rays rise and fall by {amplitude_mrad:.2f} mrad {order:.0f} times "
-            "around the ring, with a crest at azimuth {direction_deg:.1f}°."
-        ).format(**self.quantities(shape, amplitude))
+        size = super().quantities(shape, amplitude)
+        direction = size.pop("direction_deg") / shape[0]
+        return {**size, "order": shape[0], "direction_deg": direction}
 
 
 class LaserRocking(Periodic, Product):

@@ -15,12 +15,11 @@ from pipeline.instrument.probe import Probe
 from pipeline.machine.stage import Context
 from pipeline.recording.base import Recording
 from stages.diagnose.effects.base import ImagePoints
-from stages.diagnose.gauge.points import SHARP, Moving, rates, runs_across, widths_at
+from stages.diagnose.gauge.points import SHARP, Moving, rates, runs_across, way_per_px, widths_at
 from stages.motion import (
     MATCH_BIASES,
     EncoderReadings,
     Equations,
-    JointEstimate,
     KnockTest,
     Measurements,
     MotionParameters,
@@ -126,21 +125,17 @@ def with_probe(run: FieldRun, probe: Probe, context: Context) -> FieldRun:
     UnusableError
         When rings and texture do not determine the motion with that probe.
     """
-    found = _adjusted_with(run, probe, context)
-    return replace(
-        run, probe=probe, measured=found.measured, state=found.state, equations=found.equations,
-        trajectory=found.trajectory,
-    )  # fmt: skip
-
-
-def _adjusted_with(run: FieldRun, probe: Probe, context: Context) -> JointEstimate:
     parameters, before, frames = run.parameters, run.measured, run.recording.frames
     bins = ring_bins(run.rings, run.ring_frames, probe, parameters.ring_bins, parameters.surface_sigma_mm)
     measured = Measurements.of(before.tracks, bins, before.time_s, None, probe)
     # Convergence is judged by the pipe's radius; that of the stated probe is close enough.
     radius_mm = float(run.state.globals[0])
     start = replace(run.state, instrument=np.zeros(measured.unsure.shape[1] + MATCH_BIASES))
-    return adjust_at_once(start, measured, frames, radius_mm, parameters, context)
+    found = adjust_at_once(start, measured, frames, radius_mm, parameters, context)
+    return replace(
+        run, probe=probe, measured=found.measured, state=found.state, equations=found.equations,
+        trajectory=found.trajectory,
+    )  # fmt: skip
 
 
 def ring_points(run: FieldRun) -> ImagePoints:
@@ -153,7 +148,7 @@ def ring_points(run: FieldRun) -> ImagePoints:
     uv = run.probe.camera.project(found_c).uv
     away = uv - run.probe.camera.centre_px
     outward = away / np.linalg.norm(away, axis=1)[:, None]
-    along_ray = np.einsum("mij,mj->mi", run.probe.triangulate_jacobian(uv)[0], outward)
+    along_ray = way_per_px(run.probe, uv, outward)
     inclined = np.einsum("mi,mi->m", _wall_at(run, frame, found_c)[0], along_ray)
     uv = uv - (run.equations.rings.residual / inclined)[:, None] * outward
     xyz_c = run.probe.triangulate(uv)
@@ -164,7 +159,7 @@ def ring_points(run: FieldRun) -> ImagePoints:
     return ImagePoints(
         run.probe, frame, run.measured.time_s[frame], uv, xyz_c, normal_c, along_c, rate[:, None] * outward,
         speed_mm_s(run)[frame], True, widths_at(*at), azimuth, distance,
-        across_px=runs_across(*at, run.parameters.ring_bins),
+        per_px_c=way_per_px(run.probe, uv, outward), across_px=runs_across(*at, run.parameters.ring_bins),
     )  # fmt: skip
 
 

@@ -20,9 +20,8 @@ _LEAST_FRAMES = 8
 
 @dataclass(frozen=True)
 class Regime:
-    """A part of the run that can be held out: its name, its frames (N,), and the bore of its rings."""
+    """A part of the run that can be held out: its frames (N,), and the bore of its rings."""
 
-    name: str
     part: Part
     section: int
 
@@ -89,11 +88,11 @@ def regimes_of(run: GaugeRun) -> tuple[Regime, ...]:
     out = []
     for k in range(votes.shape[1]):
         frames = np.flatnonzero(section == k)
-        for n, piece in enumerate(np.array_split(frames, _STRETCHES)):
+        for piece in np.array_split(frames, _STRETCHES):
             if len(piece) >= _LEAST_FRAMES:
                 mask = np.zeros(count, bool)
                 mask[piece] = True
-                out.append(Regime(f"bore {k + 1}, stretch {n + 1}", Part(mask), k))
+                out.append(Regime(Part(mask), k))
     return tuple(out)
 
 

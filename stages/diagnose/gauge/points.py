@@ -35,8 +35,6 @@ BASELINE_SIGMA_PX = 0.01
 _RING_HARMONICS = (0, 1, 2, 3, 4)
 _EDGE_HARMONICS = (0, 1, 2)
 _MIDDLE_THETA = 1.1
-# Half the step of a derivative along the image radius, px: its error is of third order, below 1e-6.
-_APART = 0.1
 BASELINE_SIZE = 2 * (2 * len(_RING_HARMONICS) - 1) + 4 * (2 * len(_EDGE_HARMONICS) - 1)
 
 
@@ -120,8 +118,7 @@ def moved(points: ImagePoints, moving: Moving, outward: Float) -> ImagePoints:
 
 def way_per_px(probe: Probe, uv: Float, outward: Float) -> Float:
     """Return the displacement (M, 3) of the line's points in C, mm, for each px farther ``outward``."""
-    farther, nearer = (probe.triangulate(uv + way * outward) for way in (_APART, -_APART))
-    return np.asarray((farther - nearer) / (2 * _APART))
+    return np.einsum("mij,mj->mi", probe.triangulate_jacobian(uv)[0], outward)
 
 
 def edge_points(state: Unknowns, edges: Edges, time_s: Float, moving: Moving) -> ImagePoints:

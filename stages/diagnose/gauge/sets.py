@@ -65,11 +65,6 @@ class Member:
         """Whether it is a pattern without a cause."""
         return isinstance(self.model, Nameless)
 
-    @property
-    def cause(self) -> Cause:
-        """What its name stands for."""
-        return cause_of(self.model, self.shape)
-
 
 def cause_of(model: EffectModel, shape: Shape) -> Cause:
     """Return the law and, if it may occur more than once, its order."""

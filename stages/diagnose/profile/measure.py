@@ -64,8 +64,8 @@ def stack_frame(  # type: ignore[no-untyped-def]
     """Add one frame's pixels, in coordinates centred on the line, to its sectors' profiles.
 
     ``light`` and ``height`` (S, B) accumulate grey levels above the background, and the line's height, for
-    every pixel that cannot have clipped; ``share`` (S, 3) counts samples, clipped samples and the largest
-    level; ``gain`` (2, H·W) accumulates residual × model and model² of the line's bright pixels. ``dark`` is
+    every pixel that cannot have clipped; ``share`` (S, 2) counts samples and clipped samples;
+    ``gain`` (2, H·W) accumulates residual × model and model² of the line's bright pixels. ``dark`` is
     the grey level without light.
     """
     azimuths, sectors = start.size - 1, light.shape[0]
@@ -79,7 +79,6 @@ def stack_frame(  # type: ignore[no-untyped-def]
         high = first_at_least(radius, low, start[a + 1], line[a] + half)
         top = fit_height(image, pixel, radius, offset, low, high, line[a], slope[a], width[a], trusted, fit)
         share[s, 0] += 1.0
-        share[s, 2] = max(share[s, 2], top)
         if np.isnan(fit[0]) or fit[0] <= 0:
             continue
         clipped = top > trusted or fit[0] + dark > trusted
@@ -123,8 +122,6 @@ class LineProfiles:
         Number of azimuths with a line.
     clipped : (F, S)
         Share of them whose middle clips.
-    highest : (F, S)
-        Largest grey level on the line.
     background : (F,)
         Mean grey level, minus that of the darkest place, 40 to 60 px away from the line; NaN where the wall
         is lit.
@@ -143,7 +140,6 @@ class LineProfiles:
     height: Float32
     samples: Float
     clipped: Float
-    highest: Float
     background: Float
     background_sigma: float
     gain: Float
@@ -159,7 +155,7 @@ def measure_profiles(recording: Recording, rings: RingSamples) -> LineProfiles:
     rows = np.flatnonzero(np.isin(rings.frame, recording.frames.of(Illumination.LASER)) & rings.valid.any(1))
     count, bins = len(rows), round(2 * REACH_PX / STEP_PX)
     light = np.zeros((count, SECTORS, bins), np.float32)
-    height, share = np.zeros_like(light), np.zeros((count, SECTORS, 3))
+    height, share = np.zeros_like(light), np.zeros((count, SECTORS, 2))
     beside, tiles = np.full(count, np.nan), []
     gain = np.zeros((2, 2, recording.source.image_size[0] * recording.source.image_size[1]))
     trusted = _TRUSTED * _clip_level(recording, rings, rows, sectors)
@@ -181,7 +177,7 @@ def measure_profiles(recording: Recording, rings: RingSamples) -> LineProfiles:
     middle: Float = -np.pi - step / 2 + 2 * np.pi / SECTORS * (np.arange(SECTORS, dtype=np.float64) + 0.5)
     return LineProfiles(
         rings.frame[rows], rows, _times(recording, rings.frame[rows]), middle, offset,
-        light, height, share[..., 0], share[..., 1] / np.maximum(share[..., 0], 1), share[..., 2],
+        light, height, share[..., 0], share[..., 1] / np.maximum(share[..., 0], 1),
         beside - dark, dark_sigma, gain,
     )  # fmt: skip
 

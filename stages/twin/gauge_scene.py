@@ -27,22 +27,22 @@ _BEYOND_MM, _STEP_MM, _COLUMNS = 300.0, 0.1, 16
 of a bore; columns around: a bore is round."""
 
 
-def gauge_scene(recording: Recording, stated: Probe, probe: Probe, T_pc: Float) -> SceneTruth:
+def gauge_scene(recording: Recording, probe: Probe, T_pc: Float) -> SceneTruth:
     """Return the scene of a gauge run without any effect.
 
     Parameters
     ----------
     recording : Recording
         Of a gauge with fiducials.
-    stated, probe : Probe
-        The instrument as in probe.yaml, and the one that is rendered.
+    probe : Probe
+        The instrument as in probe.yaml, which is rendered.
     T_pc : (N, 4, 4)
         The camera's pose in every frame.
     """
     wall = _bores(recording, T_pc)
     laser = TrueLaser(probe.laser, profile=LineProfile(probe.laser.line_sigma_mm))
     return SceneTruth(
-        name=recording.name, kind=recording.kind, seed=0, stated=stated,
+        name=recording.name, kind=recording.kind, seed=0, stated=probe,
         instrument=TrueInstrument(TrueCamera(probe.camera), laser, LedRing(), TrueSensor(), probe.shutter),
         wall=wall, facts=recording.pipe, motion=motion_through(T_pc, recording.frames.time_s, wall.axis),
         odometer=Odometer(), frames=recording.frames, frame_rate=recording.frame_rate,
