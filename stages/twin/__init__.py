@@ -290,7 +290,7 @@ PHOTOMETRY = Stage(
 )
 TWIN = Stage(
     "twin",
-    "42",
+    "43",
     TwinParameters,
     compare_with_twin,
     "recorded frames beside the same frames, re-rendered from what the run has measured",

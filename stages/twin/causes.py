@@ -14,7 +14,7 @@ import numpy as np
 from scipy.stats import norm
 
 from pipeline.adjustment.robust import spread_about_median
-from pipeline.arrays import Float, Int
+from pipeline.arrays import Float
 from pipeline.artefacts.twin import Mismatch, NamedFigure
 from pipeline.instrument.probe import Lighting
 from stages.twin.cells import (
@@ -22,20 +22,27 @@ from stages.twin.cells import (
     Cells,
     Fitted,
     Law,
-    drift,
     fitted,
     half_turn,
-    of_sectors,
     sigmas,
     try_law,
 )
 from stages.twin.flicker import flicker
-from stages.twin.laws import LED_AZIMUTHS, SECTOR_STEP_DEG, line_laws, lit_laws, steps_of
+from stages.twin.laws import LED_AZIMUTHS, SECTOR_STEP_DEG, line_laws, lit_laws
 from stages.twin.locate import FALSE_ALARM
 from stages.twin.scene import Ring
+from stages.twin.steps import (
+    FEWEST_FRAMES,
+    LEAST_SHARE,
+    OWN_STEP,
+    all_round,
+    at_once,
+    first_frame,
+    steps_named,
+)
 
-_FEWEST_FRAMES, _ROUNDS, _BESIDE = 6, 3, 3
-"""Least frames per light; most causes per light; frames on each side that show a step."""
+_ROUNDS = 3
+"""Most causes per light."""
 _SURE = 3.0
 """σ, by the spread from frame to frame, by which one law must fit better than another to be distinguished."""
 _LEAST = {"step": 0.02, "led_dead": 0.2, "lamp_sector": 0.1, "laser_sector": 0.25}
@@ -50,7 +57,6 @@ _SHAPE, _NARROW_DEG, _OF_WIDTH = 0.03, 20.0, 0.08
 """1 σ of a sector's loss because its shape is unknown. For a sector narrower than two cells, 20°, only loss
 times width is measured, and widths are tried in steps of a quarter: relative 1 σ of the loss, half a step
 over √3."""
-_OWN_STEP = {"LEDs": "lamp_step", "laser": "laser_step"}
 
 
 def causes(lit: Cells | None, line: Cells | None, lighting: Lighting, ring: Ring) -> tuple[Mismatch, ...]:
@@ -58,7 +64,7 @@ def causes(lit: Cells | None, line: Cells | None, lighting: Lighting, ring: Ring
     found: list[Mismatch] = []
     steps: dict[str, tuple[Fitted, Cells]] = {}
     for light, cells in (("LEDs", lit), ("laser", line)):
-        if cells is None or len(cells.frame) < _FEWEST_FRAMES:
+        if cells is None or len(cells.frame) < FEWEST_FRAMES:
             continue
         base, laws = lit_laws(cells, lighting, ring) if light == "LEDs" else line_laws(cells)
         chosen, base, unsure = _chosen(cells, base, laws, light)
@@ -68,7 +74,7 @@ def causes(lit: Cells | None, line: Cells | None, lighting: Lighting, ring: Ring
             else:
                 found.append(_mismatch(best, rivals, cells, ring))
         found += _flicker_or_else(cells, base, unsure, light, ring)
-    return (*_steps(steps, lit, line, ring), *found)
+    return (*steps_named(steps, lit, line, ring), *found)
 
 
 def _chosen(
@@ -88,13 +94,15 @@ def _chosen(
         most = 1.0 + _SURE * _size_sd(best) if led else np.inf  # no LED can lose more than all its light
         if not _LEAST[best.law.name] < size < most:
             break
-        if best.law.name == "step" and _at_once(best, cells) / best.size <= 0.5:
+        if best.law.name == "step" and not (
+            at_once(best, cells) / best.size > LEAST_SHARE and all_round(best, cells, base)
+        ):
             break
         if best.probability > FALSE_ALARM:
             unsure = best
             break
         rivals = [
-            _OWN_STEP[light] if o.law.name == "step" else o.law.name
+            OWN_STEP[light] if o.law.name == "step" else o.law.name
             for o in tries
             if o.law.name not in (best.law.name, "lamp_sector")
             and o.probability < FALSE_ALARM
@@ -127,14 +135,6 @@ def _same_sector(one: Fitted, other: Fitted) -> bool:
         return False
     away = abs(half_turn(float(one.place[0] - other.place[0])))
     return bool(away < (one.place[1] + other.place[1]) / 2 + 360 / SECTORS)
-
-
-def _at_once(step: Fitted, cells: Cells) -> float:
-    """Return by how much the frames next to a step differ, as a logarithm: the rest may be drift."""
-    mean = cells.log_ratio.sum(1) / np.maximum(cells.usable.sum(1), 1)
-    first = int(step.place[0])
-    after, before = mean[first : first + _BESIDE], mean[max(first - _BESIDE, 0) : first]
-    return float(after.mean() - before.mean())
 
 
 def _places(law: Law) -> int:
@@ -214,61 +214,6 @@ def _darker_side(best: Fitted, size: NamedFigure, cells: Cells, ring: Ring) -> M
     return Mismatch("", "intensity", "time", place, (size,), best.probability, *chi2, said, look)
 
 
-def _when(frame: Int, first: int) -> NamedFigure:
-    gap = float(frame[first] - frame[first - 1])
-    return NamedFigure("frame_from", (frame[first] + frame[first - 1]) / 2, gap / np.sqrt(12), "frame")
-
-
-def _steps(
-    steps: dict[str, tuple[Fitted, Cells]], lit: Cells | None, line: Cells | None, ring: Ring
-) -> list[Mismatch]:
-    """Return steps of brightness: of the exposure where both lights step alike, else of one light."""
-    found = []
-    for light, (best, cells) in steps.items():
-        other = {"LEDs": line, "laser": lit}[light]
-        first = int(best.place[0])
-        when = _when(cells.frame, first)
-        same = _same_step(best, cells.frame[first - 1 : first + 1], other)
-        if same and light == "laser" and "LEDs" in steps:
-            continue  # already reported
-        own = _OWN_STEP[light]
-        name = {True: "exposure_step", False: own, None: f"exposure_step or {own}"}[same]
-        # With drift all frames measure a step, without it only the frames beside it: σ includes their
-        # disagreement.
-        sd = float(np.exp(best.size) * np.hypot(best.sd, _at_once(best, cells) - best.size))
-        size = NamedFigure("change", float(np.expm1(best.size)), sd, "relative")
-        what = {
-            True: "all frames are",
-            False: f"frames lit by the {light} alone are",
-            None: f"frames lit by the {light} are",
-        }[same]
-        way = "brighter" if best.size > 0 else "darker"
-        found.append(Mismatch(
-            name, "line" if light == "laser" and not same else "intensity", "time", (when,), (size,),
-            best.probability, best.chi2_before, best.chi2_after,
-            f"From frame {when.value:.0f} on, {what} {100 * abs(size.value):.0f} % {way}.",
-            ring.whole(cells.frame[first]),
-        ))  # fmt: skip
-    return found
-
-
-def _same_step(best: Fitted, between: Int, other: Cells | None) -> bool | None:
-    """Return whether frames of the other light step alike at that time; None if they cannot decide."""
-    if other is None or len(other.frame) < _FEWEST_FRAMES:
-        return None
-    columns, first = steps_of(len(other.frame))
-    at = first.astype(int)
-    here = (other.frame[at] > between[0]) & (other.frame[at - 1] < between[1])
-    if not here.any():
-        return None
-    frames = len(other.frame)
-    base = np.concatenate([of_sectors(frames, np.eye(SECTORS)), drift(frames)])
-    own = try_law(other, base, Law("step", columns[here], first[here, None]), 1)
-    sd = float(np.hypot(own.sd, best.sd))
-    alike, absent = abs(own.size - best.size) < _SURE * sd, abs(own.size) < _SURE * own.sd
-    return None if alike == absent else alike
-
-
 def _flicker_or_else(
     cells: Cells, base: Float, unsure: Fitted | None, light: str, ring: Ring
 ) -> list[Mismatch]:
@@ -278,8 +223,8 @@ def _flicker_or_else(
         return found
     if flicker(cells, np.concatenate([base, unsure.change[None]]), light, ring):
         return found
-    what, name = "a step of brightness", f"{found[0].name} or {_OWN_STEP[light]}"
-    place: tuple[NamedFigure, ...] = (_when(cells.frame, int(unsure.place[0])),)
+    what, name = "a step of brightness", f"{found[0].name} or {OWN_STEP[light]}"
+    place: tuple[NamedFigure, ...] = (first_frame(cells.frame, int(unsure.place[0])),)
     if unsure.law.name in _AROUND:
         place = _of_led(unsure, cells)
         what, name = f"an LED that fails at image azimuth {place[1].value:.0f}°", "flicker or led_dead"
@@ -296,4 +241,4 @@ def _of_led(found: Fitted, cells: Cells) -> tuple[NamedFigure, NamedFigure]:
     """Return when an LED fails (frame) and where (image azimuth)."""
     where = half_turn(float(np.degrees(found.place[0])))
     at = NamedFigure("azimuth_deg", where, 180 / LED_AZIMUTHS, "deg")
-    return _when(cells.frame, int(found.place[1])), at
+    return first_frame(cells.frame, int(found.place[1])), at

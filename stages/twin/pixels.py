@@ -75,4 +75,4 @@ def _alone(places: Int, mean: Float) -> Int:
         label = cv2.connectedComponents((near - np.median(near) > own / 2).astype(np.uint8))[1]
         group = label == label[row - corner[0], column - corner[1]]
         kept.append(own > 0 and group.sum() <= _SPREAD_PIXELS)
-    return places[np.array(kept, bool)]
+    return np.asarray(places[np.array(kept, bool)])

@@ -58,6 +58,14 @@ def test_a_step_belongs_to_the_exposure_or_to_one_light(lit, line, name):
     assert step.chi2_after < step.chi2_before
 
 
+@pytest.mark.parametrize("azimuth_deg", [-170, -60, 10, 80])
+def test_wall_that_is_darker_on_one_side_of_the_last_frames_is_no_step_of_the_laser(azimuth_deg):
+    """Corrosion that two frames at the end saw on one side had been a laser that is 7 % darker."""
+    away = np.abs((AZIMUTH_DEG - azimuth_deg + 180) % 360 - 180)
+    wall = -0.17 * (away < 80) * (np.arange(FRAMES) >= FRAMES - 2)[:, None]
+    assert not any("step" in m.name for seed in range(4) for m in _found(0.0, wall, seed))
+
+
 def test_a_step_beside_an_error_that_changes_slowly_is_as_large_as_its_sigma_says():
     inside = 0
     for phase in np.linspace(0, 2 * np.pi, 12, endpoint=False):
