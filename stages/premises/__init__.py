@@ -29,7 +29,7 @@ from stages.premises.light import Light, alike, light_seen, pattern_breaks, rhyt
 from stages.premises.losses import Steps, row_times, rows_by_motion, steps_of_wall, sway_of_line
 from stages.premises.order import off_the_pipe, out_of_order
 from stages.premises.pictures import Pictures, look_at_pictures
-from stages.premises.repeats import copies, repeated, rows_of_repeats
+from stages.premises.repeats import copies, repeated, rows_beside_encoder, rows_of_repeats
 from stages.premises.rows import Alignment, Lights, aligned
 from stages.premises.scale import (
     check_diameter,
@@ -149,16 +149,17 @@ def _matched(recording: Recording, probe: Probe, seen: _Seen) -> _Matched:
     copy = _copies(recording, table, pictures, light, alignment.row)
     label = np.where(copy, _stated(table, alignment.row), _labels(table, alignment, light, pictures))
     steps, sway = steps_of_wall(pictures, seen.shown, copy), sway_of_line(pictures, light)
+    again = copy | (np.diff(alignment.row, prepend=-1) < 1)
+    first = rows_beside_encoder(alignment.row, again, table, steps, encoder)
     rings_mm = rings_seen_mm(pictures, probe)
     along_mm, radius_mm = radius_along_mm(pictures, rings_mm), radius_seen_mm(rings_mm)
-    time_s = row_times(table, alignment.row)
-    forwards = runs_forwards(encoder, time_s, steps)
+    forwards = runs_forwards(encoder, time_s := row_times(table, first), steps)
     one_bore, read = recording.kind != "gauge", in_mm(encoder, time_s, steps, radius_mm)
-    row = rows_by_motion(alignment.row, steps, rhythm_of(light), table, read, sway, along_mm, one_bore)
+    row = rows_by_motion(first, steps, rhythm_of(light), table, read, sway, along_mm, one_bore)
     stated_s = without_stretch(row_times(table, row), row, table, recording.frame_rate)
     jumps = clock_jumps(stated_s, steps, encoder)
     changes = Changes(recording.frames, label, row, without_jumps(stated_s, jumps))
-    left_out = LeftOut(seen.outside, seen.astray, copy & (np.diff(row, prepend=-1) > 0))
+    left_out = LeftOut(seen.outside, seen.astray, again & (np.diff(row, prepend=-1) > 0))
     return _Matched(changes, left_out, jumps, steps, rings_mm, radius_mm, forwards)
 
 
@@ -293,6 +294,6 @@ def _report(pictures: Pictures, radius_mm: float, changes: Changes, context: Con
 
 
 PREMISES = Stage(
-    "premises", "28", PremisesParameters, check_premises,
+    "premises", "29", PremisesParameters, check_premises,
     "lights, times, encoder and diameter as stated, held against the pictures and mended",
 )  # fmt: skip

@@ -6,8 +6,9 @@ import numpy as np
 from scipy.ndimage import label, median_filter, rank_filter
 
 from pipeline.arrays import Bool, Float, Int
-from pipeline.recording.base import Encoder
+from pipeline.recording.base import Encoder, FrameTable
 from stages.premises.light import Light
+from stages.premises.losses import Steps, row_times
 from stages.premises.pictures import Pictures
 
 # A picture repeats the one before if it differs from it by less than this part of the usual change. A step of
@@ -18,6 +19,9 @@ _AROUND_STEP = 9
 # A picture is a copy if it changes far less than the second smallest change around it that is no copy's. The
 # smallest does not serve: where all pictures tremble, two that are moved alike by chance change as little.
 _LEAST_OF_AROUND = 1
+# Other rows are believed if by them the encoder departs from the wall by less than half of the variance, over
+# so many steps (chosen): what it departs at repeated pictures is gone then, and what matching errs is left.
+_FOLLOWS, _LEAST_STEPS = 0.5, 12
 
 
 def rows_of_repeats(row: Int, pictures: Pictures) -> Int:
@@ -38,6 +42,32 @@ def rows_of_repeats(row: Int, pictures: Pictures) -> Int:
         counted = size[k + 1] < _ONE_STEP * usual[k + 1]
         out[k : None if counted else k + 1] -= 1
     return out
+
+
+def rows_beside_encoder(
+    row: Int, again: Bool, table: FrameTable, steps: Steps, encoder: Encoder | None
+) -> Int:
+    """Return rows (F,) that move up behind pictures put in, or do not, as the encoder follows the wall.
+
+    Lights that take turns tell that a picture is there ``again`` (F,), but not whether it was put in or
+    replaced another, nor whether clock and encoder were read at every stored picture. Of rows that move up
+    behind all such pictures, or behind none, those are returned by which the encoder follows the wall better;
+    or ``row`` itself, unless they follow it much better than that.
+    """
+    if encoder is None or not again.any() or len(steps.end) < _LEAST_STEPS:
+        return row
+    as_stored = row + np.cumsum(np.diff(row, prepend=-1) < 1)
+    put_in = np.maximum(as_stored - np.cumsum(again), 0)
+    off = [_off_the_wall(steps, encoder, row_times(table, r)) for r in (row, as_stored, put_in)]
+    best = int(np.argmin(off))
+    return (row, as_stored, put_in)[best] if off[best] < _FOLLOWS * off[0] else row
+
+
+def _off_the_wall(steps: Steps, encoder: Encoder, time_s: Float) -> float:
+    """Return the mean square by which the encoder's advance departs from the wall's, scaled to it."""
+    read = steps.by_encoder(encoder, time_s)
+    scale = float(read @ steps.size) / max(float(steps.size @ steps.size), 1e-12)
+    return float(np.mean((read - scale * steps.size) ** 2))
 
 
 def repeated(pictures: Pictures, light: Int) -> Bool:

@@ -31,6 +31,24 @@ def test_repeated_pictures_are_left_out(good, run):
     assert any("the one before is shown again" in t for t in told)
 
 
+@pytest.mark.parametrize("often", [8, 11])
+@pytest.mark.parametrize("by_picture", [True, False])
+def test_the_encoder_tells_whether_times_move_up_behind_pictures_put_in(often, by_picture, good, run):
+    """By the lights alone they always did, or never: the encoder "slipped" at every such picture."""
+    kept = np.sort(np.r_[np.arange(COUNT), 9:COUNT:often])
+    time_s = np.arange(len(kept)) / 30
+    illumination = np.where(np.arange(len(kept)) % 2 == 0, "laser", "led")
+    encoder = Encoder(time_s, STEP_MM * kept) if by_picture else good.encoder
+    table = FrameTable(np.arange(len(kept)), time_s, illumination)
+    spoiled = replace(good, frames=table, source=KeptFrames(good.source, kept), encoder=encoder)
+    found, told = checked(spoiled, run.probe)
+    new = np.diff(kept, prepend=-1) > 0
+    assert found.frame.tolist() == np.flatnonzero(new).tolist()
+    np.testing.assert_allclose(found.time_s, time_s[new] if by_picture else time_s[:COUNT])
+    assert any("now have the times of earlier rows" in t for t in told) != by_picture
+    assert not any("lost" in t for t in told)
+
+
 @pytest.mark.parametrize("first", [21, 22], ids=["led", "laser"])
 @pytest.mark.parametrize("count", [1, 6, 15])
 def test_pictures_of_a_recorder_that_hung_are_left_out_and_all_times_stay(first, count, good, run):
