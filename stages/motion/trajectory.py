@@ -220,9 +220,10 @@ def _warn_of_texture(lasting: float, tracked: TrackedPoses, observations: int, c
         context.warn(
             f"matches of texture contradict the motion by {lasting:.1f} times their σ, alike in neighbouring "
             "pictures, where good recordings have 0.5 at most: reflections, compression or lights that move "
-            "with the probe are taken for the wall. Distance and roll may be off by more than their σ; the σ "
-            "of radii includes by how much the probe was corrected. What to do: compare distance and "
-            "diameter with known ones, record with less compression"
+            "with the probe are taken for the wall, or water or glass draws the picture aside. Distance and "
+            "roll may be off by more than their σ; the σ of radii includes by how much the probe was "
+            "corrected, but not what water or glass does to the line. What to do: clean and dry the window, "
+            "compare distance and diameter with known ones, record with less compression"
         )
 
 
