@@ -61,3 +61,16 @@ def test_with_the_laser_always_on_the_two_are_not_told_apart() -> None:
 
 def test_too_few_pictures_tell_nothing() -> None:
     assert find_lines(TIME_S[:20], wander(4)[:20] + swing(5.3, 1.0)[:20], LIT[:20]) == ()
+
+
+@pytest.mark.parametrize("every", [3, 4])
+def test_lit_pictures_that_lie_aside_of_laser_pictures_are_no_vibration(every: int) -> None:
+    """A sound probe was a class of vibration and rocking sheet, .019 mm at the rhythm of its lights."""
+    time_s, random = np.arange(130) / 16.0, np.random.default_rng(5)
+    lit = np.arange(130) % every == every - 1
+    rolled = 0.3 * np.sin(0.6 * time_s)
+    aside = 0.02 * lit[:, None] * np.stack([np.cos(rolled), np.sin(rolled)], 1)
+    noise = 0.002 * random.standard_normal((130, 2))
+    assert find_lines(time_s, aside + noise, lit) == ()
+    swung = 0.05 * np.sin(2 * np.pi * 2.7 * time_s)[:, None] * [0.8, 0.6]
+    assert [round(one.frequency_hz, 1) for one in find_lines(time_s, aside + noise + swung, lit)] == [2.7]

@@ -28,6 +28,9 @@ _TRIALS = 40
 SLOWEST_HZ = 1.5
 _WANDER_HZ = 1.2
 LEAST_SAMPLES = 48
+# A difference between lit and laser pictures makes lines of its own where the rhythm of the lights has more
+# than this share of its strongest line (chosen): a probe's stated error may shift one kind against the other.
+_OF_RHYTHM = 0.1
 
 
 def shows_apart(time_s: Float, frequency: float) -> bool:
@@ -150,7 +153,7 @@ def find_lines(time_s: Float, xy_mm: Float, lit: Bool, shown: Bool | None = None
     use = np.ones(len(time_s), bool) if shown is None else shown
     left = xy_mm
     while len(lines) < _MOST:
-        found = _strongest(time_s, left)
+        found = _strongest(time_s, left, lit)
         if found is None:
             break
         line = _measured(time_s[use], left[use], lit[use], *found)
@@ -162,8 +165,8 @@ def find_lines(time_s: Float, xy_mm: Float, lit: Bool, shown: Bool | None = None
     return tuple(lines)
 
 
-def _strongest(time_s: Float, xy_mm: Float) -> tuple[float, float] | None:
-    """Return frequency and p-value of the largest significant line, or None."""
+def _strongest(time_s: Float, xy_mm: Float, lit: Bool) -> tuple[float, float] | None:
+    """Return frequency and p-value of the largest significant line that is none of the lights' rhythm."""
     rate = 1 / float(np.median(np.diff(time_s)))
     even = time_s[0] + np.arange(int(np.round((time_s[-1] - time_s[0]) * rate)) + 1) / rate
     series = np.stack([np.interp(even, time_s, xy_mm[:, k]) for k in range(2)], 1)
@@ -180,6 +183,7 @@ def _strongest(time_s: Float, xy_mm: Float) -> tuple[float, float] | None:
     power = np.sum(area**2) * np.sum(np.abs(mean) ** 2, 1)
     ratio = (_TAPERS - 1) * power / np.maximum(rest, 1e-30)
     band = (frequency > SLOWEST_HZ) & (frequency < rate / 2 - _BANDWIDTH / count * rate)
+    band &= ~_is_rhythm(np.interp(even, time_s, lit), tapers[0], size)
     floor = np.median(np.sqrt(power[band])) if band.any() else np.inf
     ratio = np.where(band & (np.sqrt(power) > _ABOVE_FLOOR * floor), ratio, 0.0)
     chance = np.minimum(fisher.sf(ratio, 4, 4 * (_TAPERS - 1)) * count, 1.0)
@@ -188,6 +192,12 @@ def _strongest(time_s: Float, xy_mm: Float) -> tuple[float, float] | None:
     # Sampling at two kinds of moments makes images of one line, which are weaker.
     best = int(np.argmax(np.where(chance < _REPORTED, power, 0.0)))
     return float(frequency[best]), float(chance[best])
+
+
+def _is_rhythm(lit: Float, taper: Float, size: int) -> Bool:
+    """Return at which frequencies of a spectrum of ``size`` the light (N,), lit 1 and laser 0, has lines."""
+    strength = np.abs(np.fft.rfft(taper * (lit - lit.mean()), size))
+    return np.asarray(strength > _OF_RHYTHM * max(float(strength.max()), 1e-9))
 
 
 def _measured(time_s: Float, xy_mm: Float, lit: Bool, frequency: float, p_value: float) -> Line:
