@@ -222,7 +222,7 @@ def test_what_repeats_in_the_gauge_run_is_told_beside_a_slip_of_either_recording
     real_probe: Probe, slipped_in: str
 ) -> None:
     """A slip of the inspection's encoder was named, and .28 px in the gauge run, noise .13, was not told."""
-    searched = cast(Any, SimpleNamespace(steps=(SimpleNamespace(by_chance=0.5),)))
+    searched = cast(Any, SimpleNamespace(by_chance=0.5))
     where = Location("ring", "camera", None)
     quality = FitQuality("px", 0.31, 0.3, 0.29, 0.284, 0.126)
     rings = Examined(searched, None, (), (), quality=quality, location=where)

@@ -83,7 +83,7 @@ def hypotheses(fitted, weighed):
         judged.append(Judged(cast(Any, SimpleNamespace(terms=terms)), cast(Any, None), (), 0.0, 0.0, 0.0))
     unfitted = tuple(Unfitted(tuple(Member(*models[k], 0.0) for k in of), (), 0.0, p) for of, p in weighed)
     chance = np.array([p for _, p in fitted])
-    return Verdicts((), tuple(judged), chance, 1.0, cast(Any, None), 1.0, unfitted)
+    return Verdicts((), tuple(judged), chance, 1.0, cast(Any, None), unfitted)
 
 
 CONE = ("laser_cone",)
@@ -137,7 +137,7 @@ def test_the_pattern_that_is_the_likelier_beside_any_name_comes_first():
 def test_what_repeats_on_other_wall_is_not_consistent_though_nothing_was_found(heldout_px, floor_px, verdict):
     """Rows that wavered left .28 px in a gauge run alone, where noise made .13: "consistent"."""
     run = SimpleNamespace(width_px=np.full(9, 1.7))
-    searched = cast(Any, SimpleNamespace(steps=(SimpleNamespace(by_chance=0.5),), run=run))
+    searched = cast(Any, SimpleNamespace(by_chance=0.5, run=run))
     quality = FitQuality("px", 0.31, 0.3, 0.29, heldout_px, floor_px)
     seen = Examined(searched, None, (), (), quality=quality)
     assert answer.verdict_of(seen) is verdict
@@ -234,7 +234,7 @@ def test_rings_that_jump_in_an_inspection_are_told_as_a_knock_where_they_may_be_
 def test_a_gauge_run_too_short_to_be_asked_what_repeats_says_so(monkeypatch):
     short = FitQuality("px", 0.3, 0.3, np.nan, np.nan, 0.1)
     found = SimpleNamespace(state=None)
-    searched = cast(Any, SimpleNamespace(steps=(SimpleNamespace(by_chance=0.5),), found=found))
+    searched = cast(Any, SimpleNamespace(by_chance=0.5, found=found))
     monkeypatch.setattr(channels, "examine", lambda *_, **__: Examined(searched, None, (), (), quality=short))
     monkeypatch.setattr(channels, "gauge_travel", lambda *_: SimpleNamespace(shortcomings=()))
     recording = SimpleNamespace(name="gauge")

@@ -131,7 +131,7 @@ class Examined:
     @property
     def expected(self) -> float:
         """Expected number of scores as large, among all that are tested, when nothing is hidden."""
-        return 2 * min(self.searched.steps[0].by_chance, self.patterns_by_chance)
+        return 2 * min(self.searched.by_chance, self.patterns_by_chance)
 
     @property
     def global_p(self) -> float:

@@ -89,8 +89,6 @@ class Verdicts:
         Probability that the likeliest hypothesis' residual is noise.
     formula : Judged
         The empirical formula, whether it is the likeliest or not.
-    alike : float
-        Number of measurements with correlated errors that count as one.
     unfitted : tuple of Unfitted
         Sets of effects and patterns that were weighed but not fitted.
     """
@@ -100,7 +98,6 @@ class Verdicts:
     probability: Float
     adequacy: float
     formula: Judged
-    alike: float
     unfitted: tuple[Unfitted, ...] = ()
 
     def chance_of(self, term: Term) -> float:
@@ -170,7 +167,7 @@ def judge(
         best, is_new = ranked[0], ranked[0] is not former
         former = best
         if is_new:
-            left, sets = _near(run, best, searched.steps[-1].scores, laws, stated, ratio)
+            left, sets = _near(run, best, searched.scores, laws, stated, ratio)
         near = _unfitted(sets, ranked)
         more = _better(run, best, near) if rounds_left > 1 else None
         if more is None and rounds_left and patterned is not best:
@@ -186,7 +183,7 @@ def judge(
     unfitted = tuple(sorted(each, key=lambda u: -u.probability))
     of_formula = _of(judged, formula)
     ranked = (replace(best, evidence=evidence(run, best.fit, ())[0]), *ranked[1:])
-    return Verdicts(regimes, ranked, chance[:count], left, of_formula, searched.alike, unfitted)
+    return Verdicts(regimes, ranked, chance[:count], left, of_formula, unfitted)
 
 
 def _of(judged: Sequence[Judged], formula: Fit) -> Judged:

@@ -123,19 +123,6 @@ def _weight(of: Equations, rows: slice, sigma: Float) -> Float:
 
 
 @dataclass(frozen=True)
-class Step:
-    """One step of the selection: the fit it starts from, all scores there, and the refits tried.
-
-    ``by_chance`` is the expected number of scores as large as the largest when nothing more is hidden.
-    """
-
-    before: Fit
-    scores: tuple[Scored, ...]
-    tried: tuple[Fit, ...]
-    by_chance: float
-
-
-@dataclass(frozen=True)
 class Search:
     """The outcome of the selection.
 
@@ -147,7 +134,10 @@ class Search:
         With no effect, and with those selected.
     rivals : tuple of Fit
         Fits in which one of the found effects is replaced or left out.
-    steps : tuple of Step
+    scores : tuple of Scored
+        All scores about what was found.
+    by_chance : float
+        Expected number of scores about the stated instrument as large as the largest, when nothing is hidden.
     alike : float
         Number of measurements with correlated errors that count as one, given the effects found.
     """
@@ -156,25 +146,24 @@ class Search:
     nothing: Fit
     found: Fit
     rivals: tuple[Fit, ...]
-    steps: tuple[Step, ...]
+    scores: tuple[Scored, ...]
+    by_chance: float
     alike: float
 
 
 def search(run: GaugeRun, start: Fit, library: Mapping[str, EffectModel], stated: Stated) -> Search:
     """Add effects while the data require them; whether another set is better is decided in `judge`."""
-    found, steps = start, []
-    tried: list[Fit] = []
+    found, tried, scanned = start, list[Fit](), list[list[Scored]]()
     while True:
-        step, better = _extended(run, found, library, stated)
-        steps.append(step)
-        if better is None or len(better.terms) > MOST_EFFECTS or len(steps) > 2 * MOST_EFFECTS:
+        scanned.append(scan(run, found, library, stated))
+        better = refits(run, found, scanned[-1]) if by_chance(scanned[-1]) <= DETECTED else []
+        if not better or not _is_needed(better[0], found, scanned[-1]) or len(scanned) > 2 * MOST_EFFECTS:
             break
-        better = refined(run, better)
-        tried += [*step.tried, found]
-        run, found = _weighed_anew(run, better)
-    ratio = alike(steps[-1].scores)
+        tried += [*better, found]
+        run, found = _weighed_anew(run, refined(run, better[0]))
+    ratio = alike(scanned[-1])
     nothing, rivals = fit(run, start.state, ()), _rivals(run, found, tried, ratio)
-    return Search(run, nothing, found, rivals, tuple(steps), ratio)
+    return Search(run, nothing, found, rivals, tuple(scanned[-1]), by_chance(scanned[0]), ratio)
 
 
 def _weighed_anew(run: GaugeRun, found: Fit) -> tuple[GaugeRun, Fit]:
@@ -254,24 +243,12 @@ def _shifts_px(found: Fit, term: Term) -> tuple[float, float]:
     return float(np.sqrt(np.nanmean(ring**2))), float(np.sqrt(np.nanmean(edge**2)))
 
 
-def _extended(
-    run: GaugeRun, found: Fit, library: Mapping[str, EffectModel], stated: Stated
-) -> tuple[Step, Fit | None]:
-    scores = scan(run, found, library, stated)
-    expected = by_chance(scores)
-    if expected > DETECTED:
-        return Step(found, tuple(scores), (), expected), None
-    tried = refits(run, found, scores)
-    step = Step(found, tuple(scores), tuple(tried), expected)
-    best = tried[0]
-    needed = found.cost - best.cost > _LEAST_GAIN * alike(scores) and _counts(best)
-    return step, best if needed else None
-
-
-def _counts(found: Fit) -> bool:
-    """Return whether the last effect is large enough relative to the others."""
-    sizes = [shift_px(found, t) for t in found.terms]
-    return len(sizes) < 2 or sizes[-1] > LEAST_SHARE * max(sizes[:-1])
+def _is_needed(better: Fit, found: Fit, scores: Sequence[Scored]) -> bool:
+    """Return whether one more effect gains enough and is large enough relative to the others."""
+    *others, last = [shift_px(better, t) for t in better.terms]
+    large = not others or last > LEAST_SHARE * max(others)
+    gain = found.cost - better.cost
+    return len(better.terms) <= MOST_EFFECTS and large and gain > _LEAST_GAIN * alike(scores)
 
 
 def _in_own_units(state: Unknowns) -> Unknowns:

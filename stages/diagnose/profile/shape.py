@@ -13,26 +13,22 @@ HERMITE_FLOOR = 1e-3
 OF_A_TAIL = ("line_skew", "subsurface")
 
 
-def third_hermite(rest: Float, offset_px: Float, centre_px: Float, width_px: Float) -> Float:
-    """Return the coefficient (N,) of He₃(x) exp(−x²/2) in the residual (N, B) of a unit Gaussian fit.
+def cell_skewness(cells: Cells) -> Float:
+    """Return the coefficient (N,) of He₃(x) exp(−x²/2) in what a unit Gaussian leaves of the cells.
 
-    A small third cumulant κ₃ gives κ₃ / 6w³. What the fit would absorb is removed from the template.
+    Outward positive; NaN where the middle is not seen. A small third cumulant κ₃ gives κ₃ / 6w³. What the fit
+    would absorb is removed from the template.
     """
-    x = (offset_px - centre_px[:, None]) / width_px[:, None]
+    w = cells.whole
+    x = (cells.offset_px - cells.centre_px[w, None]) / cells.width_px[w, None]
     e = np.exp(-0.5 * x * x) * (np.abs(x) < CORE_REACH)
     tangent = np.stack([e, x * e, x * x * e], axis=-1)
     template = (x**3 - 3 * x) * e
     gram = np.einsum("nbi,nbj->nij", tangent, tangent)
     taken = np.linalg.solve(gram, np.einsum("nbi,nb->ni", tangent, template)[..., None])
     template = template - (tangent @ taken)[..., 0]
-    return np.asarray(np.sum(template * np.where(e > 0, rest, 0.0), axis=1) / np.sum(template**2, axis=1))
-
-
-def cell_skewness(cells: Cells) -> Float:
-    """Return `third_hermite` (N,) of the cells, outward positive; NaN where the middle is not seen."""
-    out = np.full(len(cells.whole), np.nan)
-    w = cells.whole
-    out[w] = third_hermite(cells.rest[w], cells.offset_px, cells.centre_px[w], cells.width_px[w])
+    out = np.full(len(w), np.nan)
+    out[w] = np.sum(template * np.where(e > 0, cells.rest[w], 0.0), axis=1) / np.sum(template**2, axis=1)
     return out
 
 
