@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -279,10 +279,7 @@ def stretch(
 def _borne_out(claim: Claim, other: Claim) -> Claim:
     """Return the claim with the other recording's evidence; a rival remains only where both leave it."""
     alike = tuple(n for n in claim.alike if n in other.alike)
-    both = agreements(
-        claim.where, claim.compared, other.where, other.compared, "whole " if claim.whole else ""
-    )
-    return replace(claim, alike=alike, agreements=(*claim.agreements, *both))
+    return replace(_compared(claim, other.where, other.compared), alike=alike)
 
 
 def _against(claim: Claim, other: Seen | None) -> Claim:
@@ -291,6 +288,9 @@ def _against(claim: Claim, other: Seen | None) -> Claim:
     estimate = travel.estimate(claim.name) if travel is not None else None
     if travel is None or estimate is None or not np.isfinite(estimate.sigma) or estimate.alike:
         return claim
-    same = {estimate.quantity: whole_size(estimate)}
-    both = agreements(claim.where, claim.compared, travel.source, same, "whole " if claim.whole else "")
+    return _compared(claim, travel.source, {estimate.quantity: whole_size(estimate)})
+
+
+def _compared(claim: Claim, where: str, sizes: Mapping[str, Value]) -> Claim:
+    both = agreements(claim.where, claim.compared, where, sizes, "whole " if claim.whole else "")
     return replace(claim, agreements=(*claim.agreements, *both))

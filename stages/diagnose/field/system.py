@@ -87,7 +87,8 @@ def field_system(run: FieldRun, asked: Asked, slips: Int) -> FieldSystem:
     plausible = [a.plausible for model, _ in asked for a in model.amplitudes]
     sigma = np.sqrt(np.diag(run.probe.covariance))[known]
     held = (_HOLD * np.concatenate([sigma, [_SCALE_SIGMA], plausible])) ** -2.0
-    rows.append(_held(held, _own_size(state) + size))
+    border = _own_size(state) + size
+    rows.append(_priors(np.arange(border - size, border), np.zeros(size), held**-0.5, border))
     return FieldSystem(tuple(rows), _texture_rows(run, known, asked, size), tuple(names), value, held)
 
 
@@ -179,16 +180,13 @@ def _own_priors(state: State, size: int) -> Rows:
         state.globals - np.array([state.nominal_radius_mm, 0, 0, 1.0]), state.instrument[-MATCH_BIASES:]
     ]
     value = np.r_[value, np.zeros(_MORE_BIASES)]
-    by_border = np.eye(_own_size(state) + size)[own]
-    none = np.zeros((len(own), 0), np.int64)
-    return Rows(none, np.zeros((len(own), 0, BLOCK)), by_border, value, sigma)
+    return _priors(own, value, sigma, _own_size(state) + size)
 
 
-def _held(information: Float, border: int) -> Rows:
-    count = len(information)
-    by_border = np.eye(border)[border - count :]
-    none = np.zeros((count, 0), np.int64)
-    return Rows(none, np.zeros((count, 0, BLOCK)), by_border, np.zeros(count), information**-0.5)
+def _priors(place: Int, value: Float, sigma: Float, border: int) -> Rows:
+    """Return priors (K,) of zero for columns of the border, with their present values and 1 σ."""
+    none = np.zeros((len(place), 0), np.int64)
+    return Rows(none, np.zeros((len(place), 0, BLOCK)), np.eye(border)[place], value, sigma)
 
 
 def _shape_size(state: State) -> int:

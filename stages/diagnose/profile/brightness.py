@@ -12,7 +12,7 @@ from pipeline.artefacts.measured import RingSamples
 from pipeline.instrument.probe import Probe
 from pipeline.recording.base import Illumination, Recording
 from stages.diagnose.profile.cells import Cells, LineGeometry
-from stages.diagnose.profile.finding import Finding, Regression, Size, finding, regress, tested, untestable
+from stages.diagnose.profile.finding import Finding, Regression, Size, finding, regress, untestable
 from stages.diagnose.profile.measure import LineProfiles
 from stages.texture.light import irradiance
 
@@ -48,9 +48,9 @@ def vignetting_finding(recording: Recording, probe: Probe) -> Finding:
     grey = _grey_by_theta(recording, probe, frames[:: max(1, len(frames) // _FRAMES)], theta)
     light = _log_light(probe, recording.pipe.nominal_diameter_mm / 2, theta)
     fit = _fitted(grey, light, theta)
-    if not np.isfinite(fit.sigma[0]):
+    test = fit.test(1, FALLOFF_FLOOR)
+    if test is None:
         return untestable("vignetting", "The lit wall is too dark or too bright to follow into the depth.")
-    test = tested(float(fit.coefficient[1]), float(fit.sigma[1]), FALLOFF_FLOOR, fit.groups)
     sigma = float(np.hypot(fit.sigma[0], EXPONENT_FLOOR))
     exponent, falloff = (float(c) for c in fit.coefficient[:2])
     return finding(
@@ -165,19 +165,13 @@ def decentre_finding(geometry: LineGeometry, cells: Cells) -> Finding:
     blocks = [(group == k)[:, None] * np.ones_like(psi) for k in range(len(cells.frames))]
     design = np.stack([np.cos(psi), np.sin(psi), np.log(geometry.radius_mm), *blocks], axis=-1)
     fit = regress(design, np.log(geometry.height), group)
-    if not np.isfinite(fit.sigma[0]):
+    test = fit.test_wave(DECENTRE_FLOOR)
+    if test is None:
         return untestable("beam_decentre", "The line's brightness is not seen all round.")
     size = float(np.hypot(*fit.coefficient[:2]))
-    random = float(np.sqrt(np.trace(fit.covariance[:2, :2]) / 2))
-    test = tested(size, random, DECENTRE_FLOOR, fit.groups)
     direction = float(np.degrees(np.arctan2(fit.coefficient[1], fit.coefficient[0])))
-    return finding(
-        "beam_decentre",
-        test.z,
-        test.p_value,
-        (),
-        f"Brightness varies around the ring by ±{100 * size:.0f} %, and is largest at {direction:.0f}°.",
-    )
+    seen = f"Brightness varies around the ring by ±{100 * size:.0f} %, and is largest at {direction:.0f}°."
+    return finding("beam_decentre", test.z, test.p_value, (), seen)
 
 
 def clip_finding(profiles: LineProfiles, cells: Cells, geometry: LineGeometry) -> Finding:
@@ -193,9 +187,9 @@ def clip_finding(profiles: LineProfiles, cells: Cells, geometry: LineGeometry) -
     fit = regress(design, foot, cells.block)
     clipped = float(np.mean(profiles.clipped[geometry.steady])) if geometry.steady.any() else 0.0
     # One cell in twenty (chosen): with fewer, the slope of the spill depends on few frames.
-    if clipped < 0.05 or not np.isfinite(fit.sigma[3]):
+    test = fit.test(3, 2 * STRAY_FLOOR)
+    if clipped < 0.05 or test is None:
         return untestable("saturation", f"{100 * clipped:.1f} % of the line is clipped: too little to test.")
-    test = tested(float(fit.coefficient[3]), float(fit.sigma[3]), 2 * STRAY_FLOOR, fit.groups)
     return finding(
         "saturation", test.z, test.p_value, (),
         f"{100 * clipped:.0f} % of the line is clipped; there its foot is {100 * fit.coefficient[3]:+.2f} % "

@@ -34,6 +34,18 @@ class Regression:
         """(K,) 1 σ."""
         return np.asarray(np.sqrt(np.diagonal(self.covariance)))
 
+    def test(self, place: int, floor: float, stated: float = 0.0) -> Tested | None:
+        """Test a coefficient against its ``stated`` value; None where it is not determined."""
+        sigma = float(self.sigma[place])
+        off = float(self.coefficient[place]) - stated
+        return tested(off, sigma, floor, self.groups) if np.isfinite(sigma) else None
+
+    def test_wave(self, floor: float) -> Tested | None:
+        """Test the amplitude of the first two coefficients, of a cosine and a sine, against zero."""
+        size = float(np.hypot(*self.coefficient[:2]))
+        sigma = float(np.sqrt(np.trace(self.covariance[:2, :2]) / 2))
+        return tested(size, sigma, floor, self.groups) if np.isfinite(sigma) else None
+
 
 def regress(design: Float, value: Float, group: Int) -> Regression:
     """Fit ``value`` (...) by ``design`` (..., K) with biweights; σ by the jackknife over ``group`` (...).

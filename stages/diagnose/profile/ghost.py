@@ -86,7 +86,7 @@ def bounced(found: Responses, cells: Cells, floor: float) -> SecondLine:
     cone = np.arange(-_LARGEST_RAD, _LARGEST_RAD + 1e-9, _CONE_STEP_RAD)
     grid = np.stack(np.meshgrid(tilt, tilt, cone, indexing="ij"), -1).reshape(-1, 3)
     steps = np.array([_TILT_STEP_RAD, _TILT_STEP_RAD, _CONE_STEP_RAD])
-    return _best(found, design, grid, steps, cells.block[w], cells.sector[w], cells.width_px[w], floor)
+    return _best(found, design, grid, steps, cells, floor)
 
 
 def copied(found: Responses, cells: Cells, floor: float) -> SecondLine:
@@ -94,15 +94,16 @@ def copied(found: Responses, cells: Cells, floor: float) -> SecondLine:
     w = cells.whole
     grid = np.arange(-_LARGEST_MM, _LARGEST_MM + 1e-9, _COPY_STEP_MM)[:, None]
     design, steps = -cells.px_per_mm[w][:, None], np.array([_COPY_STEP_MM])
-    return _best(found, design, grid, steps, cells.block[w], cells.sector[w], cells.width_px[w], floor)
+    return _best(found, design, grid, steps, cells, floor)
 
 
 def _best(
-    found: Responses, design: Float, grid: Float, steps: Float, block: Int, sector: Int, width_px: Float,
-    floor: float,
-) -> SecondLine:  # fmt: skip
+    found: Responses, design: Float, grid: Float, steps: Float, cells: Cells, floor: float
+) -> SecondLine:
     """Search the grid of parameters, then refine with decreasing steps; σ by leaving out blocks."""
-    clear = _CLEAR_WIDTHS * float(np.median(width_px)) if len(width_px) else 0.0
+    block, sector, widths_px = (v[cells.whole] for v in (cells.block, cells.sector, cells.width_px))
+    width_px = float(np.median(widths_px)) if len(widths_px) else 0.0
+    clear = _CLEAR_WIDTHS * width_px
 
     def rated(parameters: Float) -> Float:
         return np.asarray(_rate(found.score, found.information, design, parameters, block, clear))
@@ -119,7 +120,7 @@ def _best(
         best = around[int(np.argmax(rated(around)))]
         steps = steps * _SHRINK
     line = _sized(found, design, best, block, sector, floor)
-    left = _skirt(found, line, float(np.median(width_px)), sector)
+    left = _skirt(found, line, width_px, sector)
     return replace(line, floor=float(np.hypot(floor, left)), tries=_TRIES_A_STEP ** len(steps) * len(grid))
 
 

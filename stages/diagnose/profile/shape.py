@@ -6,7 +6,7 @@ import numpy as np
 
 from pipeline.arrays import Float
 from stages.diagnose.profile.cells import CORE_REACH, Cells
-from stages.diagnose.profile.finding import Finding, finding, regress, tested, untestable
+from stages.diagnose.profile.finding import Finding, finding, regress, untestable
 
 # Half a grey level of compression on one flank of a line 100 levels high, over its whole width.
 HERMITE_FLOOR = 1e-3
@@ -39,11 +39,11 @@ def skew_findings(cells: Cells) -> tuple[Finding, Finding]:
     """
     coefficient = cell_skewness(cells)
     mean = regress(np.ones((len(coefficient), 1)), coefficient, cells.block)
-    if not np.isfinite(mean.sigma[0]):
+    test = mean.test(0, HERMITE_FLOOR)
+    if test is None:
         why = "The line's middle is clipped or not seen: its skewness cannot be measured."
         sheet, wall = (untestable(name, why) for name in OF_A_TAIL)
         return sheet, wall
-    test = tested(float(mean.coefficient[0]), float(mean.sigma[0]), HERMITE_FLOOR, mean.groups)
     side = "outside" if test.z > 0 else "inside"
     seen = f"The line has a longer tail on its {side}, {test.z:.1f} σ beyond what compression leaves."
     sheet, wall = (finding(name, test.z, test.p_value, (), seen) for name in OF_A_TAIL)

@@ -99,12 +99,11 @@ def blur_finding(cells: Cells, geometry: LineGeometry, probe: Probe) -> Finding:
     known = np.isfinite(width2) & np.isfinite(design).all(-1)
     design, width2 = _without_frame_means(design, known), _without_frame_means(width2[..., None], known)
     fit = regress(design, width2[..., 0], cells.block_of_frames(len(width2)))
-    if not np.isfinite(fit.sigma[0]):
+    own = probe.shutter.exposure_s
+    test = fit.test(0, EXPOSURE2_FLOOR, own**2)
+    if test is None:
         return untestable("motion_blur", "The line does not move enough for its width to show the exposure.")
-    exposure2, own = float(fit.coefficient[0]), probe.shutter.exposure_s
-    test = tested(exposure2 - own**2, float(fit.sigma[0]), EXPOSURE2_FLOOR, fit.groups)
-    sigma = test.sigma
-    total = np.sqrt(max(exposure2, 0.0))
+    total, sigma = np.sqrt(max(float(fit.coefficient[0]), 0.0)), test.sigma
     size = Size("exposure_s", "s", float(total - own), sigma / (2 * max(total, np.sqrt(sigma))))
     return finding(
         "motion_blur", test.z, test.p_value, (size,),
@@ -140,12 +139,10 @@ def locking_finding(rings: RingSamples, profiles: LineProfiles, cells: Cells) ->
     phase = 2 * np.pi * smooth
     parts = [np.where(valid, f(phase) - _smoothed(f(phase), valid), np.nan) for f in (np.sin, np.cos)]
     fit = regress(np.stack(parts, axis=-1), rough, group)
-    if not np.isfinite(fit.sigma[0]):
+    test = fit.test_wave(LOCKING_FLOOR_PX)
+    if test is None:
         return untestable("pixel_locking", "The line is at the same fraction of a pixel everywhere.")
-    size = float(np.hypot(*fit.coefficient))
-    random = float(np.sqrt(np.trace(fit.covariance) / 2))
-    test = tested(size, random, LOCKING_FLOOR_PX, fit.groups)
-    sigma = test.sigma
+    size, sigma = float(np.hypot(*fit.coefficient)), test.sigma
     return finding(
         "pixel_locking", test.z, test.p_value,
         (Size("amplitude_px", "px", float(fit.coefficient[0]), sigma),),
