@@ -172,7 +172,9 @@ class PatternInCourse(Nameless, InCourse):
     def __post_init__(self) -> None:
         waves = ("sine ", "cosine ") if self.kind is CourseKind.SINUSOID else ("",)
         each = tuple(replace(a, name=wave + a.name) for wave in waves for a in self.static.amplitudes)
-        course = f" as {self.like.name}" if self.like is not None else f", {self.kind}"
+        # A pattern that grows with time or speed has the steady one's name: no set holds both.
+        swing = f", {self.kind}" if self.kind is CourseKind.SINUSOID else ""
+        course = f" as {self.like.name}" if self.like is not None else swing
         object.__setattr__(self, "name", f"{self.static.name}{course}")
         object.__setattr__(self, "harmonic", self.static.harmonic)
         object.__setattr__(self, "amplitudes", each)
