@@ -104,6 +104,8 @@ class CheckedFrames:
         As in `Recording`.
     interlaced : bool
         Whether odd rows were taken at another time than even ones; then the even ones alone are used.
+    cut : tuple of int
+        Frames whose wall does not continue that of the frames before: how far the probe went is not known.
     """
 
     frame: Int
@@ -115,6 +117,7 @@ class CheckedFrames:
     withheld: Bool | None = None
     stays: Bool | None = None
     interlaced: bool = False
+    cut: tuple[int, ...] = ()
 
     def applied_to(self, recording: Recording) -> Recording:
         """Return the recording with these frames, and its encoder in mm and with the motion's sign.

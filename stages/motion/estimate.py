@@ -23,6 +23,7 @@ from pipeline.recording.checks import CheckedFrames
 from stages.motion.bundle_adjustment.equations import Equations, Measurements
 from stages.motion.bundle_adjustment.solver import Estimate, estimate_state
 from stages.motion.bundle_adjustment.unknowns import State
+from stages.motion.cuts import beyond_cuts
 from stages.motion.events import find_events, warn_of_slips
 from stages.motion.loops.loop_closure import LoopReport, close_loops
 from stages.motion.loops.revisits import Passage, WallFeatures, bands_in_rings, texture_at
@@ -193,12 +194,13 @@ def _motion_of_run(
     context: Context,
 ) -> Trajectory:
     """Estimate the motion from the frames and encoder as corrected by the stage premises."""
-    return estimate_motion(frames.applied_to(recording), probe, rings, points, parameters, context)
+    motion = estimate_motion(frames.applied_to(recording), probe, rings, points, parameters, context)
+    return beyond_cuts(motion, frames.cut)
 
 
 MOTION = Stage(
     "motion",
-    "54",
+    "55",
     MotionParameters,
     _motion_of_run,
     "camera pose in every frame and the pipe's axis, from texture, rings and encoder together",

@@ -95,7 +95,7 @@ def check_premises(
     return CheckedFrames(
         recording.frames.frame[keep], changes.time_s[keep], changes.label[keep], factor,
         int(changes.relabelled.sum()), int(changes.retimed.sum()),
-        withheld if withheld.any() else None, seen.stays, combed,
+        withheld if withheld.any() else None, seen.stays, combed, found.cut,
     )  # fmt: skip
 
 
@@ -124,6 +124,7 @@ class _Matched:
 
     changes: Changes
     left_out: LeftOut
+    cut: tuple[int, ...]
     jumps: list[ClockJump]
     steps: Steps
     rings_mm: Float
@@ -160,7 +161,8 @@ def _matched(recording: Recording, probe: Probe, seen: _Seen) -> _Matched:
     jumps = clock_jumps(stated_s, steps, encoder)
     changes = Changes(recording.frames, label, row, without_jumps(stated_s, jumps))
     left_out = LeftOut(seen.outside, seen.astray, again & (np.diff(row, prepend=-1) > 0))
-    return _Matched(changes, left_out, jumps, steps, rings_mm, radius_mm, forwards)
+    cut = tuple(recording.frames.frame[cuts(pictures, seen.shown, left_out.any, changes.time_s)].tolist())
+    return _Matched(changes, left_out, cut, jumps, steps, rings_mm, radius_mm, forwards)
 
 
 def _compared(recording: Recording, probe: Probe, seen: _Seen, found: _Matched, context: Context) -> float:
@@ -169,7 +171,7 @@ def _compared(recording: Recording, probe: Probe, seen: _Seen, found: _Matched, 
     shown = np.where(seen.outside, Light.WALL, seen.light)
     warn_of_frames(changes, pictures, shown, _table(recording), context)
     found.left_out.warn(frame, context)
-    warn_of_cuts(cuts(pictures, seen.shown, found.left_out.any, changes.time_s), pictures, frame, context)
+    warn_of_cuts(found.cut, pictures, frame, context)
     check_diameter(found.radius_mm, recording.pipe, probe.lighting.radius_mm, context)
     warn_of_oval(found.rings_mm, context)
     factor = encoder_factor(recording, changes.time_s, found.steps, found.radius_mm, found.forwards, context)
@@ -248,14 +250,13 @@ def _refuse_one_light(frames: FrameTable, stated: Int, light: Int) -> None:
 
 def _aligned(frames: FrameTable, table: FrameTable, pictures: Pictures, light: Int) -> Alignment:
     """Return which row belongs to which picture; with a single stated light, rows and pictures go in step."""
-    count, stated = len(frames.frame), _lights_of(table.illumination)
-    wrong = (light != Light.UNKNOWN) & (light != stated[:count])
+    rows, stated = np.arange(len(frames.frame)), _lights_of(table.illumination)
+    wrong = (light != Light.UNKNOWN) & (light != stated[rows])
     if len(np.unique(stated)) < 2:
-        lit = count > 2 and stated[0] == Light.WALL
-        rows = np.arange(count)
-        return Alignment(rows_of_repeats(rows, pictures) if lit else rows, np.zeros(count, bool))
+        lit = len(rows) > 2 and stated[0] == Light.WALL
+        return Alignment(rows_of_repeats(rows, pictures) if lit else rows, np.zeros(len(rows), bool))
     if not wrong.any():
-        return Alignment(np.arange(count), np.zeros(count, bool))
+        return Alignment(rows, np.zeros(len(rows), bool))
     again = repeated(pictures, light)
     told = np.where(again, Light.UNKNOWN, light)  # of a picture shown twice nothing tells its own light
     return aligned(Lights(told, stated, pattern_breaks(light), again))
@@ -294,6 +295,6 @@ def _report(pictures: Pictures, radius_mm: float, changes: Changes, context: Con
 
 
 PREMISES = Stage(
-    "premises", "29", PremisesParameters, check_premises,
+    "premises", "30", PremisesParameters, check_premises,
     "lights, times, encoder and diameter as stated, held against the pictures and mended",
 )  # fmt: skip

@@ -43,13 +43,13 @@ def cuts(pictures: Pictures, shown: Int, left_out: Bool, time_s: Float) -> Int:
     return np.asarray(place[(change > _CHANGES * beside) & ~goes_on])
 
 
-def warn_of_cuts(place: Int, pictures: Pictures, frame: Int, context: Context) -> None:
-    """Tell between which of the frames (F,) the recording was cut."""
-    for k in place:
+def warn_of_cuts(cut: tuple[int, ...], pictures: Pictures, frame: Int, context: Context) -> None:
+    """Tell between which of the frames (F,) the recording was ``cut``."""
+    for k in np.flatnonzero(np.isin(frame, cut)):
         context.warn(
             f"the wall in frame {frame[k]} is not the one in frame {frame[pictures.partner[k]]} before: it "
             "changes much more than in any step around, and no texture is common to both. Probably the "
             "recording was cut or paused here, or two were joined. How far the probe went in between is "
-            "not known: distances from here on are wrong by that, and laser, encoder or pipe may seem to "
-            "jump. What to do: process the two parts as recordings of their own"
+            "not known: distances from here on are wrong by that, as their σ says, and laser, encoder or "
+            "pipe may seem to jump. What to do: process the two parts as recordings of their own"
         )

@@ -13,6 +13,7 @@ from pipeline.geometry.axis import PipeAxis, straight_axis
 from pipeline.instrument.camera.fisheye import KannalaBrandt
 from pipeline.instrument.laser import LaserSheet
 from pipeline.instrument.probe import Probe
+from stages.motion.cuts import beyond_cuts
 from stages.motion.tracking.landmarks import TrackedPoses
 from stages.motion.trajectory import SeenCentres, camera_trembles, report_instrument
 from tests.quiet import quiet_context
@@ -124,3 +125,19 @@ def test_rings_of_a_probe_that_jerks_deny_nothing() -> None:
         T_pc[:, 2, 3] = 0.6 * number
         run = Trajectory(number, number / 30, T_pc, np.zeros((40, 6, 6)), axis, 50.0, 1.0, 0.0, 0.0, ())
         assert not SeenCentres(-T_pc[::2, :2, 3], 22.0).deny_trembling(run, number[1::2])
+
+
+@pytest.mark.parametrize("cut", [(), (2,), (2, 3)])
+def test_distances_beyond_a_cut_are_as_unsure_as_the_run_is_long(cut: tuple[int, ...]) -> None:
+    """Where ten pictures were stored ten too late, distances erred by 73 of their σ."""
+    poses = np.tile(np.eye(4), (4, 1, 1))
+    poses[:, 2, 3] = 10.0 * np.arange(4)
+    plain = Trajectory(
+        np.arange(4), np.arange(4) / 30, poses, np.tile(0.01 * np.eye(6), (4, 1, 1)),
+        straight_axis(-50.0, 150.0), 50.0, 1.0, 0.001, 0.0005, (), distance_sigma_mm=0.1,
+    )  # fmt: skip
+    found = beyond_cuts(plain, cut)
+    behind = bool(cut) * (np.arange(4) >= 2)
+    np.testing.assert_allclose(found.covariance[:, 2, 2], 0.01 + 900.0 * behind)
+    np.testing.assert_allclose(found.covariance[:, [0, 1, 5], [0, 1, 5]], 0.01)
+    assert found.distance_sigma_mm == pytest.approx(30.0 if cut else 0.1, rel=1e-4)

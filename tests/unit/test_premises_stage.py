@@ -39,6 +39,14 @@ def test_lights_and_times_are_mended(name, seed, good, run):
     assert all("What to do" in t for t in told)
 
 
+def test_frames_before_which_the_recording_was_cut_are_handed_on(good, run, monkeypatch):
+    assert checked(good, run.probe)[0].cut == ()
+    monkeypatch.setattr("stages.premises.cuts", lambda *_: np.array([31]))
+    found, told = checked(good, run.probe)
+    assert found.cut == (31,)
+    assert "the wall in frame 31 is not the one" in told[0]
+
+
 def test_the_spoilings_spoil(good):
     """Without mending, what is counted as wrong is there."""
     from pipeline.recording.checks import CheckedFrames
