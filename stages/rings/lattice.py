@@ -74,6 +74,24 @@ class Lattice:
         error = np.sign(across) * np.einsum("fak,ak->fa", waves, self.size_px[_slant(across)])
         return np.where(np.isfinite(error), error, 0.0)
 
+    @property
+    def most_px(self) -> Float:
+        """Largest shift of the line (2 T,) in each of its directions or in one farther from the axis.
+
+        Few samples run along the picture's rows themselves, where the error is largest.
+        """
+        size = np.hypot(self.size_px[:, 0], self.size_px[:, _OVERTONES]).reshape(2, -1)
+        return np.asarray(np.maximum.accumulate(size[:, ::-1], axis=1)[:, ::-1].ravel())
+
+    def left_px(self, samples: RingSamples) -> Float:
+        """Return 1 σ (A,) of what is left of the error once it is taken out, px.
+
+        The line is drawn towards the middle of each period. If the error's slope reaches 1, all lines of a
+        period come out at one place, and nothing tells any more where they were.
+        """
+        size = self.most_px[_slant(_across(samples, self.axis))]
+        return np.asarray(size * np.minimum(2 * np.pi * size / self.period_px, 1.0))
+
 
 def lattices_of(samples: RingSamples) -> tuple[Lattice, ...]:
     """Return what repeats with columns and with rows, where it is more than in sound recordings."""
@@ -93,11 +111,16 @@ def lattices_of(samples: RingSamples) -> tuple[Lattice, ...]:
 
 
 def take_out(lattices: tuple[Lattice, ...], samples: RingSamples) -> None:
-    """Take what repeats out of the radii of all rings, in place, some rings at a time."""
+    """Take what repeats out of the radii of all rings, in place, some rings at a time.
+
+    Their σ gets what cannot be taken out.
+    """
     for first in range(0, len(samples.frame) if lattices else 0, _RINGS):
         rings = slice(first, first + _RINGS)
         for each in lattices:
             samples.radius_px[rings] -= each.error_px(samples, rings).astype(np.float32)
+            left = each.left_px(samples).astype(np.float32)
+            samples.sigma_px[rings] = np.hypot(samples.sigma_px[rings], left)
 
 
 def warn_of_lattices(lattices: tuple[Lattice, ...], context: Context) -> None:
@@ -105,7 +128,7 @@ def warn_of_lattices(lattices: tuple[Lattice, ...], context: Context) -> None:
     if not lattices:
         return
     most = max(lattices, key=lambda each: each.share)
-    size_px = float(np.hypot(most.size_px[0, 0], most.size_px[0, _OVERTONES]))
+    size_px = float(most.most_px.max())
     context.warn(
         f"the line's place repeats every {most.period_px:.3g} px along the picture's "
         f"{('rows', 'columns')[most.axis]}, by {size_px:.2f} px to either side: the pictures were enlarged "
