@@ -133,8 +133,8 @@ def _in_field(
     """Return the inspection's residuals; all of it is held out, since the correction did not use it."""
     before = rings_against_texture(field)
     after = rings_against_texture(corrected, linear, encoder_share)
-    learned = of_gauge or (before, after)
-    every = [r.rms_px for r in (*learned, before, after)]
+    first, second = of_gauge or (before, after)
+    every = first.rms_px, second.rms_px, before.rms_px, after.rms_px
     return Compared(before, after, FitQuality("px", *every, after.floor_px))
 
 

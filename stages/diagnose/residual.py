@@ -109,9 +109,8 @@ def wall_distances_mm(residual: RingResidual) -> Float:
 
 def _mean(row: Int, azimuth_rad: Float, values: Float, rows: int) -> Float:
     """Return the means (``rows``, `AZIMUTHS`) of values (M,); NaN where there are none."""
-    inside = (-0.5, rows - 0.5), (-np.pi, np.pi)
-    bins = [rows, AZIMUTHS]
-    return np.asarray(binned_statistic_2d(row, azimuth_rad, values, "mean", bins, inside).statistic)
+    edges = [np.arange(rows + 1) - 0.5, np.linspace(-np.pi, np.pi, AZIMUTHS + 1)]
+    return np.asarray(binned_statistic_2d(row, azimuth_rad, values, "mean", edges).statistic)
 
 
 def rings_against_fiducials(

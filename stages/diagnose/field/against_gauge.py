@@ -18,7 +18,7 @@ from stages.diagnose.gauge.examine import Examined
 from stages.diagnose.gauge.fit import evidence
 from stages.diagnose.gauge.run import Term
 from stages.diagnose.gauge.scan import Scored
-from stages.diagnose.inference import Score, Stated, places_of, score
+from stages.diagnose.inference import Evidence, Score, Stated, places_of, score
 from stages.diagnose.result import Confirmation
 
 # Inspection and gauge run confirm or refute each other only where the 1 σ of one is below this share of the
@@ -115,7 +115,8 @@ def _own_score(term: Term, found: FieldEvidence, stated: Stated) -> tuple[Shape,
     """Return the inspection's own score of an effect and its shape there: of a step at the best time."""
     if found.run is None:
         return None
-    shapes, whole = (term.shape,), None
+    shapes: tuple[Shape, ...] = (term.shape,)
+    whole: Evidence | None = None
     if term.model.kind is CourseKind.STEP:
         duration = float(np.ptp(found.run.measured.time_s))
         shapes = term.model.shapes(duration, found.run.recording.frame_rate)

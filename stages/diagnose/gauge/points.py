@@ -118,7 +118,7 @@ def moved(points: ImagePoints, moving: Moving, outward: Float) -> ImagePoints:
 
 def way_per_px(probe: Probe, uv: Float, outward: Float) -> Float:
     """Return the displacement (M, 3) of the line's points in C, mm, for each px farther ``outward``."""
-    return np.einsum("mij,mj->mi", probe.triangulate_jacobian(uv)[0], outward)
+    return np.asarray(np.einsum("mij,mj->mi", probe.triangulate_jacobian(uv)[0], outward))
 
 
 def edge_points(state: Unknowns, edges: Edges, time_s: Float, moving: Moving) -> ImagePoints:

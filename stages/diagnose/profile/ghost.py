@@ -101,8 +101,8 @@ def _best(
     found: Responses, design: Float, grid: Float, steps: Float, cells: Cells, floor: float
 ) -> SecondLine:
     """Search the grid of parameters, then refine with decreasing steps; σ by leaving out blocks."""
-    block, sector, widths_px = (v[cells.whole] for v in (cells.block, cells.sector, cells.width_px))
-    width_px = float(np.median(widths_px)) if len(widths_px) else 0.0
+    block, sector = cells.block[cells.whole], cells.sector[cells.whole]
+    width_px = float(np.median(cells.width_px[cells.whole])) if len(block) else 0.0
     clear = _CLEAR_WIDTHS * width_px
 
     def rated(parameters: Float) -> Float:
