@@ -224,6 +224,7 @@ def examine_gauge(
             problem = error.problem
     if problem:
         missing += (f"Rings and fiducials of the gauge run were not examined: {problem}.",)
+        context.warn(missing[-1])
     return Seen(recording.name, geometry, travel, light, missing)
 
 
@@ -243,6 +244,7 @@ def examine_field(
     run, light = motion.run(recording, probe, rings), profile.known_light(parameters.without)
     if run is None:
         found = empty_evidence(recording, motion.problem)
+        context.warn(found.shortcomings[0])
     else:
         library = _of_geometry(library_without(parameters.without), light)
         found = field_evidence(run, library, parameters.without, context.progress)
@@ -269,14 +271,14 @@ def _of_geometry(
 
 LINE_PROFILE = Stage("line_profile", "4", Parameters, examine_line, "what the line's light says of effects")
 FIDUCIALS = Stage(
-    "fiducials", "3", GaugeParameters, measure_fiducials, "a gauge run's rings and fiducials", "gauge"
+    "fiducials", "4", GaugeParameters, measure_fiducials, "a gauge run's rings and fiducials", "gauge"
 )
 FREE_MOTION = Stage(
     "free_motion", "2", MotionParameters, adjust_freely, "an inspection's motion without encoder", "motion"
 )
 GAUGE_EVIDENCE = Stage(
-    "evidence", "46", DiagnosisParameters, examine_gauge, "what a gauge run shows of effects", "diagnosis"
+    "evidence", "47", DiagnosisParameters, examine_gauge, "what a gauge run shows of effects", "diagnosis"
 )
 FIELD_EVIDENCE = Stage(
-    "evidence", "24", DiagnosisParameters, examine_field, "what an inspection shows of effects", "diagnosis"
+    "evidence", "25", DiagnosisParameters, examine_field, "what an inspection shows of effects", "diagnosis"
 )

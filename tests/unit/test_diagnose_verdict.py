@@ -249,3 +249,22 @@ def test_a_gauge_run_too_short_to_be_asked_what_repeats_says_so(monkeypatch):
     )
     (told,) = seen.shortcomings
     assert "too short" in told
+
+
+def test_what_could_not_be_examined_is_told_and_not_only_written_on_the_page():
+    """The verdict stood alone on the terminal: "not_identifiable", of a gauge run that was never examined."""
+    warned: list[str] = []
+    given = {"parameters": SimpleNamespace(without=()), "context": SimpleNamespace(warn=warned.append)}
+    frames = SimpleNamespace(applied_to=lambda recording: recording)
+    light = SimpleNamespace(limits=(), known_light=lambda without: None)
+    unmeasured = SimpleNamespace(run=None, problem="the fiducials measure 4.00 mm")
+    recording = SimpleNamespace(name="a", frames=SimpleNamespace(of=lambda *_: []))
+    seen = channels.examine_gauge(
+        *cast(Any, (recording, frames, light, unmeasured, None)), **cast(Any, given)
+    )
+    still = SimpleNamespace(run=lambda *_: None, problem="the probe stands still")
+    channels.examine_field(*cast(Any, (recording, frames, None, light, still, None)), **cast(Any, given))
+    assert len(warned) == 2
+    assert "gauge run were not examined: the fiducials measure 4.00 mm" in warned[0]
+    assert warned[0] in seen.shortcomings
+    assert "inspection say nothing about the instrument: the probe stands still" in warned[1]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from contextlib import nullcontext
 from dataclasses import replace
 
 import cv2
@@ -176,6 +177,21 @@ def test_fiducials_of_another_size_are_refused(run: GaugeRun) -> None:
         premises.require_poses(posed, sightings, larger, stated_probe().camera, USUAL)
     right = _sightings(run.gauge)
     premises.require_poses(_posed(right, run.gauge, run), right, run.gauge, stated_probe().camera, USUAL)
+
+
+@pytest.mark.parametrize(("moved_px", "refused"), [(0.75, False), (1.5, True)])
+def test_fiducials_whose_corners_err_by_less_than_a_pixel_are_not_of_another_size(
+    run: GaugeRun, moved_px: float, refused: bool
+) -> None:
+    """Overexposed white made fiducials of 25 px .7 px smaller on each side: "measure 4.75 mm", not 5 mm."""
+    small, smaller = _with_fiducials(run.gauge, size_mm=3.0), []
+    for one in _sightings(small):
+        inward = one.corner_px.mean(1, keepdims=True) - one.corner_px
+        inward *= moved_px * np.sqrt(2) / np.linalg.norm(inward, axis=-1, keepdims=True)
+        smaller.append(replace(one, corner_px=one.corner_px + inward))
+    posed = _posed(smaller, small, run)
+    with pytest.raises(UnusableError, match="measure") if refused else nullcontext():
+        premises.require_poses(posed, smaller, small, stated_probe().camera, USUAL)
 
 
 def test_mirrored_places_are_refused(run: GaugeRun) -> None:

@@ -213,5 +213,5 @@ def _calibrate_run(
 
 
 GAUGE = Stage(
-    "gauge", "5", GaugeParameters, _calibrate_run, "fiducials and rings on known bore to camera and sheet"
+    "gauge", "6", GaugeParameters, _calibrate_run, "fiducials and rings on known bore to camera and sheet"
 )

@@ -20,7 +20,9 @@ from stages.calibrate.gauge.state import GaugeParameters
 
 STAGE = "calibrate"
 _LOOKED_AT = 6
-_SIZE_TOLERANCE = 0.05
+# Fiducials of another size are refused beyond this share, and beyond what corners may err by: the detector
+# finds each to about a pixel, and overexposed white moves all of them inward.
+_SIZE_TOLERANCE, _SIDE_ERROR_PX = 0.05, 2.0
 # Added to hints, since a recorder that scales or cuts the pictures looks like a wrong gauge: with pictures
 # scaled by 3 % the bores were blamed, with cut ones 24 fiducials.
 _PICTURES = "see whether the recorder scales, stretches, cuts or frames the pictures"
@@ -95,12 +97,13 @@ def require_poses(
             limit=f"{parameters.least_posed_frames} frames, and half of those with fiducials",
             hint=f"check columns_along, rows_along and the distance and azimuth of each id; {_PICTURES}",
         )
-    ratio = _size_ratio(posed, gauge, camera)
-    if abs(ratio - 1) > _SIZE_TOLERANCE:
+    ratio, side_px = _size_ratio(posed, gauge, camera)
+    tolerance = max(_SIZE_TOLERANCE, _SIDE_ERROR_PX / side_px)
+    if abs(ratio - 1) > tolerance:
         size = gauge.fiducials.size_mm
         raise UnusableError(
             STAGE, f"the fiducials measure {ratio * size:.2f} mm where recording.yaml says {size:g} mm",
-            limit=f"{100 * _SIZE_TOLERANCE:.0f} %",
+            limit=f"{100 * tolerance:.0f} %",
             hint=f"size_mm is the edge of the black square; {_PICTURES}",
         )  # fmt: skip
 
@@ -166,9 +169,9 @@ def require_determined(sigma_mm: float, direction: str, parameters: GaugeParamet
         )  # fmt: skip
 
 
-def _size_ratio(posed: PosedFrames, gauge: Gauge, camera: Camera) -> float:
-    """Return seen over stated size of the fiducials, the median over all."""
-    ratios = []
+def _size_ratio(posed: PosedFrames, gauge: Gauge, camera: Camera) -> tuple[float, float]:
+    """Return seen over stated size of the fiducials, and the stated side in px: the medians over all."""
+    ratios, sides = [], []
     for sighting, pose in zip(posed.sightings, posed.poses, strict=True):
         marker = sighting.marker[pose.fits]
         uv = camera.project(transform(inverse(pose.T_pc), gauge.corners(marker))).uv
@@ -176,7 +179,8 @@ def _size_ratio(posed: PosedFrames, gauge: Gauge, camera: Camera) -> float:
             np.linalg.norm(x - np.roll(x, 1, 1), axis=-1).sum(1) for x in (sighting.corner_px[pose.fits], uv)
         )
         ratios.append(seen / stated)
-    return float(np.nanmedian(np.concatenate(ratios)))
+        sides.append(stated / len("nesw"))
+    return float(np.nanmedian(np.concatenate(ratios))), float(np.nanmedian(np.concatenate(sides)))
 
 
 def _likely_cause(recording: Recording, gauge: Gauge, strangers: Sequence[int]) -> str:
