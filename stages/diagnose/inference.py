@@ -28,6 +28,9 @@ PRIOR_PLAUSIBLE = 5.0
 INSTRUMENT = "instrument"
 # Prior odds, relative to a named cause, of an unknown cause that looks exactly like it. Debt: data/debts.md.
 UNKNOWN = 0.1
+# Physics was left out, and a pattern is added, when the probability of chance, corrected for all that was
+# tried, is below this. Debt: data/debts.md.
+DETECTED = 1e-4
 # Costs of an answer, fixed in advance: 50 for a confident wrong name, 1 − 1/n for a class of n names that
 # contains the right one, 1 for a missed name. A name is given where its expected cost is below that of a
 # class of two; a class contains as many names as make it equally certain.

@@ -17,7 +17,7 @@ from stages.diagnose.field.beside import beside, in_words, nameless, union
 from stages.diagnose.field.evidence import FieldEvidence, travels
 from stages.diagnose.field.unexplained import why_unexplained
 from stages.diagnose.gauge.scan import Scored
-from stages.diagnose.inference import INSTRUMENT, Evidence, Stated, places_of, score, stated_belief
+from stages.diagnose.inference import DETECTED, INSTRUMENT, Evidence, Stated, places_of, score, stated_belief
 from stages.diagnose.result import (
     AGAIN,
     Confirmation,
@@ -30,9 +30,6 @@ from stages.diagnose.result import (
     record_next,
 )
 
-# Physics was left out when the probability of chance, corrected for all effects tried, is below this. Debt:
-# data/debts.md.
-DETECTED = 1e-4
 # Effects that explain almost as much as the best one are in its class: laws err by a few per cent, and the
 # recording's own unknowns absorb nearly the same part of each. Debt: data/debts.md.
 _ALMOST, _APART = 0.1, 20.0

@@ -25,10 +25,10 @@ from stages.diagnose.gauge.heldout import fit_quality
 from stages.diagnose.gauge.hypotheses import Judged, judged_of, regimes_of
 from stages.diagnose.gauge.judge import Verdicts, judge
 from stages.diagnose.gauge.run import GaugeRun, Term, pattern_of
-from stages.diagnose.gauge.search import DETECTED, Search, prepare, search
+from stages.diagnose.gauge.search import Search, prepare, search
 from stages.diagnose.gauge.sets import believed
 from stages.diagnose.gauge.unknown_laws import Unknown, excess_exponent, odds_of_unknown_laws
-from stages.diagnose.inference import Stated, stated_belief
+from stages.diagnose.inference import DETECTED, Stated, stated_belief
 from stages.diagnose.result import Confirmation, Feasible, FitQuality, Location
 
 # A gauge is straight and round: effects of the pipe's own shape are not tested.

@@ -21,6 +21,7 @@ from stages.diagnose.gauge.scan import Scored, freed, refined, scan
 from stages.diagnose.gauge.sets import SAME
 from stages.diagnose.inference import (
     DEGREES,
+    DETECTED,
     Around,
     Evidence,
     Score,
@@ -32,9 +33,6 @@ from stages.diagnose.inference import (
 )
 
 _MOST_TERMS = 4
-# A further term is added when the probability of chance, corrected for all terms tried, is below this. Debt:
-# data/debts.md.
-_NEEDED = 1e-4
 # A fit is adequate unless noise alone gives its residual with less than this probability. Debt:
 # data/debts.md.
 ADEQUATE = 1e-5
@@ -51,7 +49,7 @@ def empirical(run: GaugeRun, before: Fit, stated: Stated, swung: Sequence[Scored
 
     ``swung`` are the `swings` about that fit.
     """
-    swinging = [s for s in swung if s.p_value * len(SWINGS) < _NEEDED]
+    swinging = [s for s in swung if s.p_value * len(SWINGS) < DETECTED]
     words = [*VOCABULARY, *((s.model, s.shape) for s in swinging)]
     has_patterns = any(isinstance(t.model, Nameless) for t in before.terms)
     about = evidence(run, before, words)[0] if swinging or has_patterns else before.of_patterns
@@ -70,7 +68,7 @@ def empirical(run: GaugeRun, before: Fit, stated: Stated, swung: Sequence[Scored
 
 def may_need_pattern(left: float, swung: Sequence[Scored]) -> bool:
     """Return whether a pattern or swing may be needed: noise makes the rest with probability ``left``."""
-    return left < 2 * _NEEDED or any(s.p_value * len(SWINGS) < _NEEDED for s in swung)
+    return left < 2 * DETECTED or any(s.p_value * len(SWINGS) < DETECTED for s in swung)
 
 
 def swings(run: GaugeRun, found: Fit, stated: Stated) -> list[Scored]:
@@ -141,7 +139,7 @@ def _next(
     each = zip(words, _scores(about, stated, given, words), strict=True)
     scored = [(model, shape, result) for (model, shape), result in each if result is not None]
     best = max(scored, key=lambda s: s[2].statistic / len(s[2].amplitude), default=None)
-    needed = best is not None and best[2].p_value * len(VOCABULARY) < _NEEDED
+    needed = best is not None and best[2].p_value * len(VOCABULARY) < DETECTED
     return best if needed else None
 
 

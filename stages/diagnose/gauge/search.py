@@ -24,11 +24,8 @@ from stages.diagnose.gauge.points import widths_at
 from stages.diagnose.gauge.run import GaugeRun, Linearised, Term
 from stages.diagnose.gauge.scan import Scored, refined, scan
 from stages.diagnose.gauge.sets import key
-from stages.diagnose.inference import Stated
+from stages.diagnose.inference import DETECTED, Stated
 
-# Physics was left out when the probability of chance, corrected for all effects tried, is below this. Debt:
-# data/debts.md.
-DETECTED = 1e-4
 _REFITTED = 4
 _OTHER_COURSES = 2
 MOST_EFFECTS = 6

@@ -186,8 +186,8 @@ def clip_finding(profiles: LineProfiles, cells: Cells, geometry: LineGeometry) -
     design = np.stack([np.ones_like(share), along, share, -share * along], axis=1)
     fit = regress(design, foot, cells.block)
     clipped = float(np.mean(profiles.clipped[geometry.steady])) if geometry.steady.any() else 0.0
-    # One cell in twenty (chosen): with fewer, the slope of the spill depends on few frames.
     test = fit.test(3, 2 * STRAY_FLOOR)
+    # One cell in twenty (chosen): with fewer, the slope of the spill depends on few frames.
     if clipped < 0.05 or test is None:
         return untestable("saturation", f"{100 * clipped:.1f} % of the line is clipped: too little to test.")
     return finding(
