@@ -23,7 +23,7 @@ from stages.twin.fixed_line import on_line
 from stages.twin.fixed_pattern import pattern_figures
 from stages.twin.glints import window_and_glints
 from stages.twin.lamp_power import lamp_power
-from stages.twin.lamps import flicker_of_measured
+from stages.twin.lamps import faded, flicker_of_measured
 from stages.twin.locate import (
     LEAST_CONTRAST,
     ImagePlace,
@@ -211,7 +211,8 @@ def compared_with(
         raise UnusableError("twin", "no frame could be decoded", hint="copy the video again")
     state, samples = photometry.state, sums.blocks.samples()
     over_time = or_on_window(causes(*sums.cells(), scene.probe.lighting, scene.ring))
-    over_time = (*over_time, *flicker_of_measured(photometry.state, over_time, scene.ring))
+    for also in (flicker_of_measured, faded):
+        over_time = (*over_time, *also(photometry.state, over_time, scene.ring))
     failed = any("led_dead" in m.name for m in over_time)
     whole, withdrawn = sums.named(samples, recording, failed)
     on_window, of_photo = separated_from_photo(sums.on_window(samples), scene.ring)
@@ -290,7 +291,7 @@ PHOTOMETRY = Stage(
 )
 TWIN = Stage(
     "twin",
-    "43",
+    "44",
     TwinParameters,
     compare_with_twin,
     "recorded frames beside the same frames, re-rendered from what the run has measured",

@@ -10,13 +10,14 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from scipy.stats import norm, theilslopes
 
 from pipeline.arrays import Float, Int
 from pipeline.artefacts.twin import Mismatch, NamedFigure
 from stages.twin.cells import SECTORS, centred, sector_azimuth_rad
 from stages.twin.dead_led import seen_from
 from stages.twin.gate import Suspected
-from stages.twin.lamp_light import LampLight
+from stages.twin.lamp_light import Course, LampLight
 from stages.twin.laws import LED_AZIMUTHS, dim_share
 from stages.twin.reference import WALL_COLUMNS, BlockSamples
 from stages.twin.scene import Ring, Scene
@@ -39,6 +40,9 @@ _MOSTLY, _SURE_OF_WALL, _PARTS, _OVER_CELLS = 0.5, 3.0, 6, 4.0
 significance in σ; parts of the frames, each left out once for that σ. Least ratio of the pattern's variance
 on the same wall to that within a cell, where wall that is paler on one side varies alike: below it the share
 would be too large by more than a quarter."""
+_FADES, _CONFIDENCE = 0.25, 0.99
+"""Least slow change of a light, as a logarithm, that is reported: the photo errs by less, as for a dim sector
+of the laser. Confidence with which it must be larger. Chosen."""
 _WIDER = 1.8
 """1 σ of a spread estimated from the median size of steps over that of a standard deviation: from 20,000
 draws for each of 6 to 40 normal samples."""
@@ -172,15 +176,10 @@ def flicker_of_measured(
 
     Compared frames lie at regular steps: lights that flicker in step with them look steady.
     """
-    clipped = state.line_is_clipped  # a clipped line hardly shows the laser's power
-    courses = (
-        ("flicker", "LEDs", "intensity", None if state.lamp is None else state.lamp.gain),
-        ("laser_flicker", "laser", "line", None if clipped or state.line is None else state.line.course),
-    )
     named = {name for m in found for name in m.names}
     made = []
-    for name, light, channel, course in courses:
-        if course is None or name in named or len(course.frame) < _FEWEST_FRAMES:
+    for name, light, channel, course in _courses(state):
+        if name in named:
             continue
         spread, nan = course.spread, float("nan")
         if spread < max(_VARIES[name], _SURE * float(np.median(course.sd))):
@@ -195,3 +194,39 @@ def flicker_of_measured(
         look = ring.whole(int(course.frame[0]))
         made.append(Mismatch(name, channel, "time", (), (size,), nan, nan, nan, said, look))
     return tuple(made)
+
+
+def faded(state: PhotometricState, found: Sequence[Mismatch], ring: Ring) -> tuple[Mismatch, ...]:
+    """Return lights that slowly change over the run; ``found`` is what is known to change over time.
+
+    They have no name: what the light does, and what the photo errs by along the run, look alike. The change
+    is the median slope between frames (H. Theil, 1950; P. K. Sen, 1968), which the first and the last
+    frames, with little photo, do not govern.
+    """
+    steps = {"exposure_step", "lamp_step", "laser_step", "led_dead"} & {n for m in found for n in m.names}
+    made = []
+    for _, light, channel, course in () if steps else _courses(state):
+        way = (course.frame - course.frame[0]) / np.ptp(course.frame)
+        slope, _, low, high = theilslopes(course.log_value, way, _CONFIDENCE)
+        if max(low, -high) < _FADES:
+            continue
+        change, nan = float(np.expm1(slope)), float("nan")
+        sd = float((high - low) / 2 / norm.isf((1 - _CONFIDENCE) / 2) * np.exp(slope))
+        said = (
+            f"From the first to the last frame the {light} {'gains' if change > 0 else 'loses'} "
+            f"{100 * abs(change):.0f} % of the brightness that the wall's photo predicts: the light changes "
+            "slowly, or the photo's brightness does along the pipe."
+        )
+        size, look = NamedFigure("change", change, sd, "relative"), ring.whole(int(course.frame[-1]))
+        made.append(Mismatch("", channel, "time", (), (size,), nan, nan, nan, said, look))
+    return tuple(made)
+
+
+def _courses(state: PhotometricState) -> list[tuple[str, str, str, Course]]:
+    """Return flicker's name, light, channel and course of each light that enough frames show."""
+    clipped = state.line_is_clipped  # a clipped line hardly shows the laser's power
+    courses = (
+        ("flicker", "LEDs", "intensity", None if state.lamp is None else state.lamp.gain),
+        ("laser_flicker", "laser", "line", None if clipped or state.line is None else state.line.course),
+    )
+    return [(n, of, by, c) for n, of, by, c in courses if c is not None and len(c.frame) >= _FEWEST_FRAMES]

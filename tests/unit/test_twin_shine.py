@@ -12,7 +12,7 @@ from pipeline.instrument.probe import Lighting
 from pipeline.recording.base import Illumination
 from stages.twin.glints import SpotsOfFrames
 from stages.twin.lamp_light import Course, LampLight
-from stages.twin.lamps import flicker_of_measured, separated_from_wall, uneven_lamps
+from stages.twin.lamps import faded, flicker_of_measured, separated_from_wall, uneven_lamps
 from stages.twin.laws import dim_share
 from stages.twin.on_wall import ring_step_mm, touching, unnamed
 from stages.twin.reference import BlockSamples, BlocksOfFrames
@@ -294,3 +294,22 @@ def test_a_line_that_is_clipped_tells_no_flicker_of_the_laser(clipped):
     line = SimpleNamespace(course=Course(np.arange(12), log, np.full(12, 1e-3)))
     told = flicker_of_measured(SimpleNamespace(lamp=None, line=line, line_is_clipped=clipped), (), RING)
     assert [m.name for m in told] == ([] if clipped else ["laser_flicker"])
+
+
+def test_a_laser_that_slowly_dims_is_told_without_a_name_and_first_frames_without_photo_do_not_tell_it():
+    random = np.random.default_rng(3)
+
+    def told(change, found=(), first=0.35):
+        log = np.linspace(0, np.log1p(change), 12) + 0.03 * random.standard_normal(12)
+        log[0] += first
+        line = SimpleNamespace(course=Course(8 * np.arange(12), log, np.full(12, 1e-3)))
+        return faded(SimpleNamespace(lamp=None, line=line, line_is_clipped=False), found, RING)
+
+    (fade,) = told(-0.5)
+    assert (fade.name, fade.channel, fade.fixed_to) == ("", "line", "time")
+    assert "loses" in fade.statement
+    assert not told(-0.5, (replace(fade, name="laser_step"),)), "a step was told already"
+    assert not any(m for _ in range(100) for m in (*told(0.0), *told(0.0, first=-0.5)))
+    sizes = [p for _ in range(300) for m in told(-0.5) for p in m.parameters]
+    assert len(sizes) > 290
+    assert np.mean([abs(p.value + 0.5) < 2 * p.sd for p in sizes]) > 0.93
