@@ -72,12 +72,17 @@ class TwinFrame:
             return self
         v, u = np.mgrid[0 : self.level.shape[0], 0 : self.level.shape[1]].astype(np.float32)
         wall = self.region == Region.WALL
-        level, whole = (
+        level, variance, whole = (
             np.asarray(cv2.remap(a, u - aside[0], v - aside[1], cv2.INTER_LINEAR), np.float32)
-            for a in (self.level, wall.astype(np.float32))
+            for a in (self.level, self.variance, wall.astype(np.float32))
         )
         # 0.999: surrounded by wall only, up to rounding.
-        return replace(self, level=np.where(wall & (whole > 0.999), level, self.level))
+        moved = wall & (whole > 0.999)
+        return replace(
+            self,
+            level=np.where(moved, level, self.level),
+            variance=np.where(moved, variance, self.variance),
+        )
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from pipeline.recording.base import Illumination
 from stages.twin.lamp_light import Course, Figure, LampLight
 from stages.twin.noise import CameraNoise
 from stages.twin.reflectance import Reflectance
-from stages.twin.render import Region, Renderer
+from stages.twin.render import Region, Renderer, TwinFrame
 from stages.twin.scene import LitSight
 from stages.twin.state import PhotometricState
 
@@ -70,3 +70,19 @@ def test_pixels_between_nodes_see_the_photo_at_their_place_and_level():
         np.testing.assert_allclose(got, expected, atol=1e-5)
     # Rows are told to 1e-5 by single precision, and neighbours differ by up to 180 grey levels.
     np.testing.assert_allclose(seen[0], grey, atol=0.01)
+
+
+def test_wall_that_a_drop_shows_elsewhere_has_the_noise_of_that_wall():
+    """Bright wall seen at the place of dark wall had kept its noise: with more light, a negative variance."""
+    noise = CameraNoise(
+        Figure(16.0, 0.1), np.inf, Figure(0.2, 0.1), Figure(0.05, 0.01), Figure(0.0, 0.01), Figure(1.0, 0.1)
+    )
+    level = np.full((60, 80), 2.0, np.float32)
+    level[:, 40:] = 200.0
+    unknown, wall = np.full(level.shape, np.nan, np.float32), np.full(level.shape, Region.WALL, np.uint8)
+    twin = TwinFrame(level, noise.variance(level), wall, unknown, unknown)
+    aside = np.zeros((2, *level.shape), np.float32)
+    aside[0] = -6.0
+    bent = twin.drawn_aside(aside).brighter(1.4, noise)
+    assert bent.level[30, 36] > 250
+    np.testing.assert_allclose(bent.variance, noise.variance(bent.level), rtol=1e-3)
