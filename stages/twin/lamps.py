@@ -215,7 +215,7 @@ def faded(state: PhotometricState, found: Sequence[Mismatch], ring: Ring) -> tup
         said = (
             f"From the first to the last frame the {light} {'gains' if change > 0 else 'loses'} "
             f"{100 * abs(change):.0f} % of the brightness that the wall's photo predicts: the light changes "
-            "slowly, or the photo's brightness does along the pipe."
+            "slowly, or the brightness of the photo along the pipe does, as with LEDs that change slowly."
         )
         size, look = NamedFigure("change", change, sd, "relative"), ring.whole(int(course.frame[-1]))
         made.append(Mismatch("", channel, "time", (), (size,), nan, nan, nan, said, look))

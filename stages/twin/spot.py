@@ -25,6 +25,8 @@ lost."""
 _SETTLED = 1e-6
 """A fit has converged when χ² changes by less than this share: of ten thousand pixels it is .01, where 1 is 1
 σ. Without a real spot, a fit that continues wanders off for hundreds of steps."""
+_SURELY = 2.0
+"""σ by which a share must exceed 1 to be none."""
 PARTS = 6
 """Parts of the frames, each left out once for the σ of a spot: consecutive frames are in one part."""
 
@@ -51,6 +53,11 @@ class FittedLaw:
         if self.shown is None:
             return significance_over_frames(self.fall)[1]
         return significance_over_frames(self.shown)[1] if self.fall.sum() > 0 else 1.0
+
+    @property
+    def is_share(self) -> bool:
+        """Whether the size may be a share of the light: no more than 1, up to its σ."""
+        return self.size.value < 1 + _SURELY * self.size.sd
 
 
 def fall_of_spot(sums: Float32, start: Float, beyond: float) -> FittedLaw:

@@ -38,9 +38,9 @@ _OF_CONTRAST = 0.15
 much."""
 _BLURS, _AT_LINE = ("motion_blur", "defocus"), ("window_dirt", "window_scatter")
 _STATED = {
-    "window_dirt": "dust or dirt on the window or the lens takes away",
-    "window_scatter": "something on the window or the lens scatters",
-    "droplet": "a drop on the window or the lens bends",
+    "window_dirt": "dust or dirt on the window or the lens takes away {}",
+    "window_scatter": "something on the window or the lens scatters {}",
+    "droplet": "a drop on the window or the lens bends {}",
 }
 
 
@@ -154,7 +154,7 @@ class WindowPlace:
             "window_scatter": fall_of_spot(spots[:, 1], start, _OF_CONTRAST),
             "droplet": _fall_of_drop(np.stack(self.drops), self.aside_px),
         }
-        name, rivals = self._likeliest(tried)
+        name, rivals = self._likeliest({n: law for n, law in tried.items() if n == "droplet" or law.is_share})
         alone = self.bends and name == "droplet" and not rivals
         chance = max(self.place.probability, tried[name].chance)
         if chance > FALSE_ALARM or ("wall" in fixed_to and not alone):
@@ -217,8 +217,8 @@ class WindowPlace:
             return f"{at} texture is {100 * -size:.0f} % stronger in all frames than in the photo."
         share = "the light" if names[0] == "droplet" else f"{100 * min(size, 1.0):.0f} % of the light"
         share = f"at least {share}" if names[0] == "window_dirt" else share
-        others = "".join(f", or {_STATED[n]} it" for n in names[1:])
-        return f"{at}, in all frames, {_STATED[names[0]]} {share}{others}."
+        others = "".join(f", or {_STATED[n].format('as much')}" for n in names[1:])
+        return f"{at}, in all frames, {_STATED[names[0]].format(share)}{others}."
 
 
 def separated_from_blur(

@@ -91,6 +91,21 @@ def test_a_share_that_may_be_nothing_is_not_told(share, sd, told, monkeypatch):
     assert (place.judged("image") is not None) == told
 
 
+@pytest.mark.parametrize(("share", "name"), [(0.9, "window_scatter or window_dirt"), (1.74, "window_dirt")])
+def test_what_would_scatter_more_than_all_light_is_no_scatter(share, name, monkeypatch):
+    """A thin, dark scratch had been scatter of 174 ± 14 % of the light, or else dirt."""
+    scatter = FittedLaw(np.linspace(9, 11, 9), NamedFigure("share", share, 0.14))
+    dirt = FittedLaw(np.linspace(11, 8, 9), NamedFigure("share", 0.3, 0.02))
+    monkeypatch.setattr("stages.twin.window.fall_of_spot", lambda *of: scatter if of[2] else dirt)
+    random, place = np.random.default_rng(3), WindowPlace(ImagePlace(120.0, 100.0, 18.0, -0.3, 0.02, 1e-6))
+    for frame in range(9):
+        level = _textured(random)
+        place.add(frame, level, _frame(level), np.ones(level.shape, bool))
+    found = place.judged("image")
+    assert found.name == name
+    assert "takes away" in found.statement
+
+
 def test_wall_that_a_few_neighbouring_frames_see_is_no_proof_of_a_spot():
     size = NamedFigure("share", 0.05, 0.01)
     passing = np.repeat([9.0, 8.0, -1.0, 1.0, 0.5], 3)
