@@ -53,7 +53,7 @@ def warn_of_missed(smallest_mm: float, asked_mm: float, context: Context) -> Non
             f"defects of 3 mm × 3 mm must be {smallest_mm:.2g} mm deep for nine of ten to be found, but "
             f"{asked_mm:.2g} mm are wanted: the laser line is too unsteady here. Shallower ones may be "
             "missed, and so are all where the wall was not measured. What to do: record with less "
-            "compression, a sharper picture and a camera that is firmly mounted"
+            "compression, a sharper picture, a dry window and a camera that is firmly mounted"
         )
 
 
