@@ -119,9 +119,13 @@ def _chosen(
 
 
 def _simplest(tries: Sequence[Fitted]) -> Fitted:
-    """Return the law that fits best; one without a name only where no named law fits about as well."""
+    """Return the law that fits best; one without a name only where no named law fits about as well.
+
+    A law that has no certain size does not, where the other one has.
+    """
     named = next(o for o in tries if o.law.name != "lamp_sector")
-    return named if sigmas(tries[0].fall - named.fall) < _SURE else tries[0]
+    by_chance = named.probability > FALSE_ALARM >= tries[0].probability
+    return tries[0] if by_chance or sigmas(tries[0].fall - named.fall) >= _SURE else named
 
 
 def _first(found: Fitted) -> int:

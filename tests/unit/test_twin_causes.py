@@ -98,6 +98,16 @@ def test_a_side_that_darkens_otherwise_than_an_led_makes_it_has_no_name(lost, ha
     assert side.parameters[0].value == pytest.approx(lost, abs=0.12)
 
 
+@pytest.mark.parametrize("azimuth_deg", [-170, 4, 60])
+@pytest.mark.parametrize("lost", [0.5, 0.9])
+def test_a_side_that_gets_nearly_dark_is_told_as_well_as_one_that_darkens(lost, azimuth_deg):
+    """An LED that loses five times its light fitted it about as well; no law was then told at all."""
+    side = np.maximum(np.cos(np.radians(AZIMUTH_DEG - azimuth_deg)), 0) ** 2
+    (found,) = _found(np.log1p(-lost * side) * _step(9))
+    assert (found.name, found.fixed_to) == ("", "time")
+    assert found.parameters[0].value == pytest.approx(lost, abs=0.1)
+
+
 def test_few_frames_call_an_led_that_fails_either_that_or_flicker(monkeypatch):
     monkeypatch.setattr("tests.unit.test_twin_causes.FRAMES", 6)
     monkeypatch.setattr("tests.unit.test_twin_causes.NUMBER", NUMBER[:6])
