@@ -44,8 +44,8 @@ from stages.premises.stays import places_that_stay
 
 _LASER, _LED, _BOTH = Illumination.LASER.value, Illumination.LED.value, Illumination.BOTH.value
 Labels = NDArray[np.str_]
-# If all pictures look alike, the light stated by at least this share of the rows is believed and the other
-# rows count as mistakes. If no light has such a share, the table is refused.
+# If all pictures look the same, the light that at least this share of the rows states is taken as true, and
+# the other rows count as mistakes. If no light has such a share, the table is refused.
 _MOST_ROWS = 2 / 3
 # Lights that change more often than this from picture to picture are switched on purpose.
 _SWITCHED = 0.1
@@ -55,7 +55,7 @@ class PremisesParameters(Parameters):
     """Parameters of the premises."""
 
     mend: bool = Field(
-        True, description="mend lights and times of frames that the pictures contradict; false: stop instead"
+        True, description="correct lights and times of frames that the pictures contradict; false: stop"
     )
     withhold: int = Field(
         0,
@@ -76,12 +76,12 @@ class PremisesParameters(Parameters):
 def check_premises(
     recording: Recording, probe: Probe, parameters: PremisesParameters, context: Context
 ) -> CheckedFrames:
-    """Compare stated lights, times, diameter and encoder with the pictures; correct what is wrong, and warn.
+    """Compare stated lights, times, diameter and encoder with the pictures; correct errors, and warn of them.
 
     Raises
     ------
     UnusableError
-        When what is stated cannot be right and cannot be mended, or is not to be.
+        When a statement is wrong and cannot be corrected, or when ``parameters.mend`` forbids it.
     """
     recording, pictures, combed = _progressive(recording, probe, parameters, context)
     seen = _seen(recording, probe, pictures, context)
@@ -104,9 +104,9 @@ class _Seen:
     """What the pictures of a recording show.
 
     ``light`` (F,) is the `Light` of every picture; ``in_order`` (F,) is the same, but unknown for pictures
-    outside the pipe or out of order; ``shown`` (F,) is ``in_order``, or the stated lights where pictures do
-    not show two. ``outside`` and ``astray`` (F,) are as in `LeftOut`. ``stays`` (h, w) is where something
-    stays in the picture while the wall moves.
+    outside the pipe or out of order; ``shown`` (F,) is ``in_order``, or the stated lights if the pictures do
+    not show two lights. ``outside`` and ``astray`` (F,) are as in `LeftOut`. ``stays`` (h, w) marks places
+    of the picture where something stays while the wall moves.
     """
 
     pictures: Pictures
@@ -120,7 +120,7 @@ class _Seen:
 
 @dataclass(frozen=True)
 class _Matched:
-    """Rows, lights and times of the pictures as corrected, and what they were corrected by."""
+    """Corrected rows, lights and times of the pictures, and the corrections."""
 
     changes: Changes
     left_out: LeftOut
@@ -166,7 +166,7 @@ def _matched(recording: Recording, probe: Probe, seen: _Seen) -> _Matched:
 
 
 def _compared(recording: Recording, probe: Probe, seen: _Seen, found: _Matched, context: Context) -> float:
-    """Warn of all that is not as stated; return the factor that the encoder's readings are to be given."""
+    """Warn of every wrong statement; return the factor by which the encoder's readings are multiplied."""
     frame, pictures, changes = recording.frames.frame, seen.pictures, found.changes
     shown = np.where(seen.outside, Light.WALL, seen.light)
     warn_of_frames(changes, pictures, shown, _table(recording), context)
@@ -216,7 +216,7 @@ def _stated(table: FrameTable, row: Int) -> Labels:
 def _light(frames: FrameTable, pictures: Pictures) -> Int:
     """Return the `Light` (F,) of every picture.
 
-    If all pictures look alike although the table states two lights, the light of most rows is returned.
+    If all pictures look the same although the table states two lights, the light of most rows is returned.
     """
     light, stated = light_seen(pictures), _lights_of(frames.illumination)
     _refuse_one_light(frames, stated, light)
@@ -249,7 +249,7 @@ def _refuse_one_light(frames: FrameTable, stated: Int, light: Int) -> None:
 
 
 def _aligned(frames: FrameTable, table: FrameTable, pictures: Pictures, light: Int) -> Alignment:
-    """Return which row belongs to which picture; with a single stated light, rows and pictures go in step."""
+    """Return the row of each picture; with a single stated light, each picture has the row of its number."""
     rows, stated = np.arange(len(frames.frame)), _lights_of(table.illumination)
     wrong = (light != Light.UNKNOWN) & (light != stated[rows])
     if len(np.unique(stated)) < 2:
@@ -258,12 +258,12 @@ def _aligned(frames: FrameTable, table: FrameTable, pictures: Pictures, light: I
     if not wrong.any():
         return Alignment(rows, np.zeros(len(rows), bool))
     again = repeated(pictures, light)
-    told = np.where(again, Light.UNKNOWN, light)  # of a picture shown twice nothing tells its own light
+    told = np.where(again, Light.UNKNOWN, light)  # a repeated picture does not show its own light
     return aligned(Lights(told, stated, pattern_breaks(light), again))
 
 
 def _labels(table: FrameTable, alignment: Alignment, light: Int, pictures: Pictures) -> Labels:
-    """Return the illumination (F,) of every picture: what it shows, or where it does not tell, its row's."""
+    """Return the illumination (F,) of every picture as it shows it; if it shows none, that of its row."""
     stated = _stated(table, alignment.row)
     led, both = stated == _LED, stated == _BOTH
     wall = _LED if led.sum() >= both.sum() else _BOTH
@@ -288,13 +288,13 @@ def _refuse_unmended(changes: Changes, parameters: PremisesParameters) -> None:
 
 
 def _report(pictures: Pictures, radius_mm: float, changes: Changes, context: Context) -> None:
-    context.report("pictures looked at", int(pictures.seen.sum()), "frames")
-    context.report("frames whose light was mended", int(changes.relabelled.sum()), "frames")
-    context.report("frames whose time was mended", int(changes.retimed.sum()), "frames")
+    context.report("pictures examined", int(pictures.seen.sum()), "frames")
+    context.report("frames whose light was corrected", int(changes.relabelled.sum()), "frames")
+    context.report("frames whose time was corrected", int(changes.retimed.sum()), "frames")
     context.report("pipe radius by ring and stated probe", radius_mm, "mm")
 
 
 PREMISES = Stage(
     "premises", "30", PremisesParameters, check_premises,
-    "lights, times, encoder and diameter as stated, held against the pictures and mended",
+    "stated lights, times, encoder and diameter compared with the pictures and corrected",
 )  # fmt: skip

@@ -11,20 +11,20 @@ from pipeline.recording.base import Encoder
 from stages.premises.losses import Steps
 
 # The pictures count as reversed if their motion fits the encoder twice as well backwards in time. In 29 sound
-# recordings (open-1 to a12) it fits at most 1.24 times as well, in all 14 gauge runs, reversed, 2.2 times or
-# more. With fewer steps nothing is said.
+# recordings (open-1 to a12) it fits at most 1.24 times as well; in all 14 gauge runs, when reversed, 2.2
+# times or more. With fewer steps there is no decision.
 _TWICE, _LEAST_TOLD = 2.0, 20
 # Delays of the encoder's clock, s, that are tried before pictures count as reversed. With ±0.1 s, up to 15 of
 # 60 drawn runs that stop and go were wrongly refused where the clock was off by more; with ±1 s none was, and
-# all 120 reversed ones were. At steps of 12.5 ms no delay is farther from one tried than a fifth of a frame
-# at 30 frames a second.
+# all 120 reversed ones were. In steps of 12.5 ms, no delay is farther from a tried one than a fifth of a
+# frame at 30 frames a second.
 _LATE_S = np.linspace(-1, 1, 161)
 
 
 def runs_forwards(encoder: Encoder | None, time_s: Float, steps: Steps) -> bool:
-    """Return whether the wall's motion shows that the pictures are stored first to last.
+    """Return whether the wall's motion shows that the pictures are stored in the order of time.
 
-    False also if it cannot: without an encoder, at a steady speed, or with too few known steps.
+    False also if it cannot show that: without an encoder, at a steady speed, or with too few known steps.
 
     Parameters
     ----------
@@ -33,13 +33,14 @@ def runs_forwards(encoder: Encoder | None, time_s: Float, steps: Steps) -> bool:
     time_s : (F,)
         Times of the pictures, s, corrected.
     steps
-        Of the wall between pictures, in radii of the pipe.
+        Motion of the wall between pictures, in radii of the pipe.
 
     Raises
     ------
     UnusableError
         When the encoder fits twice as well backwards in time as forwards, whatever its sign and unit, and
-        even if its clock is a second off. A run there and back is the same both ways and never refused.
+        even if its clock is a second off. A run to and fro looks the same in both directions and is never
+        refused.
     """
     if encoder is None:
         return False
@@ -54,13 +55,13 @@ def runs_forwards(encoder: Encoder | None, time_s: Float, steps: Steps) -> bool:
     if _TWICE * backwards < as_it_is:
         raise UnusableError(
             "premises",
-            "the pictures are stored in reverse order, last first: the wall moves in them as the encoder "
-            f"does, read backwards in time, which fits {as_it_is / max(backwards, 1e-9):.1f} times as well",
-            hint="turn the order of the pictures round, or find out what reversed the video",
+            "the pictures are stored in reverse order, last first: the wall's motion fits the encoder read "
+            f"backwards in time {as_it_is / max(backwards, 1e-9):.1f} times as well as forwards",
+            hint="reverse the order of the pictures, or find out what reversed the video",
         )
     return _TWICE * as_it_is < backwards
 
 
 def _misfit(wall: Float, shown: Float) -> float:
-    """Return by how much steps of the wall (K,) differ from those ``shown`` (K,), at the best ratio."""
+    """Return how much steps of the wall (K,) differ from the ``shown`` steps (K,), after the best scaling."""
     return root_mean_square(wall - shown * float(wall @ shown) / max(float(shown @ shown), 1e-12))

@@ -1,4 +1,4 @@
-"""Whether the encoder, too, shows a faster probe for a moment: then no pictures were lost there."""
+"""Checks whether the encoder also shows a faster probe for a moment: then no pictures were lost there."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from pipeline.arrays import Float
 from pipeline.recording.base import Encoder
 from stages.premises.moving import usual_speed
 
-# Shifts of the encoder's clock, in pictures, over which the encoder must be steady: behind losses that were
-# not found, its clock is off by as many pictures (chosen: a third of a second at 30 a second).
+# Shifts of the encoder's clock, in pictures, over which the encoder must be steady: after losses that were
+# not found, its clock is off by as many pictures (chosen: a third of a second at 30 pictures a second).
 _SHIFTS = np.arange(-10, 11)
 # The usual speed is the median over nine steps, as for the wall, and over at least five changes of the count,
 # so that more than half of them lie outside of the step that is examined.
@@ -21,16 +21,16 @@ _STEPS, _COUNTS = 9, 5
 
 @dataclass(frozen=True)
 class Pace:
-    """How far an encoder goes, and how fast it usually does.
+    """An encoder's distance over time, and its usual speed.
 
     Attributes
     ----------
     time_s, distance : (N,)
         Time and distance midway between two readings that differ, and those at both ends. At such a change
-        the distance is known to the time between two readings, however coarse the count; in between it is
-        not.
+        the distance is known to within the time between two readings, however coarse the count; between
+        changes it is not.
     grid_s, usual : (M,)
-        Times, and the usual advance per picture there, the jitter of a standing encoder included.
+        Times, and the usual advance per picture there, including the jitter of a standing encoder.
     period_s, least : float
         Time from picture to picture, and the smallest advance in that time of an encoder that moves.
     """
@@ -44,9 +44,10 @@ class Pace:
 
     @classmethod
     def of(cls, encoder: Encoder | None, pictures_s: Float, step_pictures: float) -> Pace | None:
-        """Return the pace of an encoder over the times of pictures (F,), s, and steps of so many pictures.
+        """Return the pace of an encoder over the times of pictures (F,), s.
 
-        None without an encoder, or where it stands or changes too seldom.
+        ``step_pictures`` is the usual number of pictures in a step. None without an encoder, or if it
+        stands or changes too seldom.
         """
         period_s = float(np.median(np.diff(pictures_s)))
         k = np.empty(0, np.int64) if encoder is None else np.flatnonzero(np.diff(encoder.distance_mm))
@@ -72,9 +73,10 @@ class Pace:
     def excess(self, begin_s: float, end_s: float) -> Float:
         """Return by how many pictures (21,) more than usual the encoder advances from one time to another.
 
-        There is a value for each assumed shift of its clock, first that for none. Compared is the way between
-        those changes of the count that enclose the times, so that a slow or coarse count is compared over as
-        long as it takes. NaN where no changes enclose them, infinite where the encoder stands or turns back.
+        There is a value for each assumed shift of its clock, the first one without a shift. The distance is
+        taken between the changes of the count that enclose the times, so that a slow or coarse count is
+        compared over as long as it needs. NaN where no changes enclose the times, infinite where the encoder
+        stands or turns back.
         """
         shifts_s = self.period_s * np.r_[0, _SHIFTS[_SHIFTS != 0]]
         sense = float(np.sign(np.interp((begin_s + end_s) / 2, self.grid_s, self.usual)))

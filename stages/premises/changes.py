@@ -1,4 +1,4 @@
-"""What differs between a recording's tables and its pictures, and the warnings about it."""
+"""Differences between a recording's tables and its pictures, and the warnings about them."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ from stages.premises.light import Light
 from stages.premises.pictures import Pictures
 
 _SHOWN = 8
-# A picture counts as combed if neighbouring rows differ by so many times as much as rows two apart, and a
-# recording as interlaced if so large a share of its pictures is combed. The ratio is 1.0 ± 0.06 in noise, .3
-# to .4 in lit pictures of open-1 to open-3, a01 and a05, and 1.7 to 5 where every second row is from two
-# frames later. Pictures of the laser line are never combed: it moves too little.
+# A picture counts as combed if the difference of neighbouring rows is this many times that of rows two apart,
+# and a recording as interlaced if at least this share of its pictures is combed. The ratio is 1.0 ± 0.06 in
+# noise, .3 to .4 in lit pictures of open-1 to open-3, a01 and a05, and 1.7 to 5 where every second row is
+# from two frames later. Pictures of the laser line are never combed: the line moves too little.
 _COMBED, _MANY_COMBED = 1.3, 0.25
 
 
 @dataclass(frozen=True)
 class Changes:
-    """What differs between the recording's frames and what the pictures show."""
+    """Differences between the stated frames of a recording and its pictures."""
 
     frames: FrameTable
     label: NDArray[np.str_]
@@ -34,12 +34,12 @@ class Changes:
 
     @property
     def relabelled(self) -> Bool:
-        """(F,) true where the light is another than stated."""
+        """(F,) true where the light differs from the stated one."""
         return np.asarray(self.label != self.frames.illumination)
 
     @property
     def retimed(self) -> Bool:
-        """(F,) true where the time is another than stated."""
+        """(F,) true where the time differs from the stated one."""
         return np.asarray(self.time_s != self.frames.time_s)
 
     @property
@@ -48,7 +48,7 @@ class Changes:
         return self.row - np.arange(len(self.row))
 
     def lost(self) -> list[tuple[int, int]]:
-        """Return (frame, number) wherever pictures were lost before a frame."""
+        """Return (frame, number of pictures lost before it) for every frame after a loss."""
         skipped = np.diff(self.row, prepend=-1) - 1
         return [(int(self.frames.frame[k]), int(skipped[k])) for k in np.flatnonzero(skipped > 0)]
 
@@ -56,7 +56,7 @@ class Changes:
 def warn_of_frames(
     changes: Changes, pictures: Pictures, light: Int, table: FrameTable, context: Context
 ) -> None:
-    """Tell of lost pictures, wrong labels, a video cut short and pictures that show nothing."""
+    """Warn of lost pictures, wrong labels, a video that ends early and pictures that show nothing."""
     frame, lost = changes.frames.frame, changes.lost()
     if lost:
         context.warn(
@@ -69,8 +69,8 @@ def warn_of_frames(
     wrong = frame[changes.relabelled & (changes.rows_later == 0)]
     if wrong.size:
         context.warn(
-            f"{_pictures(len(wrong))} in another light than frames.csv states: frame {_listed(wrong)}. What "
-            "the pictures show is used. What to do: correct the column illumination"
+            f"{_pictures(len(wrong))} in another light than frames.csv states: frame {_listed(wrong)}. The "
+            "light that the pictures show is used. What to do: correct the column illumination"
         )
     repeats = np.diff(changes.row, prepend=-1) < 1
     again = frame[repeats]
@@ -78,19 +78,19 @@ def warn_of_frames(
     if left > 0:
         context.warn(
             f"the video ends early: it lacks the last {left} of the {len(table.frame)} frames in frames.csv. "
-            "Only what was filmed is measured. What to do: copy the video again, it may be cut off"
+            "Only the frames in the video are measured. What to do: copy the video again, it may be cut off"
         )
     earlier = int(((changes.rows_later < 0) & ~repeats).sum())
     hint = (
-        f"see whether the recorder puts pictures in: the {earlier} frames after them now have the times of "
+        f"check whether the recorder inserts pictures: the {earlier} frames after them now have the times of "
         "earlier rows; else correct frames.csv"
     )
-    what = "left out, since the one before is shown again"
+    what = "left out, since they repeat the picture before"
     warn_of(again, what, hint if earlier else "nothing, or repair the recorder", context)
     warn_of(frame[~pictures.seen], "that cannot be decoded", "copy the video again", context)
     dark = (light == Light.UNKNOWN) & pictures.seen & np.any(light != Light.UNKNOWN)
     warn_of(
-        frame[dark], "that show neither a laser line in the dark nor a lit wall, taken as stated",
+        frame[dark], "that show neither a laser line in the dark nor a lit wall; their stated light is used",
         "look at them: the lens was covered, a lamp failed, or daylight came in", context,
     )  # fmt: skip
 
@@ -106,7 +106,7 @@ def refuse_or_warn_of_interlacing(mend: bool, context: Context) -> None:
     Raises
     ------
     UnusableError
-        When interlaced pictures are not to be used.
+        When ``mend`` is false, so that interlaced pictures are refused.
     """
     what = "the pictures are interlaced: odd and even rows differ in time or in light"
     hint = "set camera and recorder to progressive"
@@ -117,16 +117,16 @@ def refuse_or_warn_of_interlacing(mend: bool, context: Context) -> None:
 
 @dataclass(frozen=True)
 class LeftOut:
-    """Pictures that are left out, each (F,) by its reason.
+    """Pictures that are left out, by reason; each (F,) bool.
 
     Attributes
     ----------
     outside
-        Taken before the first laser line, or behind the last.
+        Pictures taken before the first laser line, or after the last.
     astray
-        Stored in another order than they were taken.
+        Pictures stored in another order than they were taken.
     copy
-        A repetition of an earlier picture.
+        Pictures that repeat an earlier one.
     """
 
     outside: Bool
@@ -139,24 +139,24 @@ class LeftOut:
         return np.asarray(self.outside | self.astray | self.copy)
 
     def warn(self, frame: Int, context: Context) -> None:
-        """Tell which of the frames (F,) are left out, and why."""
+        """Warn which of the frames (F,) are left out, and why."""
         warn_of(
-            frame[self.outside], "left out: taken before the first laser line or behind the last",
-            "nothing, if the probe was outside the pipe there; else see why the laser was off", context,
+            frame[self.outside], "left out: taken before the first laser line or after the last",
+            "nothing, if the probe was outside the pipe there; else find out why the laser was off", context,
         )  # fmt: skip
         warn_of(
             frame[self.astray], "left out: stored in another order than taken",
-            "look whether the recorder, or what cut the video, mixes pictures up", context,
+            "check whether the recorder, or the program that cut the video, reorders pictures", context,
         )  # fmt: skip
         warn_of(
             frame[self.copy],
-            "left out, since the recorder hung, or the codec held the one before",
-            "nothing, if the wall that was passed meanwhile need not be seen", context,
+            "left out, since the recorder hung, or the codec repeated the picture before",
+            "nothing, if the wall passed meanwhile need not be inspected; else record again", context,
         )  # fmt: skip
 
 
 def warn_of(frame: Int, what: str, hint: str, context: Context) -> None:
-    """Warn ``what`` is wrong with the pictures of some frames, and what to do (``hint``); not of none."""
+    """Warn ``what`` is wrong with the pictures of these frames, and what to do (``hint``); not if empty."""
     if frame.size:
         context.warn(f"{_pictures(len(frame))} {what}: frame {_listed(frame)}. What to do: {hint}")
 

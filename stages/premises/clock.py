@@ -1,4 +1,4 @@
-"""The camera's clock: its rate, and jumps in its times that neither wall nor encoder shows."""
+"""Checks the camera's clock: its rate, and jumps in its times that neither wall nor encoder shows."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from pipeline.machine.stage import Context
 from pipeline.recording.base import Encoder, FrameTable, Recording
 from stages.premises.losses import Steps
 
-# A gap of more frame times than this may be a jump of the clock; lost pictures that the table knows of make
-# shorter ones.
+# A gap of more frame times than this may be a jump of the clock; lost pictures that the table shows make
+# shorter gaps.
 _GAP = 4.0
-# Two advances are alike within this factor, since steps err by a tenth. The clock jumped if the wall's step
-# over the gap is like a usual one, and the encoder's is like it only once the gap is taken out.
+# Two advances agree within this factor, since steps err by a tenth. The clock jumped if the wall's step over
+# the gap agrees with a usual one, and the encoder's step agrees with it only after the gap is removed.
 _LIKE = 2.0
 # Frame rates that differ by a larger factor are reported: recorders round 29.97 to 30 (chosen).
 _OTHER_RATE = 1.2
@@ -35,8 +35,8 @@ class ClockJump:
 def clock_jumps(time_s: Float, steps: Steps, encoder: Encoder | None) -> list[ClockJump]:
     """Return the gaps in the times (F,) of pictures over which the wall moved by only a usual step.
 
-    If the encoder, too, shows a usual step once the gap is taken out, and not with the times as stated, the
-    clock jumped. If it shows one with the times as stated, the probe stood meanwhile and the times are right.
+    If the encoder also shows a usual step after the gap is removed, and not with the stated times, the clock
+    jumped. If it shows one with the stated times, the probe stood meanwhile and the times are right.
     """
     period = float(np.median(np.diff(time_s))) if len(time_s) > 1 else 0.0
     if encoder is None or len(steps.end) < _FEWEST:
@@ -55,11 +55,11 @@ def without_jumps(time_s: Float, jumps: list[ClockJump]) -> Float:
 
 
 def without_stretch(time_s: Float, row: Int, table: FrameTable, frame_rate: float) -> Float:
-    """Return times (F,) of pictures, of which some were lost, where the table spreads those left evenly.
+    """Return times (F,) of pictures, corrected if some were lost and the table spaces the others evenly.
 
-    Such a table begins and ends with the video and has the mean rate of the pictures that are left; its times
-    are spread over the rows that were found. A table that only counts pictures has the camera's own
-    ``frame_rate`` and ends too early; its times stay as they are.
+    Such a table begins and ends with the video and has the mean rate of the remaining pictures; its times are
+    spread over the rows that were found. A table that only counts pictures has the camera's own
+    ``frame_rate`` and ends too early; its times are returned unchanged.
     """
     step_s, last = np.diff(table.time_s), int(row[-1])
     if last < len(table.time_s) or len(step_s) == 0 or np.ptp(step_s) > _EVEN * np.median(step_s):
@@ -90,19 +90,19 @@ def _alike(one: float, other: float) -> bool:
 
 
 def warn_of_clock(jumps: list[ClockJump], time_s: Float, recording: Recording, context: Context) -> None:
-    """Warn of jumps of the clock, and of a frame rate other than stated."""
+    """Warn of jumps of the clock, and of a frame rate that differs from the stated one."""
     for jump in jumps:
         context.warn(
             f"the clock of frames.csv jumps by {jump.by_s:.3g} s before frame "
             f"{recording.frames.frame[jump.place]}: wall and encoder go on as from one picture to the next. "
-            "The jump is taken out of the times. What to do: nothing, or see what set the recorder's clock"
+            "The jump is removed from the times. What to do: nothing, or find out what set the clock"
         )
     if len(time_s) < 2:
         return
     rate = 1 / float(np.median(np.diff(time_s)))
     if max(rate / recording.frame_rate, recording.frame_rate / rate) > _OTHER_RATE:
         context.warn(
-            f"by frames.csv {rate:.3g} frames were taken a second, recording.yaml states "
+            f"frames.csv has {rate:.3g} frames per second, recording.yaml states "
             f"{recording.frame_rate:g}. What to do: check the unit (s) of time_s; speeds and the encoder's "
-            "match rest on it"
+            "alignment with the pictures depend on it"
         )

@@ -10,11 +10,11 @@ from pipeline.machine.stage import Context
 from stages.premises.light import Light
 from stages.premises.pictures import Pictures
 
-# At a cut the wall's picture changes by so many times as much as in any step around it. Two joined runs make
+# At a cut the wall's picture changes this many times as much as in any step around it. Two joined runs make
 # 3.0, 2.1 and 2.0 (open-1 to open-3), 8 lost pictures 1.4, everything else in 90 spoilt copies of open-1 at
 # most 1.1; the bound is the middle between 1.4 and 2.0. Failing lamps change more, but texture goes on.
 _CHANGES = 1.7
-# Texture goes on if the wall's step differs from the usual one by less than so many usual steps.
+# Texture continues if the wall's step differs from the usual one by less than this many usual steps.
 _GOES_ON = 3.0
 # Eight steps on either side, with which one is compared, and fewest of them in a recording.
 _BESIDE, _FEWEST = np.arange(-8, 9) != 0, 12
@@ -26,8 +26,8 @@ def cuts(pictures: Pictures, shown: Int, left_out: Bool, time_s: Float) -> Int:
     Parameters
     ----------
     shown, left_out, time_s : (F,)
-        `Light` of each picture, whether it is left out, and its time: over a gap the encoder tells how far
-        the probe went, and pictures are known to be missing.
+        `Light` of each picture, whether it is left out, and its time. A gap in the times is no cut: there
+        pictures are known to be missing, and the encoder shows how far the probe went.
     """
     place = np.flatnonzero((pictures.partner >= 0) & (shown == Light.WALL) & ~left_out)
     before = pictures.partner[place]
@@ -44,12 +44,12 @@ def cuts(pictures: Pictures, shown: Int, left_out: Bool, time_s: Float) -> Int:
 
 
 def warn_of_cuts(cut: tuple[int, ...], pictures: Pictures, frame: Int, context: Context) -> None:
-    """Tell between which of the frames (F,) the recording was ``cut``."""
+    """Warn between which of the frames (F,) the recording was ``cut``."""
     for k in np.flatnonzero(np.isin(frame, cut)):
         context.warn(
-            f"the wall in frame {frame[k]} is not the one in frame {frame[pictures.partner[k]]} before: it "
+            f"frame {frame[k]} does not continue the wall of frame {frame[pictures.partner[k]]}: the picture "
             "changes much more than in any step around, and no texture is common to both. Probably the "
-            "recording was cut or paused here, or two were joined. How far the probe went in between is "
-            "not known: distances from here on are wrong by that, as their σ says, and laser, encoder or "
-            "pipe may seem to jump. What to do: process the two parts as recordings of their own"
+            "recording was cut or paused here, or two were joined. The distance travelled in between is "
+            "unknown: distances from here on are wrong by it, which their σ includes, and laser, encoder or "
+            "pipe may seem to jump. What to do: process the two parts as separate recordings"
         )

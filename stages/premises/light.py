@@ -1,4 +1,4 @@
-"""Which light each picture was taken in, and which one the rhythm of the lights predicts."""
+"""Finds the light in which each picture was taken, and the light that the rhythm of the lights predicts."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from stages.premises.pictures import CLOSED, Pictures
 
 # A picture whose brightness lies in the middle third between the two lights belongs to neither.
 _MIDDLE = 1 / 3
-# Two lights are told apart where they differ by more than this many of their own spreads, and where hardly
-# any picture lies between them: a single light that changes slowly would fill the middle.
+# Two lights are distinguished if they differ by more than this many of their own spreads and hardly any
+# picture lies between them: a single light that changes slowly would fill the middle.
 _APART, _MOST_BETWEEN = 3.0, 0.05
 # Two lights differ by at least this part of their brightness (chosen): two runs of open-3 that were joined,
 # with one light, differ by 0.01.
 _LEAST_APART = 0.05
-# Dark pictures are those of the laser only where more than this part of them shows its line.
+# Dark pictures count as those of the laser only if more than this part of them shows its line.
 _MOST_DARK = 0.5
 # With fewer pictures in one light, its spread is not known.
 _FEWEST_ALIKE = 3
-# Brightness of each light is compared within so many frames on both sides, since lamps warm up.
+# The brightness of each light is compared within this many frames on both sides, since lamps warm up.
 _AROUND = 8
 # The median of n normal values has a σ of √(π / 2) σ / √n (Huber 1981, § 1.2); beyond three times as much,
 # values differ: by chance in one recording of 400.
@@ -44,9 +44,9 @@ class Light(IntEnum):
 
 
 def light_seen(pictures: Pictures) -> Int:
-    """Return the `Light` (F,) of every picture; all unknown where the recording has only one light.
+    """Return the `Light` (F,) of every picture; all unknown if the recording has only one light.
 
-    It has only one where its dark pictures show no line. A picture is unknown that cannot be decoded, lies
+    It has only one if its dark pictures show no line. A picture is unknown if it cannot be decoded, lies
     between the lights, or is dark without a closed line (a covered lens, a lamp that failed).
     """
     out = np.full(len(pictures.brightness), Light.UNKNOWN, np.int64)
@@ -63,11 +63,11 @@ def light_seen(pictures: Pictures) -> Int:
 
 
 def alike(pictures: Pictures, one: Bool, other: Bool) -> bool:
-    """Return whether two sets (F,) of pictures that the table tells apart look the same.
+    """Return whether two sets (F,) of pictures, which the table labels differently, look the same.
 
     They do if neither brightness nor the share of a closed line differs between the sets by more than it
-    varies within one of them, or if it goes on where the table passes from one to the other: over many frames
-    in one light it drifts as well. With too few pictures they are taken to differ.
+    varies within one of them, or if it continues smoothly where the table passes from one set to the other:
+    over many frames in one light it drifts as well. With too few pictures, the sets count as different.
     """
     measures = (pictures.brightness, pictures.closed)
     if min((one & pictures.seen).sum(), (other & pictures.seen).sum()) < _FEWEST_ALIKE:
@@ -79,7 +79,7 @@ def alike(pictures: Pictures, one: Bool, other: Bool) -> bool:
 def _goes_on(value: Float, one: Bool, other: Bool) -> bool:
     """Return whether values (F,) change no more from one set (F,) to the other than within them.
 
-    Compared are medians, so that one flash within a set does not make the sets alike.
+    Medians are compared, so that one flash within a set does not make the sets look the same.
     """
     step = np.abs(np.diff(value))
     within = (one[:-1] & one[1:]) | (other[:-1] & other[1:])
@@ -124,7 +124,7 @@ def _otsu(value: Float) -> float:
 def _height(brightness: Float, low: float, high: float) -> Float:
     """Return where each picture (F,) lies between dark (0) and bright (1).
 
-    It is measured against its neighbours where both lights are among them: daylight or a warming lamp lifts
+    It is measured against its neighbours if both lights are among them: daylight or a warming lamp brightens
     both, so that medians of the whole run would misjudge them.
     """
     darkest = minimum_filter1d(brightness, 2 * _AROUND + 1, mode="nearest")
@@ -137,9 +137,9 @@ def _height(brightness: Float, low: float, high: float) -> Float:
 def pattern_breaks(light: Int) -> Bool:
     """Return (F,) true where a picture's light is not the one predicted from the lights before it.
 
-    Predicted is the light that most often follows the same preceding lights (the context) in the recording,
-    so that laser, led, ... and laser, laser, led, ... need no rules of their own. The context is the shortest
-    that predicts nearly as well as the best one: a longer one has fewer cases to learn from.
+    The predicted light is the one that most often follows the same preceding lights (the context) in the
+    recording, so that laser, led, ... and laser, laser, led, ... need no rules of their own. The context is
+    the shortest that predicts nearly as well as the best one: a longer one has fewer cases to learn from.
     """
     found = [_unexpected(light, memory) for memory in range(1, _LONGEST_MEMORY + 1)]
     fewest = min(int(f.sum()) for f in found)
@@ -160,7 +160,7 @@ def _unexpected(light: Int, memory: int) -> Bool:
 
 
 def rhythm_of(light: Int) -> int:
-    """Return the period of the lights in pictures, 1 where they are not told apart."""
+    """Return the period of the lights in pictures, 1 if they are not distinguished."""
     if not np.any(light != Light.UNKNOWN):
         return 1
     agree = [float((light[p:] == light[:-p]).mean()) for p in range(1, min(13, len(light)))]

@@ -1,4 +1,4 @@
-"""Finds lost pictures that the rhythm of the lights does not show: the wall moves farther over them."""
+"""Finds lost pictures that the rhythm of the lights does not show, by longer steps of the wall."""
 
 from __future__ import annotations
 
@@ -14,34 +14,34 @@ from stages.premises.moving import lower_speed, usual_speed
 from stages.premises.pictures import CLOSED, Pictures
 from stages.premises.rhythm_of_steps import over_whole_periods
 
-# A step of the wall stands out if it is so many robust σ above the steps around it. Normal noise does that
+# A step of the wall stands out if it is this many robust σ above the steps around it. Normal noise does that
 # once in 10^9 steps; matching has more outliers than normal noise (chosen).
 _SIGMAS = 6.0
-# Where the table has too many rows or the rhythm of the lights breaks, pictures were surely lost, and less
-# evidence is needed for where, or for how many.
+# Where the table has too many rows or the rhythm of the lights breaks, pictures were certainly lost, and less
+# evidence is needed for their place, or for their number.
 _SIGMAS_LOST = 3.5
 # 0.9 quantile of normal errors in σ. It gives σ here, because errors of matching are not normal.
 _NINE_IN_TEN = 1.645
-# A step is compared where so many others are close by, and so many on either side (at the ends: see
+# A step is compared if so many others are close by, and so many on either side (at the ends: see
 # `_has_neighbours`). Chosen.
 _AROUND_STEP, _ON_EACH_SIDE = 4, 2
 _LEAST_STEPS = 12
-# Steps that took more than so many usual times tell nothing of lost pictures: over 32 frames, of which 30
+# Steps that took more than so many usual times are no evidence of lost pictures: over 32 frames, of which 30
 # were left out, phase correlation erred by the advance of 6 frames (open-1-field at half its size).
 _LONGEST_STEP = 4.0
-# The laser line leaps where it moves across so many times as far as it usually does, of at least half a
+# The laser line jumps if it moves sideways so many times as far as it usually does, and at least half a
 # pixel, in the time that would have passed. In open-1 to open-3, a01 and a09 it moves up to 3
 # times as far, twice in a run more than 2.5; where all pictures of open-1 were moved by 4 px, 5.4 times.
 _LINE_LEAPS, _LEAST_SWAY_PX = 2.5, 0.5
-# The median of nine steps tells the usual speed where up to four of them were lengthened by a loss.
+# The median of nine steps gives the usual speed if up to four of them were lengthened by a loss.
 _MOST_OF_STEPS = 4 / 9
-# Where one in ten of the steps between is a loss, the recorder loses pictures at the ends as well (chosen).
+# If one in ten of the inner steps is a loss, the recorder loses pictures at the ends as well (chosen).
 _OFTEN = 0.1
-# The usual speed is taken anew, with the lost pictures counted, so many times.
+# The usual speed is estimated again, with the lost pictures counted, so many times.
 _ROUNDS = 2
-# Over a run, the wall's steps make the encoder's way within this factor: single steps err by a tenth.
+# Over a run, the wall's steps sum to the encoder's distance within this factor: single steps err by a tenth.
 _MORE = 1.1
-# Lost pictures can be told from errors of matching if nine in ten errors are below this part of a period.
+# Losses can be distinguished from errors of matching if nine in ten errors are below this part of a period.
 # Errors that are as large as a period would be spread evenly over half of one, and the part would be .45. A
 # single step that is farther than this from any number of lost pictures is no loss either: a noise filter
 # holds texture back and then releases it.
@@ -50,7 +50,7 @@ _TOLD_APART = 1 / 3
 
 @dataclass(frozen=True)
 class _Leap:
-    """A step, of K, that stands out as if so many pictures were ``lost``."""
+    """A step (index into K steps) that is longer than usual by the advance of ``lost`` pictures."""
 
     step: int
     lost: int
@@ -58,22 +58,22 @@ class _Leap:
 
 @dataclass(frozen=True)
 class Steps:
-    """Motion of the lit wall from picture ``start`` to ``end`` (K,): ``size`` in pipe radii or mm."""
+    """Motion of the lit wall from pictures ``start`` to pictures ``end`` (K,); ``size``: pipe radii or mm."""
 
     start: Int
     end: Int
     size: Float
 
     def by_encoder(self, encoder: Encoder, time_s: Float) -> Float:
-        """Return by how much the encoder advances over each step (K,), in its own unit."""
+        """Return the encoder's advance over each step (K,), in its own unit."""
         read = np.interp(time_s, encoder.time_s, encoder.distance_mm)
         return np.asarray(read[self.end] - read[self.start])
 
 
 def steps_of_wall(pictures: Pictures, shown: Int, copy: Bool) -> Steps:
-    """Return the steps between pictures that are ``shown`` (F,) to be of the lit wall, or are stated to be.
+    """Return the steps between pictures of the lit wall, as the `Light` ``shown`` (F,) says.
 
-    A picture that is a ``copy`` (F,) has the place of the one that it repeats.
+    A ``copy`` (F,) has the place of the picture that it repeats.
     """
     end = np.flatnonzero((pictures.partner >= 0) & ~copy)
     start = pictures.partner[end]
@@ -84,14 +84,14 @@ def steps_of_wall(pictures: Pictures, shown: Int, copy: Bool) -> Steps:
 
 
 def row_times(table: FrameTable, row: Int) -> Float:
-    """Return the time of each row; rows beyond the table go on at its usual pace."""
+    """Return the time of each row, s; rows beyond the table continue at its usual interval."""
     usual = float(np.median(np.diff(table.time_s))) if len(table.time_s) > 1 else 0.0
     beyond = np.maximum(row - (len(table.time_s) - 1), 0)
     return np.asarray(table.time_s[np.minimum(row, len(table.time_s) - 1)] + beyond * usual)
 
 
 def sway_of_line(pictures: Pictures, light: Int) -> Float:
-    """Return how far (F,) the laser line moves sideways to its next picture, in multiples of the usual."""
+    """Return the laser line's sideways motion (F,) to its next picture, as a multiple of the usual one."""
     out, line = np.zeros(len(light)), np.flatnonzero((light == Light.LINE) & (pictures.closed > CLOSED))
     if len(line) < _LEAST_STEPS:
         return out
@@ -116,13 +116,14 @@ def rows_by_motion(
 ) -> Int:
     """Return ``row`` (F,) with more or fewer rows skipped where the wall moves by more or less than usual.
 
-    The lights give the number of lost pictures only up to whole periods of their rhythm. How far the wall
-    moved, compared with the steps around, gives the rest. Steps tell nothing where the wall stands, where the
-    encoder shows the same leap (the probe moved faster), over pictures that were left out (the speed is not
-    known for so long), or where the line's ``sway`` (F,) leaps and the rhythm goes on (the camera was
-    knocked). Steps are compared in mm where the pipe's ``radius_mm`` (F,), or one for all pictures, is known:
-    in another bore they have another size. Where the encoder goes farther in all than the wall, a codec that
-    repeats blocks holds back usual steps: the encoder must then agree with the loss rather than the wall.
+    The lights give the number of lost pictures only up to whole periods of their rhythm. The wall's motion,
+    compared with the steps around, gives the rest. A step is no evidence where the wall stands, where the
+    encoder shows the same jump (the probe moved faster), over pictures that were left out (the speed is not
+    known for so long), or where the line's ``sway`` (F,) jumps and the rhythm continues (the camera was
+    knocked). Steps are compared in mm if the pipe's ``radius_mm`` (F,), or one for all pictures, is known: in
+    another bore the same advance has another size in radii. If the encoder goes farther in all than the
+    wall, a codec that repeats blocks holds usual steps back: then the encoder must agree with the loss
+    rather than with the wall's step.
     """
     if len(steps.end) < _LEAST_STEPS:
         return row
@@ -155,7 +156,7 @@ def rows_by_motion(
 
 
 def _encoder_bears_out(leap: _Leap, pace: Pace | None, between_s: Float, *, in_spare_rows: bool) -> bool:
-    """Return whether the encoder allows that a leap between two times is a loss, by not leaping itself.
+    """Return whether the encoder allows a jump of the wall to be a loss, by not jumping itself.
 
     A loss for which the table has spare rows, or which takes back skipped rows, needs no encoder, but an
     encoder must not contradict it. Any other loss needs an encoder that is steady at all shifts of its clock
@@ -172,21 +173,21 @@ def _encoder_bears_out(leap: _Leap, pace: Pace | None, between_s: Float, *, in_s
 
 
 def _part(between: Float, lost: int) -> float:
-    """Return the share of a way that is left if ``lost`` pictures between two times (2,) are not counted.
+    """Return the share of a distance that is left if ``lost`` pictures between two times are not counted.
 
-    Times are in pictures.
+    ``between`` (2,) are these times, in pictures.
     """
     return 1 - lost / max(float(between[1] - between[0]) + lost, 1.0)
 
 
 def _knocked(leap: _Leap, steps: Steps, rhythm: int, sway: Float) -> bool:
-    """Return whether the camera was knocked: the line leaps with the wall, and the lights' rhythm goes on."""
+    """Return whether the camera was knocked: line and wall jump together, while the rhythm continues."""
     over = sway[int(steps.start[leap.step]) + 1 : int(steps.end[leap.step]) + 1]
     return bool(leap.lost % rhythm == 0 and over.max() >= _LINE_LEAPS * (1 + abs(leap.lost) / rhythm))
 
 
 def _in_spare_rows(leaps: list[_Leap], left: int) -> list[_Leap]:
-    """Return the leaps, given clearest first, that are explained by the rows ``left`` over in the table."""
+    """Return the jumps, given clearest first, that the rows ``left`` over in the table explain."""
     out = []
     for leap in leaps:
         if 0 < leap.lost <= left:
@@ -200,13 +201,13 @@ def _leaps(
 ) -> list[_Leap]:
     """Return the steps that stand out by ``sigmas`` (K,), clearest first.
 
-    ``passed`` (K,) is how many pictures the steps took by their times; ``over`` (K,) more are to be added, or
-    whole periods beyond that. What then remains is the error of matching, which losses do not widen, however
-    many there are. It counts as a part of a picture's way or as a length, whichever is more, since a slow
-    wall errs by a larger part of its way. Where the rhythm breaks, a loss only has to fit better than none.
-    Without ``one_bore``, steps of one speed differ as the bores of a gauge do, so that apparent losses count
-    as error too. The table has ``left`` rows more than there are pictures. Where the wall stands, no step
-    stands out.
+    ``passed`` (K,) is the number of pictures that the steps took by their times; ``over`` (K,) more are
+    added, or whole periods beyond that. The remainder is the error of matching, which losses do not widen,
+    however many there are. It counts as a part of a picture's advance or as a length, whichever is more,
+    since a slow wall errs by a larger part of its advance. Where the rhythm breaks, a loss only has to fit
+    better than none. Without ``one_bore``, steps of one speed differ as the bores of a gauge do, so that
+    apparent losses count as error too. The table has ``left`` rows more than there are pictures. Where the
+    wall stands, no step stands out.
     """
     speed = steps.size / (passed + over)
     lost, usual = _counted(steps.size, passed, rhythm, over, lower_speed(speed))
@@ -243,8 +244,8 @@ def _has_neighbours(steps: Steps, passed: Float, believed: Bool) -> Bool:
 
     Where steps are missing, as at the end of a gauge, the speed may have changed meanwhile: steps farther off
     than one and a half times the span of four steps are not compared. At the ends of a run a loss looks like
-    a probe that starts to go faster. It is believed there only if the rhythm breaks as well, the table has
-    rows for it, or pictures are lost all the time.
+    a probe that speeds up. There it counts only if the rhythm breaks as well, the table has rows for it, or
+    pictures are lost all the time.
     """
     middle, own = (steps.start + steps.end) / 2, np.arange(len(steps.end))
     far = 1.5 * _AROUND_STEP * np.median(passed)  # half as many again
@@ -255,7 +256,7 @@ def _has_neighbours(steps: Steps, passed: Float, believed: Bool) -> Bool:
 
 
 def _counted(size: Float, passed: Float, rhythm: int, over: Int, usual: Float) -> tuple[Int, Float]:
-    """Return how many pictures (K,) were lost, and the usual speed (K,) once these are counted.
+    """Return the number of lost pictures (K,), and the usual speed (K,) after these are counted.
 
     ``usual`` (K,) is the speed to start from.
     """
@@ -268,12 +269,12 @@ def _counted(size: Float, passed: Float, rhythm: int, over: Int, usual: Float) -
 
 
 def _excess(size: Float, usual: Float, passed: Float) -> Float:
-    """Return by how many pictures (K,) steps are longer than at the usual speed; 0 where the wall stands."""
+    """Return the pictures (K,) by which steps are longer than at the usual speed; 0 where the wall stands."""
     return np.where(usual != 0, size / np.where(usual != 0, usual, 1.0) - passed, 0.0)
 
 
 def _shows_more(encoder: Encoder | None, time_s: Float, steps: Steps) -> bool:
-    """Return whether the encoder advances farther than the wall over all steps, mm: a codec holds it back."""
+    """Return whether the encoder goes farther than the wall over all steps: a codec holds the wall back."""
     if encoder is None:
         return False
     shown = steps.by_encoder(encoder, time_s).sum()
@@ -281,7 +282,7 @@ def _shows_more(encoder: Encoder | None, time_s: Float, steps: Steps) -> bool:
 
 
 def _encoder_agrees(encoder: Encoder | None, time_s: Float, way_mm: float, part: float) -> bool:
-    """Return whether the encoder moves between two times by ``way_mm`` rather than by ``part`` of it.
+    """Return whether the encoder's advance between two times is nearer to ``way_mm`` than to ``part`` of it.
 
     Its sign may not be known yet.
     """

@@ -1,4 +1,4 @@
-"""Whether the wall moves, and how fast it usually does: where it stands, comparing steps tells nothing."""
+"""Finds where the wall moves, and its usual speed: where it stands, a comparison of steps is no evidence."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ from pipeline.arrays import Bool, Float
 # A wall stands if it moves by less than this part of its fast steps: that may be error of matching, up to a
 # tenth of a step, and the ratio of two errors says nothing. Chosen.
 _MOVES = 0.25
-# Quantile that counts as the speed of fast steps: a probe may stand for nine tenths of a run, and leaps lie
+# Quantile that counts as the speed of fast steps: a probe may stand for nine tenths of a run, and jumps lie
 # in the longest tenth.
 _FAST = 0.9
-# Steps around a place of which the speed is taken, and their percentile that is the speed without losses, if
+# Steps around a place that give its speed, and their percentile that is the speed without losses, if
 # pictures were lost in up to half of them.
 _AROUND, _LOWER = 9, 25
 
 
 def wall_moves(speed: Float, of_run: Float) -> Bool:
-    """Return where the wall moves (K,) at a ``speed`` (K,), by all the speeds ``of_run`` (N,)."""
+    """Return where the wall moves (K,) at a ``speed`` (K,), compared with all speeds ``of_run`` (N,)."""
     fast = float(np.quantile(np.abs(of_run), _FAST)) if len(of_run) else 0.0
     return np.asarray(np.abs(speed) > _MOVES * fast)
 
@@ -27,7 +27,7 @@ def wall_moves(speed: Float, of_run: Float) -> Bool:
 def usual_speed(speed: Float) -> Float:
     """Return the usual speed (K,) about each step; 0 where the wall stands.
 
-    The first and the last step are not repeated beyond the ends, where they would outvote all others.
+    The first and the last step are not repeated beyond the ends, where they would outweigh all others.
     """
     usual = median_filter(speed, _AROUND, mode="mirror")
     return np.where(wall_moves(usual, speed), usual, 0.0)

@@ -9,12 +9,12 @@ from stages.premises.light import Light, pattern_breaks
 from stages.premises.moving import lower_speed, usual_speed
 from stages.premises.pictures import CLOSED, Pictures
 
-# In usual steps. Over two exchanged pictures the wall goes on by two, back by one, and on by two; the bounds
-# lie half-way between these and one step, or none. A picture half a step off its place lies in that of
+# In usual steps. Over two exchanged pictures the wall goes two forwards, one back, and two forwards; the
+# bounds lie half-way between these and one step, or none. A picture half a step off its place lies in that of
 # another.
 _ON, _BACK, _ASTRAY = 1.5, -0.5, 0.5
-# Exchanged neighbours in two lights look like two losses to the rhythm, but the wall goes on by its usual way
-# and not, as over losses, by at least 1.5 times that; the bound is half-way.
+# Exchanged neighbours in two lights look like two losses in the rhythm, but the wall advances by its usual
+# step and not, as over losses, by at least 1.5 times that; the bound is half-way.
 _NO_LOSS = 1.25
 # Pictures of the wall that show a usual step, and pictures within which an exchanged order must be right
 # again.
@@ -38,8 +38,8 @@ _SMOOTH, _LIKE_OTHERS = 0.01, 0.75
 def out_of_order(pictures: Pictures, light: Int) -> Bool:
     """Return (F,) true for pictures exchanged with one of the same light, or with a neighbour of the other.
 
-    Not found are pictures of the laser line exchanged with each other, any where the lights are not told
-    apart, and the first and last picture of the wall, whose place nothing shows.
+    It does not find pictures of the laser line exchanged with each other, any pictures if the lights are not
+    distinguished, nor the first and last picture of the wall, for whose place there is no evidence.
     """
     out = np.zeros(len(light), bool)
     place = np.flatnonzero((light == Light.WALL) & (pictures.partner >= 0) & np.isfinite(pictures.step))
@@ -51,7 +51,7 @@ def out_of_order(pictures: Pictures, light: Int) -> Bool:
 
 
 def _in_usual_steps(size: Float) -> Float:
-    """Return steps (K,) of the wall over those around them; 1 where it stands, which tells no order."""
+    """Return steps (K,) of the wall over those around them; 1 where it stands, which shows no order."""
     usual = usual_speed(size)
     return np.divide(size, usual, out=np.ones(len(size)), where=usual != 0)
 
@@ -59,8 +59,8 @@ def _in_usual_steps(size: Float) -> Float:
 def _off_their_place(step: Float) -> Bool:
     """Return which pictures (K,) do not lie where their neighbours' motion puts them.
 
-    ``step`` (K,) is in usual steps. Over exchanged pictures the wall leaps ahead, goes back, and ends where
-    it would have been at its usual speed. No probe moves so, and behind lost pictures the wall stays ahead.
+    ``step`` (K,) is in usual steps. Over exchanged pictures the wall jumps ahead, goes back, and ends where
+    it would have been at its usual speed. No probe moves so, and after lost pictures the wall stays ahead.
     """
     out, ahead = np.zeros(len(step), bool), np.cumsum(step - 1)
     for first in np.flatnonzero(step > _ON):
@@ -104,7 +104,7 @@ def _lights_exchanged(light: Int, place: Int, size: Float) -> Bool:
 
 
 def _mends(light: Int, breaks: Bool, first: int) -> bool:
-    """Return whether the rhythm is whole behind a picture that is exchanged with the next."""
+    """Return whether the rhythm continues unbroken after a picture is exchanged with the next."""
     other = light.copy()
     other[[first, first + 1]] = light[[first + 1, first]]
     behind = slice(first, first + _BEHIND)
@@ -112,7 +112,7 @@ def _mends(light: Int, breaks: Bool, first: int) -> bool:
 
 
 def off_the_pipe(pictures: Pictures) -> Bool:
-    """Return (F,) true for pictures before the first closed laser line and behind the last, if many.
+    """Return (F,) true for pictures before the first closed laser line and after the last, if many.
 
     Pictures that cannot be decoded do not count: they may well have shown a line.
     """

@@ -1,4 +1,4 @@
-"""One look at every picture: how bright its wall is, whether a laser line closes in it, how far it moved."""
+"""Examines every picture once: brightness of the wall, closed laser line, and motion since the last one."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from pipeline.recording.base import Recording
 from pipeline.system.parallel import in_threads
 from stages.premises.stays import in_full
 
-# Rays of the polar picture: a line that closes is told from chance by tens of them already.
+# Rays of the polar picture: tens of them already distinguish a closed line from chance.
 _RAYS, _THREADS = 128, 2
 # A line is closed when it goes round more than half of the circle.
 CLOSED = 0.5
-# Part of the way from the centre to the nearer edge of the picture that is looked at.
+# Part of the distance from the centre to the nearer edge of the picture that is examined.
 _NEAREST, _FARTHEST = 0.15, 0.98
 # A laser line is thinner than this part of the picture's height, or it could not be measured to a tenth of
 # a millimetre; twice as much is left around it for blur and ghosts.
@@ -35,10 +35,10 @@ _KEPT = 8
 # Least share of the surroundings of a place that counts as known when its brightness is levelled. Not
 # measured.
 _LEAST_KNOWN = 0.05
-# Share of the correlation that lies at its peak, below which the motion is not told: a lit wall that moves
+# Share of the correlation that lies at its peak, below which the motion is unknown: a lit wall that moves
 # shows .83 to .95 in open-1-field, one without texture .07 to .36.
 _LEAST_ALIKE = 0.4
-# Every so many columns are looked at for rows that were taken at two times.
+# Every so many columns are examined for rows that were taken at two times.
 _EVERY_COLUMN = 8
 # Two pictures are taken in the same light when their brightness differs by less than this part.
 _SAME_LIGHT = 0.3
@@ -46,29 +46,29 @@ _SAME_LIGHT = 0.3
 
 @dataclass(frozen=True)
 class Pictures:
-    """What was seen in the F pictures of a recording, in the order of its frames.
+    """Measurements of the F pictures of a recording, in the order of its frames.
 
     Attributes
     ----------
     brightness : (F,)
-        Square root of the mean grey level without thin lines, so that shot noise is alike everywhere; NaN
+        Square root of the mean grey level without thin lines, so that shot noise is the same everywhere; NaN
         where a picture cannot be decoded.
     closed : (F,)
         Share of neighbouring rays on which the strongest thin line lies at the same radius.
     line_px : (F, R) float32
         Radius of the strongest thin line on each ray.
     azimuth_rad : (R,)
-        Of the rays.
+        Azimuth of the rays.
     combing : (F,)
         Power of the difference from one row to the next over that to the row after it: 1 at most in
         pictures taken at one time, more where odd and even rows show different times; NaN in a black one.
     partner : (F,) int
-        The latest picture before in like light, −1 without one.
+        The latest earlier picture in the same light, −1 without one.
     change : (F,)
-        Mean difference to it, grey levels, whatever the exposures.
+        Mean difference to the partner, grey levels, whatever the exposures.
     step : (F,)
         Motion along the pipe since the partner was taken, in pipe radii; NaN without partner and where
-        the wall does not tell it.
+        the wall does not show it.
     """
 
     brightness: Float
@@ -89,7 +89,7 @@ class Pictures:
 def look_at_pictures(
     recording: Recording, probe: Probe, context: Context, stays: Bool | None = None
 ) -> Pictures:
-    """Look once at every picture of a recording; motion is not told where something ``stays`` (h, w)."""
+    """Examine every picture of a recording once; places where something ``stays`` (h, w) show no motion."""
     polar = _PolarView(recording.source.image_size, probe.camera.centre_px)
     motion = _AxialMotion(probe.camera, polar.line_width_px, stays)
     count = len(recording.frames.frame)
@@ -122,7 +122,7 @@ def _empty(count: int, azimuth_rad: Float) -> Pictures:
 
 
 def combing(image: Image) -> float:
-    """Return by how much neighbouring rows of a picture (H, W) differ more than every second ones."""
+    """Return how much more neighbouring rows of a picture (H, W) differ than rows two apart; a ratio."""
     rows = image[:, ::_EVERY_COLUMN].astype(np.float32)
     next_row, next_but_one = (float(np.mean((rows[n:] - rows[:-n]) ** 2)) for n in (1, 2))
     return next_row / next_but_one if next_but_one > 0 else float("nan")
@@ -140,7 +140,7 @@ class _PolarView:
         self.line_width_px = round(_THICKEST_LINE * 2 * half) | 1
 
     def wall_and_line(self, image: Image) -> tuple[Image, Image]:
-        """Return the wall without what is thinner than a line, and what was taken off (a top-hat)."""
+        """Return the wall without structures thinner than a line, and those structures (a top-hat)."""
         polar = np.asarray(cv2.remap(image, self._uv[0], self._uv[1], cv2.INTER_LINEAR), np.uint8)
         wall = cv2.morphologyEx(polar, cv2.MORPH_OPEN, np.ones((1, self.line_width_px), np.uint8))
         return np.asarray(wall, np.uint8), np.asarray(cv2.subtract(polar, wall), np.uint8)
@@ -157,7 +157,7 @@ class _PolarView:
 class _Strip:
     """An unrolled wall: number of its picture, brightness, grey levels, and the rows without a laser line.
 
-    ``levelled`` holds the parts, by first row and end, that were freed of the lamps' light.
+    ``levelled`` holds the parts, by first row and end, from which the lamps' light was removed.
     """
 
     place: int
@@ -169,7 +169,7 @@ class _Strip:
 
 
 class _AxialMotion:
-    """How far the unrolled wall moves between pictures in like light."""
+    """Measures the motion of the unrolled wall between pictures in the same light."""
 
     def __init__(self, camera: Camera, line_width_px: int, stays: Bool | None) -> None:
         near, far = (1 / np.tan(np.radians(a)) for a in (_NEAR_DEG, _FAR_DEG))
@@ -196,7 +196,7 @@ class _AxialMotion:
         return _Strip(place, brightness, grey, *self._free_rows(line_px))
 
     def since(self, strip: _Strip) -> tuple[int, float, float]:
-        """Return the latest picture in like light, the difference to it, and the motion in pipe radii."""
+        """Return the latest picture in the same light, the difference to it, and the motion in pipe radii."""
         before = next((k for k in reversed(self._kept) if _in_like_light(k, strip)), None)
         self._kept.append(strip)
         if before is None:
@@ -211,16 +211,17 @@ class _AxialMotion:
         return before.place, change, -moved * self._radii_per_row if alike > _LEAST_ALIKE else np.nan
 
     def _levelled(self, strip: _Strip, rows: slice) -> Float32:
-        """Return `_freed` rows of a strip, kept for the picture that will be compared with it."""
+        """Return `_freed` rows of a strip, stored for the picture that will be compared with it."""
         part = rows.start, rows.stop
         if part not in strip.levelled:
             strip.levelled[part] = self._freed(strip, rows)
         return strip.levelled[part]
 
     def _freed(self, strip: _Strip, rows: slice) -> Float32:
-        """Return rows of a strip freed of the lamps' light, every row of spread 1.
+        """Return rows of a strip without the lamps' light, every row with a spread of 1.
 
-        Where something stays there is noise instead: gaps of one shape would say that the wall stands still.
+        Places where something stays are filled with noise: gaps of one shape would make the wall seem to
+        stand still.
         """
         grey, moves = strip.grey[rows], self._moves[rows]
         light = cv2.GaussianBlur(grey * moves, (0, 0), _BROAD)
@@ -233,7 +234,7 @@ class _AxialMotion:
         return np.where(moves > 0, fine, noise).astype(np.float32)
 
     def _share_known(self, rows: slice) -> Float32:
-        """Return which share of the light about a place is that of what moves."""
+        """Return the share of the surroundings of each place that moves with the wall."""
         part = rows.start, rows.stop
         if part not in self._known:
             known = cv2.GaussianBlur(self._moves[rows], (0, 0), _BROAD)
@@ -254,8 +255,8 @@ class _AxialMotion:
 def change_between(one: Float32, other: Float32) -> float:
     """Return the mean difference of two pictures, grey levels, as if both had the mean of their exposures.
 
-    Without that, in a recording with flickering exposure, two neighbouring pictures of equal exposure differ
-    by far less than usual, and the second was taken for a copy.
+    Otherwise, in a recording with flickering exposure, two neighbouring pictures of equal exposure would
+    differ by far less than usual, and the second would be taken for a copy.
     """
     power = float(np.vdot(one, one)), float(np.vdot(other, other))
     brighter = np.float32((power[1] / power[0]) ** 0.25 if min(power) > 0 else 1.0)
@@ -268,7 +269,7 @@ def _in_like_light(one: _Strip, other: _Strip) -> bool:
 
 
 def _moving(stays: Bool | None, image_size: tuple[int, int], uv: Float32) -> Float32:
-    """Return 1 where pixels (r, c, 2) see what moves, 0 outside the picture and where something ``stays``."""
+    """Return 1 where pixels (r, c, 2) see moving wall, 0 outside the picture and where it ``stays``."""
     size = np.array(image_size, np.float32)
     inside = ((uv > 0) & (uv < size - 1)).all(-1)
     whole = in_full(stays, image_size)

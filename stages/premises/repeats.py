@@ -17,7 +17,7 @@ _STANDS, _ONE_STEP = 0.25, 1.5
 # Steps on either side from which the usual speed is taken.
 _AROUND_STEP = 9
 # A picture is a copy if it changes far less than the second smallest change around it that is no copy's. The
-# smallest does not serve: where all pictures tremble, two that are moved alike by chance change as little.
+# smallest is not used: where all pictures tremble, two that happen to be displaced equally change as little.
 _LEAST_OF_AROUND = 1
 # Other rows are believed if by them the encoder departs from the wall by less than half of the variance, over
 # so many steps (chosen): what it departs at repeated pictures is gone then, and what matching errs is left.
@@ -25,11 +25,11 @@ _FOLLOWS, _LEAST_STEPS = 0.5, 12
 
 
 def rows_of_repeats(row: Int, pictures: Pictures) -> Int:
-    """Return the ``row`` (F,) of every picture; a repeated one, in one light, gets the row before its own.
+    """Return the ``row`` (F,) of every picture; in one light, a repeated one gets the row before its own.
 
-    A picture is repeated where the wall does not move for one picture, but before and after it. If the next
+    A picture is repeated if the wall does not move for one picture, but does before and after it. If the next
     step is a usual one, the table does not list the repetition, and all later pictures move up by a row. If
-    it is twice as long, the repetition replaces a lost picture, and the later rows are right.
+    it is twice as long, the repetition replaces a lost picture, and the later rows are correct.
     """
     size = np.abs(np.nan_to_num(pictures.step))
     usual = median_filter(size, _AROUND_STEP, mode="nearest")
@@ -90,8 +90,8 @@ def copies(
     A recorder that hangs stores one picture for several frames, while the table goes on. Where lights take
     turns, such a run of copies contradicts the light that is ``stated`` (F,) by the ``row`` (F,) of each
     picture. Where the probe only stands still, each light repeats its own picture, which contradicts nothing.
-    A picture that repeats the last one of its light while those about it change is a copy too, and so is a
-    run of them (`_hung`). ``time_s`` (F,) is when the pictures were taken.
+    A picture that repeats the last one of its light while those around it change is a copy too, and so is a
+    run of them (`_hung`). ``time_s`` (F,) are the times at which the pictures were taken.
     """
     again = repeated(pictures, light) & (np.diff(row, prepend=-1) > 0)
     runs, _ = label(again)
@@ -101,7 +101,7 @@ def copies(
 
 
 def _repeated_alone(pictures: Pictures, light: Int) -> Bool:
-    """Return (F,) true for pictures that repeat the last one of their light while those about them change."""
+    """Return (F,) true for pictures that repeat the last one of their light while those around change."""
     out = np.zeros(len(light), bool)
     for kind in (Light.LINE, Light.WALL):
         place = np.flatnonzero((light == kind) & (pictures.partner >= 0))
@@ -117,7 +117,7 @@ def _repeated_alone(pictures: Pictures, light: Int) -> Bool:
 
 
 def _hung(pictures: Pictures, light: Int, time_s: Float, encoder: Encoder | None) -> Bool:
-    """Return (F,) true where each light repeats its own last picture for a while, and the wall then leaps.
+    """Return (F,) true where each light repeats its own last picture for a while, and the wall then jumps.
 
     A probe that stands still repeats them too, but moves on by a usual step, and its encoder stands as well.
     """

@@ -1,4 +1,4 @@
-"""The rhythm of the lights when the pictures were taken, by how far the wall moves between lit pictures."""
+"""Finds the rhythm of the lights at the time of recording from the wall's steps between lit pictures."""
 
 from __future__ import annotations
 
@@ -9,18 +9,18 @@ from scipy.ndimage import median_filter
 
 from pipeline.arrays import Float, Int
 
-# A number of pictures that steps span belongs to the pattern if at least one in ten of all steps, and six,
-# span it: an incomplete last step or a single loss does not count. Chosen.
+# A number of pictures belongs to the pattern if at least one in ten of all steps, and at least six, span it:
+# an incomplete last step or a single loss does not count. Chosen.
 _SHARE, _FEWEST = 0.1, 6
-# Sizes of steps are compared with the median of so many about them that span the usual number.
+# Sizes of steps are compared with the median of so many steps around them that span the usual number.
 _AROUND = 9
-# The pictures that steps truly took are whole numbers within this part of one (chosen: steps err by a tenth),
+# The true numbers of pictures in steps are whole within this part of one (chosen: steps err by a tenth),
 # and a recorder loses one in two at most in a pattern.
 _WHOLE, _LONGEST = 0.25, 2
 
 
 def over_whole_periods(pictures: Int, size: Float, rhythm: int) -> tuple[int, Int]:
-    """Return the rhythm, and how many lost pictures (K,) complete each step to whole periods of it.
+    """Return the rhythm, and the number of lost pictures (K,) that completes each step to whole periods.
 
     An example: steps alternate over 1 and 3 pictures, and the latter go twice as far. Then they were taken
     over 2 and 4 pictures, since no other numbers fit. The evidence is the numbers of ``pictures`` (K,) that
@@ -46,7 +46,7 @@ def over_whole_periods(pictures: Int, size: Float, rhythm: int) -> tuple[int, In
 
 
 def _sizes(pictures: Int, size: Float, pattern: Int, usual: int) -> Float:
-    """Return the median size (P,) of steps of a pattern, in that of steps over the ``usual`` number."""
+    """Return the median size (P,) of steps of a pattern, relative to steps over the ``usual`` number."""
     same = np.flatnonzero(pictures == usual)
     beside = median_filter(np.abs(size[same]), _AROUND, mode="mirror")
     around = np.interp(np.arange(len(size)), same, beside)
@@ -55,7 +55,7 @@ def _sizes(pictures: Int, size: Float, pattern: Int, usual: int) -> Float:
 
 
 def _taken_over(pattern: Int, size: Float, usual: int) -> Int | None:
-    """Return over how many pictures (P,) steps of a pattern were taken: the fewest that fit their sizes."""
+    """Return the numbers of pictures (P,) in the steps of a pattern: the smallest that fit their sizes."""
     for first in range(usual, _LONGEST * usual + 1):
         taken = np.rint(first * size).astype(np.int64)
         if np.all(np.abs(first * size - taken) < _WHOLE) and np.all(taken >= pattern):

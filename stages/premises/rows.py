@@ -1,9 +1,9 @@
-"""Which row of the table of frames belongs to which picture: an alignment of the two sequences.
+"""Aligns the rows of the table of frames with the pictures.
 
-Its state at each picture is how many rows were skipped so far (pictures that were lost although the table
+The state at each picture is the number of rows skipped so far (pictures that were lost although the table
 lists them), and whether the table has the two lights swapped. Each fault (a lost picture, a wrong label, a
 swap) has a cost, and dynamic programming (Viterbi) finds the alignment of least cost. The rhythm of the
-lights tells wrong labels from lost pictures: a lost picture breaks it, a wrong label does not.
+lights distinguishes lost pictures from wrong labels: a lost picture breaks it, a wrong label does not.
 """
 
 from __future__ import annotations
@@ -15,9 +15,9 @@ import numpy as np
 from pipeline.arrays import Bool, Float, Int
 
 # The cost of one fault: a wrong label, a loss, a swap, a loss that does not break the rhythm, or a break of
-# the rhythm without a loss. Nothing is known of how often each occurs, so all cost the same.
+# the rhythm without a loss. The frequency of each is unknown, so all cost the same.
 _FAULT = 1.0
-# Of two losses that explain the same lights, the smaller is believed. A loss before the first picture does
+# Of two losses that explain the same lights, the smaller is taken. A loss before the first picture does
 # not break the rhythm, so that it could explain away wrong labels at no cost: each such picture costs more.
 _EACH_LOST, _EACH_LOST_FIRST = 0.2, 0.5
 # Rows that are left over when the pictures end cost half a fault: the video was cut short. So do missing rows
@@ -44,7 +44,7 @@ class Lights:
     Attributes
     ----------
     breaks : (F,) bool
-        Where the light is not the one that the pictures before it lead to expect.
+        Where the light is not the one predicted from the pictures before it.
     repeats : (F,) bool
         Pictures that repeat the one before.
     """

@@ -1,4 +1,4 @@
-"""Stated sizes against the pictures: the pipe's diameter, the probe's units, the encoder's unit and sign."""
+"""Compares stated sizes with the pictures: pipe diameter, the probe's units, the encoder's unit and sign."""
 
 from __future__ import annotations
 
@@ -32,21 +32,21 @@ _NEAR_UNIT = 1.25
 # gauge's bores differ from their mean, but neither reaches a factor of two.
 _CONTRADICTS = 2.0
 _LEAST_STEPS, _ONE_SIGN = 8, 0.8
-# The pipe's radius at a picture is the median of so many rings about it: four wrong ones do not move it.
+# The pipe's radius at a picture is the median of this many rings around it: four wrong ones do not move it.
 _RINGS = 9
 _MAYBE_BACKWARDS = (
-    "Or the pictures are stored last first, which the motion in this recording does not tell: then distances "
-    "are wrong by as much as the speed varied. Look whether the video runs backwards. "
+    "Or the pictures are stored in reverse order, which the motion in this recording cannot show: then "
+    "distances are wrong by as much as the speed varied. Check whether the video runs backwards. "
 )
-# Second harmonic of the ring, in radii, from which it is told; .013 at most in 15 fields (open-1 to open-3,
-# a01 to a12), .030 where pictures were made 2 % wider.
+# Second harmonic of the ring, in radii, from which it is reported; .013 at most in 15 fields (open-1 to
+# open-3, a01 to a12), .030 where pictures were made 2 % wider.
 _OVAL = 0.02
 # With the right probe every pixel of the line lies on the laser sheet; half leaves room for false lines.
 _MOST_LOST = 0.5
 
 
 def rings_seen_mm(pictures: Pictures, probe: Probe) -> Float:
-    """Return where closed laser lines lie across the camera's axis (L, R, 2), mm."""
+    """Return the points of closed laser lines (L, R, 2) across the camera's axis, mm, frame C."""
     closed = pictures.line_px[pictures.closed > CLOSED].astype(float)
     direction = np.stack([np.cos(pictures.azimuth_rad), np.sin(pictures.azimuth_rad)], -1)
     uv = np.asarray(probe.camera.centre_px) + closed[..., None] * direction
@@ -59,7 +59,7 @@ def radius_seen_mm(rings_mm: Float) -> float:
     Raises
     ------
     UnusableError
-        When the stated probe has no place on the laser sheet for most of the line.
+        When, with the stated probe, the rays of most pixels of the line miss the laser sheet.
     """
     if not rings_mm.size:
         return float("nan")
@@ -78,7 +78,7 @@ def radius_seen_mm(rings_mm: Float) -> float:
 
 
 def radius_along_mm(pictures: Pictures, rings_mm: Float) -> Float:
-    """Return the pipe's radius (F,) at each picture by the closed laser lines about it; NaN without any."""
+    """Return the pipe's radius (F,), mm, at each picture from the closed lines around it; NaN without any."""
     place, ring_mm = np.flatnonzero(pictures.closed > CLOSED), row_median(np.linalg.norm(rings_mm, axis=-1))
     known = np.isfinite(ring_mm)
     if not known.any():
@@ -88,7 +88,7 @@ def radius_along_mm(pictures: Pictures, rings_mm: Float) -> Float:
 
 
 def warn_of_oval(rings_mm: Float, context: Context) -> None:
-    """Warn where rings (L, R, 2) are oval, as a pipe may be, or a picture that was stretched."""
+    """Warn of oval rings (L, R, 2): the pipe is oval, or the picture was stretched."""
     if not len(rings_mm):
         return
     centre, radius = circles_through(rings_mm.astype(np.float32))
@@ -108,10 +108,10 @@ def warn_of_oval(rings_mm: Float, context: Context) -> None:
         towards = notation.clock(float(clock_of_azimuth(np.angle(oval) / 2)))
         context.warn(
             f"with the stated probe the laser ring is {200 * abs(oval):.1f} % longer towards {towards} in "
-            "the picture than across. Either the pipe is so oval, or something mirrors the line; or pictures "
+            "the picture than across. Either the pipe is oval, or something mirrors the line; or pictures "
             "were stretched, cropped or taken by another camera, and radii and findings are wrong by more "
-            "than their σ. What to do: measure the pipe's height and width; see that camera and recorder "
-            "keep the pictures' shape, and that the probe file is of this camera with these settings"
+            "than their σ. What to do: measure the pipe's height and width; check that camera and recorder "
+            "keep the pictures' shape, and that the probe file belongs to this camera with these settings"
         )
 
 
@@ -175,14 +175,14 @@ class _Ratio:
 
     @property
     def tells_nothing(self) -> bool:
-        """Whether the ratio is unreliable: too few steps, changing signs, or an encoder that stands."""
+        """Whether the ratio is unusable: too few steps, changing signs, or an encoder that stands."""
         return self.steps < _LEAST_STEPS or self.one_sign < _ONE_SIGN
 
 
 def encoder_factor(
     recording: Recording, time_s: Float, steps: Steps, radius_mm: float, forwards: bool, context: Context
 ) -> float:
-    """Return the factor that brings the encoder to mm and to the direction of the wall's motion; warn of it.
+    """Return the factor that converts the encoder to mm and to the wall's direction of motion; warn of it.
 
     Parameters
     ----------
@@ -191,7 +191,7 @@ def encoder_factor(
     radius_mm
         The pipe's radius from the laser ring: the texture's motion is measured in pipe radii.
     forwards : bool
-        Whether the motion tells that the pictures are stored first to last: see `runs_forwards`.
+        Whether the motion shows that the pictures are stored in the order of time: see `runs_forwards`.
     """
     if recording.encoder is None or not np.isfinite(radius_mm):
         return 1.0
@@ -201,12 +201,12 @@ def encoder_factor(
     unit, size = _nearest_unit(abs(found.value))
     contradicts = max(abs(found.value) * size, 1 / max(abs(found.value) * size, 1e-9)) > _CONTRADICTS
     factor = 1.0 if contradicts else size * float(np.sign(found.value))
-    wrong = [f"in {unit} in place of mm"] * (abs(factor) != 1.0) + ["with its sign reversed"] * (factor < 0)
+    wrong = [f"in {unit} instead of mm"] * (abs(factor) != 1.0) + ["with its sign reversed"] * (factor < 0)
     if wrong:
         perhaps = _MAYBE_BACKWARDS if factor < 0 and not forwards else ""
         context.warn(
             f"the encoder reads {found.value:.3g} mm where the wall's texture moves by 1 mm, in "
-            f"{found.steps} steps: its readings are taken as {' and '.join(wrong)}, and multiplied by "
+            f"{found.steps} steps: its readings seem to be {' and '.join(wrong)}, and are multiplied by "
             f"{factor:g}. {perhaps}What to do: correct encoder.csv"
         )
     elif contradicts:
@@ -214,8 +214,8 @@ def encoder_factor(
         context.warn(
             f"the encoder reads {found.value:.3g} mm where the wall's texture moves by 1 mm, in "
             f"{found.steps} steps: one of the encoder's scale, its clock and the probe's baseline is "
-            f"wrong{held_back}. What to do: see whether the wall flows evenly in lit pictures, and check all "
-            "three; distances may be wrong by this factor"
+            f"wrong{held_back}. What to do: check whether the wall moves evenly in lit pictures, and check "
+            "all three; distances may be wrong by this factor"
         )
     return factor
 
@@ -223,7 +223,7 @@ def encoder_factor(
 def _ratio(encoder: Encoder, time_s: Float, steps: Steps, radius_mm: float) -> _Ratio:
     known = (time_s >= encoder.time_s[0]) & (time_s <= encoder.time_s[-1])
     by_encoder, by_wall = steps.by_encoder(encoder, time_s), steps.size * radius_mm
-    # Only steps of half the fast ones' size (the 0.9 quantile) count: the ratio of two short steps is unsure.
+    # Only steps above half of the fast ones (the 0.9 quantile) count: the ratio of two short steps is noisy.
     moving = np.abs(by_wall) > 0.5 * np.nanquantile(np.abs(by_wall), 0.9) if len(by_wall) else by_wall > 0
     use = known[steps.end] & known[steps.start] & moving
     if not use.any():
@@ -234,7 +234,7 @@ def _ratio(encoder: Encoder, time_s: Float, steps: Steps, radius_mm: float) -> _
 
 
 def in_mm(encoder: Encoder | None, time_s: Float, steps: Steps, radius_mm: float) -> Encoder | None:
-    """Return the encoder brought to mm by the wall's motion, where that tells it; its sign is kept.
+    """Return the encoder converted to mm by the wall's motion, if that shows its unit; its sign is kept.
 
     Parameters
     ----------
@@ -243,9 +243,9 @@ def in_mm(encoder: Encoder | None, time_s: Float, steps: Steps, radius_mm: float
     time_s : (F,)
         Times of the pictures, s, corrected.
     steps
-        Of the wall between pictures, in radii of the pipe.
+        Motion of the wall between pictures, in radii of the pipe.
     radius_mm
-        The pipe's radius; where it is NaN, nothing is told.
+        The pipe's radius; if it is NaN, the encoder is returned unchanged.
     """
     if encoder is None or not np.isfinite(radius_mm):
         return encoder

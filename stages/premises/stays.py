@@ -1,7 +1,7 @@
-"""Places of the picture where something stays while the wall moves: it is not the wall.
+"""Finds places of the picture where something stays while the wall moves.
 
-Text and logos burnt in, dirt and reflections on the window, lamps and parts of the probe keep their place in
-the picture. Followed as if they were the wall, they say that it stands still.
+Burnt-in text and logos, dirt and reflections on the window, lamps and parts of the probe keep their place in
+the picture. If motion followed them, the wall would seem to stand still.
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ from pipeline.recording.base import Illumination, Recording
 from pipeline.system.parallel import in_threads
 
 _LOOKED_AT = 40
-"""Lit pictures, spread over the run, that are looked at. With 24, the same text was found in open-1-field."""
+"""Lit pictures, spread over the run, that are examined. With 24, the same text was found in open-1-field."""
 _HEIGHT_PX = 600
 """Pictures are reduced by a whole factor to about this height: motion takes finer detail for noise."""
 _FARTHEST_DEG, _NEAREST_DEG = 35.0, 80.0
-"""Polar angles between which the wall is looked at, by motion too."""
+"""Polar angles between which the wall is examined; the stage motion uses the same."""
 _FINE, _CELL, _BOX, _GAP = 4 / 600, 16 / 600, 9 / 600, 15 / 600
 """In heights of the picture: σ of the blur against which contrast is taken, size of the cells in which motion
 is detected, size of the box over which what stays is summed, and gap between two places that count as one. A
@@ -40,7 +40,7 @@ places shows .02 to .13, burnt-in text .98."""
 _FAINTEST = 0.02
 """Contrast that stays and is fainter is no harm: a third of what an open recording's wall has."""
 _MOST = 0.5
-"""Where more than half would count, the wall cannot be told from what stays."""
+"""If more than half would count, the wall cannot be distinguished from what stays."""
 _DARK = 8.0
 """Grey values added where contrast is taken, so that black has none. Not measured."""
 _BLUE, _RED = 0, 2
@@ -57,7 +57,7 @@ def places_that_stay(recording: Recording, probe: Probe, lit: Int, context: Cont
     Parameters
     ----------
     lit : (N,) int
-        Frames that show the wall; with the laser on, the colour that its light reaches least is looked at.
+        Frames that show the wall; with the laser on, the colour channel that its light reaches least is used.
     """
     both = bool(np.any(recording.frames.illumination == Illumination.BOTH.value))
     wall, channel = _wall_in(probe.camera), darkest_channel(probe.laser)
@@ -68,9 +68,9 @@ def places_that_stay(recording: Recording, probe: Probe, lit: Int, context: Cont
     context.report("picture that stays while the wall moves", 100 * share, "%")
     if share > _WORTH_A_WORD:
         context.warn(
-            f"{100 * share:.1f} % of the picture of the wall stays in place while the wall moves: text or a "
-            "logo burnt in, dirt, scratches or reflections on the window, a part of the probe. Motion does "
-            "not rest on it, but it hides the wall. What to do: switch the text off, clean the window"
+            f"{100 * share:.1f} % of the picture of the wall stays in place while the wall moves: burnt-in "
+            "text or a logo, dirt, scratches or reflections on the window, a part of the probe. Motion does "
+            "not use it, but it hides the wall. What to do: switch the text off, clean the window"
         )
     return places if places.any() else None
 
@@ -108,7 +108,7 @@ def what_stays(images: Iterable[Image], wall: Bool) -> Bool:
 
 
 def _wall_in(camera: Camera) -> Bool:
-    """Return where (h, w), on the reduced picture, the wall is looked at."""
+    """Return where (h, w), on the reduced picture, the wall is examined."""
     width, height = camera.image_size
     by = max(round(min(width, height) / _HEIGHT_PX), 1)
     v, u = np.mgrid[: height // by, : width // by]
@@ -125,7 +125,7 @@ def _fine(image: Image, shape: tuple[int, ...]) -> Float32:
 
 
 def _moved(before: Float32, now: Float32, wall: Bool) -> bool:
-    """Tell whether most cells of two pictures (h, w) show something else."""
+    """Return whether most cells of two pictures (h, w) differ."""
     cell = _odd(_CELL, before.shape)
     size = (before.shape[1] // cell, before.shape[0] // cell)
     both, one, other, seen = (

@@ -28,7 +28,7 @@ def test_repeated_pictures_are_left_out(good, run):
     found, told = checked(spoiled.recording, run.probe)
     assert len(found.frame) == len(spoiled.recording.frames.frame) - 1
     assert np.all(np.diff(found.time_s) > 0)
-    assert any("the one before is shown again" in t for t in told)
+    assert any("they repeat the picture before" in t for t in told)
 
 
 @pytest.mark.parametrize("often", [8, 11])
@@ -112,7 +112,7 @@ def test_a_repeated_picture_in_one_light_is_left_out(good, run, replaced):
     assert len(found.frame) == len(kept) - 1
     behind = time_s[13:] if replaced else time_s[12:-1]
     np.testing.assert_allclose(found.time_s[12:], behind)
-    assert any("the one before is shown again" in t for t in told)
+    assert any("they repeat the picture before" in t for t in told)
 
 
 def test_a_speed_that_varies_over_pictures_left_out_is_no_loss():

@@ -82,7 +82,7 @@ def test_a_picture_that_was_put_in_once_more_is_told_once(good, run):
     found, told = checked(rearranged(good, order, lights), run.probe)
     assert len(found.frame) == COUNT
     assert len([t for t in told if "frame 30" in t]) == 1
-    assert "the one before is shown again: frame 30" in told[0]
+    assert "they repeat the picture before: frame 30" in told[0]
     assert f"the {COUNT - 30} frames after them now have the times of earlier rows" in told[0]
 
 
