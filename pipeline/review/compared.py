@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from pipeline.artefacts.cloud_along import cloud_along
 from pipeline.artefacts.comparison import (
     FAMILY_ERROR,
     Change,
@@ -23,12 +24,11 @@ from pipeline.artefacts.comparison import (
     WallPair,
 )
 from pipeline.artefacts.findings import DefectKind
-from pipeline.artefacts.measured import RingSamples, Trajectory, Wall, WallTexture
+from pipeline.artefacts.measured import Trajectory, Wall, WallTexture
 from pipeline.artefacts.model import Overlay, Overlays
 from pipeline.errors import InputError
 from pipeline.files.codec import digest
 from pipeline.files.provenance import MadeBy
-from pipeline.geometry.axis import distance_along
 from pipeline.review.decisions.replay import GONE, REJECTED, Finding
 from pipeline.review.documents import cleaned, overlay_document
 from pipeline.review.flat_tiles import FlatPicture, Limits, layers_of, overlay_picture, picture_of
@@ -238,16 +238,8 @@ def _outlined(finding: Finding) -> OutlinedFinding:
 def _surveyed(review: Review) -> SurveyedWall:
     smoothing = float(review.files.record()["configuration"]["accumulate"]["smoothing_mm"])
     texture = review.files.artefact(WallTexture)
-    return SurveyedWall(review.wall(), texture, smoothing, _ring_spacing_mm(review))
-
-
-def _ring_spacing_mm(review: Review) -> float:
-    """Return the median distance between neighbouring rings; 0 where the probe stood still."""
-    trajectory, rings = review.files.artefact(Trajectory), review.files.artefact(RingSamples)
-    of_rings = trajectory.T_pc[np.isin(trajectory.frame, rings.frame)]
-    step = np.abs(np.diff(distance_along(trajectory.axis, of_rings)))
-    moving = step[step > 0]
-    return float(np.median(moving)) if len(moving) else 0.0
+    wall = review.files.artefact(Wall)
+    return SurveyedWall(wall.radius_map, texture, smoothing, cloud_along(wall.cloud).ring_spacing_mm())
 
 
 def _overlay(

@@ -25,10 +25,10 @@ from stages.premises.changes import (
 )
 from stages.premises.clock import ClockJump, clock_jumps, warn_of_clock, without_jumps, without_stretch
 from stages.premises.cuts import cuts, warn_of_cuts
-from stages.premises.light import Light, alike, light_seen, pattern_breaks, rhythm_of
+from stages.premises.light import Light, light_seen, look_the_same, pattern_breaks, rhythm_of
 from stages.premises.losses import Steps, row_times, rows_by_motion, steps_of_wall, sway_of_line
 from stages.premises.order import off_the_pipe, out_of_order
-from stages.premises.pictures import Pictures, look_at_pictures
+from stages.premises.pictures import Pictures, examine_pictures
 from stages.premises.repeats import copies, repeated, rows_beside_encoder, rows_of_repeats
 from stages.premises.rows import Alignment, Lights, aligned
 from stages.premises.scale import (
@@ -40,7 +40,7 @@ from stages.premises.scale import (
     rings_seen_mm,
     warn_of_oval,
 )
-from stages.premises.stays import places_that_stay
+from stages.premises.stays import find_static_places
 
 _LASER, _LED, _BOTH = Illumination.LASER.value, Illumination.LED.value, Illumination.BOTH.value
 Labels = NDArray[np.str_]
@@ -137,9 +137,9 @@ def _seen(recording: Recording, probe: Probe, pictures: Pictures, context: Conte
     astray = out_of_order(pictures, np.where(outside, Light.UNKNOWN, light))
     in_order = np.where(astray | outside, Light.UNKNOWN, light)
     shown = in_order if np.any(in_order == Light.WALL) else _lights_of(recording.frames.illumination)
-    stays = places_that_stay(recording, probe, recording.frames.frame[shown == Light.WALL], context)
+    stays = find_static_places(recording, probe, recording.frames.frame[shown == Light.WALL], context)
     if stays is not None:
-        pictures = look_at_pictures(recording, probe, context, stays)
+        pictures = examine_pictures(recording, probe, context, stays)
     return _Seen(pictures, light, in_order, shown, outside, astray, stays)
 
 
@@ -184,12 +184,12 @@ def _progressive(
     recording: Recording, probe: Probe, parameters: PremisesParameters, context: Context
 ) -> tuple[Recording, Pictures, bool]:
     """Return recording, pictures, and whether they are interlaced; if so, both contain even rows only."""
-    pictures = look_at_pictures(recording, probe, context)
+    pictures = examine_pictures(recording, probe, context)
     if not interlaced(pictures):
         return recording, pictures, False
     refuse_or_warn_of_interlacing(parameters.mend, context)
     recording = replace(recording, source=OneField(recording.source))
-    return recording, look_at_pictures(recording, probe, context), True
+    return recording, examine_pictures(recording, probe, context), True
 
 
 def _copies(recording: Recording, table: FrameTable, pictures: Pictures, light: Int, row: Int) -> Bool:
@@ -221,13 +221,17 @@ def _light(frames: FrameTable, pictures: Pictures) -> Int:
     light, stated = light_seen(pictures), _lights_of(frames.illumination)
     _refuse_one_light(frames, stated, light)
     line, wall = stated == Light.LINE, stated == Light.WALL
-    if np.any(light != Light.UNKNOWN) or not (line.any() and wall.any()) or not alike(pictures, line, wall):
+    if (
+        np.any(light != Light.UNKNOWN)
+        or not (line.any() and wall.any())
+        or not look_the_same(pictures, line, wall)
+    ):
         return light
     if max(line.mean(), wall.mean()) < _MOST_ROWS:
         raise UnusableError(
             "premises",
             f"frames.csv states two lights, {line.sum()} times laser and {wall.sum()} times led or both, but "
-            "all pictures look alike",
+            "all pictures look the same",
             hint="state in frames.csv which light was on in each frame",
         )
     return np.where(pictures.seen, Light.LINE if line.mean() > 0.5 else Light.WALL, Light.UNKNOWN)
@@ -258,8 +262,8 @@ def _aligned(frames: FrameTable, table: FrameTable, pictures: Pictures, light: I
     if not wrong.any():
         return Alignment(rows, np.zeros(len(rows), bool))
     again = repeated(pictures, light)
-    told = np.where(again, Light.UNKNOWN, light)  # a repeated picture does not show its own light
-    return aligned(Lights(told, stated, pattern_breaks(light), again))
+    known_light = np.where(again, Light.UNKNOWN, light)  # a repeated picture does not show its own light
+    return aligned(Lights(known_light, stated, pattern_breaks(light), again))
 
 
 def _labels(table: FrameTable, alignment: Alignment, light: Int, pictures: Pictures) -> Labels:
@@ -267,7 +271,7 @@ def _labels(table: FrameTable, alignment: Alignment, light: Int, pictures: Pictu
     stated = _stated(table, alignment.row)
     led, both = stated == _LED, stated == _BOTH
     wall = _LED if led.sum() >= both.sum() else _BOTH
-    if led.any() and both.any() and alike(pictures, led, both):
+    if led.any() and both.any() and look_the_same(pictures, led, both):
         stated = np.where(stated == _LASER, _LASER, wall)
     believed = np.where(alignment.swapped, np.where(stated == _LASER, wall, _LASER), stated)
     if len(np.unique(_lights_of(table.illumination))) < 2:

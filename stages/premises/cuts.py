@@ -15,7 +15,7 @@ from stages.premises.pictures import Pictures
 # most 1.1; the bound is the middle between 1.4 and 2.0. Failing lamps change more, but texture goes on.
 _CHANGES = 1.7
 # Texture continues if the wall's step differs from the usual one by less than this many usual steps.
-_GOES_ON = 3.0
+_CONTINUES = 3.0
 # Eight steps on either side, with which one is compared, and fewest of them in a recording.
 _BESIDE, _FEWEST = np.arange(-8, 9) != 0, 12
 
@@ -38,9 +38,9 @@ def cuts(pictures: Pictures, shown: Int, left_out: Bool, time_s: Float) -> Int:
         return np.empty(0, np.int64)
     change, step = pictures.change[place], pictures.step[place]
     usual = np.nanmedian(step) if np.any(np.isfinite(step)) else np.nan
-    goes_on = np.abs(step - usual) < _GOES_ON * np.abs(usual)
+    continues = np.abs(step - usual) < _CONTINUES * np.abs(usual)
     beside = maximum_filter(change, footprint=_BESIDE, mode="nearest")
-    return np.asarray(place[(change > _CHANGES * beside) & ~goes_on])
+    return np.asarray(place[(change > _CHANGES * beside) & ~continues])
 
 
 def warn_of_cuts(cut: tuple[int, ...], pictures: Pictures, frame: Int, context: Context) -> None:

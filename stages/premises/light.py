@@ -62,7 +62,7 @@ def light_seen(pictures: Pictures) -> Int:
     return out
 
 
-def alike(pictures: Pictures, one: Bool, other: Bool) -> bool:
+def look_the_same(pictures: Pictures, one: Bool, other: Bool) -> bool:
     """Return whether two sets (F,) of pictures, which the table labels differently, look the same.
 
     They do if neither brightness nor the share of a closed line differs between the sets by more than it
@@ -73,10 +73,10 @@ def alike(pictures: Pictures, one: Bool, other: Bool) -> bool:
     if min((one & pictures.seen).sum(), (other & pictures.seen).sum()) < _FEWEST_ALIKE:
         return False
     one, other = one & pictures.seen, other & pictures.seen
-    return not any(_differ(m[one], m[other]) and not _goes_on(m, one, other) for m in measures)
+    return not any(_differ(m[one], m[other]) and not _continues(m, one, other) for m in measures)
 
 
-def _goes_on(value: Float, one: Bool, other: Bool) -> bool:
+def _continues(value: Float, one: Bool, other: Bool) -> bool:
     """Return whether values (F,) change no more from one set (F,) to the other than within them.
 
     Medians are compared, so that one flash within a set does not make the sets look the same.

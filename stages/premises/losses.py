@@ -145,7 +145,7 @@ def rows_by_motion(
         between_s = row_times(table, out[[start, end]])
         skips = np.diff(row[start : end + 1]) - 1
         believed = leap.lost > 0 or skips.max() + leap.lost >= 0
-        believed &= _encoder_bears_out(leap, pace, between_s, in_spare_rows=leap in spare)
+        believed &= _encoder_confirms(leap, pace, between_s, in_spare_rows=leap in spare)
         if held_back:
             way_mm = float(steps.size[leap.step])
             believed &= not _encoder_agrees(encoder, between_s, way_mm, _part(between_s / period, leap.lost))
@@ -155,7 +155,7 @@ def rows_by_motion(
     return out
 
 
-def _encoder_bears_out(leap: _Leap, pace: Pace | None, between_s: Float, *, in_spare_rows: bool) -> bool:
+def _encoder_confirms(leap: _Leap, pace: Pace | None, between_s: Float, *, in_spare_rows: bool) -> bool:
     """Return whether the encoder allows a jump of the wall to be a loss, by not jumping itself.
 
     A loss for which the table has spare rows, or which takes back skipped rows, needs no encoder, but an

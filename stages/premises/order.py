@@ -99,8 +99,8 @@ def _lights_exchanged(light: Int, place: Int, size: Float) -> Bool:
             out[first : first + 2] = True
             back[[first, first + 1]] = back[[first + 1, first]]
     left = int(pattern_breaks(back).sum())
-    told = int(out.sum()) // 2 > _CLOSE_BY * left**2 / len(light)
-    return out if told else np.zeros_like(out)
+    more_than_chance = int(out.sum()) // 2 > _CLOSE_BY * left**2 / len(light)
+    return out if more_than_chance else np.zeros_like(out)
 
 
 def _mends(light: Int, breaks: Bool, first: int) -> bool:

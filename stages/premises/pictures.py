@@ -32,12 +32,12 @@ _ROWS, _COLUMNS = 128, 256
 _LEAST_ROWS, _MOST_COVERED, _BROAD = 24, 0.1, 8.0
 # Pictures kept for comparison: a light must come round again within so many frames.
 _KEPT = 8
-# Least share of the surroundings of a place that counts as known when its brightness is levelled. Not
+# Least share of the surroundings of a place that counts as known when its brightness is normalised. Not
 # measured.
 _LEAST_KNOWN = 0.05
 # Share of the correlation that lies at its peak, below which the motion is unknown: a lit wall that moves
 # shows .83 to .95 in open-1-field, one without texture .07 to .36.
-_LEAST_ALIKE = 0.4
+_LEAST_PEAK = 0.4
 # Every so many columns are examined for rows that were taken at two times.
 _EVERY_COLUMN = 8
 # Two pictures are taken in the same light when their brightness differs by less than this part.
@@ -86,7 +86,7 @@ class Pictures:
         return np.isfinite(self.brightness)
 
 
-def look_at_pictures(
+def examine_pictures(
     recording: Recording, probe: Probe, context: Context, stays: Bool | None = None
 ) -> Pictures:
     """Examine every picture of a recording once; places where something ``stays`` (h, w) show no motion."""
@@ -157,7 +157,7 @@ class _PolarView:
 class _Strip:
     """An unrolled wall: number of its picture, brightness, grey levels, and the rows without a laser line.
 
-    ``levelled`` holds the parts, by first row and end, from which the lamps' light was removed.
+    ``normalised`` holds the parts, by first row and end, from which the lamps' light was removed.
     """
 
     place: int
@@ -165,7 +165,7 @@ class _Strip:
     grey: Float32
     first: int
     end: int
-    levelled: dict[tuple[int, int], Float32] = field(default_factory=dict)
+    normalised: dict[tuple[int, int], Float32] = field(default_factory=dict)
 
 
 class _AxialMotion:
@@ -205,19 +205,19 @@ class _AxialMotion:
         rows = slice(max(strip.first, before.first), min(strip.end, before.end))
         if rows.stop - rows.start < _LEAST_ROWS:
             return before.place, change, np.nan
-        one, other = (self._levelled(s, rows) for s in (before, strip))
+        one, other = (self._stored_normalised(s, rows) for s in (before, strip))
         window = cv2.createHanningWindow(one.shape[::-1], cv2.CV_32F)
-        (_, moved), alike = cv2.phaseCorrelate(one, other, window)
-        return before.place, change, -moved * self._radii_per_row if alike > _LEAST_ALIKE else np.nan
+        (_, moved), peak = cv2.phaseCorrelate(one, other, window)
+        return before.place, change, -moved * self._radii_per_row if peak > _LEAST_PEAK else np.nan
 
-    def _levelled(self, strip: _Strip, rows: slice) -> Float32:
-        """Return `_freed` rows of a strip, stored for the picture that will be compared with it."""
+    def _stored_normalised(self, strip: _Strip, rows: slice) -> Float32:
+        """Return `_normalised` rows of a strip, stored for the picture that will be compared with it."""
         part = rows.start, rows.stop
-        if part not in strip.levelled:
-            strip.levelled[part] = self._freed(strip, rows)
-        return strip.levelled[part]
+        if part not in strip.normalised:
+            strip.normalised[part] = self._normalised(strip, rows)
+        return strip.normalised[part]
 
-    def _freed(self, strip: _Strip, rows: slice) -> Float32:
+    def _normalised(self, strip: _Strip, rows: slice) -> Float32:
         """Return rows of a strip without the lamps' light, every row with a spread of 1.
 
         Places where something stays are filled with noise: gaps of one shape would make the wall seem to

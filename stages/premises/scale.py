@@ -92,10 +92,10 @@ def warn_of_oval(rings_mm: Float, context: Context) -> None:
     if not len(rings_mm):
         return
     centre, radius = circles_through(rings_mm.astype(np.float32))
-    told = np.isfinite(radius)
-    if told.sum() < _LEAST_STEPS:
+    known = np.isfinite(radius)
+    if known.sum() < _LEAST_STEPS:
         return
-    away = np.linalg.norm((rings_mm - centre[:, None])[told], axis=-1) / radius[told, None] - 1
+    away = np.linalg.norm((rings_mm - centre[:, None])[known], axis=-1) / radius[known, None] - 1
     rays = np.linspace(-np.pi, np.pi, away.shape[1], endpoint=False)
     # Blocks of a codec, taken for the line on one ray in seven, had made a ring 4.6 % longer than wide.
     twice = ring_harmonics(away, basis_of(rays))[:, 3:]
@@ -174,7 +174,7 @@ class _Ratio:
     one_sign: float
 
     @property
-    def tells_nothing(self) -> bool:
+    def unusable(self) -> bool:
         """Whether the ratio is unusable: too few steps, changing signs, or an encoder that stands."""
         return self.steps < _LEAST_STEPS or self.one_sign < _ONE_SIGN
 
@@ -196,7 +196,7 @@ def encoder_factor(
     if recording.encoder is None or not np.isfinite(radius_mm):
         return 1.0
     found = _ratio(recording.encoder, time_s, steps, radius_mm)
-    if found.tells_nothing:
+    if found.unusable:
         return 1.0
     unit, size = _nearest_unit(abs(found.value))
     contradicts = max(abs(found.value) * size, 1 / max(abs(found.value) * size, 1e-9)) > _CONTRADICTS
@@ -250,7 +250,7 @@ def in_mm(encoder: Encoder | None, time_s: Float, steps: Steps, radius_mm: float
     if encoder is None or not np.isfinite(radius_mm):
         return encoder
     found = _ratio(encoder, time_s, steps, radius_mm)
-    if found.tells_nothing:
+    if found.unusable:
         return encoder
     _, size = _nearest_unit(abs(found.value))
     return replace(encoder, distance_mm=encoder.distance_mm * size)

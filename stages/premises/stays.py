@@ -51,7 +51,7 @@ _WORTH_A_WORD = 0.01
 """Least share of the wall's picture that is reported: no open recording has any."""
 
 
-def places_that_stay(recording: Recording, probe: Probe, lit: Int, context: Context) -> Bool | None:
+def find_static_places(recording: Recording, probe: Probe, lit: Int, context: Context) -> Bool | None:
     """Return where something stays (h, w), on the picture reduced by a whole factor, or None; warn of it.
 
     Parameters
@@ -63,7 +63,7 @@ def places_that_stay(recording: Recording, probe: Probe, lit: Int, context: Cont
     wall, channel = _wall_in(probe.camera), darkest_channel(probe.laser)
     few = recording.read(lit[:: max(-(-len(lit) // _LOOKED_AT), 1)], "bgr" if both else "grey")
     seen = (image for _, image in few if image is not None)
-    places = what_stays((np.ascontiguousarray(i[..., channel]) for i in seen) if both else seen, wall)
+    places = static_places((np.ascontiguousarray(i[..., channel]) for i in seen) if both else seen, wall)
     share = float(places.sum() / max(wall.sum(), 1))
     context.report("picture that stays while the wall moves", 100 * share, "%")
     if share > _WORTH_A_WORD:
@@ -88,7 +88,7 @@ def darkest_channel(laser: LaserSheet) -> int:
     return _RED if laser.wavelength_nm < _YELLOW_NM else _BLUE
 
 
-def what_stays(images: Iterable[Image], wall: Bool) -> Bool:
+def static_places(images: Iterable[Image], wall: Bool) -> Bool:
     """Return where (h, w) something stays in grey pictures (H, W), while the ``wall`` (h, w) moves."""
     last, count = None, 0
     total, power = (np.zeros(wall.shape, np.float32) for _ in range(2))
@@ -133,8 +133,8 @@ def _moved(before: Float32, now: Float32, wall: Bool) -> bool:
         for p in (before * now, before * before, now * now, wall.astype(np.float32))
     )
     on_wall = seen > 0.5
-    alike = both[on_wall] / np.sqrt(one[on_wall] * other[on_wall] + 1e-12)
-    return bool(alike.size and np.median(alike) < _STILL)
+    correlation = both[on_wall] / np.sqrt(one[on_wall] * other[on_wall] + 1e-12)
+    return bool(correlation.size and np.median(correlation) < _STILL)
 
 
 def _odd(part: float, shape: tuple[int, ...]) -> int:

@@ -1,10 +1,10 @@
-"""Where dirt or drops on the window, at places that a twin found, displace the line.
+"""Corrects or rejects the line where dirt or drops on the window, at places that a twin found, displace it.
 
 The twin finds places in blocks of pixels, which are larger than the dirt: in the rest of a block the line is
 as good as elsewhere. Dirt that bends light displaces the line at an azimuth of the image by the same amount
-in all rings, or magnifies its motion when the probe moves. Both show against the smooth ring that is fitted
-through all clear azimuths. Only rings that pass a place tell what it does, and only for radii at which they
-pass it.
+in all rings, or magnifies its motion when the probe moves. Both are measured against the smooth ring that is
+fitted through all clear azimuths. Only rings that pass a place show its effect, and only at the radii at
+which they pass it.
 """
 
 from __future__ import annotations
@@ -22,30 +22,37 @@ from pipeline.geometry.image_places import ImagePlaces, clear_of
 from pipeline.machine.stage import Context
 
 _HARMONICS, _MOST = 4, 3.0
-"""A round pipe seen askew, an oval one and an instrument that errs give a ring up to the fourth harmonic.
-Usual departures by which a dent that passes by counts at most."""
+"""A round pipe seen obliquely, an oval one and an error of the instrument give a ring up to the fourth
+harmonic. A dent that passes by counts as at most this many usual departures."""
 _FEWEST_RINGS, _ENOUGH_RINGS, _BESIDE = 16, 128, 9
-"""Rings that must show an azimuth for its median to be known to a third of their spread, and as many as are
-looked at, or up to twice as many; azimuths about one that must follow the ring as well, as many as tell an
-outlier."""
+"""Rings that must show an azimuth for its median to be known to a third of their spread; rings that are
+examined, or up to twice as many; azimuths around one that must follow the ring as well, as in the test for
+outliers."""
 _SURE, _ROUGH = 3.0, 2.0
-"""Spreads of the clear azimuths from which one departs steadily, and times their usual scatter that it may
-scatter, as a line beside glints does. Chosen; of sixteen rings noise changes it by a fifth."""
+"""An azimuth departs steadily from this many spreads of the clear azimuths on, and may scatter by this many
+times their usual scatter, as a line beside glints does. Chosen; with sixteen rings, noise changes the scatter
+by a fifth."""
 _OF_DEPTH, _KNOWN = 0.1, 0.05
-"""By how much of its way a line may be magnified, and so a depth; 1 σ to which that must be known. Chosen."""
+"""Largest relative magnification of the line's motion, and so of a depth; largest 1 σ of it. Chosen."""
 _ENDS, _BEYOND = 0.1, 0.5
-"""Share of the rings beyond each end of the radii at which a place counts as looked at, and share of the way
-between these ends by which radii may lie beyond them. Chosen: a way with a normal spread keeps 99 %."""
+"""Share of the rings outside either end of the radii at which a place counts as examined, and share of the
+range between these ends by which radii may lie outside. Chosen: a normal spread of radii keeps 99 %."""
 _AT_ONCE = 128
-"""Rings worked on at a time, for memory's sake."""
+"""Rings processed at a time, to limit memory."""
 
 
 @dataclass(frozen=True)
 class _Azimuths:
-    """What the line does behind dirt at azimuths (A,).
+    """The line behind dirt at azimuths (A,).
 
-    ``measured`` tells where it is as good as elsewhere but for a steady departure ``aside_px`` (0 where that
-    is no larger than elsewhere), at radii from ``from_px`` to ``to_px``.
+    Attributes
+    ----------
+    measured : (A,) bool
+        Whether the line is as good as elsewhere except for a steady displacement.
+    aside_px : (A,)
+        That displacement, px; 0 where it is no larger than elsewhere.
+    from_px, to_px : (A,)
+        Radii, px, between which this holds.
     """
 
     measured: Bool
@@ -54,16 +61,16 @@ class _Azimuths:
     to_px: Float
 
     def shown_by(self, rings: RingSamples) -> Bool:
-        """Return whether the line of rings (F, A) is as good as elsewhere behind dirt."""
+        """Return where the line of rings (F, A) is as good behind dirt as elsewhere."""
         return self.measured & (rings.radius_px >= self.from_px) & (rings.radius_px <= self.to_px)
 
 
 def set_right(rings: RingSamples, places: ImagePlaces, context: Context) -> RingSamples:
     """Leave out, in place, the samples at places of the image where they do not follow their ring.
 
-    Samples that are displaced alike in all rings, and otherwise move with them, are moved back. The whole
-    displacement is added to their σ and kept in ``moved_px`` of the rings returned. Unless the probe rolls,
-    a groove along the whole way would look the same; `pipeline.artefacts.moved_back` leaves it out.
+    Samples that are displaced equally in all rings, and otherwise move with them, are moved back. The whole
+    displacement is added to their σ and kept in ``moved_px`` of the returned rings. Unless the probe rolls,
+    a groove along the whole run would look the same; `pipeline.artefacts.moved_back` leaves it out.
     """
     hides = np.sum([_hidden(some, places).sum(0) for some in _some_at_a_time(rings)], 0)
     if not hides.any():
@@ -77,7 +84,7 @@ def set_right(rings: RingSamples, places: ImagePlaces, context: Context) -> Ring
 
 
 def _apply(behind: _Azimuths, rings: RingSamples, places: ImagePlaces) -> tuple[int, int]:
-    """Put rings right in place; return how many samples were left out and moved back."""
+    """Correct rings in place; return the numbers of samples that were left out and moved back."""
     hidden, shown = _hidden(rings, places), behind.shown_by(rings)
     rings.validity[hidden & ~shown] = RingValidity.OUT_OF_VIEW
     aside = np.where(hidden & shown, behind.aside_px, 0.0)
@@ -101,8 +108,8 @@ def _hidden(rings: RingSamples, places: ImagePlaces) -> Bool:
 def _looked_at(rings: RingSamples, places: ImagePlaces, hides: Int) -> tuple[Float, Float]:
     """Return departures from the smooth ring, and its radius (N, A), of rings spread evenly over the run.
 
-    They are taken at each azimuth from the ``hides`` (A,) rings in which it is hidden, where that is none
-    from all; so the rings in a row are not the same at all azimuths. NaN where there are fewer.
+    At each azimuth they are taken from the ``hides`` (A,) rings in which it is hidden, or from all rings if
+    there are none; so the rings in a row are not the same at all azimuths. NaN where there are fewer.
     """
     clear = hides == 0
     every = np.maximum(np.where(clear, len(rings.frame), hides) // _ENOUGH_RINGS, 1)
@@ -123,14 +130,14 @@ def _looked_at(rings: RingSamples, places: ImagePlaces, hides: Int) -> tuple[Flo
 
 
 def _with_smooth(rings: RingSamples, hidden: Bool, which: Bool) -> tuple[Float, Float]:
-    """Return the radius of some of the rings, and of the smooth ring through what is not hidden, (n, A)."""
+    """Return the radii of some of the rings, and of the smooth ring through their clear samples, (n, A)."""
     radius = np.where(rings.valid[which], rings.radius_px[which], np.nan).astype(float)
     basis = basis_of(rings.azimuth_rad, _HARMONICS)
     return radius, ring_harmonics(np.where(hidden[which], np.nan, radius), basis) @ basis.T
 
 
 def _behind(departure: Float, smooth: Float, clear: Bool) -> _Azimuths:
-    """Return what azimuths are like behind dirt, beside those (A,) that are clear in all rings."""
+    """Return the line behind dirt, compared with the azimuths (A,) that are ``clear`` in all rings."""
     enough = np.isfinite(departure).sum(0) >= _FEWEST_RINGS
     of_clear = clear & enough
     steady, gain, scatter, first, last = np.full((5, len(clear)), np.nan)
@@ -147,9 +154,9 @@ def _behind(departure: Float, smooth: Float, clear: Bool) -> _Azimuths:
 
 
 def _reaches(departs: Bool, clear: Bool) -> Bool:
-    """Return of azimuths (A,) around the circle whether they lie in a stretch that departs where it is clear.
+    """Return which azimuths (A,) lie in a stretch that also departs where it is clear.
 
-    What goes on beside dirt is on the wall, or at least not told from it.
+    A departure that continues beside the dirt is on the wall, or cannot be distinguished from one.
     """
     twice, wall = np.tile(departs, 2), np.tile(departs & clear, 2)
     whole = binary_propagation(wall, mask=twice)
@@ -157,15 +164,15 @@ def _reaches(departs: Bool, clear: Bool) -> Bool:
 
 
 def _looked_between(radius: Float) -> tuple[Float, Float]:
-    """Return the least and the largest radius (A,) that the rings (N, A) looked at stand for."""
+    """Return the smallest and the largest radius (A,) for which the examined rings (N, A) are evidence."""
     first, last = np.nanquantile(radius, (_ENDS, 1 - _ENDS), axis=0)
     return first - _BEYOND * (last - first), last + _BEYOND * (last - first)
 
 
 def _of_azimuths(departure: Float, smooth: Float) -> tuple[Float, Float, Float]:
-    """Return of azimuths (A,) the steady departure from the smooth ring, its gain on the ring's way, scatter.
+    """Return steady departure (A,) from the smooth ring, its gain with the ring's motion, and scatter.
 
-    A dent that passes by moves the gain by no more than three usual departures do.
+    A dent that passes by changes the gain by no more than three usual departures do.
     """
     steady = np.nanmedian(departure, axis=0)
     rest = departure - steady

@@ -1,11 +1,11 @@
-"""Which candidate of each sector is the line: the ring traced as one closed curve.
+"""Chooses the candidate of each sector that is the line: traces the ring as one closed curve.
 
-The candidates are the states of a hidden Markov chain around the circle. A candidate speaks for itself by its
-place against the ring expected from the image before and by its brightness against the rest of the ring; two
-neighbours speak for each other when the curve goes on from one to the next. All of it is capped: the wall may
-jump, a pit may be dark, and no single property decides. The forward–backward algorithm (L. R. Rabiner,
-Proc. IEEE 77, 1989, § III) gives every candidate's probability, from which the chance of having taken the
-wrong one enters the place's σ.
+The candidates are the states of a hidden Markov chain around the circle. The likelihood of a candidate
+depends on its distance from the ring expected from the image before, on its brightness relative to the rest
+of the ring, and on how well the curve continues to the next sector. Each of these has an upper bound: the
+wall may jump, a pit may be dark, and no single property decides. The forward–backward algorithm (L. R.
+Rabiner, Proc. IEEE 77, 1989, § III) gives every candidate's probability; σ of the position includes the
+chance of a wrong choice.
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ from pipeline.arrays import Float
 from stages.rings.kernels import slow_around
 from stages.rings.search import Candidates
 
-# 1 σ by which the curve goes aside from one sector to the next, and by which it leaves the ring expected
-# from the image before, in line widths. Both are generous: they tell candidates a few widths apart.
+# 1 σ by which the curve moves radially from one sector to the next, and by which it leaves the ring expected
+# from the image before, in line widths. Both are generous: they separate candidates a few widths apart.
 _BEND_WIDTHS, _MOVE_WIDTHS = 0.5, 1.5
 # Most that each may count against a candidate, as a logarithm of odds. A jump weighs like one sample of wrong
-# brightness, so that two or three sectors of a step are believed; leaving the expected place weighs least.
+# brightness, so that a step of two or three sectors is accepted; leaving the expected place weighs least.
 _MOST_BEND, _MOST_MOVE, _MOST_BRIGHTNESS = 4.0, 1.0, 3.0
 # 1 σ of the logarithm of a line's brightness from sector to sector, where the wall reflects evenly.
 _LEAST_SPREAD = 0.3
@@ -33,7 +33,7 @@ _LEAST_SPREAD = 0.3
 class Choice(NamedTuple):
     """The line's place in every sector, (A,) each; NaN where there is no candidate.
 
-    ``radius_px``: the likeliest candidate; ``probability``: that it is the line; ``spread_px``: root of the
+    ``radius_px``: the most likely candidate; ``probability``: that it is the line; ``spread_px``: root of the
     mean square distance of all candidates from it, weighted with their probabilities.
     """
 
@@ -43,7 +43,7 @@ class Choice(NamedTuple):
 
 
 def choose_line(candidates: Candidates, expected_px: Float, width_px: float) -> Choice:
-    """Return the likeliest closed curve through ``candidates`` (A, K) near the ring ``expected_px`` (A,)."""
+    """Return the most likely closed curve through ``candidates`` (A, K) near ``expected_px`` (A,)."""
     known = np.isfinite(candidates.radius_px)
     first = np.where(known[:, 0], candidates.radius_px[:, 0] - expected_px, np.nan)
     away = candidates.radius_px - (expected_px + slow_around(first))[:, None]
@@ -88,7 +88,7 @@ def _step(message, away, other, weight, bend, most, out):  # type: ignore[no-unt
 def _posterior(away, weight, bend, most):  # type: ignore[no-untyped-def]
     """Probability (A, K) of every candidate, 0 in sectors without any.
 
-    Each way around is walked twice, and the second turn taken: what the first one started from is forgotten.
+    Each direction is walked twice around, and the second turn is used: it no longer depends on the start.
     Sectors without a candidate are passed over.
     """
     sectors, states = away.shape

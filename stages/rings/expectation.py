@@ -20,7 +20,7 @@ _MOST_UNSEEN = 0.02
 # Part of the rings in which an azimuth shows no line, and how far around, from which the sector is named:
 # less than half of the rings leave wall between them, and a degree is a millimetre of a 4 inch pipe.
 _HIDDEN, _HIDDEN_RAD = 0.5, np.radians(1.0)
-# Hidden parts nearer to each other than an hour of the clock have one cause and are told together.
+# Hidden parts nearer to each other than an hour of the clock have one cause and are reported together.
 _ONE_SECTOR_RAD = np.radians(30.0)
 # Wander in line widths. Speckle and texture leave 0.06 to 0.10 in good recordings, crf 30 makes 0.15: the
 # middle of both.
@@ -32,10 +32,10 @@ _NARROWEST_PX = 0.5
 
 
 def warn_of_rings(samples: RingSamples, wander_px: float, stepped: bool, context: Context) -> None:
-    """Warn where frames have no ring, a sector shows no line, or the line is not what it should be.
+    """Warn of frames without a ring, sectors without a line, and a line of poor quality.
 
     ``stepped`` says that the wall is a gauge's: its steps and fiducials break the line by design (0.7 to 2.4
-    % of it in the good gauge of open-1), so that the shares of broken line say nothing there.
+    % of it in the good gauge of open-1), so that the share of broken line is no sign of quality there.
     """
     rejected = samples.validity == RingValidity.FRAME_REJECTED
     ring = ~rejected.all(1)
@@ -45,7 +45,7 @@ def warn_of_rings(samples: RingSamples, wander_px: float, stepped: bool, context
         context.warn(
             f"{len(frames)} of {len(ring)} laser frames show no ring: frame "
             f"{', '.join(str(f) for f in frames[:_NAMED_FRAMES])}{more}. Their wall is not measured. What to "
-            "do: look at these pictures; the laser may have been off or its light hidden"
+            "do: look at these pictures; the laser may have been off or blocked"
         )
     validity = samples.validity[ring]
     missing = np.asarray((validity != RingValidity.VALID).mean(0))
@@ -66,22 +66,23 @@ def warn_of_rings(samples: RingSamples, wander_px: float, stepped: bool, context
 
 def _warn_of_coarse_pictures(width_px: float, lost: float, context: Context) -> None:
     context.warn(
-        f"the line is {width_px:.2f} px wide (1 σ), too narrow for these pixels to place: {100 * lost:.1f} % "
-        "of the ring samples are lost, most near 12, 3, 6 and 9 o'clock in the picture, where rows of pixels "
-        f"run along the line. What to do: record with more pixels, so that it is {_NARROWEST_PX:g} px wide"
+        f"the line is {width_px:.2f} px wide (1 σ), too narrow to be located with these pixels: "
+        f"{100 * lost:.1f} % of the ring samples are lost, most near 12, 3, 6 and 9 o'clock in the picture, "
+        "where rows of pixels run along the line. What to do: record with more pixels, so that the line is "
+        f"{_NARROWEST_PX:g} px wide"
     )
 
 
 def _warn_of_shares(validity: Byte, context: Context) -> None:
-    """Warn of how many samples (F, A) show no line, and how many another light."""
+    """Warn of the shares of samples (F, A) that show no line, or other light."""
     unseen = np.isin(validity, (RingValidity.NO_LINE, RingValidity.LOW_CONTRAST, RingValidity.SATURATED))
     other = np.isin(validity, _NOT_THE_LINE)
     if validity.size and unseen.mean() > _MOST_UNSEEN:
         context.warn(
-            f"{100 * unseen.mean():.1f} % of the ring samples show no line that could be measured: it is too "
+            f"{100 * unseen.mean():.1f} % of the ring samples show no measurable line: it is too "
             "faint or clipped, or there is no wall (a branch, an open joint); good recordings lose none. "
-            "What to do: look where wall is missing in the model; else set the exposure of the laser frames "
-            "anew, clean window and laser"
+            "What to do: check in the model where wall is missing; if the pipe has wall there, correct the "
+            "exposure of the laser frames, clean window and laser"
         )
     if validity.size and other.mean() > _MOST_NOT_THE_LINE:
         context.warn(

@@ -35,11 +35,11 @@ _LEARNING_FRAMES = 4
 _AT_ONCE = 512
 _BLUE_GREEN_NM, _GREEN_RED_NM = 490.0, 580.0
 _LINE_WIDTHS, _WALL_WIDTHS = 0.7, 4.0
-# Of the wall's pixels beside the line every fourth tells its colours: of open-3's 46000 in a frame this moves
-# the line by .003 of its σ.
+# The wall's colours are taken from every fourth pixel beside the line: of open-3's 46000 in a frame this
+# moves the line by .003 of its σ.
 _WALL_EVERY = 4
-# Clipped pixels are looked for up to so many line widths on either side of the line. If the line lies in
-# their middle to half a width, both of its flanks were fitted.
+# Clipped pixels are searched up to so many line widths on either side of the line. If the line lies within
+# half a width of their middle, both of its flanks were fitted.
 _CLIP_WIDTHS, _CLIP_STEP, _ASIDE_WIDTHS = 3.0, 0.5, 0.5
 # If a larger share of them clips, the wall clips too, and the line is not seen.
 _MOST_CLIPPED = 0.5
@@ -58,7 +58,7 @@ class RingParameters(Parameters):
     left_out: ImagePlaces = Field(
         (),
         description="dirty places of the image, each as u, v and radius, px; the line is left out there "
-        "unless it moves as its ring does; boresight run --twin takes them from a twin",
+        "unless it moves with its ring; boresight run --twin takes them from a twin",
     )
 
 
@@ -77,7 +77,7 @@ def extract_rings(
         raise UnusableError(
             "rings", "the laser is on in no frame", hint="check frames.csv, column illumination"
         )
-    # Decoding goes on in the background from here.
+    # Decoding continues in the background from here.
     lasers = recording.read(recording.frames.of(Illumination.LASER), "grey")
     both = recording.read(recording.frames.of(Illumination.BOTH), "bgr")
     sectors = sectors_of(recording.source, probe.camera.centre_px, parameters.azimuths)
@@ -143,12 +143,12 @@ def _lit_traces(images: Images, probe: Probe, sectors: Sectors) -> Iterator[Foun
 
 
 def _without_dips(trace: RingTrace, bgr: Byte, sectors: Sectors, channel: int) -> RingTrace:
-    """Return a ring with the samples rejected that do not lie in the middle of the clipped pixels.
+    """Return a ring without the samples that do not lie in the middle of the clipped pixels.
 
     Where the laser's channel clips, the other channels rise further and the mixture has a dip at the
-    brightest place of the line. On a bright wall the line was then found beside its true place, which looked
-    like deposits. The σ of samples that stay is widened by how far the clipped pixels can pull the line's
-    centre.
+    brightest place of the line. On a bright wall the line would then be found beside its true place, which
+    looks like deposits. The σ of the remaining samples is widened by the largest shift of the line's centre
+    that the clipped pixels can cause.
     """
     across = np.arange(-_CLIP_WIDTHS, _CLIP_WIDTHS + _CLIP_STEP / 2, _CLIP_STEP)
     radius = np.nan_to_num(trace.fit.radius_px)[:, None] + across * trace.width_px
@@ -191,7 +191,7 @@ def _first_trace(
 
 
 def _empty(frames: Int, sectors: Sectors, scratch: Scratch) -> RingSamples:
-    """Return room for the rings of all frames, every one rejected as yet."""
+    """Return storage for the rings of all frames, all samples rejected so far."""
     shape = (len(frames), len(sectors.azimuth_rad))
     radius, sigma, width, amplitude = (scratch.full(shape, np.nan, np.float32) for _ in range(4))
     validity = scratch.full(shape, RingValidity.FRAME_REJECTED, np.uint8)
@@ -229,7 +229,7 @@ def _compare_rings(samples: RingSamples) -> None:
 
 
 def _some(samples: RingSamples) -> RingSamples:
-    """Return some hundred of the rings, spread evenly: statistics of them are known well enough."""
+    """Return some hundred of the rings, spread evenly, which are enough for statistics."""
     return samples.some(slice(None, None, max(len(samples.frame) // _AT_ONCE, 1)))
 
 
@@ -265,8 +265,8 @@ def discriminant_weights(bgr: Byte, sectors: Sectors, trace: RingTrace, otherwis
     """Return (3,) Fisher discriminant weights between line and wall beside it.
 
     The wall's colour covariance holds both its reflectance and the sensor's noise, so the mixture has the
-    best ratio of line height to what is not line. Scaled so that the line keeps its height in the strongest
-    channel; ``otherwise`` is returned where line and wall do not differ in colour.
+    best ratio of line height to everything else. It is scaled so that the line keeps its height in the
+    strongest channel; ``otherwise`` is returned if line and wall do not differ in colour.
     """
     radius, width = trace.radius_everywhere(), trace.width_px
     beside = sectors.pixels_near(radius, _WALL_WIDTHS * width, BAND_WIDTHS * width)[::_WALL_EVERY]

@@ -1,10 +1,10 @@
-"""Runs of samples off the wall that only one ring shows, while the rings before and after agree.
+"""Finds runs of samples off the wall that only one ring shows, while the rings before and after agree.
 
-A defect is there when the next ring comes by; a glint has moved on. Rings are laid on one another by what
-varies slowly around them, the median of five rings in a row is the wall, and a run of neighbouring samples
-that leaves it together either is seen by a neighbouring ring too or stands alone. Alone it is no line where
-its profile is that of a glint, brighter or wider than the ring's; where the profile is the line's own, the
-sample stays, with a σ that says that nothing but itself speaks for it.
+The next ring shows a defect too, but not a glint, which has moved on. Rings are aligned by their slow
+variation around the circle, and the median of five rings in a row is the wall. A run of neighbouring samples
+that leaves the wall together either shows in a neighbouring ring too or is alone. A lone run is rejected if
+its profile is that of a glint, brighter or wider than the ring's; if its profile is that of the line, its
+samples stay, with a σ that includes the chance that they are not wall.
 """
 
 from __future__ import annotations
@@ -16,24 +16,24 @@ from pipeline.adjustment.robust import robust_spread, robust_spreads
 from pipeline.arrays import Bool, Float, Float32, Int
 from stages.rings.kernels import median, slow_around
 
-# Rings on either side that have a say: two of five may be wrong, and a run is confirmed by a next one, which
-# itself is measured against two more; how much clutter there is, is counted over two on either side.
+# Rings on either side that are compared: two of five may be wrong, and a run is confirmed by a neighbour,
+# which itself is measured against two more; clutter is counted over two rings on either side.
 WALL_RINGS = 2
 _CLUTTER_RINGS = 2
 SAYING_RINGS = WALL_RINGS + 1 + _CLUTTER_RINGS
-# A run is as wide as its samples leave the wall by 2.5 σ, and counts when one leaves it by 5 σ: of a hundred
-# thousand samples of noise less than one does.
+# A run extends as far as its samples leave the wall by 2.5 σ, and counts if one of them leaves it by 5 σ:
+# less than one in a hundred thousand samples of noise does.
 _RUN_SIGMAS, _SEED_SIGMAS = 2.5, 5.0
 # Least share of a lone run's depth that a neighbouring ring must show to confirm it. Chosen so that a ring
 # beside the middle of a small pit still counts; not measured (data/debts.md).
 _SHARE = 0.25
 _NEAR_SECTORS, _GAP_SECTORS = 2, 4
-# Root mean square, over a run, of how many robust σ of the ring it is brighter and wider than the ring. The
-# ring's own runs have 1. Glaring runs are glints even where a second ring shows one in the same place; what
-# three of five rings show is the wall and no run.
+# Root mean square over a run of the excess of brightness and width, in robust σ of the ring; the ring itself
+# has 1. Runs above the larger value are glints even if a second ring shows one in the same place; what three
+# of five rings show is the wall and no run.
 _ODD_RUN, _GLARING_RUN = 3.0, 6.0
 # For every four glint samples of odd profile, one with the profile of a line is assumed; and in a recording
-# without odd ones, one in ten lone samples still counts as no wall. Both are judgements, not measured.
+# without odd ones, one in ten lone samples still does not count as wall. Both are judgements, not measured.
 _CLUTTER_ORDINARY, _CLUTTER_PRIOR = 0.25, 0.1
 _LEAST_WIDTH_SPREAD, _LEAST_BRIGHTNESS_SPREAD = 0.03, 0.1
 
@@ -41,9 +41,10 @@ _LEAST_WIDTH_SPREAD, _LEAST_BRIGHTNESS_SPREAD = 0.03, 0.1
 def lone_runs(
     radius_px: Float32, sigma_px: Float32, width_px: Float32, amplitude: Float32
 ) -> tuple[Bool, Float32]:
-    """Return which samples (F, A) are no line, and σ, px, of all with the chance of it; NaN where no sample.
+    """Return which samples (F, A) are not the line, and σ, px, of all samples, which includes that chance.
 
-    Rings in the order of time; NaN in ``radius_px`` where there is no valid sample. ``sigma_px`` is 1 σ.
+    Rings are in the order of time; ``radius_px`` is NaN where there is no valid sample, and σ is NaN there.
+    ``sigma_px`` is 1 σ.
     """
     away = _away_from_wall(radius_px.astype(np.float64))
     sigma = np.maximum(sigma_px, _spread_of(away))
@@ -59,7 +60,7 @@ def lone_runs(
 
 
 def _oddness(value: Float32, least_spread: float) -> Float:
-    """Return by how many σ of its ring each value (F, A) is above what varies slowly around it."""
+    """Return the excess of each value (F, A) over the slow variation around its ring, in σ of the ring."""
     out = np.zeros(value.shape)
     for row, ring in zip(out, value.astype(float), strict=True):
         beyond = ring - slow_around(ring)
@@ -114,9 +115,9 @@ def _away_from_wall(radius):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True)
 def _runs(away, sigma):  # type: ignore[no-untyped-def]
-    """Mark runs (F, A) that leave the wall to one side: 1 where a next ring does too, 2 alone, else 0.
+    """Mark runs (F, A) that leave the wall to one side: 1 if a neighbouring ring does too, 2 if alone, or 0.
 
-    A run goes on over a few sectors without a sample.
+    A run may include a few sectors without a sample.
     """
     rings, sectors = away.shape
     out = np.zeros((rings, sectors), np.uint8)

@@ -11,14 +11,14 @@ UNKNOWNS = 5
 # In a narrower sector, px, some radii have no pixel: pixels are one apart, up to √2 along a diagonal.
 _LEAST_ARC_PX = 1.2
 # Blocks around the ring whose medians give its slow variation: thirty degrees, far wider than a glint, which
-# then has no influence. A move across the pipe, one wave around the ring, is followed to 3 % (the square of
+# then has no influence. A motion across the pipe, one wave around the ring, is followed to 3 % (the square of
 # half a block, over 2).
 _BLOCKS = 12
 
 
 @numba.njit(cache=True, nogil=True)
 def median(values):  # type: ignore[no-untyped-def]
-    """Return the median of ``values`` (N,), not empty, which are put in order: NumPy's takes long to compile.
+    """Return the median of ``values`` (N,), not empty, and sort them; NumPy's takes long to compile.
 
     D. L. Shell, "A high-speed sorting procedure", 1959.
     """
@@ -36,7 +36,7 @@ def median(values):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True)
 def take_finite(values, out):  # type: ignore[no-untyped-def]
-    """Write the finite ``values`` (N,) to ``out`` (N,) one after the other; return the part of it filled."""
+    """Write the finite ``values`` (N,) to ``out`` (N,) one after the other; return the filled part of it."""
     count = 0
     for x in values:
         if np.isfinite(x):
@@ -47,7 +47,7 @@ def take_finite(values, out):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True)
 def slow_around(values):  # type: ignore[no-untyped-def]
-    """Return ``values`` (A,) without what is narrower than half a block; 0 when none is finite.
+    """Return the slow variation of ``values`` (A,), of half a block or wider; 0 when none is finite.
 
     Medians of twelve blocks of sectors, linear from the middle of one to the next around the circle; blocks
     of which less than a quarter is finite take the value of the block before.
@@ -87,7 +87,7 @@ def first_at_least(values, low, high, limit):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
 def neighbours_joined(sectors, radius_px):  # type: ignore[no-untyped-def]
-    """Return how many sectors on either side are joined to one, so that it is wide enough at a radius."""
+    """Return the number of sectors on either side that are joined to one, so that it is wide enough."""
     arc_px = 2 * np.pi / sectors * radius_px
     return int(np.ceil(0.5 * (_LEAST_ARC_PX / arc_px - 1))) if arc_px < _LEAST_ARC_PX else 0
 

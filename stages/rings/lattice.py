@@ -1,9 +1,9 @@
-"""Errors of the line that repeat with the picture's rows and columns: coarser pixels, or a codec's blocks.
+"""Removes errors of the line that repeat with rows and columns: coarse pixels, blocks of a codec.
 
-Where pictures were enlarged from fewer pixels, or a codec works in blocks, the line is drawn towards the same
-part of each of them. Where the ring runs along rows or columns, this is alike from ring to ring and as broad
-as a defect: neither the rings' scatter nor their number tells it from the wall. What tells it is its period:
-the wall does not know where the picture's rows are.
+If pictures were enlarged from fewer pixels, or a codec works in blocks, the line is drawn towards the same
+part of each of them. Where the ring runs along rows or columns, this error is the same from ring to ring and
+as broad as a defect: neither the rings' scatter nor their number distinguishes it from the wall. Its period
+does, because the wall has no relation to the picture's rows.
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ from pipeline.arrays import Bool, Float
 from pipeline.artefacts.measured import RingSamples
 from pipeline.machine.stage import Context
 
-# Harmonics of a ring's own smooth shape, times it is fitted anew, and spreads from which values are cut off.
+# Harmonics of a ring's own smooth shape, number of times it is fitted, spreads at which values are cut off.
 _HARMONICS, _ROUNDS, _MOST = 6, 5, 4.0
-# Periods that are looked for, px: finer ones are the pixels' own, and codecs work in blocks of 16 at most.
+# Periods that are searched, px: finer ones are the pixels' own, and codecs work in blocks of 16 at most.
 _SHORTEST, _LONGEST = 1.5, 17.0
 # Steps of place, px, and of frequency, 1/px: rows at either end of a picture of 1000 px are in step by it.
 _PLACE, _STEP = 0.1, 1e-4
-# The line's direction is that of rows or columns where its normal's part is as large as this (chosen).
+# The line runs along rows or columns where this component of its normal is as large as this (chosen).
 _ALONG = 0.9
 # Share of the line's variance that repeats. In open-1 and open-3 as they are, half as large, with a temporal
 # filter, by VP9 and by HEVC it is .003 to .029; .037 to .22 by MPEG-2 and JPEG, .11 to .47 enlarged.
@@ -33,7 +33,7 @@ _REPEATS = 0.033
 # Degrees from a row or column between which the error has one size, and overtones of its period.
 _SLANTS_DEG = np.array([0.0, 3.0, 6.0, 10.0, 15.0, 21.0, 28.0, 36.0, 45.0])
 _OVERTONES = 3
-# Periods that are taken out of one axis: pixels enlarged by 5/2 repeat by themselves and by two of them.
+# Periods that are removed from one axis: pixels enlarged by 5/2 repeat every pixel and every two of them.
 _PERIODS = 3
 # Rings that are examined, and corrected at a time: 27 000 samples along rows show a share of .001. Then the
 # fewest samples of which a size is fitted.
@@ -49,7 +49,7 @@ _KNOWN = 0.1
 
 @dataclass(frozen=True)
 class Lattice:
-    """How the line's place repeats along one axis of the picture.
+    """An error of the line's position that repeats along one axis of the picture.
 
     Attributes
     ----------
@@ -57,9 +57,10 @@ class Lattice:
         0 with columns, 1 with rows.
     period_px : float
     share : float
-        Of the line's variance where it runs along them.
+        Share of the line's variance, where it runs along columns or rows.
     size_px : (2 T, 2 K)
-        Of cosine and sine of K overtones, for T directions of the line on either side of the picture.
+        Amplitudes of cosine and sine of K overtones, px, for T directions of the line on either side of the
+        picture.
     """
 
     axis: int
@@ -68,7 +69,7 @@ class Lattice:
     size_px: Float
 
     def error_px(self, samples: RingSamples, rings: slice) -> Float:
-        """Return by how much the radii (n, A) of some rings are too large."""
+        """Return the error (n, A), px, of the radii of some rings; positive: too large."""
         across = _across(samples, self.axis)
         waves = _waves(_place(samples, self.axis, rings), self.period_px)
         error = np.sign(across) * np.einsum("fak,ak->fa", waves, self.size_px[_slant(across)])
@@ -94,7 +95,7 @@ class Lattice:
 
 
 def lattices_of(samples: RingSamples) -> tuple[Lattice, ...]:
-    """Return what repeats with columns and with rows, where it is more than in sound recordings."""
+    """Return the errors that repeat with columns and with rows, if they exceed those of sound recordings."""
     count = len(samples.frame)
     some = slice(None, None, max(count // _RINGS, 1))
     if not samples.valid[some].any():
@@ -111,9 +112,9 @@ def lattices_of(samples: RingSamples) -> tuple[Lattice, ...]:
 
 
 def take_out(lattices: tuple[Lattice, ...], samples: RingSamples) -> None:
-    """Take what repeats out of the radii of all rings, in place, some rings at a time.
+    """Subtract the repeating errors from the radii of all rings, in place, some rings at a time.
 
-    Their σ gets what cannot be taken out.
+    Their σ includes the part that cannot be removed.
     """
     for first in range(0, len(samples.frame) if lattices else 0, _RINGS):
         rings = slice(first, first + _RINGS)
@@ -124,23 +125,23 @@ def take_out(lattices: tuple[Lattice, ...], samples: RingSamples) -> None:
 
 
 def warn_of_lattices(lattices: tuple[Lattice, ...], context: Context) -> None:
-    """Warn of pictures of coarser pixels or of blocks."""
+    """Warn of pictures that were enlarged or coded in blocks."""
     if not lattices:
         return
     most = max(lattices, key=lambda each: each.share)
     size_px = float(most.most_px.max())
     context.warn(
-        f"the line's place repeats every {most.period_px:.3g} px along the picture's "
+        f"the line's position has an error that repeats every {most.period_px:.3g} px along the picture's "
         f"{('rows', 'columns')[most.axis]}, by {size_px:.2f} px to either side: the pictures were enlarged "
-        "from fewer pixels, or a codec works in blocks of that size. What repeats is taken out, yet "
-        "fine detail is lost: small defects may be missed, and those along the picture's rows or columns be "
-        "false. What to do: export the pictures in the size in which the camera took them, with less "
+        "from fewer pixels, or a codec works in blocks of that size. The repeating error is removed, but "
+        "fine detail is lost: small defects may be missed, and those along the picture's rows or columns may "
+        "be false. What to do: export the pictures in the size in which the camera took them, with less "
         "compression"
     )
 
 
 def _lattice(samples: RingSamples, rings: slice, off: Float, axis: int) -> Lattice | None:
-    """Return what repeats along an axis in how far some rings are ``off`` their smooth shape (n, A), px."""
+    """Return the repeating error along an axis of the distances ``off`` (n, A), px, from the smooth shape."""
     across, place = _across(samples, axis), _place(samples, axis, rings)
     signed = off * np.sign(across)
     along = (np.abs(across) > _ALONG) & np.isfinite(signed)
@@ -157,7 +158,7 @@ def _lattice(samples: RingSamples, rings: slice, off: Float, axis: int) -> Latti
 
 
 def _borne_out(waves: Float, value: Float, part: Float) -> bool:
-    """Return whether each part of the ring repeats with ``waves`` (n, 2 K) as all other parts do.
+    """Return whether each part of the ring repeats with ``waves`` (n, 2 K) in the same way as all others.
 
     A groove along the pipe, or the wall's roughness where the probe stands, can be fitted with some period,
     but the parts of the ring do not agree on it.
@@ -215,14 +216,14 @@ def _place(samples: RingSamples, axis: int, rings: slice) -> Float:
 
 
 def _across(samples: RingSamples, axis: int) -> Float:
-    """Return the part (A,) of a ring's outward direction that is along an axis of the picture."""
+    """Return the component (A,) of a ring's outward direction along an axis of the picture."""
     return np.asarray((np.cos, np.sin)[axis](samples.azimuth_rad))
 
 
 def _slant(across: Float) -> Float:
-    """Return the number (A,) of the line's direction, beyond 45° the last, of either side of the picture.
+    """Return the index (A,) of the line's direction, beyond 45° the last, and of its side of the picture.
 
-    Sides are far apart: a period that is off by little is out of step between them.
+    Sides are far apart: a period with a small error is out of phase between them.
     """
     slant = np.degrees(np.arccos(np.minimum(np.abs(across), 1.0)))
     number = np.searchsorted(_SLANTS_DEG, slant, side="right") - 1
@@ -230,7 +231,7 @@ def _slant(across: Float) -> Float:
 
 
 def _off_smooth(samples: RingSamples, rings: slice) -> Float:
-    """Return how far some rings (n, A) are off their own smooth shape, px, cut off at `_MOST` spreads."""
+    """Return the distance (n, A), px, of some rings from their smooth shape, cut off at `_MOST` spreads."""
     n, azimuth = np.arange(1, _HARMONICS + 1), samples.azimuth_rad[:, None]
     shape = np.concatenate([np.ones_like(azimuth), np.cos(n * azimuth), np.sin(n * azimuth)], 1)
     inverse = np.linalg.pinv(shape)

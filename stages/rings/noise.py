@@ -17,7 +17,7 @@ QUANTISATION_VARIANCE = 1 / 12
 _BINS, _BIN_LEVELS = 32, 8.0
 _ABSOLUTE_TO_SIGMA = np.sqrt(np.pi / 2)
 _LEAST_RESIDUALS = 50
-# Noise and coding blur what clips by a few levels: 5 % below white is not clipped.
+# Noise and coding blur clipped pixels by a few levels: 5 % below white is not clipped.
 SURELY_UNCLIPPED = 0.95
 
 
@@ -29,9 +29,9 @@ def dark_response(image: Image, clip_level: float) -> Response:
 
 
 def noise_response(image: Image, sectors: Sectors, fit: ProfileFit, guess: Response) -> Response:
-    """Return ``guess`` with the variance at black and per level that the fit's residuals show.
+    """Return ``guess`` with the variance at black and per level as estimated from the fit's residuals.
 
-    Mean absolute residuals are used: a few misfitted sectors do not count for more than their number.
+    Mean absolute residuals are used, so that a few misfitted sectors have no more weight than their number.
     """
     total, count, sectors = np.zeros(_BINS), np.zeros(_BINS), sectors.taken or sectors
     _residuals_by_level(
@@ -72,8 +72,8 @@ def _residuals_by_level(  # type: ignore[no-untyped-def]
 def clip_level_of(grey: Byte, bgr: Byte, line: Int32) -> float:
     """Return the grey level at which the line's strongest channel clips.
 
-    Grey is a fixed linear mixture of the channels, and a laser line keeps its colour: both are read off the
-    pixels of the ``line`` (flat indices).
+    Grey is a fixed linear mixture of the channels, and a laser line keeps its colour: both are estimated from
+    the pixels of the ``line`` (flat indices).
     """
     colour, level = bgr.reshape(-1, 3)[line].astype(float), grey.ravel()[line].astype(float)
     white = float(np.iinfo(bgr.dtype).max)

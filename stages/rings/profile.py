@@ -33,12 +33,12 @@ _STEPS, _FULL_STEPS = 12, 4
 _LOG_WIDTH_PRIOR = 0.3
 _SLOPE_SECTORS = 6
 _CLIP_SIGMAS = 2.0
-# Steps converge quadratically: one this small leaves less than a hundredth of it to go.
+# Steps converge quadratically: after a step this small, the rest is less than a hundredth of it.
 _SETTLED_WIDTHS, _SETTLED_LOG_WIDTH = 0.03, 0.06
 
 
 class Response(NamedTuple):
-    """How grey levels follow light, and their noise.
+    """Black level, noise and clipping of the grey levels.
 
     ``black``: level without light; ``variance`` there and ``variance_per_level`` above it (shot noise);
     ``clip_level``: level at which the line's strongest channel clips.
@@ -68,7 +68,7 @@ class ProfileFit(NamedTuple):
 
     ``radius_px``, ``width_px`` (1 σ), ``amplitude`` and ``background`` in grey levels, ``sigma_px`` and
     ``amplitude_sigma`` from the Fisher information, ``chi2`` per degree of freedom, ``unclipped_below`` and
-    ``unclipped_above``: pixels of the line's inner and outer flank (0.5 to 3 widths) that did not clip.
+    ``unclipped_above``: number of pixels of the inner and outer flank (0.5 to 3 widths) that did not clip.
     """
 
     radius_px: Float
@@ -103,7 +103,7 @@ def fit_line(
 def _gather(image, start, pixel, radius, offset, a, seed, slope, half, y, t):  # type: ignore[no-untyped-def]
     """Copy grey levels and distances to the seed of sector ``a``'s pixels near it; return their number.
 
-    Where sectors are narrower than a pixel, whole neighbours are joined in until there is enough to fit.
+    Where sectors are narrower than a pixel, whole neighbours are added until there is enough to fit.
     """
     sectors = start.size - 1
     step, aside = 2 * np.pi / sectors, neighbours_joined(sectors, seed)
@@ -121,7 +121,7 @@ def _gather(image, start, pixel, radius, offset, a, seed, slope, half, y, t):  #
 
 @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
 def _guess(y, t, count, width, p):  # type: ignore[no-untyped-def]
-    """Start ``p`` = (r − seed, ln w, A, b0, b1) from flanks and peak; False when a flank is not seen."""
+    """Initialise ``p`` = (r − seed, ln w, A, b0, b1) from flanks and peak; False if a flank is not seen."""
     edge = _FLANK * WINDOW_WIDTHS * width
     top, inner, inners, outer, outers = 0.0, 0.0, 0, 0.0, 0
     for k in range(count):
@@ -190,7 +190,7 @@ def _normal_equations(y, t, count, p, response, trusted, n, v):  # type: ignore[
 
 @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
 def _flank_counts(t, count, p, trusted):  # type: ignore[no-untyped-def]
-    """Clipped pixels, and unclipped ones on the inner and the outer flank."""
+    """Return the numbers of clipped pixels, and of unclipped ones on the inner and the outer flank."""
     clipped, inner, outer = 0, 0, 0
     iw = np.exp(-p[1])
     may_clip = p[2] + p[3] + abs(p[4]) / iw > trusted
@@ -207,10 +207,10 @@ def _flank_counts(t, count, p, trusted):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
 def _settle(y, t, count, width, response, trusted, n, v, p):  # type: ignore[no-untyped-def]
-    """Take Gauss–Newton steps from ``p`` until the next would not matter; return χ², or NaN.
+    """Take Gauss–Newton steps from ``p`` until they are negligible; return χ², or NaN.
 
     A weak prior on ln w holds the width where clipping leaves little of the profile. Late steps are halved:
-    the weights follow the model, and full steps may then go to and fro.
+    the weights depend on the model, so that full steps may oscillate.
     """
     for step in range(_STEPS):
         chi2 = _normal_equations(y, t, count, p, response, trusted, n, v)

@@ -1,4 +1,4 @@
-"""A seam of the picture: two parts of it that sensor or recorder displaced against each other."""
+"""Finds a seam of the picture: two parts of it that sensor or recorder displaced against each other."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class Seam:
     at_px : float
         Its number.
     step_px : float
-        By how much the ring steps there, the larger of both ends.
+        Size of the ring's step there, px, the larger of both ends.
     """
 
     along: str
@@ -45,7 +45,7 @@ class Seam:
 
 
 def seam_of(samples: RingSamples) -> Seam | None:
-    """Return the seam at which most rings step, None where no two steps lie on one row or column."""
+    """Return the seam at which most rings step; None if no two steps lie on one row or column."""
     ring = np.flatnonzero(samples.valid.any(1))
     if len(ring) < _FEWEST:
         return None
@@ -74,14 +74,14 @@ def warn_of_seam(seam: Seam | None, context: Context) -> None:
         context.warn(
             f"at both ends of the picture's {seam.along} {seam.at_px:.0f} the line steps by "
             f"{seam.step_px:.1f} px in most rings: the picture has a seam there (a sensor or recorder that "
-            "joins two parts), or it is the edge of standing water or sediment. If a seam, one part of the "
-            "wall lies as far aside, and radii and findings are wrong by more than their σ. What to do: look "
-            "at a lit picture there; have the parts aligned, or record with a camera of one sensor"
+            "joins two parts), or the edge of standing water or sediment is there. A seam displaces one part "
+            "of the wall by as much, so that radii and findings are wrong by more than their σ. What to do: "
+            "look at a lit picture there; have the parts aligned, or record with a camera of one sensor"
         )
 
 
 def _steps(radius: Float, azimuth_rad: Float) -> Float:
-    """Return by how much rings (F, A) step at each azimuth, continued straight from either side.
+    """Return the step (F, A), px, of rings at each azimuth, with the line extrapolated from either side.
 
     Next to the azimuth itself the line is left out: on a seam it is blurred, or no line at all.
     """

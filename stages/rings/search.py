@@ -1,4 +1,4 @@
-"""Search for the line, to a pixel: in a band about the ring seen last, or in the whole image."""
+"""Searches for the line, to a pixel: in a band around the ring seen last, or in the whole image."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ _CANDIDATES = 4
 
 
 class Candidates(NamedTuple):
-    """The strongest places of every sector at which the line may be, strongest first; (A, 4) each.
+    """The strongest candidates of every sector for the line, strongest first; (A, 4) each.
 
-    ``radius_px`` is NaN where there are fewer; ``score`` is the matched filter's response over its noise.
+    ``radius_px`` is NaN if there are fewer; ``score`` is the matched filter's response over its noise.
     """
 
     radius_px: Float
@@ -41,7 +41,7 @@ class Candidates(NamedTuple):
 
 
 def matched_template(width_px: float) -> Float:
-    """Gaussian of 1 σ ``width_px`` made blind to constant and linear background, of unit norm."""
+    """Return a Gaussian of 1 σ ``width_px``, orthogonal to constant and linear background, of unit norm."""
     reach = max(2, int(np.ceil(_REACH_WIDTHS * width_px)))
     t = np.arange(-reach, reach + 1.0)
     template = np.exp(-0.5 * (t / width_px) ** 2)
@@ -50,7 +50,7 @@ def matched_template(width_px: float) -> Float:
 
 
 def detection_limit(positions: float) -> float:
-    """Score that the largest of ``positions`` independent Gaussian noise values exceeds once in a hundred."""
+    """Return the score that the largest of ``positions`` Gaussian noise values exceeds once in a hundred."""
     return float(np.sqrt(2 * np.log(100 * max(positions, 2.0))))
 
 
@@ -69,7 +69,7 @@ def search_band(
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
 def _radial_profile(image, start, pixel, radius, a, aside, first, bins, total, count):  # type: ignore[no-untyped-def]
-    """Mean grey level in bins of one pixel from radius ``first``; return how many bins are seen.
+    """Compute the mean grey level in bins of one pixel from radius ``first``; return the number seen.
 
     The pixels are those of sector ``a`` and of ``aside`` sectors on either side, because a sector narrower
     than a pixel has none at some radii. Bins without a pixel take the value of the bin before.
@@ -150,13 +150,13 @@ def find_ring(image: Image, sectors: Sectors, noise: float) -> tuple[Float, floa
     """Find the ring anywhere in the image: radius (A,), NaN where no line stands out, and trial line width.
 
     The closed path of the largest summed matched-filter score is found by dynamic programming in the polar
-    image, for several line widths. Rays are a few sectors apart, which is enough to find the ring by.
+    image, for several line widths. Rays are a few sectors apart, which is enough to find the ring.
     """
     sector = np.arange(len(sectors.azimuth_rad))
     ray = sector[:: max(1, len(sector) // _RAYS)]
     nearest = np.searchsorted((ray[1:] + ray[:-1]) / 2, sector)
     polar = _polar_image(image, sectors, ray)
-    # Near the centre rays share their pixels: each speaks for the part that is its own.
+    # Near the centre rays share their pixels: each counts for the part that is its own.
     arc_px = 2 * np.pi / len(ray) * (_SMALLEST_RADIUS_PX + np.arange(polar.shape[1]))
     own = np.minimum(arc_px, 1.0).astype(np.float32)
     best_total, best = -np.inf, (np.full(len(sector), np.nan), _TRIAL_WIDTHS_PX[0])
@@ -182,16 +182,16 @@ def _credit(score: Float) -> Float32:
 
     Light with a score at the limit is certainly not noise. Beyond the limit, evidence grows slowly with
     brightness: a line ten times as bright as its halo keeps the path over many rays, but a glint ten times as
-    bright as the line does not draw the path aside over a few.
+    bright as the line does not displace the path over a few.
     """
     above = np.maximum(score, _CREDIT)
     return np.asarray(np.clip(score, 0, _CREDIT) + np.log(above / _CREDIT), np.float32)
 
 
 def _texture_noise(response: Float32, width_px: float) -> Float32:
-    """Robust spread (R,) of a filter's response (A, R) over all azimuths in a belt about each radius.
+    """Robust spread (R,) of a filter's response (A, R) over all azimuths in a belt around each radius.
 
-    The belt is wide against the line, so that a well centred ring does not pass for noise.
+    The belt is much wider than the line, so that a well centred ring does not count as noise.
     """
     belt = int(np.ceil(_BELT_WIDTHS * width_px))
     size = np.nan_to_num(np.abs(response)).T
@@ -216,7 +216,7 @@ def _polar_image(image: Image, sectors: Sectors, ray: Int) -> Float32:
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
 def _moved(value, jump, moved, origin):  # type: ignore[no-untyped-def]
-    """Best ``value`` (R,) less its way to each radius, 1 a px, at most ``jump``; and where it came from."""
+    """Best ``value`` (R,) minus its distance to each radius, px, at most ``jump``; and where it came from."""
     top = np.argmax(value)
     for r in range(value.size):
         moved[r], origin[r] = value[r], r
@@ -232,9 +232,9 @@ def _moved(value, jump, moved, origin):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
 def _closed_path(credit, jump):  # type: ignore[no-untyped-def]
-    """Path (A,) of largest credit (A, R) less its moves around the circle.
+    """Path (A,) of largest credit (A, R) minus its radial moves around the circle.
 
-    Walked twice around; the middle turn is returned, where neither end is felt.
+    The circle is walked twice; the middle turn is returned, which neither end influences.
     """
     azimuths, radii = credit.shape
     steps = 2 * azimuths

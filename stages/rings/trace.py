@@ -1,4 +1,4 @@
-"""One ring in one image: search, fit, judge."""
+"""Traces one ring in one image: search, fit, validation of the samples."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ from stages.rings.validity import middle_and_spread
 
 _EDGE_WIDTHS = 2.5
 _ODD = 6.0
-# Below this, one in ten of such samples would be of another curve.
+# Below this probability, one in ten of such samples would belong to another curve.
 _SURE = 0.9
 _LEAST_SPREAD = 0.02
 # No wall reflects so evenly that a line a fifth fainter could not be the true one.
 _REFLECTANCE_SPREAD = 0.2
 _MOST = 0.5
-# Brightness of a line over that of the brightest from which one image alone does not tell them apart: the
-# wall reflects as unevenly as this around the pipe.
+# Brightness of a line over that of the brightest one, from which one image alone cannot decide between them:
+# the wall reflects as unevenly as this around the pipe.
 _RIVAL = 0.5
-# A ring that lost more than this share of its way round from one image to the next may have left the band, or
-# the image's noise may no longer be that of the image before. Searching anew costs time and cannot do harm.
+# A ring that lost more than this share of its circle from one image to the next may have left the band, or
+# the image's noise may no longer be that of the image before. A new search costs time and does no harm.
 _LOST = 0.1
 # Sectors of the running median, as for outliers (`stages.rings.validity`): five or more that leave it are
 # wall.
@@ -45,11 +45,11 @@ class RingTrace:
     fit
         Profiles of all sectors.
     validity : (A,) uint8
-        `RingValidity`, as far as one image tells.
+        `RingValidity`, as far as one image shows it.
     width_px : float
         Median line width, 1 σ.
     response
-        Noise and clipping the fit was made with.
+        Noise and clipping used in the fit.
     """
 
     fit: ProfileFit
@@ -72,10 +72,10 @@ def trace_ring(
 ) -> RingTrace | None:
     """Find and fit the laser ring in ``image`` (H, W), grey levels; None when no sample of one is valid.
 
-    With the ring of the image ``before``, a band about it is searched first; without it, or when clearly less
-    of the ring is in there than was before, the whole image is searched too, and the fuller ring counts.
-    ``clip_level``: grey level at which the line clips. What lies far off the ring's own course is part of it
-    only where it is brighter than other light of the picture.
+    With the ring of the image ``before``, a band around it is searched first. Without it, or if clearly less
+    of the ring lies in the band than before, the whole image is searched too, and the more complete ring
+    counts. ``clip_level``: grey level at which the line clips. Samples far off the ring's course are kept
+    only if they are brighter than other light of the picture.
     """
     found = None if before is None else follow_ring(image, sectors, before)
     if found is None or before is None or found.coverage < before.coverage - _LOST:
@@ -85,9 +85,9 @@ def trace_ring(
 
 
 def follow_ring(image: Image, sectors: Sectors, before: RingTrace) -> RingTrace | None:
-    """Fit the ring within a band about the ring seen ``before``; None when most of it is not there.
+    """Fit the ring within a band around the ring seen ``before``; None when most of it is not there.
 
-    The band lies about the running median of that ring. Otherwise a few sectors that were on a reflection
+    The band lies around the running median of that ring. Otherwise a few sectors that were on a reflection
     beside the line would never find the line in their band again. Sectors without a line in the band are
     searched along their whole ray: a step of the bore moves part of the ring from one image to the next.
     """
@@ -131,7 +131,7 @@ def discover_ring(image: Image, sectors: Sectors, clip_level: float) -> RingTrac
 def _fitted_about(
     radius_px: Float, band: float, image: Image, sectors: Sectors, width_px: float, response: Response
 ) -> tuple[Choice, ProfileFit]:
-    """Search a band, px, about a ring (A,) of this image with a line of this width, and fit the likeliest.
+    """Search a band, px, around a ring (A,) of this image, and fit the most likely line of this width.
 
     The ring that defines the band was found in the same image and is no independent evidence: where another
     line is nearly as bright, either may be the ring.
@@ -157,7 +157,7 @@ def _limit(sectors: Sectors, positions: float) -> float:
 def _search_rays(
     image: Image, sectors: Sectors, peaks: Candidates, missing: Bool, width_px: float, noise: float
 ) -> Candidates:
-    """Return ``peaks`` with the ``missing`` looked for along their whole ray."""
+    """Return ``peaks`` in which the ``missing`` sectors were searched along their whole ray."""
     far = float(sectors.radius_px.max())
     low, high = np.where(missing, 4 * width_px, np.nan), np.where(missing, far, np.nan)
     wide = search_band(image, sectors, low, high, width_px, noise).above(_limit(sectors, far))
@@ -165,7 +165,7 @@ def _search_rays(
 
 
 def _without_other_light(trace: RingTrace, image: Image, sectors: Sectors) -> RingTrace:
-    """Return a ring with the samples rejected that may as well be any other light of the image."""
+    """Return a ring without the samples that may be other light of the image."""
     radius = np.where(trace.validity == RingValidity.VALID, trace.fit.radius_px, np.nan)
     lost = other_light(radius, trace.width_px, trace.response.dark_noise, image, sectors)
     return replace(trace, validity=np.where(lost, RingValidity.GHOST, trace.validity))
@@ -174,16 +174,16 @@ def _without_other_light(trace: RingTrace, image: Image, sectors: Sectors) -> Ri
 def _judged(
     fit: ProfileFit, choice: Choice, sectors: Sectors, width_px: float, response: Response
 ) -> RingTrace:
-    """Return the fitted ring with what is wrong with its samples; σ holds the chance of a wrong candidate."""
+    """Return the fitted ring with the validity of its samples; σ includes the chance of a wrong candidate."""
     validity = _judge(fit, choice, sectors)
     fit = fit._replace(sigma_px=np.hypot(fit.sigma_px, choice.spread_px))
     return RingTrace(fit, validity, width_px, response)
 
 
 def _judge(fit: ProfileFit, choice: Choice, sectors: Sectors) -> Byte:
-    """Return `RingValidity` (A,) as far as a single image tells; of several reasons the last named here wins.
+    """Return `RingValidity` (A,) as far as one image shows it; of several reasons the last one below counts.
 
-    Limits come from the ring itself: a sample is odd when it leaves the spread of the ring's own samples.
+    Limits come from the ring itself: a sample is an outlier if it leaves the spread of the ring's samples.
     """
     v = RingValidity
     brightness, width, misfit = np.log(fit.amplitude), np.log(fit.width_px), np.log(fit.chi2)
@@ -201,6 +201,6 @@ def _judge(fit: ProfileFit, choice: Choice, sectors: Sectors) -> Byte:
 
 
 def _oddness(value: Float, ring: Float, least_spread: float = _LEAST_SPREAD) -> Float:
-    """Return how many robust σ of the ``ring``'s own values each ``value`` (A,) is above their median."""
+    """Return the excess of each ``value`` (A,) over the median of the ``ring``, in robust σ of the ring."""
     middle, spread = middle_and_spread(ring)
     return np.asarray((value - middle) / max(spread, least_spread))

@@ -1,4 +1,4 @@
-"""Samples that their neighbours show to be off the ring."""
+"""Rejects samples that contradict their neighbours."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _MAJORITY = 0.5
 
 
 def contradicted(rings: RingSamples) -> tuple[Byte, Float32]:
-    """Return validity and σ (F, A) of rings after every sample was compared with its neighbours."""
+    """Return validity and σ (F, A), px, of rings after every sample was compared with its neighbours."""
     validity = mark_outliers(rings.radius_px, rings.sigma_px, rings.validity)
     radius = np.where(validity == RingValidity.VALID, rings.radius_px, np.float32(np.nan))
     glint, sigma = lone_runs(radius, rings.sigma_px, rings.width_px, rings.amplitude)
@@ -27,11 +27,11 @@ def contradicted(rings: RingSamples) -> tuple[Byte, Float32]:
 
 
 def mark_outliers(radius_px: Float32, sigma_px: Float32, validity: Byte) -> Byte:
-    """Return ``validity`` (F, A) with samples marked that leave the run of their neighbours.
+    """Return ``validity`` (F, A) with those samples marked that leave the curve of their neighbours.
 
-    The running median over nine sectors follows a step and any dent or pit at least five sectors wide; what
-    is narrower is kept when the ring before or after shows it at the same place. Where most neighbours are
-    rejected, the rest is not trusted either.
+    The running median over nine sectors follows a step and any dent or pit at least five sectors wide;
+    narrower ones are kept if the ring before or after shows them at the same place. Where most neighbours are
+    rejected, the others are rejected too.
     """
     valid = validity == RingValidity.VALID
     filled = _bridged(radius_px, valid)

@@ -1,4 +1,4 @@
-"""Scatter of the line beyond its noise, by speckle, texture of the wall, other light or compression."""
+"""Estimates the line's scatter beyond its noise: speckle, texture, other light, compression."""
 
 from __future__ import annotations
 
@@ -11,20 +11,20 @@ from pipeline.adjustment.robust import robust_spread
 from pipeline.arrays import Bool, Float, Float32
 from pipeline.artefacts.measured import RingSamples
 
-# Sectors so many line widths apart share neither pixels nor speckle.
+# Sectors this many line widths apart share neither pixels nor speckle.
 _LAG_WIDTHS = 6.0
-# Groups of equal size, by the line's height, in which the wander is read. Fewer samples than so many in each
-# tell one wander for all.
+# Groups of equal size, by the line's height, in which the wander is estimated. With fewer samples than this
+# in each, one wander is estimated for all.
 _GROUPS, _LEAST_SAMPLES = 8, 500
 
 
 @dataclass(frozen=True)
 class Wander:
-    """1 σ of the line's place beyond its noise, as far as the line's height does and does not matter.
+    """1 σ of the line's position beyond its noise: a part without and a part with influence of its height.
 
-    What the laser makes itself, speckle and its own light on the wall's texture, displaces every line alike,
-    by ``even_px``. Other light, from lamps or left by compression, displaces a line by its slope over the
-    line's height: ``slope_px`` times the grey level, over the line's height.
+    Speckle and the laser's own light on the wall's texture displace every line equally, by ``even_px``. Other
+    light, from lamps or left by compression, displaces a line by the ratio of that light's slope to the
+    line's height: by ``slope_px`` (px times grey level) over the line's height.
     """
 
     even_px: float
@@ -36,11 +36,11 @@ class Wander:
 
 
 def wander_of(samples: RingSamples) -> Wander:
-    """Return by how much the line wanders beyond the σ that the samples state.
+    """Return the scatter of the line beyond the stated σ of the samples.
 
-    From second differences along the ring between sectors far enough apart to share neither pixels nor
-    speckle (blurred together over the line's width), near enough for the wall to be straight; medians keep
-    true edges out of it.
+    It is estimated from second differences along the ring between sectors that are far enough apart to share
+    neither pixels nor speckle (both are blurred over the line's width), and near enough for the wall to be
+    straight; medians exclude true edges.
     """
     valid, lag = samples.valid, _lag(samples)
     radius = np.where(valid, samples.radius_px, np.nan).astype(float)
@@ -62,7 +62,7 @@ def _lag(samples: RingSamples) -> int:
 
 
 def _in_bends(variance: Float, lag: int, known: Bool) -> Float:
-    """Return the mean of a variance (F, A) in the second differences that are known, as they weight it."""
+    """Return the mean of a variance (F, A) over the known second differences, with their weights."""
     return np.asarray((np.roll(variance, lag, 1) + 4 * variance + np.roll(variance, -lag, 1))[known] / 6)
 
 

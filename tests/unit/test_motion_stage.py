@@ -19,7 +19,7 @@ from stages.motion.estimate import require_along_pipe
 from stages.motion.tracking.patches import cut
 from stages.motion.tracking.strips import Hidden, Strip, StripGrid
 from stages.motion.tracking.tracker import TextureTracker, _Matched
-from stages.premises.stays import places_that_stay
+from stages.premises.stays import find_static_places
 from tests.drawn_run import RADIUS, DrawnRun, drawn_run, small_probe, without_encoder
 from tests.quiet import quiet_context
 from tests.ring_images import MemorySource
@@ -199,7 +199,7 @@ def test_text_burnt_in_is_not_followed() -> None:
     followed = errors(estimated(run), run)[0][-1]
     told: list[str] = []
     context = replace(quiet_context(), warn=told.append)
-    stays = places_that_stay(run.recording, run.probe, run.recording.frames.of(Illumination.LED), context)
+    stays = find_static_places(run.recording, run.probe, run.recording.frames.of(Illumination.LED), context)
     assert "burnt in" in told[0]
     z, _, sigma = errors(estimated(replace(run, recording=replace(run.recording, stays=stays))), run)
     assert abs(z[-1]) < 3 * sigma[-1, 0] + 0.02

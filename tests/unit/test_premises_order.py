@@ -11,7 +11,7 @@ from pipeline.recording.base import Encoder, FrameTable
 from stages.premises.light import Light
 from stages.premises.losses import Steps, rows_by_motion, sway_of_line
 from stages.premises.order import _in_usual_steps, _lights_exchanged, _off_their_place, out_of_order
-from stages.premises.pictures import Pictures, look_at_pictures
+from stages.premises.pictures import Pictures, examine_pictures
 from tests.drawn_run import drawn_run
 from tests.premises_run import COUNT, STEP_MM, checked, with_rings
 from tests.quiet import quiet_context
@@ -347,6 +347,6 @@ def test_pictures_without_texture_tell_no_order(smooth, run):
 
 def test_pictures_without_texture_tell_no_motion(smooth, good, run):
     lit = good.frames.illumination == "led"
-    moved, none = (look_at_pictures(r, run.probe, quiet_context()).step[lit] for r in (good, smooth))
+    moved, none = (examine_pictures(r, run.probe, quiet_context()).step[lit] for r in (good, smooth))
     assert np.isfinite(moved).mean() > 0.9, "the control: texture tells it"
     assert not np.isfinite(none).any()

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from pipeline.recording.base import Illumination, Recording
-from stages.premises.light import Light, alike, light_seen
-from stages.premises.pictures import Pictures, look_at_pictures
+from stages.premises.light import Light, light_seen, look_the_same
+from stages.premises.pictures import Pictures, examine_pictures
 from tests.drawn_run import RADIUS, DrawnRun
 from tests.premises_run import STEP_MM
 from tests.quiet import quiet_context
@@ -50,7 +50,7 @@ def cut_off(run: DrawnRun, good: Recording, columns: int) -> tuple[Recording, Dr
 def test_a_wall_that_leaves_the_picture_is_seen_to_move_as_far(run: DrawnRun, good: Recording) -> None:
     """The edge of the picture stays where it is: taken for wall, it left 26 of 29 steps untold."""
     recording, cut = cut_off(run, good, 300)
-    seen = look_at_pictures(recording, cut.probe, quiet_context())
+    seen = examine_pictures(recording, cut.probe, quiet_context())
     lit = np.isin(good.frames.frame, good.frames.of(Illumination.LED))
     steps = seen.step[lit & (seen.partner >= 0)]
     # Pictures step by 4.3 rows of the unrolled wall, and phase correlation errs by up to one of them.
@@ -68,7 +68,7 @@ def test_a_light_that_drifts_is_one_light_and_one_that_steps_is_two(step: float)
         brightness, np.ones(160), np.ones((160, 4), np.float32), nothing[:4], nothing, number - 1, nothing,
         nothing,
     )  # fmt: skip
-    assert alike(pictures, number < 80, number >= 80) is (step == 0)
+    assert look_the_same(pictures, number < 80, number >= 80) is (step == 0)
 
 
 @pytest.mark.parametrize("flash", [False, True])
@@ -83,7 +83,7 @@ def test_two_lights_are_not_alike_because_of_one_flash(flash: bool, apart: float
     seen = Pictures(
         brightness, np.full(COUNT, 0.9), line, np.zeros(1), nothing, np.arange(COUNT) - 1, nothing, nothing
     )
-    assert alike(seen, one, ~one) is (apart == 0)
+    assert look_the_same(seen, one, ~one) is (apart == 0)
 
 
 def test_a_light_that_drifts_goes_on_into_what_the_table_calls_another() -> None:
@@ -97,4 +97,4 @@ def test_a_light_that_drifts_goes_on_into_what_the_table_calls_another() -> None
         Pictures(d, np.full(COUNT, 0.9), line, np.zeros(1), nothing, np.arange(COUNT) - 1, nothing, nothing)
         for d in drifts
     ]
-    assert all(alike(s, first, ~first) for s in seen)
+    assert all(look_the_same(s, first, ~first) for s in seen)

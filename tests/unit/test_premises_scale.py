@@ -140,7 +140,7 @@ def test_scratches_on_the_window_are_not_taken_for_the_wall(good, run, monkeypat
     assert "scratches" in told[0]
     assert found.encoder_factor == 25.4
     assert found.applied_to(scratched).stays is not None
-    monkeypatch.setattr("stages.premises.places_that_stay", lambda *parts: None)
+    monkeypatch.setattr("stages.premises.find_static_places", lambda *parts: None)
     assert checked(scratched, run.probe)[0].encoder_factor == 1, "the control: scratches are followed"
 
 

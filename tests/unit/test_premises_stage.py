@@ -138,7 +138,7 @@ def test_a_table_of_one_light_is_refused_where_two_alternate(good, run):
 
 def test_a_table_of_two_lights_is_refused_where_all_look_alike(good, run):
     order = [2 * (k // 2) for k in range(COUNT)]
-    with pytest.raises(UnusableError, match="all pictures look alike"):
+    with pytest.raises(UnusableError, match="all pictures look the same"):
         checked(rearranged(good, order, ["laser", "led"] * (COUNT // 2)), run.probe)
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from pipeline.arrays import Float32, Image
-from stages.premises.stays import what_stays
+from stages.premises.stays import static_places
 
 WALL = np.hypot(*(np.mgrid[:150, :200] - np.array([74.5, 99.5])[:, None, None])) < 70
 SIGN = (slice(30, 46), slice(60, 140))
@@ -34,13 +34,13 @@ def passing(
 
 
 def test_a_sign_that_stays_while_the_wall_moves_is_found_where_it_is() -> None:
-    hidden = what_stays(passing(sign=60.0), WALL)
+    hidden = static_places(passing(sign=60.0), WALL)
     assert hidden[SIGN].mean() > 0.95
     assert hidden.sum() < 1.8 * hidden[SIGN].sum(), "little is hidden beside it"
 
 
 def test_a_sign_is_found_on_a_plain_wall_too() -> None:
-    assert what_stays(passing(sign=60.0, contrast=0.0), WALL)[SIGN].mean() > 0.95
+    assert static_places(passing(sign=60.0, contrast=0.0), WALL)[SIGN].mean() > 0.95
 
 
 @pytest.mark.parametrize(
@@ -55,10 +55,10 @@ def test_a_sign_is_found_on_a_plain_wall_too() -> None:
     ids=["moves", "is plain", "stands still", "stands still in noise", "few pictures"],
 )
 def test_nothing_is_hidden_where_the_wall(pictures: dict[str, float]) -> None:
-    assert not what_stays(passing(**pictures), WALL).any()
+    assert not static_places(passing(**pictures), WALL).any()
 
 
 def test_where_more_stays_than_moves_nothing_is_hidden() -> None:
     still = passing(step_px=0, noise=0.0)[0]
     pictures = [np.where(np.arange(200) < 140, still, p).astype(np.uint8) for p in passing(step_px=9)]
-    assert not what_stays(pictures, WALL).any()
+    assert not static_places(pictures, WALL).any()
