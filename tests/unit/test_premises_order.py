@@ -231,7 +231,7 @@ def test_pictures_from_outside_the_pipe_are_left_out(outside, good, run):
     assert set(found.frame.tolist()) & set(away) <= {39, 41}
     np.testing.assert_allclose(found.time_s, good.frames.time_s[found.frame])
     assert len(told) == 1
-    assert "before the first laser line or behind the last" in told[0]
+    assert "before the first laser line or after the last" in told[0]
 
 
 def told_by_motion(order, way, noise_mm):
