@@ -1,8 +1,8 @@
 """Motion: camera poses, pipe axis and encoder scale from texture, rings and encoder together.
 
-The rooms: ``tracking`` follows the wall's texture, ``bundle_adjustment`` estimates one window of frames,
+The packages: ``tracking`` follows the wall's texture, ``bundle_adjustment`` estimates one window of frames,
 ``windows`` slides it over a long run and joins the windows, ``loops`` closes loops where a wall is seen
-again. ``estimate`` is the stage. What others use of them is named here.
+again. ``estimate`` is the stage. This module exports the names that other packages use.
 """
 
 from stages.motion.bundle_adjustment import residuals

@@ -1,4 +1,4 @@
-"""How wide the pipe is along its way, as the rings show it: steps of the bore, and reducers between bores."""
+"""Estimates the pipe's width along its axis from the rings: steps of the bore, and reducers between bores."""
 
 from __future__ import annotations
 
@@ -11,27 +11,27 @@ from pipeline.arrays import Float, Int
 from pipeline.machine.stage import Context
 
 _STEP_MM = 0.5
-"""Change of radius that counts as a step of the bore: five times the relief about the smooth pipe
+"""Change of radius, mm, that counts as a step of the bore: five times the relief around the smooth pipe
 (`surface_sigma_mm`). A choice."""
 _LENGTH_RADII, _FEWEST_RINGS_OF_LENGTH = 0.5, 5
 """A length of a bore is at least half its radius long: welds and rings of deposit are shorter. A choice."""
 _MOST_RINGS_IN_STEP = 2
-"""Rings in a row that a step may leave between the two bores; with more it is a reducer. Chamfers of gauges
-hold one. A choice."""
+"""Rings in a row that may lie between the two bores of a step; with more it is a reducer. The chamfer of a
+gauge holds one ring. A choice."""
 _PLACE_MM = 0.5
-"""1 σ of the place of a reducer against landmarks on it: half the way from ring to ring. Without it, four of
-five drawn reducers came out .03 to .4 mm farther off along the pipe, the fifth .1 mm less far."""
+"""1 σ of the position of a reducer relative to landmarks on it: half the distance from ring to ring. Without
+it, four of five drawn reducers came out .03 to .4 mm too far along the pipe, the fifth .1 mm too near."""
 
 
 @dataclass(frozen=True)
 class Bore:
-    """Where the bore steps (k,), and how much wider (k + 1,) than the rings' median the lengths between are.
+    """Steps of the bore (k,), and the excess (k + 1,) of the radius between them over the rings' median.
 
-    A pipe of one bore has no steps. Held to one radius, two bores 2 mm apart moved the probe by 20 σ. In a
-    reducer the width is that of its rings, linear between them: ``rings_mm`` (r,) and ``rings_wider_mm``
-    (r,), which are then given for the whole pipe and hold the steps as well. From ``aside_from_mm`` on the
-    pipe lies farther across by ``aside_mm``, along x and y of its sections. By another instrument the width
-    is another: ``by_instrument`` (2, Q) mm per σ, times width and width squared.
+    A pipe of one bore has no steps. When held to one radius, two bores 2 mm apart moved the probe by 20 σ. In
+    a reducer the width is that of its rings, linear between them: ``rings_mm`` (r,) and ``rings_wider_mm``
+    (r,), which are then given for the whole pipe and hold the steps as well. From ``aside_from_mm`` on, the
+    pipe is displaced across by ``aside_mm``, along x and y of its sections. The width depends on the
+    instrument: ``by_instrument`` (2, Q) mm per σ, times width and width squared.
     """
 
     at_mm: Float
@@ -69,12 +69,12 @@ class Bore:
         return len(self.rings_mm) > 1
 
     def wider_at(self, distance_mm: Float) -> Float:
-        """Return how much wider (M,) the bore is at distances (M,), mm."""
+        """Return the excess of the radius (M,), mm, over the rings' median at distances (M,), mm."""
         stepped = self.wider_mm[np.searchsorted(self.at_mm, distance_mm)]
         return np.asarray(stepped + np.interp(distance_mm, self.rings_mm, self.rings_wider_mm))
 
     def slope_at(self, distance_mm: Float) -> Float:
-        """Return how much wider (M,) the bore becomes per mm at distances (M,)."""
+        """Return the gradient of the radius (M,), mm/mm, at distances (M,), mm."""
         if not self.reduces:
             return np.zeros(np.shape(distance_mm))
         slope = np.diff(self.rings_wider_mm) / np.maximum(np.diff(self.rings_mm), 1e-9)
@@ -82,17 +82,18 @@ class Bore:
         return np.asarray(np.concatenate([[0.0], slope, [0.0]])[inside])
 
     def sigma_at(self, distance_mm: Float) -> Float:
-        """Return the 1 σ (M,) of the width for texture at distances (M,), mm: a slope may lie elsewhere."""
+        """Return the 1 σ (M,), mm, of the width for texture at distances (M,): a slope may be displaced."""
         return _PLACE_MM * np.abs(self.slope_at(distance_mm))
 
     def width_by_instrument(self, wider_mm: Float) -> Float:
-        """Return what widths (M,) change by (M, Q) per σ of the instrument, mm."""
+        """Return the change of widths (M,) per σ of the instrument (M, Q), mm."""
         return np.stack([wider_mm, wider_mm**2], -1) @ self.by_instrument
 
     def measured_by(self, xyz_c: Float, by_instrument: Float, radius_mm: float) -> Bore:
-        """Return the bore with what is known of how rings (M, 3) in C change with the instrument (M, 3, Q).
+        """Return the bore with the dependence of its widths on the instrument.
 
-        Held to widths of the stated instrument, a reducer of 10 mm shrank its σ to a half.
+        It follows from rings ``xyz_c`` (M, 3) in C, mm, and their change ``by_instrument`` (M, 3, Q), mm per
+        σ. With widths held to the stated instrument, a reducer of 10 mm halved the instrument's σ.
         """
         radius = np.hypot(xyz_c[:, 0], xyz_c[:, 1])
         outward = xyz_c * [1, 1, 0] / radius[:, None]
@@ -100,14 +101,14 @@ class Bore:
         powers = np.vander(radius - radius_mm, 3, increasing=True)
         return replace(self, by_instrument=np.linalg.lstsq(powers, change, rcond=None)[0][1:])
 
-    def behind(self, start_mm: float) -> Bore:
+    def counted_from(self, start_mm: float) -> Bore:
         """Return the bore with distance counted from ``start_mm``."""
         aside_from = self.aside_from_mm - start_mm
         at_mm, rings_mm = self.at_mm - start_mm, self.rings_mm - start_mm
         return replace(self, at_mm=at_mm, rings_mm=rings_mm, aside_from_mm=aside_from)
 
     def with_joint(self, at_mm: float, aside_mm: tuple[float, float], wider_mm: float) -> Bore:
-        """Return the bore with a joint behind which the pipe lies aside and is wider."""
+        """Return the bore with a joint, after which the pipe is displaced by ``aside_mm`` and wider."""
         place = int(np.searchsorted(self.at_mm, at_mm))
         wider = np.insert(self.wider_mm, place, self.wider_mm[place])
         wider[place + 1 :] += wider_mm
@@ -115,7 +116,7 @@ class Bore:
         return replace(self, at_mm=steps, wider_mm=wider, aside_from_mm=at_mm, aside_mm=aside_mm)
 
     def off_at(self, distance_mm: Float, azimuth_rad: Float) -> Float:
-        """Return how much farther from the axis the wall is (M,) at distances and azimuths (M,), mm."""
+        """Return the excess of the wall's distance from the axis (M,), mm, at distances and azimuths (M,)."""
         (x, y), behind = self.aside_mm, distance_mm > self.aside_from_mm
         return self.wider_at(distance_mm) + behind * (x * np.cos(azimuth_rad) + y * np.sin(azimuth_rad))
 
@@ -124,27 +125,27 @@ ONE_BORE = Bore(np.zeros(0), np.zeros(1))
 
 
 def warn_of_steps(bore: Bore, context: Context) -> None:
-    """Warn where the bore steps (not in a reducer), and which results are unreliable there."""
+    """Warn of steps of the bore (not of a reducer), and of the results that are unreliable there."""
     if not len(bore.at_mm):
         return
     change = 2 * np.diff(bore.wider_mm)
     steps = ", ".join(f"by {by:+.1f} mm at {at:.0f} mm" for at, by in zip(bore.at_mm, change, strict=True))
     context.warn(
         f"the pipe's diameter steps {steps} (a joint of two sizes, a socket, a gauge). The edge is smeared "
-        "over about a tenth of the diameter: radii there may be wrong by more than their σ, and what is "
-        "found all around it is the step itself. Texture near it is hidden or matched less well, so that "
-        "roll may be off, too. What to do: process the lengths of one bore as recordings of their own"
+        "over about a tenth of the diameter: radii there may be wrong by more than their σ, and a finding "
+        "all around it is the step itself. Texture near it is hidden or matched less well, so that "
+        "roll may be wrong, too. What to do: process the lengths of each bore as separate recordings"
     )
 
 
 def rings_of_length(radius_mm: Float, at_mm: Float) -> int:
-    """Return how many rings, with radii (F,) at distances (F,), the shortest length of a bore has."""
+    """Return the number of rings, with radii (F,) at distances (F,), mm, in the shortest length of a bore."""
     apart_mm = max(float(np.ptp(at_mm)) / len(at_mm), 1e-9)
     return max(round(_LENGTH_RADII * float(np.median(radius_mm)) / apart_mm), _FEWEST_RINGS_OF_LENGTH)
 
 
 def _steps(radius_mm: Float, n: int) -> Int:
-    """Return the first rings (k,) behind steps between lengths of at least ``n`` rings."""
+    """Return the first rings (k,) after steps between lengths of at least ``n`` rings."""
     median = np.median(np.lib.stride_tricks.sliding_window_view(radius_mm, n), axis=1)
     size = np.abs(median[n + 1 :] - median[: -n - 1])  # of a step at ring n + k
     highest = size == maximum_filter1d(size, 2 * n + 1)
@@ -154,14 +155,14 @@ def _steps(radius_mm: Float, n: int) -> Int:
 
 
 def _stepped_at(radius_mm: Float, near: int, n: int) -> int:
-    """Return the first ring behind a step: medians of ``n`` rings tell it to half as many only."""
+    """Return the first ring after a step: medians of ``n`` rings locate it only to n / 2 rings."""
     part = radius_mm[near - n : near + n + 1]
     before, behind = np.abs(part - np.median(part[:n])), np.abs(part - np.median(part[n + 1 :]))
     return near - n + int(np.argmin([before[:k].sum() + behind[k:].sum() for k in range(len(part))]))
 
 
 def _in_reducers(off_mm: Float, place: Int) -> np.ndarray:
-    """Return which rings (F,), off the length they lie in, belong to a reducer about a step."""
+    """Return which rings (F,), ``off_mm`` the length they lie in, belong to a reducer around a step."""
     apart, inside = np.abs(off_mm) > _STEP_MM / 2, np.zeros(len(off_mm), bool)
     for first in place:
         start, end = int(first), int(first)

@@ -1,4 +1,4 @@
-"""The encoder at the frames' times, whether it is used, and the pose it predicts for the next frame."""
+"""Reads the encoder at the frames' times, decides whether it is used, and predicts the next frame's pose."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ fast as nine in ten steps are at most. Not measured."""
 _LEAST_COVERED = 0.2
 """Share of the frames that an encoder must cover. Not measured."""
 _MOST_OUTSIDE = 0.05
-"""Share of the frames without a reading from which that is told (chosen): a clock that starts a little late
-is no news."""
+"""Share of the frames without a reading from which a warning is given (chosen): a clock that starts a little
+late needs none."""
 _NAMED = 4
 """Runs of frames without a reading that are named, the longest."""
 _COUNTS = 1.5
-"""Counts between two readings from which readings are missing, where a counter logs only what it counts: such
+"""Counts between two readings from which readings are missing, if a counter logs only its changes: such
 readings are one count apart, so the bound lies half-way between one and two."""
 _LEAST_STEPS = 8
 """Steps by which an encoder is judged at least. Not measured."""
@@ -38,8 +38,9 @@ _COARSE = 3.5
 """Differences within so many σ of a reading do not count either: one quantum of a coarse counter is √12 σ."""
 _USUAL_PERCENT = 90.0
 _LIKE_USUAL = 3.0
-"""An encoder caught up if its jump is what the probe went meanwhile, within this factor of its mean speed.
-Not measured."""
+"""An encoder has caught up if its jump is the distance that the probe went meanwhile at its mean speed,
+within
+this factor. Not measured."""
 
 
 @dataclass(frozen=True)
@@ -68,7 +69,7 @@ def encoder_at_frames(
 
     A quantum q adds q²/12 to the variance of the readings. Jumps are removed. An encoder that covers too few
     frames, or that usually advances from frame to frame by more than the wall in view (``farthest_mm``), is
-    not used. All of it is reported.
+    not used. All of this is reported.
     """
     encoder = recording.encoder
     if encoder is None or len(encoder.time_s) < 2:
@@ -80,7 +81,7 @@ def encoder_at_frames(
     known &= ~_in_gaps(time_s, read_s, read_mm, slack)
     at_frames, jumps = _without_jumps(time_s, np.interp(time_s, *_going_on(read_s, read_mm, slack)))
     context.report("frames outside the encoder's time", int((~known).sum()), "frames")
-    context.report("encoder jumps taken out", jumps, "")
+    context.report("encoder jumps removed", jumps, "")
     if known.mean() < _LEAST_COVERED or _usual(np.diff(at_frames)) > farthest_mm:
         context.report("encoder left out", "it does not fit the frames")
         context.warn(
@@ -95,9 +96,9 @@ def encoder_at_frames(
 
 
 def warn_of_unread(encoder: EncoderReadings, tracked: TrackedPoses, frames: Int, context: Context) -> None:
-    """Warn where the encoder says nothing of many frames (N,) of a run in which the wall's texture moves.
+    """Warn if the encoder has no readings for many frames (N,) in which the wall's texture moves.
 
-    A counter that logs only what it counts says nothing at rest, before its first count and after its last.
+    A counter that logs only its changes has no readings at rest, before its first count and after its last.
     """
     if len(tracked.frames) < 2:
         return
@@ -116,8 +117,8 @@ def warn_of_unread(encoder: EncoderReadings, tracked: TrackedPoses, frames: Int,
     context.warn(
         f"the encoder has no readings for {count} of {len(frames)} frames"
         f"{', most of them' * (len(unread) > _NAMED)} (frames {where}), in which the probe moved: distances "
-        "there rest on laser and texture, and their σ says so. What to do: see whether encoder.csv was cut "
-        "off, and whether its clock is that of frames.csv"
+        "there depend on laser and texture, and their σ includes that. What to do: check whether encoder.csv "
+        "was cut off, and whether its clock is that of frames.csv"
     )
 
 
@@ -136,16 +137,16 @@ def contradicted(encoder: EncoderReadings, tracked: TrackedPoses, context: Conte
     context.report("encoder left out", "the wall's texture contradicts it")
     context.warn(
         f"the encoder is not used: in {int(differs[judged].sum())} of {int(judged.sum())} steps the wall's "
-        "texture shows another motion, so that distance rests on the laser's baseline alone. What to do: "
+        "texture shows another motion, so that distance depends on the laser's baseline alone. What to do: "
         "check the encoder's scale and clock, and whether its wheel slipped"
     )
     return True
 
 
 def _without_held(time_s: Float, distance_mm: Float) -> tuple[Float, Float]:
-    """Return times and readings (M,) without those at which the encoder stood still and then caught up.
+    """Return times and readings (M,) without those at which the encoder hung and then caught up.
 
-    That is where readings do not change and then jump by about the probe's usual advance in that time.
+    There, readings do not change and then jump by about the probe's usual advance in that time.
     """
     step, usual = np.diff(distance_mm), _usual(np.diff(distance_mm))
     kept = np.ones(len(time_s), bool)
@@ -166,7 +167,7 @@ def _going_on(time_s: Float, distance_mm: Float, by_s: float) -> tuple[Float, Fl
 
 
 def _in_gaps(time_s: Float, read_s: Float, read_mm: Float, frame_s: float) -> Bool:
-    """Return which frames (N,) lie in gaps of the readings during which the probe moved on."""
+    """Return which frames (N,) lie in gaps of the readings during which the probe moved."""
     usual_s = float(np.median(np.diff(read_s)))
     gap = np.diff(read_s) > max(_JUMP_TIMES * usual_s, 2 * frame_s)
     gap &= np.abs(np.diff(read_mm)) > max(_DIFFERENCE_MM, _COUNTS * _quantum(read_mm))
@@ -175,9 +176,9 @@ def _in_gaps(time_s: Float, read_s: Float, read_mm: Float, frame_s: float) -> Bo
 
 
 def _without_jumps(time_s: Float, distance_mm: Float) -> tuple[Float, int]:
-    """Return distances (N,) from 0 with impossible steps removed, and how many.
+    """Return distances (N,) from 0 with impossible steps removed, and the number of these steps.
 
-    Where frames were lost or left out a step takes longer, and the probe goes farther meanwhile.
+    Where frames were lost or left out, a step takes longer, and the probe goes farther meanwhile.
     """
     step, passed = np.diff(distance_mm), np.diff(time_s)
     jump = np.abs(step) > np.maximum(_JUMP_TIMES * _usual(step / passed) * passed, _JUMP_MM)
@@ -204,16 +205,16 @@ def _frame_time(time_s: Float) -> float:
 class PosePredictor:
     """Predicts poses in the straightened pipe.
 
-    Distance and roll go on at constant speed (distance as the encoder advances, where there is one); the
-    rings say where the pipe's axis passes; pitch and yaw are taken as zero.
+    Roll continues at constant speed, and so does distance, or it follows the encoder if there is one. The
+    rings give the position of the pipe's axis; pitch and yaw are taken as zero.
 
     Parameters
     ----------
     time_s : (N,)
-        Of all frames.
+        Times of all frames, s.
     encoder : EncoderReadings or None
     centre_c : (N, 2)
-        Where the pipe's axis passes the laser's plane, mm in C.
+        Point at which the pipe's axis passes through the laser's plane, mm, frame C.
     """
 
     def __init__(self, time_s: Float, encoder: EncoderReadings | None, centre_c: Float) -> None:
@@ -221,7 +222,7 @@ class PosePredictor:
         self._known: list[tuple[int, float, float]] = []  # frame, distance, roll of the last two
 
     def learn(self, frame: int, T_pc: Float) -> None:
-        """Take note of a frame's pose (4, 4)."""
+        """Store a frame's pose (4, 4)."""
         roll = float(np.arctan2(T_pc[1, 0], T_pc[0, 0]))
         self._known = [*self._known[-1:], (frame, float(T_pc[2, 3]), roll)]
 
@@ -233,7 +234,7 @@ class PosePredictor:
         return from_parts(rotation, offset + np.array([0, 0, z]))
 
     def between(self, tracked: TrackedPoses) -> Float:
-        """Return first guesses (N, 4, 4) of all poses, interpolated between those that were tracked."""
+        """Return first guesses (N, 4, 4) of all poses, interpolated between the tracked ones."""
         count = len(self._time)
         z = self._encoder.distance_mm if self._encoder is not None else np.zeros(count)
         roll = np.zeros(count)

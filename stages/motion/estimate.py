@@ -1,8 +1,8 @@
 """The motion stage: one robust estimate of camera, pipe axis and encoder from texture, rings and encoder.
 
 Texture tracks are landmarks on the wall; rings lie on the wall; the encoder has a scale and slips; the motion
-is smooth; the axis bends as little as possible; the instrument is as stated, within its uncertainty. All of
-it forms one least-squares problem with robust weights. A long run is a chain of such problems, with loops
+is smooth; the axis bends as little as possible; the instrument is as stated, within its uncertainty. Together
+these form one least-squares problem with robust weights. A long run is a chain of such problems, with loops
 closed where the probe passes a wall again.
 """
 
@@ -35,19 +35,19 @@ from stages.motion.tracking.strips import WallView
 from stages.motion.trajectory import (
     SeenCentres,
     camera_trembles,
-    doubting_instrument,
     report_instrument,
     report_motion,
     report_steps,
     trajectory_of,
+    with_doubtful_instrument,
 )
 from stages.motion.windows.measured_run import MeasuredRun
 from stages.motion.windows.sliding_window import adjust_run, joined_at_once
 from stages.motion.windows.submap_joining import JoinedRun
 
 _LARGEST_CHANGE = 0.1
-"""Share by which the radius may differ from the rings' before the adjustment counts as diverged: the rings'
-median radius errs by far less. Not measured."""
+"""Relative difference of the radius from that of the rings from which the adjustment counts as diverged: the
+rings' median radius errs by far less. Not measured."""
 _MOST_TURNED = np.radians(45)
 """Largest angle between the optical axis and the pipe's: the laser would draw an ellipse of 1.4 to 1 there.
 In the sharpest elbow (short radius, a diameter, by ASME B16.9) a probe as long as the pipe is wide turns
@@ -87,7 +87,7 @@ def estimate_motion(
     seen = SeenCentres(run.circles.centre_c, probe.laser.baseline_mm)
     shakes = camera_trembles(trajectory, run.texture.poses, seen)
     doubted = shakes or run.texture.poses.much_lost
-    steady, believed = estimate.steady, doubting_instrument(trajectory, probe, estimate.lasting, doubted)
+    steady, believed = estimate.steady, with_doubtful_instrument(trajectory, probe, estimate.lasting, doubted)
     report_motion(context, estimate, run.texture, believed, shakes, wider)
     require_along_pipe(trajectory)
     loops.report(context)
@@ -107,7 +107,7 @@ def _with_loops_closed(
     parameters: MotionParameters,
     context: Context,
 ) -> tuple[JoinedRun, LoopReport]:
-    """Return a joined run with its loops closed, and what the report says of them."""
+    """Return a joined run with its loops closed, and the report on them."""
     distance = distance_along(joined.axis, joined.T_pc)
     grid, lit, circles = run.texture.grid, run.texture.poses.frames, run.circles
     passage = Passage.of(lit, distance[lit], grid.near_mm, grid.far_mm)
@@ -130,11 +130,11 @@ class JointEstimate:
     ----------
     measured : Measurements
     state : State
-        At the optimum.
+        State at the optimum.
     equations : Equations
-        There, with the robust weights.
+        Equations at the optimum, with the robust weights.
     trajectory : Trajectory
-        In P.
+        In frame P.
     """
 
     measured: Measurements
@@ -151,9 +151,9 @@ def adjust_at_once(
     parameters: MotionParameters,
     context: Context,
 ) -> JointEstimate:
-    """Adjust all frames of a recording at once, however many, and do not look for loops.
+    """Adjust all frames of a recording at once, however many, without closing loops.
 
-    ``radius_mm`` is the rings' radius, from which the adjusted one may not differ much.
+    ``radius_mm`` is the rings' radius, from which the adjusted one must not differ much.
 
     Raises
     ------
@@ -176,11 +176,11 @@ def _require_convergence(radius_mm: float, estimate: Estimate) -> None:
     if not abs(found - radius_mm) < _LARGEST_CHANGE * radius_mm:
         raise UnusableError(
             "motion",
-            f"the adjustment of the motion does not converge: its radius is {found:.4g} mm, that of the "
-            f"rings {radius_mm:.4g} mm",
+            f"the adjustment of the motion does not converge: it gives a radius of {found:.4g} mm, the rings "
+            f"{radius_mm:.4g} mm",
             limit=f"{100 * _LARGEST_CHANGE:.0f} % of difference",
-            hint="see that the pictures are whole, in their own size, and of the stated probe; else cut the "
-            "recording where they jump, and process the parts",
+            hint="check that the pictures are complete, not resized, and taken with the stated probe; where "
+            "they jump, cut the recording and process the parts separately",
         )
 
 
@@ -222,9 +222,10 @@ def require_along_pipe(trajectory: Trajectory) -> None:
     if lost.any():
         raise UnusableError(
             "motion",
-            f"the camera comes out turned by {np.degrees(turned.max()):.0f}° from the pipe's axis",
+            f"the estimated camera axis is turned by {np.degrees(turned.max()):.0f}° from the pipe's axis",
             limit=f"{limit_deg:.0f}°",
             frames=trajectory.frame[lost].tolist(),
-            hint="see the warnings before: what moves with the probe (a reflection, text, the line in lit "
-            "pictures) may have been taken for the wall. Record with less compression, or cut the recording",
+            hint="read the warnings before: something that moves with the probe (a reflection, text, the "
+            "line in lit pictures) may have been taken for the wall. Record with less compression, or cut "
+            "the recording",
         )

@@ -1,4 +1,4 @@
-"""Events of the motion: stops, reversals, slip, dropped and duplicated frames, lost texture."""
+"""Finds events of the motion: stops, reversals, slip, dropped and duplicated frames, lost texture."""
 
 from __future__ import annotations
 
@@ -38,19 +38,19 @@ _SLIP_STEP_MM = 0.02
 _SLIP_MM = 0.3
 """A slip is a row of steps of the encoder's slip beyond six spreads and 0.02 mm, 0.3 mm in all."""
 _QUIETEST, _OF_NORMAL = 0.25, 0.3186
-"""The spread is that of the quietest quarter of the steps in which the probe moves, as encoders may hang for
-most of a run. A quarter of normal values of 1 σ do not exceed so much."""
-_TOLD_SIGMAS = 5.0
-"""A slip is reported from so many σ on, with the σ over the slip's own way."""
-_TOLD_MM = 3.0
+"""The spread is estimated from the smallest quarter of the steps in which the probe moves, because encoders
+may hang for most of a run. A quarter of normal values with σ = 1 are below the second number."""
+_REPORTED_SIGMAS = 5.0
+"""A slip is reported from this many σ on, with the σ of the distance over which it occurs."""
+_REPORTED_MM = 3.0
 """Smaller slips are not reported (chosen): rings bridge them, and a wheel at rest has some play."""
 _ONE_SENSE = 3.0
-"""Small slips are reported together where their sum exceeds so many times the root of the sum of their
-squares, as one in 400 sums of random signs does. Those of a probe that jerks cancel."""
-_WHAT_SLIPPED = (
-    ": the wheel slipped or hung, readings stop, or a filter against noise held the texture back. Distances "
-    "there follow laser and texture. What to do: see that the wheel is pressed to the wall and turns, and "
-    "that encoder.csv is whole"
+"""Small slips are reported together if their sum exceeds this many times the root of the sum of their
+squares, as one in 400 sums of random signs does. The slips of a probe that jerks cancel."""
+_SLIP_CAUSES = (
+    ": the wheel slipped or hung, readings stop, or a noise filter held the texture back. Distances "
+    "there follow laser and texture. What to do: check that the wheel is pressed to the wall and turns, and "
+    "that encoder.csv is complete"
 )
 
 
@@ -65,7 +65,7 @@ def find_events(
     slip : (N,)
         Encoder's accumulated slip, mm.
     has_encoder : bool
-        Whether ``slip`` means anything.
+        Whether there is an encoder; without one ``slip`` is not used.
     """
     z, t, f = distance_along(trajectory.axis, trajectory.T_pc), frames.time_s, frames.frame
     if len(z) < _FEWEST_FRAMES:
@@ -89,11 +89,21 @@ def warn_of_slips(
 ) -> None:
     """Warn where encoder and texture disagree by more than the encoder's σ and its clock explain.
 
-    ``slip`` (N,) is the encoder's accumulated slip, mm. Each event is held against the 1 σ of the encoder's
-    scale (1) over its own way, that of two readings, mm, and the way of a usual frame, by which the clocks
-    of encoder and pictures may differ. So is
-    the sum of all where none of them alone is worth telling, as far as the encoder did not make up for it
-    between them.
+    Each slip is compared with its σ, which combines the encoder's scale over the distance of the slip, two
+    readings, and the usual distance per frame, by which the clocks of encoder and pictures may differ. If no
+    single slip is significant, their sum is tested in the same way, as far as the encoder did not make up for
+    it between them.
+
+    Parameters
+    ----------
+    events, trajectory
+    slip : (N,)
+        Encoder's accumulated slip, mm.
+    scale_sigma
+        1 σ of the encoder's scale (1).
+    reading_sigma_mm
+        1 σ of a reading, mm.
+    context
     """
     z = distance_along(trajectory.axis, trajectory.T_pc)
     frame_mm = float(np.percentile(np.abs(np.diff(z)), _CRUISE_PERCENT)) if len(z) > 1 else 0.0
@@ -103,38 +113,38 @@ def warn_of_slips(
     size = np.array([e.size for e in slips])
     way = np.abs(z[last] - z[first]) + np.abs(size)
     sigma = np.sqrt((scale_sigma * way) ** 2 + 2 * reading_sigma_mm**2 + frame_mm**2)
-    told = np.flatnonzero(_is_told(np.abs(size), sigma))
+    significant = np.flatnonzero(_is_significant(np.abs(size), sigma))
     whole = _kept_sum(size, float(slip[last[-1]] - slip[first[0]])) if len(slips) else 0.0
     whole_sigma = np.sqrt(
         scale_sigma**2 * way.sum() ** 2 + 2 * len(slips) * reading_sigma_mm**2 + frame_mm**2
     )
-    if len(told):
-        worst = slips[told[np.argmax(np.abs(size[told]))]]
-        elsewhere = f", and {len(told) - 1} times more" if len(told) > 1 else ""
+    if len(significant):
+        worst = slips[significant[np.argmax(np.abs(size[significant]))]]
+        elsewhere = f", and in {len(significant) - 1} other places" if len(significant) > 1 else ""
         context.warn(
             f"encoder and wall's texture disagree by {abs(worst.size):.1f} mm between frame "
-            f"{worst.frame_from} and {worst.frame_to}{elsewhere}{_WHAT_SLIPPED}"
+            f"{worst.frame_from} and {worst.frame_to}{elsewhere}{_SLIP_CAUSES}"
         )
-    elif _is_told(whole, whole_sigma) and whole > _ONE_SENSE * np.linalg.norm(size):
+    elif _is_significant(whole, whole_sigma) and whole > _ONE_SENSE * np.linalg.norm(size):
         context.warn(
             f"encoder and wall's texture disagree {len(slips)} times by up to {np.abs(size).max():.1f} mm, "
-            f"each too small to be certain alone, and by {whole:.1f} mm in all between frame "
-            f"{slips[0].frame_from} and {slips[-1].frame_to}{_WHAT_SLIPPED}"
+            f"each too small to be certain alone, and by {whole:.1f} mm in total between frame "
+            f"{slips[0].frame_from} and {slips[-1].frame_to}{_SLIP_CAUSES}"
         )
 
 
 def _kept_sum(size_mm: Float, net_mm: float) -> float:
-    """Return the sum of slips (K,), mm, or the net slip from first to last where that is less; 0 if opposed.
+    """Return the size of the sum of slips (K,), mm, or of the net slip if smaller; 0 if their signs differ.
 
-    The net slip matters where the encoder's clock is late: each sudden start of the probe then looks like a
-    slip in one sense, and its slow stop makes up for it in steps too small to be slips.
+    The net slip from first to last matters if the encoder's clock is late: each sudden start of the probe
+    then looks like a slip in one direction, and its slow stop makes up for it in steps too small to be slips.
     """
     total = float(size_mm.sum())
     return min(abs(total), abs(net_mm)) if total * net_mm > 0 else 0.0
 
 
-def _is_told(size_mm: Float | float, sigma_mm: Float | float) -> Bool:
-    return np.asarray((size_mm > _TOLD_MM) & (size_mm > _TOLD_SIGMAS * sigma_mm))
+def _is_significant(size_mm: Float | float, sigma_mm: Float | float) -> Bool:
+    return np.asarray((size_mm > _REPORTED_MM) & (size_mm > _REPORTED_SIGMAS * sigma_mm))
 
 
 def _ends_of_runs(mask: Bool) -> list[tuple[int, int]]:

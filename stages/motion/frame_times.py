@@ -1,4 +1,4 @@
-"""Times of frames whose stamps scatter, because pictures of a regular camera were stamped on arrival."""
+"""Corrects frame times that scatter because the pictures of a regular camera were stamped on arrival."""
 
 from __future__ import annotations
 
@@ -13,14 +13,15 @@ from stages.motion.tracking.landmarks import TrackedPoses
 _SCATTER = 0.01
 """Smaller scatter of stamps, in frame times, does not matter: at 20 mm/s and 30 frames/s it makes 7 µm."""
 _FARTHEST = 0.5
-"""Stamps farther from an even rhythm, in frame times, are no scatter: frames are missing, or it changes."""
+"""Stamps farther from an even rhythm, in frame times, are not scatter: frames are missing, or the rhythm
+changes."""
 _BETTER = 0.7
-"""Equal intervals are believed if the difference of encoder and wall falls to this share with them: if the
-stamps are right, it rises. Not measured."""
+"""Equal intervals are used if they reduce the difference of encoder and wall to this share: if the stamps are
+right, it rises. Not measured."""
 _FEWEST = 10
 
 
-def believed_times(recording: Recording, tracked: TrackedPoses, context: Context) -> Float:
+def frame_times(recording: Recording, tracked: TrackedPoses, context: Context) -> Float:
     """Return the frames' times (N,): equal intervals where encoder and texture agree better with them."""
     stamps = recording.frames.time_s
     even = even_rhythm(stamps)
@@ -46,7 +47,7 @@ def believed_times(recording: Recording, tracked: TrackedPoses, context: Context
 
 
 def even_rhythm(stamps: Float) -> Float | None:
-    """Return times (N,) of equal intervals that stamps (N,) scatter about; None where there are none."""
+    """Return times (N,) of equal intervals around which stamps (N,) scatter; None if there are none."""
     if len(stamps) < _FEWEST:
         return None
     k = np.arange(len(stamps))

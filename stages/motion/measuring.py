@@ -1,4 +1,4 @@
-"""Gathers what motion is estimated from: tracked texture of the wall, rings with their bore, and encoder."""
+"""Gathers the measurements for the motion: tracked texture of the wall, rings and their bore, encoder."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from stages.motion.encoder import (
     encoder_at_frames,
     warn_of_unread,
 )
-from stages.motion.frame_times import believed_times
+from stages.motion.frame_times import frame_times
 from stages.motion.parameters import MotionParameters
 from stages.motion.rings import RingCircles, circles_in_rings
 from stages.motion.tracking.landmarks import TrackedPoses
@@ -30,12 +30,12 @@ from stages.motion.tracking.tracker import TextureTracker, TrackedTexture, track
 from stages.motion.windows.measured_run import MeasuredRun
 
 _LEAST_TRACKED = 0.5
-"""Share of the lit frames that texture must be followed in where there is no encoder. Not measured."""
+"""Share of the lit frames in which texture must be followed if there is no encoder. Not measured."""
 _FEWEST_COLUMNS = 240
 """Fewest columns of a strip, in thin pipes: ten cells of ``cell_px`` around."""
 _FOLLOWED_ANEW = 2
-"""Times that texture is tracked again in a reducer, each time with a better known bore. Without an encoder,
-texture seems to move faster by as much as the bore is narrower."""
+"""Number of times that texture is tracked again in a reducer, each time with a better known bore. Without an
+encoder, texture seems to move faster in proportion as the bore is narrower."""
 
 
 def measure_run(
@@ -47,9 +47,9 @@ def measure_run(
     context: Context,
     use_encoder: bool = True,
 ) -> MeasuredRun:
-    """Track the wall's texture and gather what was measured: texture, rings, times and encoder.
+    """Track the wall's texture and gather the measurements: texture, rings, times and encoder.
 
-    Without ``use_encoder`` the encoder is left out, so that it can be compared with what the pictures show.
+    Without ``use_encoder`` the encoder is left out, so that it can be compared with the pictures.
 
     Raises
     ------
@@ -78,7 +78,7 @@ def measure_run(
 
 @dataclass(frozen=True)
 class _Tracked:
-    """Texture tracked on a cylinder, its predictor of poses, the encoder if believed, and times (N,), s."""
+    """Texture tracked on a cylinder, its predictor of poses, the encoder if used, and times (N,), s."""
 
     texture: TrackedTexture
     predictor: PosePredictor
@@ -89,12 +89,12 @@ class _Tracked:
 def _tracked(
     view: WallView, circles: RingCircles, parameters: MotionParameters, context: Context, use_encoder: bool
 ) -> _Tracked:
-    """Track texture with the encoder; without it, if the texture contradicts it."""
+    """Track texture with the encoder, or without it if the texture contradicts it."""
     recording, far_mm, encoder = view.recording, view.grid.far_mm, None
     if use_encoder:
         encoder = encoder_at_frames(recording, parameters.encoder_sigma_mm, far_mm, context)
     texture, predictor = _track(view, circles, encoder, parameters, context)
-    times = believed_times(recording, texture.poses, context)
+    times = frame_times(recording, texture.poses, context)
     if encoder is not None and times is not recording.frames.time_s:
         recording = replace(recording, frames=replace(recording.frames, time_s=times))
         encoder = encoder_at_frames(recording, parameters.encoder_sigma_mm, far_mm, context)
@@ -137,7 +137,7 @@ def _track(
 
 @dataclass(frozen=True)
 class _Followed:
-    """Texture that was followed, the poses (N, 4, 4) it gives, where rings lie (F,) by them, and the bore."""
+    """Tracked texture, its poses (N, 4, 4), the distances of the rings (F,) by these poses, and the bore."""
 
     texture: TrackedTexture
     T_pc: Float
@@ -152,7 +152,7 @@ def _in_bore(
     view: WallView,
     encoder: EncoderReadings | None = None,
 ) -> _Followed:
-    """Return first guesses of the poses, and the bore that the rings show by them.
+    """Return first guesses of the poses, and the bore that follows from rings at these poses.
 
     In a reducer an ``encoder`` gives better distances than texture that was tracked on a cylinder.
     """
@@ -173,7 +173,7 @@ def _in_reducer(
     parameters: MotionParameters,
     context: Context,
 ) -> _Followed:
-    """Return texture that is followed on a wall as wide as its rings, not on a cylinder."""
+    """Return texture that was tracked on a wall with the width of its rings, not on a cylinder."""
     for _ in range(_FOLLOWED_ANEW):
         view = replace(view, grid=replace(view.grid, bore=followed.bore))
         texture, predictor = _track(view, circles, encoder, parameters, context)
@@ -186,12 +186,12 @@ def _in_reducer(
 
 
 def _warn_of_reducer(bore: Bore, encoder: EncoderReadings | None, context: Context) -> None:
-    by = "the errors that other reducers had" if encoder is None else "how much texture and encoder differ"
+    by = "errors as in other reducers" if encoder is None else "the difference of texture and encoder"
     context.warn(
         f"the pipe's width changes by {2 * np.ptp(bore.rings_wider_mm):.1f} mm over a length (a reducer or "
-        f"taper): texture is matched less well there. The σ of distances includes {by}; radii may be off by "
+        f"taper): texture is matched less well there. The σ of distances includes {by}; radii may err by "
         "more than their σ, most of all on the slope. What to do: compare distance and diameters with known "
-        "ones, or process the pipe before and behind the reducer as separate recordings"
+        "ones, or process the pipe before and after the reducer as separate recordings"
     )
 
 
@@ -201,7 +201,7 @@ def _require_distance(tracked: TrackedPoses, encoder: EncoderReadings | None) ->
         raise UnusableError(
             "motion",
             f"the wall's texture could be followed in only {100 * share:.0f} % of the lit frames and "
-            "there is no encoder, so distance is not determined",
+            "there is no encoder, so that distance is not determined",
             limit="half of the lit frames",
-            hint="give the encoder file, light the wall better, or record lit frames more often",
+            hint="add the encoder file, light the wall better, or record lit frames more often",
         )

@@ -1,4 +1,4 @@
-"""Recognises pictures that a recorder mirrors or turns: a probe mirrored likewise fits them better."""
+"""Recognises pictures that a recorder mirrors or turns: an equally mirrored probe fits them better."""
 
 from __future__ import annotations
 
@@ -9,22 +9,23 @@ from pipeline.artefacts.measured import Trajectory
 from pipeline.instrument.probe import Probe
 
 _WAYS = {"mirrored left to right": "x", "mirrored upside down": "y", "turned by 180°": "xy"}
-"""What a recorder may do to pictures, and along which axes of the image they are mirrored then."""
+"""Changes that a recorder may make to pictures, and the axes of the image along which it then mirrors
+them."""
 _SURE = float(np.log(1000))
 """Least log odds of mirrored pictures against pictures as stated. A choice."""
 _FITS, _LEAST_VARIANCE = 5.0, 1e-6
-"""A mirrored probe fits if the data move it by at most so many times what they usually move a right one: more
+"""A mirrored probe fits if the data move it by at most so many times the usual motion of a right one: more
 happens once in 10⁵ recordings. The least variance is in units of the stated variance."""
 _WHOLLY = 0.01
-"""A mirrored probe is considered if the stated probe's uncertain directions compose it up to this part of the
-change. A choice."""
+"""A mirrored probe is considered if a combination of the stated probe's uncertain directions gives it, up to
+this part of the change. A choice."""
 
 
 def mirrored_way(probe: Probe, trajectory: Trajectory) -> str:
-    """Return how the pictures of a run are mirrored, empty where they are not or nothing tells it.
+    """Return how the pictures of a run are mirrored; empty if they are not, or if there is no evidence.
 
     In mirrored pictures the principal point and every asymmetry of lens and laser lie on the other side. The
-    run's estimate of the instrument, with the prior taken out, is compared with both.
+    run's estimate of the instrument, without its prior, is compared with both.
     """
     if trajectory.instrument is None or trajectory.instrument_covariance is None:
         return ""
@@ -53,8 +54,8 @@ def _mirrored(probe: Probe, axes: str) -> Float:
 def _turning_sign(axis: str) -> tuple[str, ...]:
     """Return the parameters that have the other sign in an image mirrored along ``axis``.
 
-    Azimuth ψ becomes π − ψ along x, and −ψ along y. Tangential distortion is that of Brown, with OpenCV's
-    names, the affine part of the image Scaramuzza's.
+    Azimuth ψ becomes π − ψ along x, and −ψ along y. The tangential distortion is Brown's, with OpenCV's
+    names; the affine part of the image is Scaramuzza's.
     """
     waves = tuple(f"wave{m}_{'cos' if axis == 'x' and m % 2 else 'sin'}" for m in (2, 3, 4))
     return (f"tilt_{axis}", f"decentre_{axis}_mm", {"x": "p2", "y": "p1"}[axis], "d", "e", *waves)
@@ -68,16 +69,15 @@ def _can_be(probe: Probe, change: Float) -> bool:
 
 
 def _fits(change: Float, found: Float, covariance: Float) -> bool:
-    """Return whether the data move a prior mean at ``change`` (Q,) by no more than they usually would."""
+    """Return whether the data move a prior mean at ``change`` (Q,) by no more than usual."""
     usual = np.sqrt(np.maximum(1 - np.diagonal(covariance), _LEAST_VARIANCE))
     return bool((np.abs(found + covariance @ change - change) / usual).max() < _FITS)
 
 
 def _log_odds(change: Float, found: Float, covariance: Float) -> float:
-    """Return the log odds of a prior mean moved by ``change`` (Q,) against none, both of unit covariance.
+    """Return the log odds of a prior mean at ``change`` (Q,) against one at 0, both of unit covariance.
 
-    The data's part is what the posterior ``found`` (Q,) with ``covariance`` (Q, Q) has beyond the prior
-    N(0, 1); with it both evidences are Gaussian integrals (Bishop, "Pattern recognition and machine
-    learning", 2.3).
+    The likelihood is the posterior ``found`` (Q,) with ``covariance`` (Q, Q) divided by the prior N(0, 1);
+    with it both evidences are Gaussian integrals (Bishop, "Pattern recognition and machine learning", 2.3).
     """
     return float(change @ found - change @ change / 2 + change @ covariance @ change / 2)

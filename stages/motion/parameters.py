@@ -8,10 +8,10 @@ from pipeline.machine.stage import Parameters
 
 
 class MotionParameters(Parameters):
-    """What the motion stage lets the user choose; every default holds for 2 to 4 inch pipe.
+    """Parameters of the motion stage; every default is meant for 2 to 4 inch pipe.
 
-    The defaults were chosen on the open recordings and on drawn runs. How much results depend on each was not
-    measured; where a default follows from something, a comment says so.
+    The defaults were chosen on the open recordings and on drawn runs. The sensitivity of the results to them
+    was not measured; if a default follows from something, a comment says so.
     """
 
     # A patch of 21 samples is 4.6 mm of wall.
@@ -42,7 +42,7 @@ class MotionParameters(Parameters):
     # 5°, the 72nd part of the circle, is finer than the ovality that the pipe's model has.
     ring_bins: int = Field(72, ge=12, le=720, description="azimuth bins into which a ring is condensed")
     surface_sigma_mm: float = Field(
-        0.10, gt=0, le=5, description="1 σ, mm, of the wall about the smooth pipe, at landmarks and rings"
+        0.10, gt=0, le=5, description="1 σ, mm, of the wall around the smooth pipe, at landmarks and rings"
     )
     axis_knot_mm: float = Field(30.0, ge=5, le=500, description="spacing, mm, of the axis' spline knots")
     axis_bend_sigma: float = Field(
@@ -52,7 +52,7 @@ class MotionParameters(Parameters):
         0.005,
         gt=0,
         le=10,
-        description="1 σ, mm, of an encoder reading beside its quantisation, which is measured",
+        description="1 σ, mm, of an encoder reading in addition to its quantisation, which is measured",
     )
     encoder_slip_sigma_mm: float = Field(
         0.002,
@@ -70,8 +70,8 @@ class MotionParameters(Parameters):
     most_observations: int = Field(
         16, ge=3, le=1000, description="most observations of one landmark that enter the adjustment"
     )
-    # Against a probe calibrated on a gauge, matches of open-1-field err by up to 0.05 px. Where matches of a
-    # recording disagree by more, more of it is taken to be shared (`with_shared_error`).
+    # Compared with a probe calibrated on a gauge, matches of open-1-field err by up to 0.05 px. If matches of
+    # a recording disagree by more, a larger shared error is assumed (`with_shared_error`).
     match_bias_px: float = Field(
         0.1,
         gt=0,
@@ -79,11 +79,11 @@ class MotionParameters(Parameters):
         description="least 1 σ, px, of the radial error that matches near one polar angle share",
     )
     turn_sigma_rad: float = Field(
-        0.1, gt=0, le=1, description="1 σ, rad, of a turn from frame to frame where no texture shows it"
+        0.1, gt=0, le=1, description="1 σ, rad, of a rotation from frame to frame where no texture shows it"
     )
     iterations: int = Field(60, ge=2, le=1000, description="most steps of the adjustment of a window")
     max_track_frames: int = Field(
-        240, ge=20, le=2000, description="most frames through which one landmark is followed"
+        240, ge=20, le=2000, description="largest number of frames through which one landmark is followed"
     )
     window_frames: int = Field(
         800, ge=40, le=20000, description="frames adjusted jointly; a longer run is cut in such windows"
@@ -95,11 +95,11 @@ class MotionParameters(Parameters):
         100.0,
         ge=10,
         le=100000,
-        description="spacing, mm, of places at which a wall passed again is compared with what was seen",
+        description="spacing, mm, of places at which a wall passed again is compared",
     )
     most_loops: int = Field(
         100,
         ge=0,
         le=1000,
-        description="most places in a run at which a wall passed again is compared; 0 closes no loops",
+        description="largest number of places at which a wall passed again is compared; 0: no loops",
     )

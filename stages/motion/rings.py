@@ -17,14 +17,14 @@ from pipeline.recording.base import Recording
 from stages.premises.stays import in_full
 
 CORRELATED_FRAMES = 4.0
-"""Neighbouring frames in which a ring meets the same relief of the wall, so that their errors are alike: the
-relief's length along the pipe over the way from ring to ring. Taken for all recordings, not measured."""
+"""Neighbouring frames in which a ring meets the same relief of the wall, so that their errors are the same:
+the relief's length along the pipe over the distance from ring to ring. Assumed for all recordings, not
+measured."""
 _FEWEST_RINGS = 3
 _MOST_NOT_ON_WALL = 0.5
-"""Share of the rings that show no wall in a sector, from which its texture is not followed. A choice:
-half is most of the way."""
+"""Texture is not followed in a sector in which at least this share of the rings shows no wall. A choice."""
 _FARTHEST_PX = 20.0
-"""A ring farther than this from where it is expected is a hole or an outlier, of little weight. Up to this
+"""A ring farther than this, px, from its expected place is a hole or an outlier, of little weight. Up to this
 distance derivatives change linearly: with relief of 5 px rms no bias remains. A choice."""
 
 
@@ -36,7 +36,7 @@ class RingBins:
     ----------
     frame : (M,) int
     xyz_c : (M, 3)
-        Mean point with the instrument as stated.
+        Mean point, mm in C, with the instrument as stated.
     by_instrument : (M, 3, Q)
         Its change with the instrument's principal uncertainties, mm per σ.
     by_pixel : (M, 3)
@@ -62,10 +62,10 @@ class RingBins:
     def instrument_where_expected(self, residual_mm: Float, normal_c: Float) -> Float:
         """Return ``by_instrument`` at the places where the pipe's model expects the rings.
 
-        ``residual_mm`` (M,) is how far each ring was found off there, along ``normal_c`` (M, 3). Derivatives
-        at the places found would follow the wall's relief, and their product with the residual has a mean
-        that is not zero: in open-1-field it moved radius and distance by 0.15 σ (W. A. Fuller, "Measurement
-        Error Models", 1987, ch. 3).
+        ``residual_mm`` (M,) is the distance of each measured ring from there, along ``normal_c`` (M, 3).
+        Derivatives at the measured places would follow the wall's relief, and their product with the residual
+        has a mean that is not zero: in open-1-field it moved radius and distance by 0.15 σ (W. A. Fuller,
+        "Measurement Error Models", 1987, ch. 3).
         """
         away = residual_mm / np.einsum("mi,mi->m", normal_c, self.by_pixel)
         away = np.clip(away, -_FARTHEST_PX, _FARTHEST_PX)
@@ -81,7 +81,8 @@ class RingCircles:
     frame : (F,) int
         Frame numbers.
     centre_c : (F, 2)
-        Where the pipe's axis passes the laser's plane, mm in C; NaN where too little of a ring is seen.
+        Point at which the pipe's axis passes through the laser's plane, mm in C; NaN where too little of a
+        ring is seen.
     radius_mm : (F,)
     """
 
@@ -116,9 +117,9 @@ def circles_in_rings(points: RingPoints) -> RingCircles:
     if np.isfinite(radius).sum() < _FEWEST_RINGS:
         raise UnusableError(
             "motion",
-            f"only {int(np.isfinite(radius).sum())} laser frames show enough of a ring to place the pipe",
+            f"only {int(np.isfinite(radius).sum())} laser frames show enough of a ring to locate the pipe",
             limit=f"{_FEWEST_RINGS} rings seen over {100 * LEAST_COVERED:.0f} % of the circle",
-            hint="check exposure and that the laser is on; see the rejected ring samples by reason",
+            hint="check the exposure and that the laser is on; the report lists rejected samples by reason",
         )
     return RingCircles(points.frame, centre, radius)
 
@@ -126,7 +127,7 @@ def circles_in_rings(points: RingPoints) -> RingCircles:
 def looking_at_wall(recording: Recording, rings: RingSamples, points: RingPoints) -> Recording:
     """Return the recording without those sectors of the picture in which most rings have no line on the wall.
 
-    Standing water mirrors the wall above it, so that texture seen there lies elsewhere, too.
+    Standing water mirrors the wall above it, so that texture seen there belongs to other wall.
     """
     lost = (rings.valid & np.isnan(points.xyz_c[..., 0])).mean(0) > _MOST_NOT_ON_WALL
     if not lost.any():
@@ -146,13 +147,13 @@ def ring_bins(rings: RingSamples, place: Int, probe: Probe, bins: int, wall_sigm
     ----------
     rings
     place : (F,) int
-        Places of the rings in the list of frames.
+        Indices of the rings' frames in the list of frames.
     probe
     bins : int
         Azimuth bins of a ring.
     wall_sigma_mm : float
-        1 σ of the wall about the smooth pipe. The relief is alike in neighbouring frames, so it is widened by
-        the root of `CORRELATED_FRAMES`.
+        1 σ of the wall around the smooth pipe. The relief is the same in neighbouring frames, so it is
+        widened by the root of `CORRELATED_FRAMES`.
     """
     frames, azimuths = rings.radius_px.shape
     size = azimuths // bins

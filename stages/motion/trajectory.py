@@ -1,4 +1,4 @@
-"""The trajectory in the pipe frame P, its figures for the report, and warnings where it may be wrong."""
+"""Makes the trajectory in the pipe frame P, its figures for the report, and its warnings."""
 
 from __future__ import annotations
 
@@ -25,22 +25,25 @@ from stages.motion.windows.submap_joining import JoinedRun
 _START_MM = 60.0
 """Length of pipe whose direction is the z-axis of P: two knots of the axis. Not measured."""
 _TOO_FAR = 5.0
-"""A right probe moves farther than so many σ along one of its ten or so directions once in 10⁵ recordings."""
+"""A correct probe moves farther than so many σ along one of its ten or so directions once in 10⁵
+recordings."""
 _MOST_LOST = 0.05
-"""Share of the lit frames without enough texture that is told; good recordings have none. Not measured."""
+"""Share of the lit frames without enough texture that is warned of; good recordings have none. Not
+measured."""
 _RING = 72
-"""Places around the pipe of which its radius is taken, 5° apart, as a calibration's errors are elsewhere."""
+"""Points around the pipe at which its radius is computed, 5° apart, as for a calibration's errors
+elsewhere."""
 _FEWEST_CENTRES = 16
-"""Rings of which the trembling of their centres is known, as that of poses is."""
+"""Fewest rings from which the trembling of their centres is estimated, as for poses."""
 _MOST_LASTING = 0.57
-"""Reprojection error, in σ of matching, shared by a landmark's neighbouring matches, that is told: .44 to
-.51 in open-1, open-2, at half their size, shaken, and in a scene of ours; .18 in open-3, of much noise;
-.63 in open-1 as HEVC of crf 32, .69 at crf 30, .85 with glints, dust and blur besides."""
+"""Reprojection error, in σ of matching, shared by a landmark's neighbouring matches, that is warned of: .44
+to .51 in open-1, open-2, at half their size, shaken, and in a scene of ours; .18 in open-3, of much noise;
+.63 in open-1 as HEVC of crf 32, .69 at crf 30, .85 with glints, dust and blur as well."""
 
 
 @dataclass(frozen=True)
 class SeenCentres:
-    """Where rings, one after the other, have the pipe's axis in the laser's plane (F, 2), mm in C.
+    """Centres of successive rings in the laser's plane (F, 2), mm in C.
 
     ``ahead_mm`` is that plane's distance from the camera.
     """
@@ -49,7 +52,7 @@ class SeenCentres:
     ahead_mm: float
 
     def deny_trembling(self, trajectory: Trajectory, lit: Int) -> bool:
-        """Return whether the centres surely tremble by less than half of what poses of ``lit`` frames say."""
+        """Return whether the centres tremble by less than half of what the poses of ``lit`` frames imply."""
         known = np.isfinite(self.centre_c).all(1)
         if known.sum() < _FEWEST_CENTRES:
             return False
@@ -63,7 +66,7 @@ class SeenCentres:
 def trajectory_of(run: JoinedRun, frames: FrameTable, probe: Probe, has_encoder: bool) -> Trajectory:
     """Return the trajectory in P.
 
-    Distance 0 and roll 0 are those of the first camera, z is the direction of the pipe there.
+    Distance 0 and roll 0 are those of the first camera; z is the direction of the pipe there.
     """
     T_po = _pipe_of_origin(run.T_pc[0], run.axis)
     first = float(to_pipe(run.axis, run.T_pc[0, :3, 3])[0])
@@ -94,14 +97,16 @@ def trajectory_of(run: JoinedRun, frames: FrameTable, probe: Probe, has_encoder:
     )
 
 
-def doubting_instrument(trajectory: Trajectory, probe: Probe, lasting: float, shakes: bool) -> Trajectory:
-    """Return the trajectory, with the instrument's correction added to its σ where that is doubtful.
+def with_doubtful_instrument(
+    trajectory: Trajectory, probe: Probe, lasting: float, shakes: bool
+) -> Trajectory:
+    """Return the trajectory, with the instrument's correction added to its σ if the correction is doubtful.
 
-    A correction is doubtful where matches contradict the motion (``lasting``), since their common error then
-    made it: a lamp mirrored in a polished wall made radii 0.3 mm too large. It is so too where the
+    A correction is doubtful if matches contradict the motion (``lasting``), since their common error may have
+    caused it: a lamp mirrored in a polished wall made radii 0.3 mm too large. It is also doubtful if the
     camera ``shakes`` or the probe does not fit, since the picture may have moved and not the probe: pictures
     shaken by 2 px at random made radii 0.06 mm too small. Distances get the same relative σ as the radius,
-    because a wrong probe scales both alike.
+    because a wrong probe scales both equally.
     """
     if trajectory.instrument is None or trajectory.instrument_covariance is None:
         return trajectory
@@ -121,7 +126,7 @@ def doubting_instrument(trajectory: Trajectory, probe: Probe, lasting: float, sh
 
 
 def _wider_by(moved: Float, probe: Probe, radius_mm: float) -> float:
-    """Return by which share a pipe comes out wider with a probe whose parameters were moved so (P,)."""
+    """Return the relative change of the pipe's measured radius if a probe's parameters are ``moved`` (P,)."""
     psi = np.linspace(-np.pi, np.pi, _RING, endpoint=False)
     ring = np.stack([radius_mm * np.cos(psi), radius_mm * np.sin(psi), 0 * psi + probe.laser.baseline_mm], -1)
     uv, found = (
@@ -133,7 +138,7 @@ def _wider_by(moved: Float, probe: Probe, radius_mm: float) -> float:
 
 
 def report_instrument(probe: Probe, trajectory: Trajectory, context: Context) -> None:
-    """Report how far the probe was moved, in its stated σ, and warn where it cannot have been right."""
+    """Report how far the probe was moved, in its stated σ, and warn if it cannot have been right."""
     if trajectory.instrument is None:
         return
     change = trajectory.instrument - probe.parameters
@@ -154,9 +159,9 @@ def _remedy(probe: Probe, trajectory: Trajectory) -> str:
     if way := mirrored_way(probe, trajectory):
         return (
             f"It fits pictures that are {way}; clock positions are then {way} as well. What to do: switch "
-            "this off in camera and recorder, or turn the pictures back, and run again"
+            "this off in camera and recorder, or undo it in the pictures, and run again"
         )
-    return "Run boresight diagnose, or calibrate the probe anew"
+    return "What to do: run boresight diagnose, or calibrate the probe again"
 
 
 def report_motion(
@@ -167,9 +172,10 @@ def report_motion(
     shakes: bool,
     wider: float,
 ) -> None:
-    """Report the figures of a motion, and warn where it may be off by more than its σ.
+    """Report the figures of a motion, and warn if it may be wrong by more than its σ.
 
-    ``shakes`` is what `camera_trembles` says; ``wider`` is the pipe's diameter over the nominal one, less 1.
+    ``shakes`` is the result of `camera_trembles`; ``wider`` is the pipe's diameter over the nominal one,
+    minus 1.
     """
     report_steps(context, estimate.trials, estimate.unsettled)
     context.report("landmarks", texture.store.landmarks, "")
@@ -196,8 +202,8 @@ def report_steps(context: Context, steps: int, unsettled: int) -> None:
     context.report("steps of the joint adjustment", steps, "")
     if unsettled:
         context.warn(
-            "the adjustment of the motion stopped after its largest number of steps, before it had settled: "
-            "poses may be off by more than their σ. What to do: raise motion.iterations"
+            "the adjustment of the motion stopped after its largest number of steps and has not converged: "
+            "poses may be wrong by more than their σ. What to do: raise motion.iterations"
         )
 
 
@@ -207,35 +213,35 @@ def _warn_of_texture(lasting: float, tracked: TrackedPoses, observations: int, c
     if len(lost) > _MOST_LOST * len(tracked.frames):
         context.warn(
             f"in {len(lost)} of {len(tracked.frames)} lit frames too little texture was found, first in "
-            f"frame {lost[0]}: there the motion rests on rings, encoder and smoothness. What to do: look at "
+            f"frame {lost[0]}: there rings, encoder and smoothness give the motion. What to do: look at "
             "these pictures; more light, a sharper lens or a slower pull show more texture"
         )
     elif not observations:
         context.warn(
-            "no place of the wall was seen again from picture to picture: distance rests on the encoder "
+            "no place of the wall was seen again from picture to picture: distance depends on the encoder "
             "alone, and roll is not measured. What to do: pull more slowly, record lit frames more often, or "
             "light the wall better"
         )
     if lasting > _MOST_LASTING:
         context.warn(
-            f"matches of texture contradict the motion by {lasting:.1f} times their σ, alike in neighbouring "
-            "pictures, where good recordings have 0.5 at most: reflections, compression or lights that move "
-            "with the probe are taken for the wall, or water or glass draws the picture aside. Distance and "
-            "roll may be off by more than their σ; the σ of radii includes by how much the probe was "
-            "corrected, but not what water or glass does to the line. What to do: clean and dry the window, "
-            "compare distance and diameter with known ones, record with less compression"
+            f"matches of texture contradict the motion by {lasting:.1f} times their σ, in the same way in "
+            "neighbouring pictures (good recordings: 0.5 at most): reflections, compression or lights that "
+            "move with the probe are taken for the wall, or water or glass distorts the picture. Distance and "
+            "roll may err by more than their σ; the σ of radii includes the correction of the probe, but not "
+            "the displacement of the line by water or glass. What to do: clean and dry the window, compare "
+            "distance and diameter with known ones, record with less compression"
         )
 
 
 def camera_trembles(trajectory: Trajectory, texture: TrackedPoses, seen: SeenCentres) -> bool:
-    """Return whether the camera's direction changes from picture to picture by more than poses err.
+    """Return whether the camera's direction changes from picture to picture by more than the poses' errors.
 
     A trembling camera moves the ring in the picture as well. If the ring stays in place, the matches of
     texture tremble instead, for example on glints.
     """
     shaken = trembling(trajectory.T_pc, trajectory.time_s, texture.frames)
-    told = trembles(shaken) and not texture.mostly_lost
-    return told and not seen.deny_trembling(trajectory, texture.frames)
+    trembling = trembles(shaken) and not texture.mostly_lost
+    return trembling and not seen.deny_trembling(trajectory, texture.frames)
 
 
 def _warn_of_trembling(trajectory: Trajectory, texture: TrackedPoses, shakes: bool, context: Context) -> None:
@@ -250,22 +256,22 @@ def _warn_of_trembling(trajectory: Trajectory, texture: TrackedPoses, shakes: bo
     )
     if not shakes:
         context.warn(
-            f"by its texture the camera trembles: {moves} (1 σ). The laser's ring does not, so the camera "
-            "stands firm and texture is matched wrongly: glints, reflections, blur or compression. Radii "
-            "hold; distance and roll may be off by more than their σ. What to do: shade reflections, record "
-            "with less compression"
+            f"the texture suggests a trembling camera: {moves} (1 σ). The laser's ring does not tremble, so "
+            "the camera is steady and texture is matched wrongly: glints, reflections, blur or compression. "
+            "Radii are right; distance and roll may be wrong by more than their σ. What to do: shade "
+            "reflections, record with less compression"
         )
     else:
         context.warn(
-            f"the camera trembles: {moves} (1 σ). If the whole probe trembles, the measurements hold. If the "
-            "camera is loose on its mount, or the pictures were stabilised afterwards, radii and distances "
-            "may be off by more than their σ; the recording cannot tell which. What to do: look whether the "
-            "camera sits tight, switch stabilisation off, and compare a diameter with one that is known"
+            f"the camera trembles: {moves} (1 σ). If the whole probe trembles, the measurements hold. If "
+            "the camera is loose on its mount, or the pictures were stabilised afterwards, radii and "
+            "distances may be wrong by more than their σ; the recording cannot show which. What to do: check "
+            "that the camera is tight, switch stabilisation off, and compare a diameter with a known one"
         )
 
 
 def _farthest(change: Float, probe: Probe) -> float:
-    """Return the longest part of a change (P,) along the principal directions of a probe's uncertainty, σ."""
+    """Return the largest component, σ, of a change (P,) along the principal directions of its uncertainty."""
     moved, *_ = np.linalg.lstsq(probe.principal_uncertainties(), change, rcond=None)
     return float(np.max(np.abs(moved), initial=0.0))
 
@@ -282,7 +288,7 @@ def _pipe_of_origin(T_oc: Float, axis: PipeAxis) -> Float:
 
 
 def _roll_of(T_po: Float, axis: PipeAxis, distance_mm: float) -> Float:
-    """Return the turn about the tangent that brings the sections' x next to P's x at a distance."""
+    """Return the rotation about the tangent that brings the sections' x closest to P's x at a distance."""
     rotation = T_po[:3, :3] @ frames_at(axis, np.array(distance_mm))[1]
     angle = np.arctan2(rotation[1, 0], rotation[0, 0])
     c, s = np.cos(angle), np.sin(angle)

@@ -206,8 +206,8 @@ def encoder_factor(
         perhaps = _MAYBE_BACKWARDS if factor < 0 and not forwards else ""
         context.warn(
             f"the encoder reads {found.value:.3g} mm where the wall's texture moves by 1 mm, in "
-            f"{found.steps} steps: its readings seem to be {' and '.join(wrong)}, and are multiplied by "
-            f"{factor:g}. {perhaps}What to do: correct encoder.csv"
+            f"{found.steps} steps: it seems to count {' and '.join(wrong)}, so its readings are multiplied "
+            f"by {factor:g}. {perhaps}What to do: correct encoder.csv"
         )
     elif contradicts:
         held_back = ", or the codec holds the wall's texture back" if abs(found.value) > 1 else ""

@@ -132,7 +132,7 @@ def test_recordings_without_lights(
     told = boresight("run", spoilt(good, tmp_path, ALIKE[name]), "-o", tmp_path / "run", *QUICK)
     assert told.code == UNUSABLE, told.err
     assert "states two lights" in told.err
-    assert "all pictures look alike" in told.err
+    assert "all pictures look the same" in told.err
     assert "What to do" in told.err
 
 

@@ -29,7 +29,7 @@ def test_a_reducer_is_as_wide_as_its_rings() -> None:
     assert bore.wider_at(AT_MM) + np.nanmedian(seen) == pytest.approx(50 + WIDER_MM, abs=0.4)
     inside = np.array([38.1, 42.1, 45.3])
     assert bore.slope_at(inside) == pytest.approx(-0.8, abs=0.15)
-    assert bore.behind(10.0).wider_at(inside - 10) == pytest.approx(bore.wider_at(inside))
+    assert bore.counted_from(10.0).wider_at(inside - 10) == pytest.approx(bore.wider_at(inside))
 
 
 @pytest.mark.parametrize("step_mm", [0.0, -3.0])

@@ -282,7 +282,7 @@ def test_an_encoder_that_differs_from_lost_texture_is_followed_and_told(
     assert not found.contradicted
     found.warn(replace(quiet_context(), warn=told.append), 0.0)
     assert len(told) == (abs(scale - 1) > 0.02)
-    assert all("too little texture to tell which is right" in words for words in told)
+    assert all("too little texture to decide" in words for words in told)
     assert unsure >= abs(scale - 1)
 
 

@@ -62,7 +62,7 @@ def test_readings_are_put_in_time_and_unknown_beyond_their_end() -> None:
     late = readings(0.2)
     found = find_delay(TIME_S, way(TIME_S), late)
     assert found is not None
-    mended = found.taken_out(late, TIME_S)
+    mended = found.corrected(late, TIME_S)
     off = mended.distance_mm - 1.01 * (way(TIME_S) - way(TIME_S[:1]))
     assert np.ptp(off[mended.known]) < 2 * QUANTUM
     assert np.ptp((late.distance_mm - 1.01 * way(TIME_S))[mended.known]) > 10 * QUANTUM, "the control"

@@ -9,7 +9,7 @@ import pytest
 
 from pipeline.arrays import Float
 from pipeline.recording.base import Encoder, FrameTable
-from stages.motion.frame_times import believed_times, even_rhythm
+from stages.motion.frame_times import even_rhythm, frame_times
 from stages.motion.tracking.landmarks import TrackedPoses
 from tests.quiet import quiet_context
 
@@ -37,7 +37,7 @@ def believed(taken_s: Float, stamps: Float, told: list[str] | None = None) -> Fl
     T_pc[:, 2, 3] = way(taken_s) + 0.01 * np.random.default_rng(1).standard_normal(FRAMES)
     tracked = TrackedPoses(np.arange(FRAMES), T_pc, np.zeros(FRAMES, bool))
     context = replace(quiet_context(), warn=(told if told is not None else []).append)
-    return believed_times(recording, tracked, context)  # type: ignore[arg-type]
+    return frame_times(recording, tracked, context)  # type: ignore[arg-type]
 
 
 @pytest.fixture

@@ -21,7 +21,7 @@ from stages.motion.bundle_adjustment.equations import Measurements
 from stages.motion.bundle_adjustment.image_scale import ScaleDrift, drift_of_scale
 from stages.motion.bundle_adjustment.solver import Estimate, estimate_state
 from stages.motion.tracking.landmarks import TrackedPoses
-from stages.motion.trajectory import doubting_instrument
+from stages.motion.trajectory import with_doubtful_instrument
 from stages.motion.windows import steady_scale
 from stages.motion.windows.steady_scale import SteadyRun, with_steady_scale
 from stages.motion.windows.submaps import Window
@@ -47,7 +47,7 @@ def adjusted(**changes: float) -> tuple[Scene, Estimate]:
 def drift_in(**changes: float) -> tuple[ScaleDrift, list[str]]:
     made, estimate = adjusted(**changes)
     drift, told = drift_of_scale(estimate, made.measured), []
-    drift.warn(replace(quiet_context(), warn=told.append), taken_out=True)
+    drift.warn(replace(quiet_context(), warn=told.append), corrected=True)
     return drift, told
 
 
@@ -70,7 +70,7 @@ def seen_growing(run: DrawnRun, grows: float) -> DrawnRun:
 def test_a_picture_that_grows_is_told_with_its_size(grows: float) -> None:
     drift, told = drift_in(picture_grows=grows)
     found = drift.at_frames[-1] - drift.at_frames[0]
-    assert drift.told
+    assert drift.certain
     assert abs(found - grows) < 3 * 2 * drift.sigma[-1] + 0.1 * GROWS  # one step of linear equations
     assert any(("grows" if grows > 0 else "shrinks") in words for words in told)
 
@@ -104,15 +104,15 @@ def test_in_a_reducer_no_drift_is_told(changes: dict[str, float]) -> None:
     """Rings and texture depart from each other there as they do where the picture grows."""
     for bore, told in ((ONE_BORE, True), (REDUCER, False)):
         steady = steady_run(bore, 0.0, **changes)
-        assert (steady.drift.told or steady.drift.ambiguous) == told
+        assert (steady.drift.certain or steady.drift.ambiguous) == told
         assert (steady.scale_sigma is not None) == told
 
 
 def test_without_texture_a_picture_that_grows_may_be_a_pipe_that_widens() -> None:
     """Of 85 lit pictures 84 showed no texture, and the picture was said to grow by 8 %."""
     seen, lost = (steady_run(ONE_BORE, share, picture_grows=GROWS) for share in (0.1, 0.9))
-    assert seen.drift.told
-    assert not lost.drift.told
+    assert seen.drift.certain
+    assert not lost.drift.certain
     assert lost.drift.ambiguous
     assert lost.scale_sigma is not None
 
@@ -149,9 +149,9 @@ class WholeRun:
         return replace(was, tracks=tracks, rings=replace(was.rings, xyz_c=was.rings.xyz_c - larger))
 
 
-@pytest.mark.parametrize(("again", "taken_out"), [(1.0, True), (0.1, False)])
+@pytest.mark.parametrize(("again", "corrected"), [(1.0, True), (0.1, False)])
 def test_a_drift_that_is_not_found_again_is_not_taken_out(
-    again: float, taken_out: bool, monkeypatch: pytest.MonkeyPatch
+    again: float, corrected: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Behind a filter against noise one of .55 % was taken out, and .07 % were found then."""
     made, parameters = scene(FEW, 100, noise=0.1, picture_grows=GROWS), MotionParameters()
@@ -163,8 +163,8 @@ def test_a_drift_that_is_not_found_again_is_not_taken_out(
     monkeypatch.setattr(steady_scale, "estimate_state", lambda *_: estimate)
     run = WholeRun(made)
     steady = with_steady_scale(cast(Any, run), WHOLE, estimate, made.measured, parameters, cast(Any, None))
-    assert steady.taken_out == steady.drift.told == (steady.scale is not None) == taken_out
-    assert steady.drift.contradicted != taken_out
+    assert steady.corrected == steady.drift.certain == (steady.scale is not None) == corrected
+    assert steady.drift.contradicted != corrected
     assert steady.scale_sigma is not None
     assert (steady.scale_sigma >= np.abs(drift.at_frames)).all()
     assert steady.distance_sigma > 0
@@ -177,8 +177,8 @@ def test_a_drift_that_contradicts_itself_is_told_as_such() -> None:
     for p_neither in (0.0, 1.0):
         told: list[str] = []
         refused = replace(drift, p_neither=p_neither, contradicted=True)
-        refused.warn(replace(quiet_context(), warn=told.append), taken_out=False)
-        assert not refused.told
+        refused.warn(replace(quiet_context(), warn=told.append), corrected=False)
+        assert not refused.certain
         assert not refused.ambiguous
         assert len(told) == 1
         assert "texture and rings do not agree" in told[0]
@@ -192,7 +192,7 @@ def test_a_drift_that_is_real_is_found_again_and_taken_out() -> None:
     steady = with_steady_scale(
         cast(Any, WholeRun(made)), WHOLE, estimate, made.measured, parameters, lambda *_: None
     )
-    assert steady.taken_out
+    assert steady.corrected
     assert not steady.drift.contradicted
     assert steady.scale is not None
     assert np.ptp(steady.scale) == pytest.approx(GROWS, rel=0.1)
@@ -202,7 +202,7 @@ def test_a_drift_that_is_real_is_found_again_and_taken_out() -> None:
 def test_what_drifts_goes_one_way(course: tuple[float, ...], told: bool) -> None:
     """Grooves of a gauge left a course up and down in a healthy probe, 6 σ from a steady scale."""
     drift = drift_in()[0]
-    assert not drift.told
+    assert not drift.certain
     assert replace(drift, at_frames=GROWS * np.array(course), p_steady=1e-9).told == told
 
 
@@ -210,7 +210,7 @@ def test_what_no_lens_does_is_told_with_other_causes() -> None:
     drift, told = drift_in(picture_grows=GROWS)[0], []
     context = replace(quiet_context(), warn=told.append)
     for times in (1.0, 10.0):
-        replace(drift, at_frames=times * drift.at_frames).warn(context, taken_out=times == 1.0)
+        replace(drift, at_frames=times * drift.at_frames).warn(context, corrected=times == 1.0)
     assert ["water" in words for words in told] == [False, True]
     assert "No lens changes so much" in told[1]
 
@@ -282,7 +282,7 @@ def test_a_probe_moved_by_what_is_in_doubt_is_as_unsure_as_it_was_moved(
         np.arange(4), np.arange(4) / 30, run.T_pc, np.zeros((4, 6, 6)), straight_axis(-50.0, 150.0), RADIUS,
         1, 0, 0, (), run.probe.parameters + moved, 1e-4 * np.eye(len(moved)),
     )  # fmt: skip
-    found = doubting_instrument(got, run.probe, lasting, trembles).instrument_covariance
+    found = with_doubtful_instrument(got, run.probe, lasting, trembles).instrument_covariance
     assert found is not None
     np.testing.assert_allclose(found, 1e-4 * np.eye(len(moved)) + doubted * np.outer(moved, moved))
 
@@ -314,6 +314,6 @@ def test_distances_are_as_unsure_as_the_pipe_is_wider_by_a_probe_in_doubt() -> N
         1, 0, 0, (), run.probe.parameters + moved, 1e-4 * np.eye(len(moved)),
     )  # fmt: skip
     sound = replace(plain, distance_sigma_mm=0.01)
-    doubted = doubting_instrument(sound, run.probe, 0.5, shakes=True)
+    doubted = with_doubtful_instrument(sound, run.probe, 0.5, shakes=True)
     assert doubted.distance_sigma_mm == pytest.approx(np.hypot(0.01, 0.01 * 2.7), rel=0.01)
     assert np.sqrt(doubted.covariance[:, 2, 2]) == pytest.approx(0.01 * 0.9 * np.arange(4), abs=1e-4)

@@ -105,7 +105,7 @@ def jump_in(run: DrawnRun) -> RingJump | None:
 
 def test_rings_that_texture_does_not_follow_were_knocked() -> None:
     found = knock_in(ring_shifted(scene(FRAMES, LANDMARKS, noise=1.0), SHIFT_MM), (SHIFT_MM, 0, 0))
-    assert found.told
+    assert found.certain
     tilt = SHIFT_MM / (RADIUS * RADIUS / 22.0)  # dr = r tan θ tan φ, tan θ = r / l
     assert found.knock.change[1] == pytest.approx(-tilt, rel=0.1)
 
@@ -113,7 +113,7 @@ def test_rings_that_texture_does_not_follow_were_knocked() -> None:
 def test_a_knock_of_which_the_rings_show_a_part_at_first_is_one() -> None:
     """A knock that takes longer than a ring, as that of one drawn by another renderer, jumps by less."""
     found = knock_in(ring_shifted(scene(FRAMES, LANDMARKS, noise=1.0), SHIFT_MM), (0.4 * SHIFT_MM, 0, 0))
-    assert found.told
+    assert found.certain
 
 
 @pytest.mark.parametrize("joint_mm", [(0.0, SHIFT_MM), (SHIFT_MM, 0.0)])
@@ -121,7 +121,7 @@ def test_a_pipe_that_steps_is_not_taken_for_it(joint_mm: tuple[float, float]) ->
     """The rings jump as much as by a knock, but so do the landmarks behind the joint."""
     wider, aside = joint_mm
     found = knock_in(scene(FRAMES, LANDMARKS, noise=1.0, joint_mm=joint_mm), (aside, 0, wider))
-    assert not found.told
+    assert not found.certain
     assert not found.ambiguous
 
 
@@ -132,8 +132,8 @@ def test_a_jump_of_which_texture_cannot_tell_is_said_to_be_one() -> None:
     jump = RingJump.of(7, np.array([0.5, 0, 0]), ring, instrument, 30.0, ONE_BORE)
     for better in (-50.0, 2.0, 50.0):
         KnockTest(jump.guess, better, jump, 1.0).warn(context)
-    assert ["does not tell for sure" in words for words in told] == [True, False]
-    assert "knocked against each other, by" in told[1]
+    assert ["does not show clearly" in words for words in told] == [True, False]
+    assert "knocked relative to each other, by" in told[1]
     wider = replace(jump, jump_mm=np.array([0.1, 0, 0.9]))
     KnockTest(wider.guess, 50.0, wider, 1.0).warn(context)
     assert ["or the picture's scale changed" in words for words in told] == [False, False, True]

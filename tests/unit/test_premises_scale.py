@@ -27,7 +27,7 @@ from tests.spoiled_recordings import KeptFrames
         (1 / 25.4, "in inch"),
         (1 / 1000, "in m "),
         (-1.0, "its sign reversed"),
-        (-0.1, "in cm in place of mm and"),
+        (-0.1, "in cm instead of mm and"),
     ],
 )
 def test_the_encoder_is_brought_to_mm_and_to_the_sense_of_the_motion(factor, message, good, run):
@@ -166,7 +166,7 @@ def test_pictures_stored_last_first_end_the_run(seed, encoder, sense):
 def test_a_steady_probe_does_not_tell_whether_the_video_runs_backwards(good, run):
     assert not runs_forwards(*turned_round(pulled(1, steady=True)))
     backwards = replace(good, encoder=replace(good.encoder, distance_mm=-good.encoder.distance_mm))
-    assert "Look whether the video runs backwards" in checked(backwards, run.probe)[1][0]
+    assert "Check whether the video runs backwards" in checked(backwards, run.probe)[1][0]
 
 
 def test_a_recording_whose_video_runs_backwards_is_refused(good, run):

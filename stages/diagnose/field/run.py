@@ -106,14 +106,14 @@ def field_run(
 
 def warn_of_knock(knock: KnockTest | None, context: Context) -> None:
     """Warn of a laser that was, or may have been, knocked during the run; the run is examined as it is."""
-    if knock is None or not (knock.told or knock.ambiguous):
+    if knock is None or not (knock.certain or knock.ambiguous):
         return
     x, y, radius = knock.jump.jump_mm
     context.warn(
         f"at {knock.time_s:.2f} s (frame {knock.jump.frame}) the inspection's rings jump by "
         f"{np.hypot(x, y):.2f} mm across and {radius:+.2f} mm of radius: laser and camera were knocked "
-        f"against each other{'' if knock.told else ', or the pipe steps there'}. The inspection is examined "
-        "as if nothing had moved. What to do: fix laser and camera, and record both runs anew"
+        f"against each other{'' if knock.certain else ', or the pipe steps there'}. The inspection is "
+        "examined as if nothing had moved. What to do: fix laser and camera, and record both runs anew"
     )
 
 

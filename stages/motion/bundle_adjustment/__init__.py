@@ -1,1 +1,1 @@
-"""Bundle adjustment: poses, landmarks, pipe axis and instrument from everything that a window measured."""
+"""Bundle adjustment: poses, landmarks, pipe axis and instrument from all measurements of a window."""

@@ -1,8 +1,8 @@
-"""The delay of the encoder's clock against the pictures' clock, estimated from the motion.
+"""Estimates the delay of the encoder's clock relative to the pictures' clock from the motion.
 
-A reading is the scaled distance at a shifted time. What remains is rounding, and a random walk that stands
-for slips of the wheel and drifts of the estimate. The difference is whitened by both and fitted robustly at
-every delay; of several strengths of the walk the likeliest is taken.
+A reading is the scaled distance at a shifted time. The residual is rounding, and a random walk that models
+slips of the wheel and drifts of the estimate. The difference is whitened by both and fitted robustly at
+every delay; of several strengths of the walk the most likely is taken.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ _LONGEST_S = 1.0
 (`stages.motion.encoder.contradicted`). Delays are tried by whole frames, because between two frames the
 rounding of both would be averaged."""
 _WALKS_MM = np.geomspace(0.002, 0.064, 6)
-"""Strengths of the walk tried, mm a frame: motion by texture walks by .002 in open-1, slips are more."""
+"""Strengths of the walk tried, mm per frame: motion from texture walks by .002 in open-1, slips by more."""
 _FRAMES = 400
 """Frames compared at most: a matrix of that size takes a hundredth of a second."""
 _FEWEST = 30
@@ -36,18 +36,19 @@ _MOVES = 3.0
 rounding. Less does no harm; at even speed any delay moves them by 1.4 times, since both are rounded."""
 _ROUNDS = 5
 _STANDS = 1e-12
-"""Share of a reading's square beside its shift from which it moves at all: less is rounding."""
+"""Share of the readings' mean square that must remain after removal of their mean, for them to move at
+all."""
 _REDESCENT = 2.5
 """Larger whitened differences are weighted down: they belong to slips, which could be taken for a delay."""
 
 
 @dataclass(frozen=True)
 class EncoderDelay:
-    """How late the encoder's times are against those of the pictures, s, with its 1 σ.
+    """Delay of the encoder's times relative to those of the pictures, s, with its 1 σ.
 
-    ``better`` is the log likelihood of the delay over that of none. It is needed beside σ: at even speed one
-    delay is nearly as likely as another, even where the optimum is sharp. ``moves`` is by how many σ of a
-    reading, rms, the delay moves the readings after a shift and a scale.
+    ``better`` is the log likelihood ratio of the delay to none. It is needed in addition to σ: at even speed
+    one delay is nearly as likely as another, even where the optimum is sharp. ``moves`` is the rms change of
+    the readings by the delay after a shift and a scale, in σ of a reading.
     """
 
     delay_s: float
@@ -61,8 +62,8 @@ class EncoderDelay:
         certain = self.better > 0.5 * _SURE**2 and abs(self.delay_s) > _SURE * self.sigma_s
         return certain and self.moves > _MOVES
 
-    def taken_out(self, encoder: EncoderReadings, time_s: Float) -> EncoderReadings:
-        """Return the readings that belong to the times (N,) of the pictures; at an end they are unknown."""
+    def corrected(self, encoder: EncoderReadings, time_s: Float) -> EncoderReadings:
+        """Return readings corrected to the times (N,) of the pictures; at one end they are unknown."""
         then = time_s + self.delay_s
         shown = encoder.known & (then >= time_s[0]) & (then <= time_s[-1])
         at_frames = np.interp(then, time_s, encoder.distance_mm)
@@ -74,13 +75,14 @@ class EncoderDelay:
             return
         way = "late" if self.delay_s > 0 else "early"
         context.warn(
-            f"the times in encoder.csv are {abs(self.delay_s):.3f} ± {self.sigma_s:.3f} s {way} against the "
-            "motion in the pictures; this is corrected. What to do: synchronise the clocks, or correct time_s"
+            f"the times in encoder.csv are {abs(self.delay_s):.3f} ± {self.sigma_s:.3f} s {way} relative to "
+            "the motion in the pictures; this is corrected. What to do: synchronise the clocks, or correct "
+            "time_s"
         )
 
 
 def delay_of_encoder(estimate: Estimate, measured: Measurements) -> EncoderDelay | None:
-    """Return the delay of the encoder against an estimate of the motion; None where nothing tells it."""
+    """Return the delay of the encoder relative to an estimate of the motion; None without evidence."""
     if measured.encoder is None:
         return None
     z = distance_along(estimate.state.axis, estimate.state.T_pc)
@@ -88,7 +90,7 @@ def delay_of_encoder(estimate: Estimate, measured: Measurements) -> EncoderDelay
 
 
 def find_delay(time_s: Float, distance_mm: Float, encoder: EncoderReadings) -> EncoderDelay | None:
-    """Return the delay of readings (N,) against distances (N,); None where nothing tells it."""
+    """Return the delay of readings (N,) relative to distances (N,); None without evidence."""
     inside = (time_s > time_s[0] + _LONGEST_S) & (time_s < time_s[-1] - _LONGEST_S) & encoder.known
     used = np.flatnonzero(inside)
     if len(used) < _FEWEST:
@@ -116,7 +118,7 @@ def _moved_mm(before: Float, after: Float) -> float:
 
 
 def _costs(z: Float, reading: Float, sigma_mm: float, walk_mm: float) -> Float:
-    """Return minus the log likelihood (K,) of distances (M,) at readings (M, K) of each delay."""
+    """Return the negative log likelihood (K,) of distances (M,) for the readings (M, K) at each delay."""
     count = np.arange(1.0, len(z) + 1)
     root = np.linalg.cholesky(sigma_mm**2 * np.eye(len(z)) + walk_mm**2 * np.minimum(count[:, None], count))
     white = solve_triangular(root, np.column_stack([z, np.ones_like(z), reading]), lower=True)

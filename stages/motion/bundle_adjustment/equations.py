@@ -26,24 +26,24 @@ from stages.motion.rings import RingBins
 from stages.motion.tracking.landmarks import Tracks
 
 MATCH_BIASES = 5
-"""Corrections of texture matching, last of the instrument's: radial, at so many knots of the polar angle and
-linear between. What shifts matches is local in the picture: compression drops the fine texture of the dim
-wall far ahead, an edge of the tracked field cuts patches, a template is seen from another angle. A bias at
-the far end alone, allowed for as a constant and a slope, was taken for 0.8 mm of distance with 0.03 mm stated
+"""Corrections of texture matching, last among the instrument's: radial, at this many knots of the polar angle
+and linear between. Causes of these errors are local in the picture: compression drops the fine texture of the
+dim wall far ahead, an edge of the tracked field cuts patches, a template is seen from another angle. A bias
+at the far end alone, modelled as a constant and a slope, was taken for 0.8 mm of distance with 0.03 mm stated
 (`test_a_bias_of_far_matches_is_not_taken_for_distance`)."""
 _RADIUS_SHARE = 0.1
-"""1 σ of radius and ovality beforehand, as a share of the radius: rings tell far more."""
+"""Prior 1 σ of radius and ovality, as a share of the radius: rings are far more precise."""
 _FINEST_WALL_MM = 0.02
-"""Smallest spread of the rings about the smooth pipe that is believed. Not measured."""
+"""Smallest spread of the rings around the smooth pipe that is accepted. Not measured."""
 _REDESCENT = 2.5
-"""Width of the rings' Geman-McClure loss in spreads of the wall: what lies farther off, a defect, hardly
-counts. The usual tuning constant; not measured here."""
+"""Width of the rings' Geman-McClure loss in spreads of the wall: points farther off, such as defects, have
+hardly any weight. The usual tuning constant; not measured here."""
 _LEAST_EXCESS = 0.3
-"""Matches are never believed to be more than three times better than predicted. Not measured."""
+"""Matches never count as more than three times better than predicted. Not measured."""
 _DAMPED = 1e-5
-"""Relative damping with which covariances are computed where rounding made the equations singular."""
+"""Relative damping with which covariances are computed if rounding made the equations singular."""
 LEAST_REACH = 4
-"""Frames that are coupled at least: a third difference has four."""
+"""Smallest number of coupled frames: a third difference has four."""
 _AT_ONCE, _THREADS = 16384, 2
 
 
@@ -58,15 +58,15 @@ class Measurements:
     time_s : (N,)
     encoder : EncoderReadings or None
     probe : Probe
-        As stated.
+        The stated probe.
     unsure : (P, Q)
-        Its principal uncertainties.
+        Principal uncertainties of the probe.
     smooth_sigma : (6,)
         1 σ of the pose's third difference from frame to frame, mm and rad.
     shared : (S,) or None
-        Encoder scale and instrument (`State.shared`) as the whole run has them, where that is known.
+        Encoder scale and instrument (`State.shared`) of the whole run, once they are known.
     held : int
-        The frame that stays where it is, since it defines the frame of the estimate.
+        Index of the fixed frame, which defines the coordinate frame of the estimate.
     """
 
     tracks: Tracks
@@ -83,7 +83,7 @@ class Measurements:
     def of(
         tracks: Tracks, rings: RingBins, time_s: Float, encoder: EncoderReadings | None, probe: Probe
     ) -> Measurements:
-        """Return measurements of a motion whose smoothness is not known yet."""
+        """Return measurements of a motion of yet unknown smoothness."""
         unsure = probe.principal_uncertainties()
         return Measurements(tracks, rings, time_s, encoder, probe, unsure, LOOSE)
 
@@ -100,9 +100,9 @@ class Scales:
     Attributes
     ----------
     texture : float
-        By how much matches err beyond their predicted σ.
+        Error of the matches over their predicted σ.
     wall_mm : float
-        1 σ of the wall about the smooth pipe.
+        1 σ of the wall around the smooth pipe.
     """
 
     texture: float
@@ -111,12 +111,12 @@ class Scales:
 
 @dataclass(frozen=True)
 class Equations:
-    """Every equation, linearised at one state of so many ``frames``.
+    """All equations, linearised at one state of ``frames`` frames.
 
     Attributes
     ----------
     rows : tuple of Rows
-        Those without landmarks whose σ is known beforehand.
+        Equations without landmarks, with known σ.
     rings : Rows
     texture : LandmarkRows
     """
@@ -128,7 +128,7 @@ class Equations:
 
     @property
     def cost(self) -> float:
-        """Return the robust cost: half the squared residuals in σ, where they are small."""
+        """Return the robust cost: half the squared residuals in σ, as far as they are small."""
         return sum(row.cost for row in (*self.rows, self.rings)) + self.texture.cost
 
     @property
@@ -151,7 +151,7 @@ class Equations:
         return Step(frames, border, landmark_steps(self.texture, inverse_information, right, frames, border))
 
     def decrease(self, step: Step) -> float:
-        """Return the decrease of the cost that the linear equations predict of a step."""
+        """Return the decrease of the cost that the linear equations predict for a step."""
         return sum(row.decrease(step) for row in (*self.rows, self.rings)) + self.texture.decrease(step)
 
     def factor(self) -> Factor:
@@ -222,7 +222,7 @@ def rescaled(equations: Equations, tracks: Tracks, scales: Scales) -> Equations:
 
 
 def scales_of(equations: Equations, tracks: Tracks, alike: float) -> Scales:
-    """Return the scales that residuals show; ``alike`` neighbouring observations of a landmark err alike."""
+    """Return the scales of the residuals; ``alike`` neighbouring observations of a landmark share errors."""
     size = np.linalg.norm(equations.texture.residual, axis=1)
     excess = _excess_of(size, tracks.sigma_px) * np.sqrt(alike)
     relief = np.abs(equations.rings.residual)
@@ -233,7 +233,7 @@ def scales_of(equations: Equations, tracks: Tracks, alike: float) -> Scales:
 def landmark_rows(state: State, measured: Measurements, parameters: MotionParameters) -> LandmarkRows:
     """Return the equations of texture, each match with its predicted σ.
 
-    A landmark that projects nowhere does not pull, but costs as much as one far from its match.
+    A landmark without a projection has no influence, but costs as much as one far from its match.
     """
     tracks, count = measured.tracks, len(measured.tracks.frame)
     unsure = measured.unsure.shape[1]
@@ -275,7 +275,7 @@ def _observe(
 
 
 def _excess_of(size: Float, sigma: Float) -> float:
-    """Return by how much residuals (M,) of two coordinates exceed their σ: for Rayleigh's median, 1."""
+    """Return the ratio of residuals (M,) of two coordinates to their σ; 1 at the median of Rayleigh's law."""
     if not len(size):
         return 1.0
     return max(float(np.median(size / sigma) / np.sqrt(2 * np.log(2))), _LEAST_EXCESS)

@@ -1,4 +1,4 @@
-"""A linear step of the adjustment at its optimum, with further unknowns that change rings and texture."""
+"""Makes a linear step at the adjustment's optimum, with further unknowns that change rings and texture."""
 
 from __future__ import annotations
 
@@ -21,17 +21,18 @@ from stages.motion.bundle_adjustment.unknowns import State
 
 @dataclass(frozen=True)
 class ExtraColumns:
-    """What K further unknowns change, and their 1 σ beforehand (K,).
+    """Derivatives of the residuals by K further unknowns, and the prior 1 σ of these.
 
     Attributes
     ----------
     rings : (M, K)
-        Residuals of the rings' bins.
+        Derivatives of the residuals of the rings' bins.
     pixels : (O, 2, K)
-        Residuals of texture.
+        Derivatives of the residuals of texture.
     landmarks : (L, K)
-        Residuals of landmarks against the smooth pipe.
+        Derivatives of the residuals of landmarks relative to the smooth pipe.
     sigma : (K,)
+        Prior 1 σ of the unknowns.
     """
 
     rings: Float
@@ -77,9 +78,9 @@ class RingsInPipe:
     ----------
     xyz_c : (M, 3)
     span_mm, azimuth_rad : (M,)
-        Along the pipe and around it.
+        Distance along the pipe, and azimuth.
     normal_c : (M, 3)
-        The wall's normals in C.
+        Normals of the wall in C.
     """
 
     xyz_c: Float
@@ -89,7 +90,7 @@ class RingsInPipe:
 
     @staticmethod
     def of(state: State, measured: Measurements) -> RingsInPipe:
-        """Return where the rings lie."""
+        """Return the rings' bins at a state."""
         rings, T = measured.rings, state.T_pc[measured.rings.frame]
         xyz_c = rings.xyz_c + rings.by_instrument @ state.instrument[: rings.by_instrument.shape[2]]
         xyz_p = transform(T, xyz_c)
@@ -100,7 +101,7 @@ class RingsInPipe:
 
 
 def chance(value: Float, covariance: Float) -> float:
-    """Return the chance by which values (K,) lie as far from 0 or farther."""
+    """Return the probability that values (K,) lie as far from 0 by chance, or farther."""
     return float(chdtrc(len(value), value @ np.linalg.solve(covariance, value)))
 
 

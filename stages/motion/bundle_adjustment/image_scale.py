@@ -1,9 +1,9 @@
-"""An image scale that drifts over a run, told from a pipe that widens, by a linear step at an estimate.
+"""Distinguishes an image scale that drifts over a run from a pipe that widens, by a linear step.
 
-A lens that warms up, or a laser that moves against the camera, makes the rings grow or shrink over the run: a
-picture larger by a share ε has rings with 3 ε more radius, but the wall that texture follows, between
-landmarks and encoder, is wider by 0.3 ε only (open-1-field). A pipe that widens is wider in both. Columns for
-both, low polynomials of time and of distance, are added to the equations at their optimum.
+A lens that warms up, or a laser that moves relative to the camera, makes the rings grow or shrink over the
+run: in a picture enlarged by a share ε, rings have a radius larger by 3 ε, but the wall as located by texture
+and encoder is wider by 0.3 ε only (open-1-field). A pipe that widens is wider in both. Columns for both
+causes, low polynomials of time and of distance, are added to the equations at their optimum.
 """
 
 from __future__ import annotations
@@ -23,35 +23,36 @@ from stages.motion.bundle_adjustment.solver import Estimate
 from stages.motion.bundle_adjustment.unknowns import State
 
 _COURSE, _WIDTH = 3, 4
-"""Degrees of the polynomials: warming up by an exponential of a third of the run is followed by three to a
-thirtieth of its size; the pipe's width gets one more, so that its own waves are not taken for the lens."""
+"""Degrees of the polynomials: three follow an exponential warm-up of a third of the run to a thirtieth of its
+size; the pipe's width gets one more, so that its own waves are not attributed to the lens."""
 _LARGEST = 0.1
-"""1 σ of either beforehand, relative: no more than keeps the equations regular."""
+"""Relative prior 1 σ of either: just enough to keep the equations regular."""
 _SURE_P = 1e-4
-"""Chance of the equations by which a steady scale is refused: that of 4 σ."""
+"""Probability below which a steady scale is rejected: that of 4 σ."""
 _MAY_BE_P = 1e-3
-"""Chance above which the rings' course may all be due to the scale: that of 3 σ."""
+"""Probability above which the rings' course may be due to the scale alone: that of 3 σ."""
 _ONE_WAY = 0.5
-"""Share of its range by which a scale that drifts must have changed from first to last: what warms up or
-comes loose goes one way. Grooves of a gauge left a fifth in a healthy probe (a01), drifts have 0.9."""
+"""Share of its range by which a scale that drifts must have changed from first to last: warming up and coming
+loose go one way. Grooves of a gauge left a fifth in a healthy probe (a01), drifts have 0.9."""
 _LARGE = 0.01
-"""Course, relative, from which it is not taken out. One of 0.8 % was, within its σ; at 1 % over 80 mm the
+"""Relative course from which it is not corrected. One of 0.8 % was, within its σ; at 1 % over 80 mm the
 rings' change was taken for a step of the bore. A pipe full of water came to 7 %."""
 _OTHER_CAUSE = 0.1
-"""Share of the course that is unsure: a laser that moves changes the rings alone, a lens the wall seen in
-texture too, by a tenth as much, which is below the σ of texture."""
+"""Uncertain share of the course: a laser that moves changes the rings alone, a lens also changes the wall
+seen
+in texture, by a tenth as much, which is below the σ of texture."""
 
 
 @dataclass(frozen=True)
 class ScaleDrift:
-    """How the image scale changes over a window; its mean is taken to be the probe's.
+    """Course of the image scale over a window; its mean is assumed to be the probe's scale.
 
     Attributes
     ----------
     at_frames : (N,)
-        By how much pictures are larger than on average, relative, including what was corrected so far.
+        Relative excess of the pictures' size over its mean, including the correction so far.
     sigma : (N,)
-        Its 1 σ.
+        1 σ of ``at_frames``.
     p_steady : float
         Probability of a scale that changes so much if it was steady.
     p_even : float
@@ -59,11 +60,11 @@ class ScaleDrift:
     p_neither : float
         Probability of rings that change so much if neither scale nor width did.
     alone : (N,)
-        The course if the pipe is of one width.
+        The course of the scale if the pipe has one width.
     ring_mm : float
-        Gain of the rings' radius per relative gain of scale.
+        Change of the rings' radius per relative change of the scale.
     stated_mm : float
-        1 σ of the pipe's radius without any of it.
+        1 σ of the pipe's radius without a drift.
     contradicted : bool
         Whether the run with the drift corrected did not confirm it: see `with_steady_scale`.
     """
@@ -79,64 +80,66 @@ class ScaleDrift:
     contradicted: bool = False
 
     @property
-    def told(self) -> bool:
-        """Whether the scale cannot have been steady, and went one way."""
+    def certain(self) -> bool:
+        """Whether the scale certainly drifted: it cannot have been steady, and went one way."""
         one_way = abs(self.change) > _ONE_WAY * float(np.ptp(self.at_frames))
         return self.p_steady < _SURE_P and one_way and not self.contradicted
 
-    def not_told(self) -> ScaleDrift:
-        """Return the drift as one that is neither certain (`told`) nor `ambiguous`."""
+    def without_evidence(self) -> ScaleDrift:
+        """Return the drift as one that is neither `certain` nor `ambiguous`."""
         return replace(self, p_steady=1.0, p_neither=1.0)
 
-    def not_told_from_width(self) -> ScaleDrift:
-        """Return the drift as one that a widening pipe explains as well."""
+    def indistinct_from_width(self) -> ScaleDrift:
+        """Return the drift as one that a widening pipe explains equally well."""
         return replace(self, p_steady=1.0, p_even=1.0)
 
     @property
     def change(self) -> float:
-        """Return the relative gain of the scale from first to last."""
+        """Return the relative change of the scale from first to last."""
         return float(self.at_frames[-1] - self.at_frames[0])
 
     @property
     def large(self) -> bool:
-        """Whether it is more than a lens changes by warming up."""
+        """Whether it exceeds the change of a lens that warms up."""
         return float(np.ptp(self.at_frames)) > _LARGE
 
     @property
     def ambiguous(self) -> bool:
-        """Whether the rings change, and a lens that drifts explains it as well as a pipe that widens."""
-        return not (self.told or self.contradicted) and self.p_neither < _SURE_P and self.p_even > _MAY_BE_P
+        """Whether the rings change, and a drifting lens and a widening pipe explain it equally well."""
+        return (
+            not (self.certain or self.contradicted) and self.p_neither < _SURE_P and self.p_even > _MAY_BE_P
+        )
 
     @property
     def offset_sigma(self) -> float:
-        """Return the relative 1 σ of the mean scale: the probe was calibrated anywhere on the course."""
+        """Return the relative 1 σ of the mean scale: the calibration may belong to any part of the course."""
         return float(np.abs(self.at_frames).max())
 
     @property
     def stated_sigma(self) -> Float:
-        """Return the 1 σ (N,) of the scale, relative, that radii are to be stated with."""
-        if self.told or self.contradicted:
+        """Return the relative 1 σ (N,) of the scale for the σ of radii."""
+        if self.certain or self.contradicted:
             own = np.hypot(self.sigma, _OTHER_CAUSE * self.at_frames)
             return np.asarray(np.hypot(own, self.offset_sigma))
         return np.abs(self.alone) if self.ambiguous else np.zeros_like(self.alone)
 
-    def warn(self, context: Context, taken_out: bool) -> None:
+    def warn(self, context: Context, corrected: bool) -> None:
         """Warn of a scale that drifts, or of rings that may change because of it."""
-        if self.told:
-            context.warn(self._words(taken_out))
+        if self.certain:
+            context.warn(self._words(corrected))
         elif self.contradicted:
             context.warn(
-                f"as if {self._what}. But with this taken out texture and rings do not agree, as where a "
-                "noise filter makes texture lag behind the wall. Nothing is corrected: σ of the radii "
-                "includes it. What to do: switch off noise reduction, let the probe warm up, or measure both "
-                "ends' diameters"
+                f"it seems that {self._what}. But after correction texture and rings do not agree, as with a "
+                "noise filter that makes texture lag behind the wall. Nothing is corrected: σ of the radii "
+                "includes it. What to do: switch off noise reduction, let the probe warm up, or measure the "
+                "diameters at both ends"
             )
         elif self.ambiguous and (widest := float(np.ptp(self.alone) * abs(self.ring_mm))) > self.stated_mm:
             context.warn(
-                f"the rings change by {widest:.2f} mm of radius over the run. Either the pipe does, or the "
-                f"picture's scale drifts by {100 * np.ptp(self.alone):.2f} % (a lens that warms up): there "
-                "is too little texture to tell which. σ of the radii includes it. What to do: let the probe "
-                "warm up, record back and forth, give an encoder, or measure both ends' diameters"
+                f"the radius of the rings changes by {widest:.2f} mm over the run. Either the pipe's does, "
+                f"or the picture's scale drifts by {100 * np.ptp(self.alone):.2f} % (a lens that warms up): "
+                "there is too little texture to decide. σ of the radii includes it. What to do: let the "
+                "probe warm up, record back and forth, use an encoder, or measure the diameters at both ends"
             )
 
     @property
@@ -144,32 +147,32 @@ class ScaleDrift:
         course = float(np.ptp(self.at_frames))
         return (
             f"the picture {'grows' if self.change > 0 else 'shrinks'} by {100 * course:.2f} % over the run: "
-            f"the rings change by {abs(course * self.ring_mm):.2f} mm of radius, and the texture does not "
+            f"the rings' radius changes by {abs(course * self.ring_mm):.2f} mm, and the texture does not "
             "follow"
         )
 
-    def _words(self, taken_out: bool) -> str:
+    def _words(self, corrected: bool) -> str:
         if self.large:
             return (
-                f"as if {self._what}. No lens changes so much by warming up: zoom or stabilisation is on, "
-                "the laser is loose, or the pipe's filling (water) or the probe is not as stated. This is "
-                "not corrected: radii and distances may be off by more than their σ. What to do: look at the "
-                "pictures and the probe file, run boresight diagnose"
+                f"it seems that {self._what}. No lens changes so much by warming up: zoom or stabilisation "
+                "is on, the laser is loose, or the pipe's filling (water) or the probe is not as stated. "
+                "This is not corrected: radii and distances may be wrong by more than their σ. What to do: "
+                "check the pictures and the probe file, run boresight diagnose"
             )
         outcome = (
-            "This is corrected in motion and radii, and their σ includes what remains"
-            if taken_out
-            else "Runs of this length are not corrected: radii and distances may be off by more than their σ"
+            "This is corrected in motion and radii, and their σ includes the rest"
+            if corrected
+            else "Runs of this length are not corrected: radii and distances may err by more than their σ"
         )
         return (
-            f"{self._what}. The lens warms up or is loose, the laser moves against the camera, or zoom or "
+            f"{self._what}. The lens warms up or is loose, the laser moves in its mount, or zoom or "
             f"stabilisation is on. {outcome}. What to do: let the probe warm up before the run, fix lens and "
             "laser, switch off zoom and stabilisation"
         )
 
 
 def drift_of_scale(estimate: Estimate, measured: Measurements, before: Float | None = None) -> ScaleDrift:
-    """Return the course of the image scale at an estimate; ``before`` (N,) was taken out of it already."""
+    """Return the course of the image scale at an estimate; ``before`` (N,) is already corrected in it."""
     course = _polynomials(measured.time_s, _COURSE)
     step, covariance = _widths_and_scales(estimate, measured, course).solved(estimate)
     widths = len(step) - _COURSE
@@ -207,7 +210,7 @@ def _widths_and_scales(estimate: Estimate, measured: Measurements, course: Float
 
 
 def _ring_gain(rings: RingsInPipe, state: State, measured: Measurements) -> tuple[Float, float]:
-    """Return what rings' residuals (M,) change by per scale that was too large, and the mean radius' gain."""
+    """Return derivatives of the rings' residuals (M,) by the image scale, and that of the mean radius, mm."""
     camera = measured.camera_at(state)
     radius_px = np.linalg.norm(camera.project(rings.xyz_c).uv - camera.centre_px, axis=1)
     gain = np.einsum("mi,mi->m", rings.normal_c, measured.rings.by_pixel) * radius_px
@@ -216,12 +219,12 @@ def _ring_gain(rings: RingsInPipe, state: State, measured: Measurements) -> tupl
 
 
 def _widths(at_mm: Float, bore: Bore) -> Float:
-    """Return what the pipe's width may add at distances (M,): (M, 4 + steps), smooth, and a step at each."""
+    """Return basis functions (M, 4 + steps) of the width at distances (M,): smooth, and one per step."""
     steps = (at_mm[:, None] > bore.at_mm).astype(float)
     return np.concatenate([_polynomials(at_mm, _WIDTH), steps], 1)
 
 
 def _polynomials(at: Float, degree: int) -> Float:
-    """Return Legendre's polynomials (M, degree) from the first on, over the span of places (M,)."""
+    """Return Legendre's polynomials (M, degree) from degree 1 on, over the range of ``at`` (M,)."""
     x = 2 * (at - at.min()) / max(float(np.ptp(at)), 1e-9) - 1
     return np.asarray(legendre.legvander(x, degree)[:, 1:])

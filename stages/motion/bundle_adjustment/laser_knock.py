@@ -1,9 +1,9 @@
-"""A laser knocked in mid-run, told from a pipe that steps, and taken out.
+"""Distinguishes a laser knocked in mid-run from a pipe that steps, and corrects the knock.
 
-A laser or camera that is knocked makes the rings jump from one to the next, all round at once and for good,
-and the texture does not follow. A pipe that steps in width or across, at a joint, makes the rings jump too;
-but the landmarks on its wall, seen before and after, lie where the rings do. Columns for both are added to
-the equations at their optimum.
+If laser or camera is knocked, the rings jump from one to the next, all round at once and permanently, and the
+texture does not follow. If the pipe steps in width or across, at a joint, the rings jump too; but the
+landmarks on its wall, seen before and after, agree with the rings. Columns for both causes are added to the
+equations at their optimum.
 """
 
 from __future__ import annotations
@@ -27,11 +27,12 @@ from stages.motion.rings import RingCircles
 from stages.motion.tracking.landmarks import TrackedPoses
 
 _SIDE = 3
-"""Rings on either side through which a line is laid; the jump is that of the lines between the two. With five
-the sway of open-1's probe counts four times as much."""
+"""Rings on either side through which a line is fitted; the jump is the distance of the two lines at the
+middle.
+With five rings the sway of open-1's probe has four times the influence."""
 _SUSPECT, _LEAST_MM = 10.0, 0.1
-"""Jump that is looked into, in spreads of such differences and in mm: good recordings show 3 to 4 (open-1,
-a01, a10), a weld 168 (open-2), after which the radius is what it was. A choice."""
+"""Jump that is examined, in spreads of such differences and in mm: good recordings show 3 to 4 (open-1,
+a01, a10), a weld 168 (open-2), after which the radius is the same as before. A choice."""
 _LARGEST_JUMP = 0.1
 """Share of the radius beyond which a jump is another bore: in gauges and reducers they differ by a fifth
 (a01) or more, and no laser moves so far. A choice."""
@@ -39,19 +40,24 @@ _SURE = float(np.log(1000))
 """Least log odds for a knock with which it is certain, and against one with which it is ruled out. Drawn runs
 without a knock, or with a joint, have -9 and less; a09, knocked by .35°, has 9."""
 _WELD = 0.3
-"""By what share of the jump the lasting change of radius may differ from it: more is the edge of a weld."""
+"""Largest difference of the permanent change of radius from the jump, as a share of the jump: at the edge of
+a
+weld it is larger."""
 _USUAL_MM = 1.0
-"""1 σ of each part of the jump that a knock or a joint is expected to make. It sets how much the freedom of
-either costs, equally for both. A choice."""
+"""Prior 1 σ of each component of the jump by a knock or a joint. It sets the penalty for the free parameters
+of
+either, equally for both. A choice."""
 _LARGEST = 0.2
-"""1 σ of any change beforehand, as a share of the radius or as a slope: it keeps the equations regular."""
+"""Prior 1 σ of any change, as a share of the radius or as a slope: it keeps the equations regular."""
 _LASER = 3
-"""Parameters of the sheet that may change: baseline and two slopes. A cone's change is a baseline's where the
-pipe has one diameter."""
+"""Parameters of the sheet that may change: baseline and two slopes. In a pipe of one diameter, a change of
+the
+cone is the same as one of the baseline."""
 
 LASER_AND_JOINT = np.repeat([True, False], _LASER)
-"""Which of six sizes are the laser's change (`LaserKnock.change`); the others are how far the pipe lies aside
-(x, y) and how much wider it is behind a joint, mm."""
+"""Which of six sizes are the laser's change (`LaserKnock.change`); the others are the displacement of the
+pipe
+(x, y) and its change of radius after a joint, mm."""
 
 
 @dataclass(frozen=True)
@@ -61,15 +67,15 @@ class RingJump:
     Attributes
     ----------
     frame : int
-        First frame behind it.
+        First frame after it.
     jump_mm : (3,)
-        Of the circle's centre, x and y of C, and its radius.
+        Jump of the circle's centre, x and y of C, and of its radius.
     by_laser : (3, 3)
         Jump per change of the laser (`LaserKnock.change`).
     at_mm : float
-        Where the rings lie that jump.
+        Distance of the jump along the pipe.
     bore : Bore
-        The pipe's, if the laser made the jump.
+        The pipe's bore, if the laser caused the jump.
     """
 
     frame: int
@@ -90,12 +96,12 @@ class RingJump:
 
     @property
     def guess(self) -> LaserKnock:
-        """Return the knock that would make all of the jump."""
+        """Return the knock that would explain the whole jump."""
         change = np.asarray(np.linalg.solve(self.by_laser, self.jump_mm), np.float64)
         return LaserKnock(self.frame, change, np.zeros((_LASER, _LASER)))
 
     def likelihood_of_size(self, size: Float, covariance: Float, free: Bool) -> float:
-        """Return what the freedom of those of `LASER_AND_JOINT` that are ``free`` (6,) costs, as a logarithm.
+        """Return the log penalty for the ``free`` (6,) parameters of `LASER_AND_JOINT`.
 
         It is Laplace's approximation of the prior's part in a marginal likelihood (D. MacKay, "Information
         theory, inference and learning algorithms", 2003, ch. 28): jumps are N(0, `_USUAL_MM`).
@@ -109,7 +115,7 @@ class RingJump:
 
 
 def find_jump(circles: RingCircles, at_mm: Float, points: RingPoints, probe: Probe) -> RingJump | None:
-    """Return where the rings, at distances (F,), jump most; None where they do not."""
+    """Return the largest jump of the rings, at distances (F,); None if there is none."""
     shape = np.column_stack([circles.centre_c, circles.radius_mm])
     seen = np.isfinite(shape).all(1)
     shape, frame, at_seen = shape[seen], circles.frame[seen], at_mm[seen]
@@ -117,7 +123,7 @@ def find_jump(circles: RingCircles, at_mm: Float, points: RingPoints, probe: Pro
         return None
     weight, sway = _jump_of_lines(frame)
     jump = np.einsum("nci,ni->nc", sliding_window_view(shape, 2 * _SIDE, axis=0), weight)
-    # Rings of a picture that stands still are the same: then only rounding differs.
+    # Rings of a repeated picture are the same: then only rounding differs.
     usual = np.maximum(robust_spreads(jump, axis=0), np.finfo(np.float32).eps)
     spreads = np.linalg.norm(jump / usual, axis=1) / sway
     most = int(np.argmax(spreads))
@@ -135,7 +141,7 @@ def find_jump(circles: RingCircles, at_mm: Float, points: RingPoints, probe: Pro
 
 
 def texture_breaks(jump: RingJump, ring_frame: Int, poses: TrackedPoses) -> bool:
-    """Return whether texture is lost beside the jump of rings (F,): it cannot tell a knock from a cut."""
+    """Return whether texture is lost at the jump of rings (F,): a knock then cannot be told from a cut."""
     place = int(np.searchsorted(ring_frame, jump.frame))
     first, last = ring_frame[max(place - 1, 0)], ring_frame[min(place + 1, len(ring_frame) - 1)]
     lost = poses.frames[poses.lost]
@@ -144,13 +150,13 @@ def texture_breaks(jump: RingJump, ring_frame: Int, poses: TrackedPoses) -> bool
 
 @dataclass(frozen=True)
 class KnockTest:
-    """A laser's knock as rings, texture and encoder show it.
+    """Result of the test for a knock of the laser by rings, texture and encoder.
 
     Attributes
     ----------
     knock : LaserKnock
     better : float
-        By how much likelier the rings, texture and encoder are with a knock than without, as a logarithm.
+        Log likelihood ratio of rings, texture and encoder with a knock to without.
     jump : RingJump
     time_s : float
     """
@@ -161,44 +167,44 @@ class KnockTest:
     time_s: float
 
     @property
-    def told(self) -> bool:
-        """Whether the laser must have been knocked."""
+    def certain(self) -> bool:
+        """Whether the laser was certainly knocked."""
         return self.better > _SURE
 
     @property
     def ambiguous(self) -> bool:
-        """Whether the laser may have been knocked, but something else may have made the jump."""
-        return not self.told and self.better > -_SURE
+        """Whether the laser may have been knocked, but something else may have caused the jump."""
+        return not self.certain and self.better > -_SURE
 
     def warn(self, context: Context) -> None:
         """Warn of a knocked laser, or of a jump that may be due to one."""
         x, y, radius = self.jump.jump_mm
         where = f"at {self.time_s:.2f} s (frame {self.jump.frame}, at {self.jump.at_mm:.0f} mm)"
-        jump = f"{where} the rings jump by {np.hypot(x, y):.2f} mm across and {radius:+.2f} mm of radius"
-        if self.told:
+        jump = f"{where} the rings jump by {np.hypot(x, y):.2f} mm across and {radius:+.2f} mm in radius"
+        if self.certain:
             tilt_deg, baseline_mm = np.degrees(np.hypot(*self.knock.change[1:])), self.knock.change[0]
             sigma = np.sqrt(np.diagonal(self.knock.covariance))
             zoomed = " (or the picture's scale changed)" if abs(radius) > np.hypot(x, y) else ""
             by = f"{tilt_deg:.2f} ± {np.degrees(sigma[1:].max()):.2f}°"
             context.warn(
                 f"{jump}, all round at once and permanently, while the texture does not: laser and "
-                f"camera were knocked against each other, by {by} and "
+                f"camera were knocked relative to each other, by {by} and "
                 f"{baseline_mm:+.3f} ± {sigma[0]:.3f} mm of the baseline{zoomed}. This is corrected from "
-                "there on, and σ includes what remains. What to do: fix laser and camera, calibrate anew"
+                "there on, and σ includes the rest. What to do: fix laser and camera, calibrate again"
             )
         elif self.ambiguous:
             context.warn(
-                f"{jump}. This recording does not tell for sure whether laser and camera were knocked "
-                "against each other or the pipe steps there: nothing is corrected, and radii and distances "
-                "may be off by more than their σ on one side of it. What to do: pass the place again; a "
-                "step of the pipe is found at the same place"
+                f"{jump}. This recording does not show clearly whether laser and camera were knocked "
+                "or the pipe steps there: nothing is corrected, and radii and distances "
+                "may be wrong by more than their σ on one side of it. What to do: pass the place again; a "
+                "step of the pipe is then found at the same place"
             )
 
 
 def by_laser_and_joint(
     estimate: Estimate, measured: Measurements, first_behind: int, at_mm: float
 ) -> ExtraColumns:
-    """Return what `LASER_AND_JOINT` change: the laser from a frame on, the pipe from a place on."""
+    """Return the derivatives by `LASER_AND_JOINT`: the laser from a frame on, the pipe from a place on."""
     state = estimate.state
     rings = RingsInPipe.of(state, measured)
     by_sheet = measured.probe.laser.intersect_jacobian(rings.xyz_c)[1][..., :_LASER]
@@ -218,21 +224,21 @@ def _joint(behind: Bool, azimuth_rad: Float) -> Float:
 
 
 def _lasting(radius_mm: Float, at_mm: Float, first: int) -> float:
-    """Return by how much radii (F,) differ from ring ``first`` on, over a length that no weld has."""
+    """Return the change of radii (F,), mm, from ring ``first`` on, over a length longer than any weld."""
     n = rings_of_length(radius_mm, at_mm)
     return float(np.median(radius_mm[first : first + n]) - np.median(radius_mm[max(first - n, 0) : first]))
 
 
 def _jump_of_lines(frame: Int) -> tuple[Float, Float]:
-    """Return what rings in frames (F,) weigh in the jump between lines through those on either side.
+    """Return weights of rings in frames (F,) that give the jump between lines through those on either side.
 
     Returns
     -------
     weight : (N, 2 n)
-        Of each 2 n rings in a row, by least squares.
+        Least-squares weights of each 2 n rings in a row.
     sway : (N,)
-        How many times more of the probe's sway remains where rings are missing in between. Compared is the
-        third power of time, the lowest that lines on both sides do not follow.
+        Factor by which more of the probe's sway remains where rings are missing in between. It is computed
+        for the third power of time, the lowest that lines on both sides do not follow.
     """
     at = sliding_window_view(frame / np.median(np.diff(frame)), 2 * _SIDE)
     at = np.vstack([np.arange(2 * _SIDE), at - at[:, :1]])
@@ -243,6 +249,6 @@ def _jump_of_lines(frame: Int) -> tuple[Float, Float]:
 
 
 def _start_of_line(at: Float) -> Float:
-    """Return the weights (N, n) of values at places (N, n) in their fitted line's value at 0."""
+    """Return the weights (N, n) with which values at places (N, n) enter their fitted line's value at 0."""
     first, second = (np.sum(at**k, 1, keepdims=True) for k in (1, 2))
     return np.asarray((second - first * at) / (_SIDE * second - first**2))

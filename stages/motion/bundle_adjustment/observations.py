@@ -1,4 +1,4 @@
-"""Equations of texture in compiled loops: where landmarks are seen, and errors that matches share."""
+"""Equations of texture in compiled loops: projected landmarks, and errors that matches share."""
 
 from __future__ import annotations
 
@@ -6,9 +6,9 @@ import numba
 import numpy as np
 
 _FIRST_RAD, _KNOT_RAD = np.radians(38.0), np.radians(10.0)
-"""First knot and way to the next: five cover the polar angles at which texture is tracked by default."""
+"""First knot and spacing, rad: five cover the polar angles at which texture is tracked by default."""
 _NO_PIXEL_PX = 1000.0
-"""Residual of a landmark that projects nowhere."""
+"""Residual of a landmark without a projection."""
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
@@ -18,9 +18,10 @@ def observe(  # type: ignore[no-untyped-def]
 ):  # fmt: skip
     """Write residuals of texture and their derivatives by point, pose and instrument.
 
-    ``off`` (M, 2) is how far a landmark projects from its match, ``from_centre`` (M, 2) where that lies. The
-    pose moves by T = [R exp(w), t + d], (d, w), as in `stages.motion.bundle_adjustment.unknowns.moved`.
-    Last of the instrument's are errors that matches share: ``biases`` (K,), in 1 σ of ``bias_px``.
+    ``off`` (M, 2) is the distance of a projected landmark from its match, px, ``from_centre`` (M, 2) the
+    match's place in the picture. The pose moves by T = [R exp(w), t + d], (d, w), as in
+    `stages.motion.bundle_adjustment.unknowns.moved`. The last parameters of the instrument are errors that
+    matches share: ``biases`` (K,), in 1 σ of ``bias_px``.
     """
     camera = unsure.shape[1]
     share = np.empty(len(biases))
@@ -53,11 +54,11 @@ def observe(  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
 def _share_of_biases(x, y, z, share):  # type: ignore[no-untyped-def]
-    """Write by how much a match at a point in C errs for a unit error at each knot of the polar angle.
+    """Write the error of a match at a point in C per unit error at each knot of the polar angle.
 
     Errors are radial, equal all round, and piecewise linear in the polar angle. Light that falls off across a
-    patch, blur that grows with distance, and compression shift matches along the radius, and that must not be
-    taken for the lens.
+    patch, blur that grows with distance, and compression shift matches along the radius; this must not be
+    attributed to the lens.
     """
     theta = np.arctan2(np.hypot(x, y), z)
     place = min(max((theta - _FIRST_RAD) / _KNOT_RAD, 0.0), len(share) - 1.0)

@@ -22,18 +22,19 @@ from stages.motion.rings import RingBins
 ORIGIN_SIGMA = np.array([1e-4] * 3 + [1e-6] * 3)
 """1 σ, mm and rad, of the first pose, which defines the frame: far below the σ of any other pose."""
 _HELD = 1e-3
-"""Shared parameters settled by the whole run are held to this share of their stated σ: so tightly that a
-window cannot move them, yet not exactly, so that the equations stay regular."""
+"""Shared parameters of the whole run are held to this share of their stated σ: so tightly that a window
+cannot
+move them, yet not exactly, so that the equations stay regular."""
 _VIEW_RAD = 0.2
 """1 σ of the angle between camera and pipe: centring skids lean by less than 11°. It matters where no texture
-shows turns: carried on at the pace of the frames before, they came to 86°. Not measured."""
+shows rotations: extrapolated at the rate of the frames before, they came to 86°. Not measured."""
 
 
 def surface(state: State, xyz_p: Float, moved_mm: Float | float = 0.0) -> tuple[Float, Float, Float]:
-    """Return the residual (M,) of points (M, 3) against the smooth pipe, with derivatives.
+    """Return the residual (M,), mm, of points (M, 3) relative to the smooth pipe, with derivatives.
 
-    The derivatives are by the point, (M, 3), and by the border, (M, B). The bore is looked up at places so
-    much less far along the pipe as points were ``moved_mm`` (M,) since it was measured.
+    The derivatives are by the point, (M, 3), and by the border, (M, B). The bore is evaluated at the points'
+    distance minus ``moved_mm`` (M,), their displacement along the pipe since the bore was measured.
     """
     s, psi, rho = to_pipe(state.axis, xyz_p)
     basis = state.axis_basis(s)
@@ -49,7 +50,7 @@ def surface(state: State, xyz_p: Float, moved_mm: Float | float = 0.0) -> tuple[
     deflect = [-basis * c, -basis * sn]
     instrument = np.zeros((len(psi), len(state.instrument)))
     if state.bore.reduces:
-        # Where the axis turns toward a point, that lies farther along it, and the bore is wider there.
+        # If the axis turns toward a point, the point lies farther along it, where the bore is wider.
         ahead = (slope * rho)[:, None] * _basis_slope(state, s)
         deflect = [-basis * c - ahead * c, -basis * sn - ahead * sn]
         by_width = state.bore.width_by_instrument(state.bore.wider_at(s - moved_mm))
@@ -64,7 +65,7 @@ def surface(state: State, xyz_p: Float, moved_mm: Float | float = 0.0) -> tuple[
 
 
 def _basis_slope(state: State, distance_mm: Float) -> Float:
-    """Return by how much the axis turns (M, knots) per deflection, rad/mm, at distances (M,)."""
+    """Return the rotation of the axis (M, knots) per deflection, rad/mm, at distances (M,)."""
     ahead, behind = (state.axis_basis(distance_mm + step) for step in (AXIS_STEP_MM, -AXIS_STEP_MM))
     return (ahead - behind) / (2 * AXIS_STEP_MM)
 
@@ -72,8 +73,8 @@ def _basis_slope(state: State, distance_mm: Float) -> Float:
 def ring_rows(state: State, rings: RingBins, loss: Loss) -> Rows:
     """Return the equations: every ring bin lies on the pipe's smooth surface.
 
-    In a reducer, the width at a ring's place was read from the ring itself, so it says nothing of how far
-    along the pipe the ring lies.
+    In a reducer, the width at a ring's place was taken from the ring itself, so it is no evidence of the
+    ring's distance along the pipe.
     """
     T = state.T_pc[rings.frame]
     along, moved_mm = camera_moved(state)
@@ -86,7 +87,7 @@ def ring_rows(state: State, rings: RingBins, loss: Loss) -> Rows:
     by_instrument = rings.instrument_where_expected(residual, normal_c)
     by_border[:, first : first + unsure] += np.einsum("mj,mjq->mq", normal_c, by_instrument)
     by_frame = np.zeros((len(residual), 1, BLOCK))
-    if state.bore.reduces:  # the place in the bore goes along with the camera
+    if state.bore.reduces:  # the place in the bore moves with the camera
         place = to_pipe(state.axis, transform(T, xyz_c))[0] - moved_mm[rings.frame]
         slope = state.bore.slope_at(place)
         normal = normal + (slope / np.hypot(1, slope))[:, None] * along[rings.frame]
@@ -95,14 +96,14 @@ def ring_rows(state: State, rings: RingBins, loss: Loss) -> Rows:
 
 
 def camera_moved(state: State) -> tuple[Float, Float]:
-    """Return the pipe's direction (N, 3) at the camera, and how far (N,) it was moved along it, mm."""
+    """Return the pipe's direction (N, 3) at the camera, and the camera's displacement (N,), mm, along it."""
     s = to_pipe(state.axis, state.T_pc[:, :3, 3])[0]
     moved_mm = s - state.guess_mm if len(state.guess_mm) else np.zeros(len(s))
     return state.section_frames(s)[:, :, 2], moved_mm
 
 
 def turn_rows(state: State, sigma_rad: float) -> Rows:
-    """Return the equations: turns from frame to frame are small; they matter where no texture shows turns."""
+    """Return the equations: rotations from frame to frame are small; they matter where texture is missing."""
     n = len(state.T_pc)
     rotation = state.T_pc[:, :3, :3]
     residual = vector_from_rotation(np.swapaxes(rotation[:-1], 1, 2) @ rotation[1:])
@@ -151,7 +152,7 @@ def encoder_rows(state: State, encoder: EncoderReadings, slip_sigma_mm: float) -
 
 
 def no_slip_rows(state: State) -> Rows:
-    """Return the equations that replace those of the encoder where there is none: slip is zero."""
+    """Return the equations that replace those of a missing encoder: slip is zero."""
     n = len(state.slip)
     by_frame = np.zeros((n, 1, BLOCK))
     by_frame[:, 0, 6] = 1
@@ -159,7 +160,7 @@ def no_slip_rows(state: State) -> Rows:
 
 
 def origin_rows(state: State, held: int = 0) -> Rows:
-    """Return the equations: the frame ``held`` stays where it is; it defines the frame of the estimate."""
+    """Return the equations: the frame ``held`` is fixed; it defines the coordinate frame of the estimate."""
     by_frame = np.zeros((6, 1, BLOCK))
     by_frame[np.arange(6), 0, np.arange(6)] = 1
     return Rows(np.full((6, 1), held), by_frame, np.zeros((6, state.border_size)), np.zeros(6), ORIGIN_SIGMA)
@@ -184,9 +185,9 @@ def axis_rows(state: State, bend_sigma: float) -> Rows:
 def prior_rows(
     state: State, encoder_sigma: float, radius_sigma_mm: float, shared: Float | None = None
 ) -> Rows:
-    """Return the equations of what is known beforehand: of the pipe, the encoder scale and the instrument.
+    """Return the equations of the priors of the pipe, the encoder scale and the instrument.
 
-    ``shared`` (S,) are encoder scale and instrument as the whole run has them; they are all but held then.
+    ``shared`` (S,) are encoder scale and instrument of the whole run; they are then held almost fixed.
     """
     size, corrections = state.border_size, len(state.instrument)
     pipe = state.globals[:3] - np.array([state.nominal_radius_mm, 0.0, 0.0])

@@ -1,4 +1,4 @@
-"""The bundle adjustment of motion, landmarks and pipe: `pipeline.adjustment.levenberg_marquardt`."""
+"""Solves the bundle adjustment of motion, landmarks and pipe (`pipeline.adjustment.levenberg_marquardt`)."""
 
 from __future__ import annotations
 
@@ -29,34 +29,37 @@ from stages.motion.bundle_adjustment.unknowns import State, moved
 from stages.motion.parameters import MotionParameters
 
 ROUGHLY, CLOSELY = 1e-2, 1e-5
-"""Share of the cost that a step must promise, else the adjustment ends: at 1e-5, about a hundredth of the
+"""The adjustment ends if a step promises less than this share of the cost: at 1e-5, about a hundredth of the
 cost of 1 σ on a window of some thousand equations. Before the motion's smoothness is known, 1e-2 suffices."""
 _ONE_SIGMA = 0.5
-"""Cost of 1 σ of any combination of unknowns. The derivatives leave out the turn of the axis' frames, so that
-a step that promises less and yet fails may be due to that: it is the last."""
+"""Cost of 1 σ of any combination of unknowns. The derivatives neglect the rotation of the axis' frames. If a
+step promises less than this and yet fails, that may be the reason: it is the last step."""
 _FIRST_SCALES = Scales(3.0, 1.0)
-"""Scales before there are residuals: wide, so that a poor start is not taken for outliers."""
+"""Scales before there are residuals: wide, so that a poor start does not make outliers."""
 
 _TREMBLES_RAD = 5e-4
-"""Turn from frame to frame, 1 σ, from which pictures are taken to tremble: a quarter of a pixel at 500 px per
+"""Rotation from frame to frame, 1 σ, from which pictures count as trembling: a quarter of a pixel at 500 px
+per
 radian. Open-1 shows less than 1e-4, pictures shifted by half a pixel 1.7e-3."""
 _ACROSS = np.array([0, 1, 3, 4])
-"""Positions and turns across the pipe. Along it and in roll, what differs from frame to frame is what poses
-err by, and smoothness may hold it down."""
+"""Positions and rotations across the pipe. Along it and in roll, differences from frame to frame are errors
+of
+the poses, which smoothness may reduce."""
 _LOOSER = 3.0
-"""How much looser than its 1 σ trembling is held. All lengths shrink with what is held to 0 at its own 1 σ: a
-drawn shift of .4 px shortened the pipe by 1.4 %. At three times it the pull is a ninth."""
+"""Factor on the 1 σ of trembling in its prior. With a prior of 0 at its own 1 σ all lengths shrink: a drawn
+shift of .4 px shortened the pipe by 1.4 %. At three times that σ, the pull is a ninth."""
 _SHORTEST_MM = 1.0
-"""Ways are compared as if they were at least so long: a probe that stands has none."""
+"""Distances are compared as if they were at least this long, mm: a probe that stands has none."""
 _ROUNDS, _MORE = 3, 1.2
-"""The smoothness of trembling pictures is estimated up to so many times more, as long as it grows by a fifth:
-the first, loose prior still holds down strong trembling. Not measured."""
+"""The smoothness of trembling pictures is estimated up to this many times more, as long as it grows by a
+fifth: the first, loose prior still reduces strong trembling. Not measured."""
 _IN_LINE = 4
-"""Frames with texture from which the motion at an end of a run is taken: their poses' noise hardly matters,
-and the motion has not changed much. Not measured."""
+"""Frames with texture from which the motion at an end of a run is extrapolated: their poses' noise has little
+influence, and the motion has not changed much. Not measured."""
 _SWING_RAD = np.radians(1)
-"""Least swing of an end that is no motion: in the few pictures before texture is followed no probe turns as
-far in a pipe. Not measured."""
+"""Smallest swing of an end that is not motion: in the few pictures before texture is followed no probe
+rotates
+as far in a pipe. Not measured."""
 _RAYLEIGH_MEDIAN = float(np.sqrt(2 * np.log(2)))
 """Median length of an error of two coordinates, of 1 σ each."""
 
@@ -65,7 +68,7 @@ Adjusted = Minimum[State, Equations]
 
 @dataclass(frozen=True)
 class Estimate:
-    """The adjustment's end, the factorised equations there, and how smooth the motion was found (6,)."""
+    """The adjustment's end, the factorised equations there, and the smoothness (6,) of the motion."""
 
     adjusted: Adjusted
     factor: Factor
@@ -80,7 +83,7 @@ class Estimate:
 def estimate_state(
     start: State, measured: Measurements, parameters: MotionParameters, watch: Watch = unwatched
 ) -> Estimate:
-    """Adjust with loose motion first, estimate from it how smooth the motion is, then adjust again.
+    """Adjust with a loose motion prior, estimate the smoothness of the motion, then adjust again.
 
     ``watch`` is called before every step.
 
@@ -106,9 +109,9 @@ def estimate_state(
 def _loosely(start: State, measured: Measurements, parameters: MotionParameters, watch: Watch) -> State:
     """Adjust with a loose motion prior. If the ends of the run swing, do so again with another frame held.
 
-    With a loose prior, a ring alone does not determine how the camera is turned. If the first pose, which is
-    held, then lies on a swing of some degrees, all others turn with it, and the robust smoothness of the next
-    adjustment never removes that. So a frame is held whose pose texture determines.
+    With a loose prior, a ring alone does not determine the camera's direction. If the first pose, which is
+    fixed, then lies on a swing of some degrees, all others rotate with it, and the robust smoothness of the
+    next adjustment never removes that. So a frame is fixed whose pose texture determines.
     """
     loose = adjust(start, measured, parameters, ROUGHLY, watch).state
     seen = np.unique(measured.tracks.frame)
@@ -122,14 +125,14 @@ def _loosely(start: State, measured: Measurements, parameters: MotionParameters,
 
 
 def ends_in_line(T_pc: Float, time_s: Float, seen: Int) -> Float:
-    """Return poses (N, 4, 4); those before and behind all texture go on evenly from the next ones.
+    """Return poses (N, 4, 4); those before and after all texture are extrapolated at constant speed.
 
     Parameters
     ----------
     T_pc : (N, 4, 4)
     time_s : (N,)
     seen : (K,) int
-        Frames with matches of texture, ascending. Ends that last longer than four of them stay as they are.
+        Frames with matches of texture, ascending. Ends longer than four of them are not changed.
     """
     out = T_pc.copy()
     if len(seen) < _IN_LINE:
@@ -150,11 +153,11 @@ def ends_in_line(T_pc: Float, time_s: Float, seen: Int) -> Float:
 def scale_between_halves(
     estimate: Estimate, measured: Measurements, parameters: MotionParameters, watch: Watch = unwatched
 ) -> float:
-    """Return the 1 σ of distances, relative, from adjustments to near and to far matches alone.
+    """Return the relative 1 σ of distances from adjustments to near and to far matches alone.
 
-    Compression and light shift all matches under one polar angle alike. Residuals do not show it, but the way
-    found from either half of the matches then differs from that of all. The larger difference is returned; by
-    chance alone it is as large as the σ of the whole estimate.
+    Compression and light shift all matches at one polar angle equally. Residuals do not show it, but the
+    distance from either half of the matches then differs from that of all. The larger difference is returned;
+    by chance alone it is as large as the σ of the whole estimate.
     """
     tracks = measured.tracks
     away = np.linalg.norm(tracks.uv - measured.probe.camera.centre_px, axis=1)
@@ -170,7 +173,7 @@ def scale_between_halves(
 
 
 def excess_of(in_sigma: Float) -> float:
-    """Return how many times its σ an error is that is known in σ (M, 2)."""
+    """Return the size of errors (M, 2), in σ, relative to the expected size."""
     size = np.linalg.norm(in_sigma, axis=1)
     return float(np.median(size)) / _RAYLEIGH_MEDIAN if size.size else 0.0
 
@@ -178,7 +181,7 @@ def excess_of(in_sigma: Float) -> float:
 def lasting_excess(in_sigma: Float, landmark: Int) -> float:
     """Return the part of the errors (M, 2), in σ, that a landmark's neighbouring observations share.
 
-    Noise is independent in every picture: it appears in full in the difference of two of them and hardly
+    Noise is independent in every picture: the difference of two of them contains all of it, and it hardly
     affects distance. An error that lasts moves the poses.
     """
     step = np.diff(in_sigma, axis=0)[np.diff(landmark) == 0] / np.sqrt(2)
@@ -190,7 +193,7 @@ def _way_mm(state: State) -> float:
 
 
 def _smoothness(T_pc: Float, time_s: Float, known: Int) -> Float:
-    """Return the 1 σ (6,) of third differences, of pictures that tremble with what trembling adds to them."""
+    """Return the 1 σ (6,) of third differences, including the trembling of pictures that tremble."""
     sigma = third_difference_sigma(T_pc, time_s, known)
     shaken = trembling(T_pc, time_s, known)
     if not trembles(shaken):
@@ -201,14 +204,14 @@ def _smoothness(T_pc: Float, time_s: Float, known: Int) -> Float:
 
 
 def _looser(sigma: Float, T_pc: Float, time_s: Float, known: Int) -> Float:
-    """Return 1 σ (6,) of third differences, grown where poses found with it tremble more."""
+    """Return 1 σ (6,) of third differences, increased where the poses found with it tremble more."""
     if not trembles(trembling(T_pc, time_s, known)):
         return sigma
     return np.maximum(sigma, _smoothness(T_pc, time_s, known))
 
 
 def trembles(shaken: Float) -> bool:
-    """Return whether trembling (6,) exceeds the error of poses, judged by turns across the pipe."""
+    """Return whether trembling (6,) exceeds the error of poses, judged by rotations across the pipe."""
     return float(shaken[3:5].max()) > _TREMBLES_RAD
 
 
@@ -266,7 +269,7 @@ def adjust(
 
 @contextmanager
 def _refusing_undetermined() -> Iterator[None]:
-    """Turn equations that cannot be solved into an error that says what to do."""
+    """Convert the failure to solve the equations into an error that says what to do."""
     try:
         # More threads gain nothing on blocks this small, and stall when the machine is busy.
         with threadpool_limits(1):
@@ -275,5 +278,5 @@ def _refusing_undetermined() -> Iterator[None]:
         raise UnusableError(
             "motion",
             f"the motion is not determined by this recording ({error})",
-            hint="record more lit frames or rings, or give an encoder",
+            hint="record more lit frames or rings, or use an encoder",
         ) from error

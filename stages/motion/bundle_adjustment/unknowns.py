@@ -34,14 +34,14 @@ class State:
     globals : (4,)
         Radius, second-harmonic cosine and sine of the radius (ovality), mm, and encoder scale.
     axis : PipeAxis
-        Where the axis is now; the adjustment's axis unknowns are deflections from it.
+        Current axis; the adjustment's axis unknowns are deflections from it.
     curve : (2, knots)
         Sum of the deflections so far, as spline coefficients along x and y of the sections.
     knot_mm, nominal_radius_mm : float
     instrument : (Q,)
         Corrections of the instrument along its principal uncertainties, then of texture matching, in σ.
     bore : Bore
-        Widths of the pipe as read from the rings; not an unknown.
+        Widths of the pipe as measured by the rings; not an unknown.
     guess_mm : (N,)
         Camera distances with which the places of the rings in the bore were computed; empty: the current
         ones.
@@ -71,12 +71,12 @@ class State:
 
     @property
     def shared(self) -> Float:
-        """What all windows of a run have in common (S,): encoder scale and instrument."""
+        """Parameters (S,) that all windows of a run share: encoder scale and instrument."""
         return np.append(self.globals[ENCODER_SCALE], self.instrument)
 
     @property
     def shared_columns(self) -> Int:
-        """Places (S,) of `shared` in the border."""
+        """Indices (S,) of `shared` in the border."""
         return np.asarray(np.r_[ENCODER_SCALE, self.border_size - len(self.instrument) : self.border_size])
 
     def with_shared(self, shared: Float) -> State:
@@ -97,7 +97,7 @@ class State:
         return frames_at(self.axis, distance_mm)[1]
 
     def with_bore_in_place(self, ahead_mm: float) -> State:
-        """Return the state with a reducer moved to where its rings, ``ahead_mm`` of the camera, lie now."""
+        """Return the state with a reducer moved to its rings' current place, ``ahead_mm`` of the camera."""
         if not self.bore.reduces or not len(self.guess_mm):
             return self
         now = to_pipe(self.axis, self.T_pc[:, :3, 3])[0]
@@ -148,7 +148,7 @@ def straight_start(
 ) -> State:
     """Return the state of a straight pipe from first guesses of poses and landmarks.
 
-    ``corrections`` is the number of those of the instrument and of texture matching.
+    ``corrections`` is the number of corrections of the instrument and of texture matching.
     """
     steps = max(int(np.ceil((to_mm - from_mm) / AXIS_STEP_MM)), 2)
     z = np.linspace(from_mm, to_mm, steps + 1)

@@ -1,8 +1,8 @@
-"""How pose errors accumulate along a chain of submaps.
+"""Accumulation of pose errors along a chain of submaps.
 
 Errors form a Gauss-Markov chain (D. Simon, "Optimal state estimation", 2006, § 3.1). Within a window they
-have the covariance of its adjustment. From window to window they are carried on by the anchors, and the
-parameters that all windows share err alike in all of them.
+have the covariance of its adjustment. From window to window they propagate through the anchors, and the
+shared parameters have the same errors in all windows.
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ class Link:
     Attributes
     ----------
     at : (k,) int
-        Frames, of the list of all, whose errors are known: from the window's anchor to the next one's.
+        Frames, of the list of all, whose errors are known: from the window's anchor to the next anchor.
     carry : (k, 6, 6)
-        Errors there by the anchor's error.
+        Derivatives of the errors at these frames by the anchor's error.
     joint : (k, 6, k, 6)
         Covariance of the errors relative to the anchor, the shared parameters given.
     response : (k, 6, S)
@@ -44,9 +44,9 @@ class ErrorSums:
     Attributes
     ----------
     knot : (E,) int
-        Which of the chain's frames, ascending.
+        Indices of the chain's frames, ascending.
     column : (E,) int
-        Which sum.
+        Indices of the sums.
     weight : (E, 6)
     columns : int
         Number C of sums.
@@ -104,10 +104,10 @@ class ErrorChain:
         return np.concatenate(found)
 
     def turn_variances(self) -> Float:
-        """Return the variance (K, 3) of turns in C gathered up to each frame, the shared parameters given.
+        """Return the variance (K, 3) of rotations in C summed up to each frame, given the shared parameters.
 
-        It is the variance of turns added up from frame to frame, so it only grows along the run: on a curved
-        way, an error of heading at the start is not counted as roll later on.
+        It is the variance of rotations summed from frame to frame, so it only grows along the run: on a
+        curved path, an error of heading at the start is not counted as roll later on.
         """
         before, found = np.zeros(3), []
         for link in self.links:
@@ -120,8 +120,8 @@ class ErrorChain:
     def covariances_with(self, sums: ErrorSums) -> Iterator[Float]:
         """Yield the covariance (k, 6, C) of each window's errors with C sums of errors.
 
-        The chain is passed once back and once forth: the work grows linearly with its length, and in memory
-        are one window's covariance and six numbers for each window and sum.
+        The chain is passed once backwards and once forwards: the work grows linearly with its length, and
+        memory holds one window's covariance and six numbers for each window and sum.
         """
         ends = np.cumsum([0] + [len(link.at) for link in self.links])
         later = np.zeros((6, sums.columns))
@@ -148,7 +148,7 @@ class ErrorChain:
 
 
 def neighbours(wanted: Int, at: Int) -> tuple[Int, Int, Float]:
-    """Return the places (N,) in ascending ``at`` (K,) left and right of wanted ones, and the right share."""
+    """Return the indices (N,) in ascending ``at`` (K,) on either side of ``wanted``, and the right weight."""
     right = np.clip(np.searchsorted(at, wanted), min(1, len(at) - 1), len(at) - 1)
     left = np.maximum(right - 1, 0)
     return left, right, (wanted - at[left]) / np.maximum(at[right] - at[left], 1)
@@ -162,6 +162,6 @@ def interpolated(wanted: Int, at: Int, value: Float) -> Float:
 
 
 def _with_last(weight: Float, later: Float) -> Float:
-    """Return a window's weights (k, 6, C) with those that came in by the windows after it (6, C)."""
+    """Return a window's weights (k, 6, C) with those of the windows after it (6, C) added."""
     weight[-1] += later
     return weight

@@ -1,4 +1,4 @@
-"""The first window of a run: it shows the errors of matches and the encoder's faults for all others."""
+"""Adjusts the first window of a run, which shows the errors of matches and of the encoder for all others."""
 
 from __future__ import annotations
 
@@ -29,34 +29,35 @@ from stages.motion.windows.steady_scale import SteadyRun, with_steady_scale
 from stages.motion.windows.submaps import Window
 
 _SHARED_ERROR = 1 / 3
-"""Radial error that matches share over their median reprojection error: against a calibrated probe 0.05 px of
-0.14 px in open-1-field, 0.2 px of 0.60 px in its copy at crf 30."""
+"""Radial error that matches share over their median reprojection error: compared with a calibrated probe 0.05
+of 0.14 px in open-1-field, 0.2 of 0.60 px in its copy at crf 30."""
 _LAG = 1.2
-"""Error along the radius of templates, which are cut far ahead, over the error that a landmark's neighbouring
-matches share: against true poses 0.2 to 0.45 px of 0.28 px in open-1-field's copy at crf 30."""
+"""Radial error of templates, which are cut far ahead, over the error that a landmark's neighbouring matches
+share: compared with true poses 0.2 to 0.45 px of 0.28 px in open-1-field's copy at crf 30."""
 _FARTHEST_RAD = np.radians(45)
-"""Smallest polar angle of matches that count where more of their error than ``match_bias_px`` lasts: wall one
-radius ahead. Codecs move the dim wall ahead of it too slowly: in open-1-field's copy at crf 30 the stream's
-own motion vectors lag behind the wall by .3 px a picture at 40°, by .02 px at 60°. Distances of open-1 to
-open-3 at crf 30 without encoder are .43, .14 and -.20 % off without such matches, .71, .28 and .43 % with
-them. Where matches err as much by noise alone (0 px last in open-3, .2 px at crf 30), all of them count."""
+"""Smallest polar angle of matches that are used if more of their error than ``match_bias_px`` lasts from
+picture to picture: wall one radius ahead. Codecs move the dim wall beyond it too slowly: in open-1-field's
+copy at crf 30 the stream's own motion vectors lag behind the wall by .3 px a picture at 40°, by .02 px at
+60°. Distances of open-1 to open-3 at crf 30 without encoder are .43, .14 and -.20 % off without such matches,
+.71,
+.28 and .43 % with them. If the error is noise alone (0 px last in open-3, .2 px at crf 30), all are used."""
 _MOST_SHARED_PX = 2.0
 """Where matches disagree by more, the parameter's own limit holds."""
 _IN_REDUCER = 0.005
-"""Relative 1 σ of distances where texture was followed through a reducer and nothing else tells them: in five
-drawn ones, 12 to 15 % wider or narrower over 14 and 20 mm, they were off by .1 to 1.0 %, .5 % rms."""
+"""Relative 1 σ of distances if texture alone gives them and was followed through a reducer: in five drawn
+ones, 12 to 15 % wider or narrower over 14 and 20 mm, they were off by .1 to 1.0 %, .5 % rms."""
 _IN_LOST = 0.05
-"""Relative 1 σ of distances where much texture was lost and nothing else tells them: by VP9 at .5 Mbit/s,
-which left half of the pictures without texture, a way came out 4.8 % short (one recording)."""
+"""Relative 1 σ of distances if texture alone gives them and much of it was lost: by VP9 at .5 Mbit/s, which
+left half of the pictures without texture, a distance came out 4.8 % short (one recording)."""
 _ROUNDS, _NOISIER = 4, 1.5
-"""The noise of the encoder's readings is estimated up to so many times, as long as it comes out 1.5 times the
-noise assumed before: poses follow readings that are trusted too much, which hides their noise. In good
-recordings it is 0.5 to 1.2 times the noise assumed (open-1 to open-3, a05)."""
+"""The noise of the encoder's readings is estimated up to so many times, as long as it exceeds 1.5 times the
+assumed noise: poses follow readings that have too much weight, which hides their noise. In good recordings
+it is 0.5 to 1.2 times the assumed noise (open-1 to open-3, a05)."""
 
 
 @dataclass(frozen=True)
 class EncoderCheck:
-    """The encoder's delay and scale against rings and texture; None where nothing tells them."""
+    """The encoder's delay and scale compared with rings and texture; None where there is no evidence."""
 
     delay: EncoderDelay | None
     scale: EncoderScale | None
@@ -66,7 +67,7 @@ class EncoderCheck:
         return 0.0 if self.scale is None else self.scale.doubt_of_probe(wider)
 
     def warn(self, context: Context, wider: float) -> None:
-        """Tell of what was wrong with the encoder, in a pipe ``wider`` than nominal by that share."""
+        """Warn of errors of the encoder; ``wider`` is the pipe's diameter over the nominal one, minus 1."""
         if self.delay is not None:
             self.delay.warn(context)
         if self.scale is not None:
@@ -75,23 +76,23 @@ class EncoderCheck:
 
 @dataclass(frozen=True)
 class FirstWindow:
-    """The first window adjusted, and the run as it is to be adjusted from there.
+    """The adjusted first window, and the run as the following windows are to use it.
 
     Attributes
     ----------
     run : MeasuredRun
-        Its encoder in time with the pictures, its scale no surer than they allow.
+        The run with its encoder synchronised with the pictures, and a scale no surer than they allow.
     parameters : MotionParameters
-        With the error that matches share in this recording.
+        Parameters with the error that matches share in this recording.
     estimate : Estimate
     measured : Measurements
     unsure : float
         Relative 1 σ of distances by texture that its residuals do not show.
     encoder : EncoderCheck
     steady : SteadyRun
-        Its image scale.
+        Course of the image scale.
     knock : KnockTest or None
-        Of its laser, where rings jump.
+        Test for a knock of the laser, if rings jump.
     """
 
     run: MeasuredRun
@@ -105,13 +106,13 @@ class FirstWindow:
 
     @property
     def distance_sigma(self) -> float:
-        """Return the relative 1 σ of distances beside the estimate's own."""
+        """Return the relative 1 σ of distances in addition to the estimate's own."""
         return float(np.hypot(self.unsure, self.steady.distance_sigma))
 
 
 @dataclass(frozen=True)
 class _Adjusted:
-    """The first window as adjusted with some run and parameters."""
+    """The first window, adjusted with a certain run and parameters."""
 
     run: MeasuredRun
     window: Window
@@ -127,24 +128,24 @@ class _Adjusted:
         return lasting_excess(residual, self.measured.tracks.landmark)
 
     def with_encoder(self, encoder: EncoderReadings) -> _Adjusted:
-        """Return it with other readings, not adjusted to them yet."""
+        """Return it with other readings, before an adjustment to them."""
         run = replace(self.run, encoder=encoder)
         return replace(self, run=run, measured=run.measured(self.window, self.parameters))
 
     def with_texture_off(self, times: float) -> _Adjusted:
-        """Return it adjusted again, with matches whose common and own errors are so many times larger."""
+        """Return it adjusted again, with common and own errors of the matches multiplied by ``times``."""
         given = self.parameters
         wider = {"match_bias_px": times * given.match_bias_px, "alike": times**2 * given.alike}
         return replace(self, parameters=given.model_copy(update=wider)).again(self.estimate.state)
 
     def again(self, start: State) -> _Adjusted:
-        """Return it adjusted again, from a state on."""
+        """Return it adjusted again, starting at a state."""
         estimate = estimate_state(start, self.measured, self.parameters, self.watch)
         return replace(self, estimate=estimate)
 
 
 def adjust_first(run: MeasuredRun, window: Window, parameters: MotionParameters, watch: Watch) -> FirstWindow:
-    """Adjust the first window of a run, and again where it shows that something was not as stated.
+    """Adjust the first window of a run, and again for every stated property that it contradicts.
 
     Raises
     ------
@@ -165,7 +166,7 @@ def adjust_first(run: MeasuredRun, window: Window, parameters: MotionParameters,
 
 
 def _with_shared_error(first: _Adjusted) -> tuple[_Adjusted, float]:
-    """Allow matches the error that they share; return the relative 1 σ of distances by it as well."""
+    """Allow for the error that matches share; return also the relative 1 σ of distances that it causes."""
     noisy = with_shared_error(first.parameters, first.estimate.adjusted.equations.reprojection_px)
     if noisy is first.parameters:
         return first, 0.0
@@ -180,7 +181,7 @@ def _with_shared_error(first: _Adjusted) -> tuple[_Adjusted, float]:
 
 
 def _without_far_texture(first: _Adjusted) -> _Adjusted:
-    """Adjust again without the matches far ahead, unless they are most of all."""
+    """Adjust again without the matches far ahead, unless they are the majority."""
     tracks, state = first.measured.tracks, first.estimate.state
     beside = tracks.polar_angle(first.run.probe.camera) >= _FARTHEST_RAD
     if beside.mean() < 0.5:
@@ -191,7 +192,7 @@ def _without_far_texture(first: _Adjusted) -> _Adjusted:
 
 
 def _without_delay(first: _Adjusted) -> tuple[_Adjusted, EncoderDelay | None]:
-    """Correct a delay of the encoder, measured against the motion that pictures alone show."""
+    """Correct a delay of the encoder relative to the motion from pictures alone."""
     delay, encoder = delay_of_encoder(first.estimate, first.measured), first.run.encoder
     if delay is None or encoder is None or not delay.matters:
         return first, delay
@@ -199,11 +200,11 @@ def _without_delay(first: _Adjusted) -> tuple[_Adjusted, EncoderDelay | None]:
     delay = delay_of_encoder(free, first.measured)
     if delay is None or not delay.matters:
         return first, delay
-    return first.with_encoder(delay.taken_out(encoder, first.run.time_s)).again(free.state), delay
+    return first.with_encoder(delay.corrected(encoder, first.run.time_s)).again(free.state), delay
 
 
 def _with_noise(first: _Adjusted) -> _Adjusted:
-    """Give the encoder's readings the noise that they show, where it is more than what is taken."""
+    """Give the encoder's readings the noise that they show, if it exceeds the assumed noise."""
     for _ in range(_ROUNDS):
         encoder, noise_mm = first.run.encoder, noise_of_encoder(first.estimate, first.measured)
         if encoder is None or noise_mm < _NOISIER * encoder.sigma_mm:
@@ -213,7 +214,7 @@ def _with_noise(first: _Adjusted) -> _Adjusted:
 
 
 def with_scale(first: _Adjusted, unsure: float) -> tuple[_Adjusted, EncoderScale | None, float]:
-    """Make the encoder's scale as unsure as the pictures contradict it; return it and texture's 1 σ."""
+    """Widen the encoder scale's σ by its contradiction to the pictures; return it and texture's 1 σ."""
     scale = scale_of_encoder(first.estimate, first.measured, unsure)
     if scale is None:
         return first, None, float(np.hypot(unsure, _unseen_error(first.run)))
@@ -230,20 +231,20 @@ def with_scale(first: _Adjusted, unsure: float) -> tuple[_Adjusted, EncoderScale
 
 
 def _unseen_error(run: MeasuredRun) -> float:
-    """Return the relative 1 σ of distances that texture alone tells, where it errs more than it shows."""
+    """Return the relative 1 σ of distances from texture alone, for errors that its residuals do not show."""
     lost = _IN_LOST * run.texture.poses.much_lost
     return float(np.hypot(lost, _IN_REDUCER * run.bore.reduces))
 
 
 def _lost_much(first: _Adjusted) -> bool:
-    """Return whether much texture was lost in the first window, which alone tells the encoder's scale."""
+    """Return whether much texture was lost in the first window, which alone gives the encoder's scale."""
     return first.run.texture.poses.between(first.window.first, first.window.last).much_lost
 
 
 def _beside_lost_texture(
     first: _Adjusted, scale: EncoderScale, unsure: float
 ) -> tuple[_Adjusted, EncoderScale, float]:
-    """Follow the encoder, and make distances as unsure as what is left of the texture contradicts it."""
+    """Follow the encoder, and widen the σ of distances by its contradiction to the remaining texture."""
     doubted = scale.beside_lost_texture()
     if scale.doubted:
         first, unsure = first.with_texture_off(scale.in_sigma), doubted.sigma
@@ -253,16 +254,16 @@ def _beside_lost_texture(
 
 
 def _without_encoder(first: _Adjusted) -> Estimate:
-    """Return the motion by rings and texture alone: a late encoder would shift it."""
+    """Return the motion from rings and texture alone: a late encoder would shift it."""
     start = replace(first.estimate.state, slip=0 * first.estimate.state.slip)
     return estimate_state(start, replace(first.measured, encoder=None), first.parameters, first.watch)
 
 
 def with_shared_error(parameters: MotionParameters, reprojection_px: float) -> MotionParameters:
-    """Return the parameters with the radial error that matches may share, as large as this recording's is.
+    """Return the parameters with the size of the radial error that the matches of this recording may share.
 
-    Blur and compression move all matches near one polar angle alike. A scale along the pipe absorbs such an
-    error without a residual, so its size is judged by how much the matches disagree (`_SHARED_ERROR`).
+    Blur and compression move all matches near one polar angle equally. A scale along the pipe absorbs such an
+    error without a residual, so its size is estimated from the scatter of the matches (`_SHARED_ERROR`).
     """
     shared = _SHARED_ERROR * reprojection_px
     if shared <= parameters.match_bias_px:
@@ -271,11 +272,11 @@ def with_shared_error(parameters: MotionParameters, reprojection_px: float) -> M
 
 
 def scale_by_lag(lag_px: float, grid: StripGrid, camera: Camera) -> float:
-    """Return the relative 1 σ of distances, if templates are cut ``lag_px`` off when they come into view.
+    """Return the relative 1 σ of distances if templates are cut with an error ``lag_px`` far ahead.
 
     A codec drops the texture of the dim wall far ahead and repeats it from the picture before. While the
-    camera passes such a template, its error shrinks, exactly as if the probe had moved farther: no residual
-    shows it.
+    camera passes such a template, its error shrinks, exactly as if the probe had moved farther, without a
+    residual.
     """
     ends = np.array([[grid.radius_mm, 0, grid.far_mm + ahead] for ahead in (-0.5, 0.5)])
     px_per_mm = float(np.linalg.norm(np.diff(camera.project(ends).uv, axis=0)))

@@ -1,4 +1,4 @@
-"""What was measured over a whole run, of which every window has its part."""
+"""The measurements of a whole run, from which every window takes its part."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ _MARGIN_MM = 20.0
 
 @dataclass(frozen=True)
 class MeasuredRun:
-    """What was measured over a whole run; a window's part is worked out when it is needed.
+    """The measurements of a whole run; a window's part is computed when it is needed.
 
     Attributes
     ----------
     texture : TrackedTexture
     rings : RingSamples
     ring_place : (F,) int
-        Places of the rings' frames in the list of all frames.
+        Indices of the rings' frames in the list of all frames.
     time_s : (N,)
     T_pc : (N, 4, 4)
         First guess in the straightened pipe.
@@ -41,15 +41,15 @@ class MeasuredRun:
     probe : Probe
         As stated.
     bore : Bore
-        Of the straightened pipe.
+        Bore of the straightened pipe.
     circles : RingCircles
-        Through the rings.
+        Circles through the rings.
     image_scale : (N,) or None
-        Size of the pictures over that of the probe's camera; None where their scale does not drift.
+        Size of the pictures over that of the probe's camera; None if their scale does not drift.
     jump : RingJump or None
-        Where the rings jump.
+        Jump of the rings, if any.
     knock : LaserKnock or None
-        What the laser did there.
+        Change of the laser there.
     farthest_rad : float
         Smallest polar angle of matches of texture that are used: the wall farthest ahead.
     """
@@ -74,7 +74,7 @@ class MeasuredRun:
         return Window(0, len(self.time_s))
 
     def measured(self, window: Window, parameters: MotionParameters) -> Measurements:
-        """Return what was measured in a window, frames and distance counted from its first."""
+        """Return the measurements of a window, with frames and distance counted from its first."""
         part = slice(window.first, window.last)
         rows = slice(*np.searchsorted(self.ring_place, [window.first, window.last]))
         rings, place = self.rings.some(rows), self.ring_place[rows] - window.first
@@ -89,7 +89,7 @@ class MeasuredRun:
         return Measurements.of(tracks, bins, self.time_s[part], encoder, self.probe)
 
     def knocked(self, knock: LaserKnock) -> MeasuredRun:
-        """Return the run with a laser that was knocked where the rings jump."""
+        """Return the run with a knock of the laser at the jump of the rings."""
         return replace(self, knock=knock, bore=self.bore if self.jump is None else self.jump.bore)
 
     def _bins(self, rings: RingSamples, place: Int, parameters: MotionParameters) -> RingBins:
@@ -104,12 +104,15 @@ class MeasuredRun:
         )
 
     def start(self, window: Window, measured: Measurements, parameters: MotionParameters) -> State:
-        """Return the first guess in a window: a straight pipe, as long as its wall was seen."""
+        """Return the first guess in a window: a straight pipe with the length of the wall in view."""
         T_pc = self.T_pc[window.first : window.last].copy()
         T_pc[:, 2, 3] -= self.start_mm(window)
         z, grid = T_pc[:, 2, 3], self.texture.grid
         span = (float(z.min()) - _MARGIN_MM, float(z.max()) + grid.far_mm + _MARGIN_MM)
-        corrections, bore = measured.unsure.shape[1] + MATCH_BIASES, self.bore.behind(self.start_mm(window))
+        corrections, bore = (
+            measured.unsure.shape[1] + MATCH_BIASES,
+            self.bore.counted_from(self.start_mm(window)),
+        )
         straight = straight_start(
             T_pc, measured.tracks.xyz, *span, grid.radius_mm, parameters.axis_knot_mm, corrections
         )
@@ -120,7 +123,7 @@ class MeasuredRun:
         return replace(straight, bore=bore, guess_mm=z)
 
     def start_mm(self, window: Window) -> float:
-        """Return the distance of a window's first frame, from which its own are counted."""
+        """Return the distance of a window's first frame, mm, from which its own distances are counted."""
         return float(self.T_pc[window.first, 2, 3]) if window.first else 0.0
 
 

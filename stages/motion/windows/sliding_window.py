@@ -1,4 +1,4 @@
-"""The bundle adjustment slid over a long run window by window; a short run is one window."""
+"""Slides the bundle adjustment over a long run window by window; a short run is one window."""
 
 from __future__ import annotations
 
@@ -41,28 +41,28 @@ from stages.motion.windows.submaps import (
 
 @dataclass(frozen=True)
 class RunEstimate:
-    """A whole run at its optimum, and how the adjustments of its windows ended.
+    """A whole run at its optimum, with statistics of its windows' adjustments.
 
     Attributes
     ----------
     joined : JoinedRun
     trials : int
-        Steps tried in all windows together.
+        Number of steps tried in all windows together.
     unsettled : int
-        Windows in which a step could still gain something.
+        Number of windows in which a further step could still reduce the cost.
     reprojection_px : float
         Median over the windows of the median reprojection error.
     excess : float
-        Median over the windows of how many times the σ predicted by matching that error is; samples that are
-        blurred together count as one.
+        Median over the windows of that error over the σ predicted by matching; samples that are blurred
+        together count as one.
     lasting : float
         The part of ``excess`` that matches of one landmark in neighbouring pictures have in common.
     encoder : EncoderCheck
-        Against what rings and texture of the first window show.
+        Comparison with rings and texture of the first window.
     steady : SteadyRun
-        What the image scale did in the first window.
+        Course of the image scale in the first window.
     knock : KnockTest or None
-        Of the laser, where rings jump.
+        Test for a knock of the laser, if rings jump.
     """
 
     joined: JoinedRun
@@ -78,16 +78,16 @@ class RunEstimate:
 
 @dataclass(frozen=True)
 class _Alone:
-    """What is kept of a window adjusted on its own."""
+    """The stored results of a window that was adjusted on its own."""
 
     state: State
     smooth_sigma: Float
-    told: SharedInformation
+    evidence: SharedInformation
 
 
 @dataclass(frozen=True)
 class _End:
-    """How a window's adjustment ended."""
+    """Statistics of a window's adjustment."""
 
     trials: int
     settled: bool
@@ -112,7 +112,7 @@ def adjust_run(
     check: Callable[[Estimate], None],
     progress: Callable[[int, int], None],
 ) -> RunEstimate:
-    """Return the estimate of a whole run; ``check`` is shown every window's and may refuse it.
+    """Return the estimate of a whole run; ``check`` is called with every window's estimate and may refuse it.
 
     Raises
     ------
@@ -135,7 +135,7 @@ def adjust_run(
         check(estimate)
         alone.append(_alone(estimate, measured))
     measured = run.measured(windows[-1], parameters)
-    shared = fuse_shared([a.told for a in alone], _new_shares(windows), measured, alone[-1].state)
+    shared = fuse_shared([a.evidence for a in alone], _new_shares(windows), measured, alone[-1].state)
     found: list[tuple[Submap, _End]] = []
     for k, own in enumerate(alone):
         measured = run.measured(windows[k], parameters)
@@ -177,7 +177,7 @@ def _alone(estimate: Estimate, measured: Measurements) -> _Alone:
 
 
 def _submap(estimate: Estimate, windows: Sequence[Window], number: int) -> Submap:
-    """Return a window's submap, its errors stated from the handover before it to the one behind it."""
+    """Return a window's submap, with its errors from the handover before it to the one after it."""
     window = windows[number]
     first = handover(windows[number - 1], window) - window.first if number else 0
     is_last = number + 1 == len(windows)
@@ -186,6 +186,6 @@ def _submap(estimate: Estimate, windows: Sequence[Window], number: int) -> Subma
 
 
 def _new_shares(windows: Sequence[Window]) -> list[float]:
-    """Return the part of each window that the one before it has not seen."""
+    """Return the share of each window that the one before it has not seen."""
     ends = [windows[0].first, *(w.last for w in windows)]
     return [(w.last - max(w.first, before)) / w.frames for w, before in zip(windows, ends, strict=False)]

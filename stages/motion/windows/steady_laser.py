@@ -1,4 +1,4 @@
-"""Estimates by how much a laser was knocked in mid-run, and corrects the rings after the knock."""
+"""Estimates the size of a knock of the laser in mid-run, and corrects the rings after the knock."""
 
 from __future__ import annotations
 
@@ -23,18 +23,18 @@ from stages.motion.windows.measured_run import MeasuredRun
 from stages.motion.windows.submaps import Window
 
 _ROUNDS = 2
-"""Times that the size of a cause is estimated, each time with the size found before corrected. With 0.8° of
-tilt, a third time would change it by a fifth of its σ."""
+"""Number of times that the size of a cause is estimated, each time after correction by the size found before.
+With 0.8° of tilt, a third time would change it by a fifth of its σ."""
 _STEPS = 20
 """Most steps of an adjustment: a right cause takes 5 to 10 (open-1-field, its line moved), a wrong one may
-never settle, and is refused all the same."""
+never converge, and is rejected in any case."""
 
 
 @dataclass(frozen=True)
 class _Place:
-    """Where rings jump in a window of a run.
+    """The place of a jump of the rings in a window of a run.
 
-    ``behind`` is the first frame behind the jump, counted from the run's first.
+    ``behind`` is the first frame after the jump, counted from the run's first.
     """
 
     run: MeasuredRun
@@ -42,20 +42,20 @@ class _Place:
     window: Window
     behind: int
 
-    def taken_out(self, size: Float) -> MeasuredRun:
-        """Return the run without sizes (6,) of knock and joint (`LASER_AND_JOINT`)."""
+    def corrected(self, size: Float) -> MeasuredRun:
+        """Return the run corrected for sizes (6,) of knock and joint (`LASER_AND_JOINT`)."""
         run = self.run.knocked(LaserKnock(self.jump.frame, size[LASER_AND_JOINT], np.zeros((3, 3))))
         x, y, wider = size[~LASER_AND_JOINT]
         return replace(run, bore=run.bore.with_joint(self.jump.at_mm, (x, y), wider))
 
     def columns(self, estimate: Estimate, measured: Measurements) -> ExtraColumns:
-        """Return what these sizes change."""
+        """Return the derivatives of the residuals by these sizes."""
         first, at_mm = self.behind - self.window.first, self.jump.at_mm - self.run.start_mm(self.window)
         return by_laser_and_joint(estimate, measured, first, at_mm)
 
     @property
     def guesses(self) -> tuple[Float, Float]:
-        """Return the sizes (6,) by which a knock alone, or a joint alone, makes the jump."""
+        """Return the sizes (6,) with which a knock alone, or a joint alone, explains the jump."""
         aside_mm = self.run.T_pc[self.behind, :2, :2] @ self.jump.jump_mm[:2]
         knock = np.concatenate([self.jump.guess.change, np.zeros(3)])
         return knock, np.array([0.0, 0, 0, *aside_mm, self.jump.jump_mm[2]])
@@ -63,7 +63,7 @@ class _Place:
 
 @dataclass(frozen=True)
 class _Fitted:
-    """Sizes (6,) of which those that are ``free`` were estimated, with covariance, and the estimate."""
+    """Sizes (6,), of which the ``free`` ones were estimated, their covariance, and the estimate."""
 
     free: Bool
     size: Float
@@ -75,7 +75,7 @@ class _Fitted:
 def with_steady_laser(
     run: MeasuredRun, parameters: MotionParameters, watch: Watch
 ) -> tuple[MeasuredRun, KnockTest | None]:
-    """Return the run with the change of its laser, and the test for a knock; None where no rings jump.
+    """Return the run with the change of its laser, and the test for a knock; None if no rings jump.
 
     Three causes of the rings' jump are adjusted and compared by their marginal likelihoods: a knock, a joint
     of the pipe, and neither. Both at once are not tried: at a weld (open-2) their freedom would fit best.
@@ -96,14 +96,14 @@ def with_steady_laser(
     knocked, *others = _likelihoods(fitted, run.jump, parameters)
     knock = LaserKnock(run.jump.frame, fitted[0].size[LASER_AND_JOINT], fitted[0].covariance)
     test = KnockTest(knock, knocked - max(others), run.jump, float(run.time_s[behind]))
-    return (run.knocked(knock) if test.told else run), test
+    return (run.knocked(knock) if test.certain else run), test
 
 
 def _fitted(place: _Place, free: Bool, size: Float, parameters: MotionParameters, watch: Watch) -> _Fitted:
-    """Return the sizes (6,) that are free adjusted, in rounds."""
+    """Return the free sizes (6,), adjusted in rounds."""
     covariance, state = np.zeros((0, 0)), None
     for _ in range(_ROUNDS if free.any() else 1):
-        run = place.taken_out(size)
+        run = place.corrected(size)
         measured = run.measured(place.window, parameters)
         first = run.start(place.window, measured, parameters)
         start = first if state is None else replace(state, bore=first.bore)
@@ -117,7 +117,7 @@ def _fitted(place: _Place, free: Bool, size: Float, parameters: MotionParameters
 
 
 def _likelihoods(fitted: list[_Fitted], jump: RingJump, parameters: MotionParameters) -> list[float]:
-    """Return logarithms of causes' marginal likelihoods, by the smallest scales that one of them shows."""
+    """Return the causes' log marginal likelihoods, with the smallest scales of residuals among them."""
     scales = [scales_of(f.estimate.adjusted.equations, f.measured.tracks, parameters.alike) for f in fitted]
     same = Scales(min(s.texture for s in scales), min(s.wall_mm for s in scales))
     smooth = np.min([f.estimate.smooth_sigma for f in fitted], axis=0)
@@ -130,6 +130,6 @@ def _likelihoods(fitted: list[_Fitted], jump: RingJump, parameters: MotionParame
 
 
 def _around(frame: int, whole: Window, frames: int) -> Window:
-    """Return a window of so many frames, fewer in a short run, with a frame in its middle."""
+    """Return a window of at most ``frames`` frames with a frame in its middle."""
     first = min(max(frame - frames // 2, 0), max(whole.last - frames, 0))
     return Window(first, min(first + frames, whole.last))

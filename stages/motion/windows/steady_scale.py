@@ -1,4 +1,4 @@
-"""Correction of an image scale that drifts over a run, and the run adjusted again."""
+"""Corrects an image scale that drifts over a run, and adjusts the run again."""
 
 from __future__ import annotations
 
@@ -17,31 +17,31 @@ from stages.motion.windows.measured_run import MeasuredRun
 from stages.motion.windows.submaps import Window
 
 _ROUNDS = 2
-"""Times that the scale is taken out: the second finds what the linear step before it left."""
+"""Number of corrections of the scale: the second finds the rest that the linear step before it left."""
 _FOUND_AGAIN = 0.5
 """A correction is kept only if the drift estimated afterwards, correction included, differs from it by at
-most this share of it (chosen). Behind a noise filter, whose matches lag behind the wall, .55 % were taken
-out of a steady scale and .07 % were found afterwards: the wall came out .8 mm wider at one end."""
+most this share of it (chosen). With a noise filter, whose matches lag behind the wall, .55 % were
+removed from a steady scale and .07 % were found afterwards: the wall came out .8 mm wider at one end."""
 
 
 @dataclass(frozen=True)
 class SteadyRun:
-    """A run, its estimate, its image scale, and whether a drift of that was ``taken_out``."""
+    """A run, its estimate, its image scale, and whether a drift of the scale was corrected."""
 
     run: MeasuredRun
     estimate: Estimate
     measured: Measurements
     drift: ScaleDrift
-    taken_out: bool
+    corrected: bool
 
     def warn(self, context: Context) -> None:
         """Warn of a scale that drifted."""
-        self.drift.warn(context, self.taken_out)
+        self.drift.warn(context, self.corrected)
 
     @property
     def distance_sigma(self) -> float:
         """Return the relative 1 σ that a drift adds to distances, which follow the rings or the encoder."""
-        if not (self.drift.told or self.drift.contradicted):
+        if not (self.drift.certain or self.drift.contradicted):
             return 0.0
         by_rings = abs(self.drift.ring_mm) * self.drift.offset_sigma / self.estimate.state.nominal_radius_mm
         return by_rings if self.measured.encoder is None else min(by_rings, self._encoder_sigma)
@@ -52,14 +52,14 @@ class SteadyRun:
 
     @property
     def scale(self) -> Float | None:
-        """Return by how many times (N,) pictures were too large; None where nothing was taken out."""
+        """Return the factor (N,) by which pictures were too large; None if nothing was corrected."""
         return self.run.image_scale
 
     @property
     def scale_sigma(self) -> Float | None:
-        """Return its 1 σ (N,); None where the recording bears out a steady scale, or is too long."""
+        """Return its 1 σ (N,); None if the recording confirms a steady scale, or is too long."""
         whole = len(self.drift.at_frames) == len(self.run.time_s)
-        stated = self.drift.told or self.drift.ambiguous or self.drift.contradicted
+        stated = self.drift.certain or self.drift.ambiguous or self.drift.contradicted
         return self.drift.stated_sigma if whole and stated else None
 
 
@@ -71,11 +71,11 @@ def with_steady_scale(
     parameters: MotionParameters,
     watch: Watch,
 ) -> SteadyRun:
-    """Test the image scale for drift in a window, and correct it where the window is the whole run.
+    """Test the image scale for drift in a window, and correct it if the window is the whole run.
 
     A large drift is reported and not corrected. In a reducer nothing is reported, because rings and texture
-    differ there as they do where the image scale drifts. Where most pictures show no texture, a drift cannot
-    be told from a pipe that widens. A correction that the corrected run does not confirm is undone.
+    differ there in the same way as with a drift. If most pictures show no texture, a drift cannot be
+    distinguished from a pipe that widens. A correction that the corrected run does not confirm is undone.
 
     Raises
     ------
@@ -84,21 +84,21 @@ def with_steady_scale(
     """
     drift = drift_of_scale(estimate, measured)
     if run.bore.reduces:
-        drift = drift.not_told()
+        drift = drift.without_evidence()
     elif run.texture.poses.mostly_lost:
-        drift = drift.not_told_from_width()
-    if not drift.told or window != run.whole or drift.large:
-        return SteadyRun(run, estimate, measured, drift, taken_out=False)
+        drift = drift.indistinct_from_width()
+    if not drift.certain or window != run.whole or drift.large:
+        return SteadyRun(run, estimate, measured, drift, corrected=False)
     contradicted = replace(drift, contradicted=True)
-    unchanged = SteadyRun(run, estimate, measured, contradicted, taken_out=False)
+    unchanged = SteadyRun(run, estimate, measured, contradicted, corrected=False)
     first = drift
     for _ in range(_ROUNDS):
-        taken_out = drift.at_frames
-        run = replace(run, image_scale=1 + taken_out)
+        correction = drift.at_frames
+        run = replace(run, image_scale=1 + correction)
         measured = run.measured(window, parameters)
         estimate = estimate_state(estimate.state, measured, parameters, watch)
-        drift = drift_of_scale(estimate, measured, taken_out)
-    if np.ptp(drift.at_frames - taken_out) > _FOUND_AGAIN * np.ptp(taken_out):
+        drift = drift_of_scale(estimate, measured, correction)
+    if np.ptp(drift.at_frames - correction) > _FOUND_AGAIN * np.ptp(correction):
         return unchanged
     drift = replace(drift, p_steady=first.p_steady)
-    return SteadyRun(run, estimate, measured, drift, taken_out=True)
+    return SteadyRun(run, estimate, measured, drift, corrected=True)

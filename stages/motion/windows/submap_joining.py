@@ -1,4 +1,4 @@
-"""Submap joining: each window is placed on the one before by the frames that they share."""
+"""Joins submaps: each window is aligned with the one before by the frames that they share."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from stages.motion.windows.error_chain import ErrorChain, Link, interpolated
 from stages.motion.windows.submaps import SharedParameters, Submap, carried_error, handover
 
 _BLENDED = 0.5
-"""Middle share of the frames of an overlap over which poses go over from one window to the next: the outer
-quarters are worst determined in one of the two. Not measured."""
+"""Middle share of an overlap over which poses are blended from one window to the next: the outer quarters are
+worst determined in one of the two. Not measured."""
 _LEAST_WEIGHT = 1e-3
-"""Weight of an axis, mm, beyond the wall that its window drove along, where no other window has one."""
+"""Weight of an axis, mm, beyond the wall that its window passed, where no other window has an axis."""
 
 
 @dataclass(frozen=True)
@@ -53,12 +53,12 @@ class JoinedRun:
     ----------
     placed : tuple of PlacedSubmap
     chain : ErrorChain
-        Of the submaps as placed.
+        Errors of the submaps as placed.
     T_pc : (N, 4, 4)
     slip : (N,)
     axis : PipeAxis
     covariance : (N, 6, 6)
-        Of the poses, as in `pipeline.artefacts.measured.Trajectory`.
+        Covariance of the poses, as in `pipeline.artefacts.measured.Trajectory`.
     radius_mm, radius_sigma_mm : float
     shared : SharedParameters
     distance_sigma_mm : float
@@ -77,7 +77,7 @@ class JoinedRun:
     distance_sigma_mm: float
 
     def with_scale_sigma(self, relative: float) -> JoinedRun:
-        """Return the run with distances that are unsure all together by a relative 1 σ more."""
+        """Return the run with an additional relative 1 σ that all distances share."""
         way = np.zeros((len(self.T_pc), 6))
         way[:, :3] = relative * (self.T_pc[:, :3, 3] - self.T_pc[0, :3, 3])
         covariance = self.covariance + way[:, :, None] * way[:, None, :]
@@ -87,15 +87,15 @@ class JoinedRun:
 
     @property
     def turn_variance(self) -> Float:
-        """Return the variance (N, 3) of rotations gathered up to every frame: `ErrorChain.turn_variances`."""
+        """Return the variance (N, 3) of rotations summed up to every frame: `ErrorChain.turn_variances`."""
         return interpolated(np.arange(len(self.T_pc)), self.chain.at, self.chain.turn_variances())
 
 
 def join_submaps(submaps: Sequence[Submap], shared: SharedParameters) -> JoinedRun:
-    """Place every window on the one before it.
+    """Align every window with the one before it.
 
-    Neighbouring windows see much the same in the frames they share, so these agree to a fraction of their σ:
-    poses go over from one window to the other gradually, in the middle of the shared frames.
+    Neighbouring windows use nearly the same data in the frames they share, so these agree to a fraction of
+    their σ: poses are blended gradually from one window to the other, in the middle of the shared frames.
     """
     placed = _placed(submaps)
     T_pc, slip = _blended(placed)
@@ -109,7 +109,7 @@ def join_submaps(submaps: Sequence[Submap], shared: SharedParameters) -> JoinedR
 
 
 def merged_axis(placed: Sequence[PlacedSubmap]) -> PipeAxis:
-    """Return the mean of all windows' axes, each weighing most in the middle of the wall it saw."""
+    """Return the mean of all windows' axes, each with the largest weight in the middle of its wall."""
     if len(placed) == 1:
         return placed[0].submap.axis
     spans = [part.submap.axis.distance_mm[[0, -1]] + part.distance_mm for part in placed]
@@ -156,12 +156,12 @@ def _distance_of(placed: PlacedSubmap, T_pc: Float) -> float:
 
 
 def _hat(place: Int, middle: int, half: float) -> Float:
-    """Return weights (K,) that fall linearly from 1 in the middle to 0 at ``half`` from it."""
+    """Return weights (K,) that fall linearly from 1 in the middle to 0 at a distance ``half``."""
     return np.asarray(np.maximum(1 - np.abs(place - middle) / max(half, 1.0), 0.0))
 
 
 def _mean_step(old: Float, new: Float, weight: Float) -> Float:
-    """Return the one motion X (4, 4) with old ≈ X new for poses (K, 4, 4), in the weighted mean."""
+    """Return the transform X (4, 4) with old ≈ X new for poses (K, 4, 4), in the weighted mean."""
     turn = vector_from_rotation(old[:, :3, :3] @ np.swapaxes(new[:, :3, :3], 1, 2))
     rotation = rotation_from_vector(np.average(turn, axis=0, weights=weight))
     shift = old[:, :3, 3] - new[:, :3, 3] @ rotation.T
@@ -187,7 +187,7 @@ def _blended(placed: Sequence[PlacedSubmap]) -> tuple[Float, Float]:
 
 
 def _between(old: Float, new: Float, share: Float) -> Float:
-    """Return poses (n, 4, 4) the ``share`` (n,) of the way from old to new."""
+    """Return poses (n, 4, 4) interpolated from old to new by a ``share`` (n,)."""
     turn = vector_from_rotation(np.swapaxes(old[:, :3, :3], 1, 2) @ new[:, :3, :3])
     rotation = old[:, :3, :3] @ rotation_from_vector(share[:, None] * turn)
     origin = old[:, :3, 3] + share[:, None] * (new[:, :3, 3] - old[:, :3, 3])
@@ -196,7 +196,7 @@ def _between(old: Float, new: Float, share: Float) -> Float:
 
 
 def _error_chain(placed: Sequence[PlacedSubmap], shared: SharedParameters) -> ErrorChain:
-    """Return how errors accumulate through windows as they are placed."""
+    """Return the chain of errors through the placed windows."""
     links: list[Link] = []
     before = np.zeros((6, len(shared.value)))
     for part in placed:
@@ -212,17 +212,17 @@ def _error_chain(placed: Sequence[PlacedSubmap], shared: SharedParameters) -> Er
 
 
 def _radius_sigma(submaps: Sequence[Submap], shared: SharedParameters) -> float:
-    """Return 1 σ of the mean radius: independent in each window, but for what they share."""
+    """Return 1 σ of the mean radius: independent in each window, except for the shared parameters."""
     response = np.mean([s.radius_response for s in submaps], 0)
     variance = float(np.mean([s.radius_variance for s in submaps])) / len(submaps)
     return float(np.sqrt(variance + float(response @ shared.covariance @ response)))
 
 
 def _distance_sigma(submaps: Sequence[Submap], shared: SharedParameters) -> float:
-    """Return 1 σ of the distance along the axis: independent in each window, but for what they share.
+    """Return 1 σ of the distance along the axis: independent in each window, except for shared parameters.
 
-    The direction of the pipe drifts from window to window; that turns the way behind and does not lengthen
-    it.
+    The direction of the pipe drifts from window to window; that rotates the following part of the path
+    without making it longer.
     """
     variance, response = 0.0, np.zeros(len(shared.value))
     for own in submaps:

@@ -1,6 +1,6 @@
-"""Submaps: what a window of frames contributes to the whole run, and what all windows share.
+"""Submaps: the contribution of a window of frames to the whole run, and the parameters all windows share.
 
-Windows are adjusted on their own, the parameters that all share (encoder scale and instrument) are fused by
+Windows are adjusted on their own, the shared parameters (encoder scale and instrument) are fused by
 their information, and every window is adjusted again with these held. G. Sibley et al., "Sliding window
 filter with application to planetary landing", 2010; S. Huang et al., "Sparse local submap joining filter for
 building large-scale maps", 2008.
@@ -26,10 +26,11 @@ _COVARIANCES, _FEWEST_COVARIANCES = 60, 12
 interpolated, since neighbouring frames have nearly the same. More would take time and memory. Not
 measured."""
 _INDEPENDENT_WINDOWS = 3.0
-"""Windows whose information on the shared parameters is added up at most: texture matching errs alike in all
-of them. Taken for independent, the eighty windows of a rendered 100 m moved the instrument by 36 of its σ and
-the distance by 435 mm; with three, by 1.6 σ and 27 mm (`python -m tests.benchmarks.bench_long_run`, one run).
-Chosen on that run."""
+"""Largest number of windows whose information on the shared parameters is added: texture matching has the
+same errors in all of them. As if independent, the eighty windows of a rendered 100 m moved the instrument by
+36 of its σ and the distance by 435 mm; with three, by 1.6 σ and 27 mm (`python -m
+tests.benchmarks.bench_long_run`,
+one run). Chosen on that run."""
 
 
 @dataclass(frozen=True)
@@ -47,7 +48,7 @@ class Window:
 
 @dataclass(frozen=True)
 class SharedInformation:
-    """What one window tells of the shared parameters (S,): best values and added information."""
+    """A window's evidence on the shared parameters (S,): best values and added information."""
 
     value: Float
     information: Float
@@ -75,13 +76,13 @@ class Submap:
     anchor : int
         Frame of the window relative to which errors are stated.
     sampled : (k,) int
-        Frames of the window whose errors are known, from the anchor on; between them they hardly differ.
+        Frames of the window whose errors are known, from the anchor on; errors between them hardly differ.
     joint : (k, 6, k, 6)
-        Covariance of their errors relative to the anchor, the shared parameters given.
+        Covariance of their errors relative to the anchor, given the shared parameters.
     response : (k, 6, S)
         Derivatives of their poses, relative to the anchor, by the shared parameters.
     radius_variance : float
-        Of the radius, the shared parameters given.
+        Variance of the radius, mm², given the shared parameters.
     radius_response : (S,)
         Derivatives of the radius by the shared parameters.
     """
@@ -115,12 +116,12 @@ def cut_windows(frames: int, length: int, overlap: int) -> tuple[Window, ...]:
 
 
 def handover(window: Window, following: Window) -> int:
-    """Return the frame, in the list of all, at which a window hands over to the next: amid shared ones."""
+    """Return the frame, in the list of all, at which the next window takes over: the middle shared one."""
     return (window.last - 1 + following.first) // 2
 
 
 def shared_information(estimate: Estimate, measured: Measurements) -> SharedInformation:
-    """Return what a window adjusted on its own tells of the shared parameters."""
+    """Return the evidence of a window, adjusted on its own, on the shared parameters."""
     state = estimate.state
     which = state.shared_columns
     posterior = np.linalg.inv(estimate.factor.border_covariance()[np.ix_(which, which)])
@@ -130,27 +131,27 @@ def shared_information(estimate: Estimate, measured: Measurements) -> SharedInfo
 
 
 def fuse_shared(
-    told: Sequence[SharedInformation], new_shares: Sequence[float], measured: Measurements, state: State
+    evidence: Sequence[SharedInformation], new_shares: Sequence[float], measured: Measurements, state: State
 ) -> SharedParameters:
-    """Return the shared parameters from what all windows tell of them and what was stated.
+    """Return the shared parameters from the evidence of all windows and the stated values.
 
-    Errors of texture matching are the same in every window: beyond a few windows' worth
-    (`_INDEPENDENT_WINDOWS`) agreement adds no information.
+    Errors of texture matching are the same in every window: beyond the information of a few windows
+    (`_INDEPENDENT_WINDOWS`) agreement adds none.
 
     Parameters
     ----------
-    told
-        By all windows.
+    evidence
+        Evidence of all windows.
     new_shares
-        Part of each window that the one before it has not seen.
+        Share of each window that the one before it has not seen.
     measured, state
-        Of any window: what was stated, and how many parameters there are.
+        Those of any window: they give the stated values and the number of parameters.
     """
     stated = np.diag(_stated_sigma(measured, state) ** -2)
     mean = np.append(1.0, np.zeros(len(state.instrument)))
     information, right = stated.copy(), np.zeros(len(mean))
     believed = min(1.0, _INDEPENDENT_WINDOWS / sum(new_shares))
-    for own, share in zip(told, new_shares, strict=True):
+    for own, share in zip(evidence, new_shares, strict=True):
         information += believed * share * own.information
         right += believed * share * (own.information + stated) @ (own.value - mean)
     covariance = np.asarray(np.linalg.inv(information), float)
@@ -158,9 +159,9 @@ def fuse_shared(
 
 
 def submap_of(estimate: Estimate, window: Window, anchor: int, last: int, windows: int) -> Submap:
-    """Return the submap of a window; its errors are stated from ``anchor`` up to frame ``last`` of it.
+    """Return the submap of a window, with errors from frame ``anchor`` to frame ``last`` of it.
 
-    Everything else, landmarks above all, is marginalised. ``windows`` is the number of windows of the run.
+    All other unknowns, mainly landmarks, are marginalised. ``windows`` is the number of windows of the run.
     """
     state, factor = estimate.state, estimate.factor
     which = state.shared_columns
@@ -182,9 +183,9 @@ def submap_of(estimate: Estimate, window: Window, anchor: int, last: int, window
 
 
 def carried_error(T_pc: Float, anchor_T_pc: Float) -> Float:
-    """Return (k, 6, 6): the errors of poses (k, 4, 4) fixed to an anchor, by the anchor's error (d, w).
+    """Return the derivatives (k, 6, 6) of the errors of poses (k, 4, 4) fixed to an anchor, by its error.
 
-    An error (d, w) stands for the pose [R exp(w), t + d], as in `unknowns.moved`.
+    An error (d, w) means the pose [R exp(w), t + d], as in `unknowns.moved`.
     """
     out = np.zeros((len(T_pc), 6, 6))
     turn = anchor_T_pc[:3, :3]
