@@ -240,8 +240,8 @@ def camera_trembles(trajectory: Trajectory, texture: TrackedPoses, seen: SeenCen
     texture tremble instead, for example on glints.
     """
     shaken = trembling(trajectory.T_pc, trajectory.time_s, texture.frames)
-    trembling = trembles(shaken) and not texture.mostly_lost
-    return trembling and not seen.deny_trembling(trajectory, texture.frames)
+    found = trembles(shaken) and not texture.mostly_lost
+    return found and not seen.deny_trembling(trajectory, texture.frames)
 
 
 def _warn_of_trembling(trajectory: Trajectory, texture: TrackedPoses, shakes: bool, context: Context) -> None:

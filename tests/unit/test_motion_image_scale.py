@@ -203,7 +203,7 @@ def test_what_drifts_goes_one_way(course: tuple[float, ...], told: bool) -> None
     """Grooves of a gauge left a course up and down in a healthy probe, 6 σ from a steady scale."""
     drift = drift_in()[0]
     assert not drift.certain
-    assert replace(drift, at_frames=GROWS * np.array(course), p_steady=1e-9).told == told
+    assert replace(drift, at_frames=GROWS * np.array(course), p_steady=1e-9).certain == told
 
 
 def test_what_no_lens_does_is_told_with_other_causes() -> None:

@@ -116,8 +116,8 @@ def test_a_wall_that_repeats_itself_closes_nothing(run: LoopedRun) -> None:
     same = rough_wall(repeat_mm=12.0)
     joined, loops = closing(run, DrawnView(run, same, same, {}))
     assert joined is run.joined
-    assert set(loops.verdicts) <= {Verdict.ALIKE, Verdict.OTHER}
-    assert Verdict.ALIKE in loops.verdicts
+    assert set(loops.verdicts) <= {Verdict.REPEATED, Verdict.OTHER}
+    assert Verdict.REPEATED in loops.verdicts
 
 
 def test_equal_welds_at_equal_spacing_are_told_apart(run: LoopedRun) -> None:
@@ -254,7 +254,7 @@ def test_pictures_there_and_back_close_loops_and_the_report_says_so() -> None:
     chosen = MotionParameters.model_validate(windows | {"loop_spacing_mm": 20.0})
     context = replace(quiet_context(), report=tell)
     found = estimate_motion(drawn.recording, drawn.probe, drawn.rings, drawn.points, chosen, context)
-    compared = told["places where the wall was compared with what was seen before"]
+    compared = told["places where the wall was compared with an earlier pass"]
     assert 3 <= int(compared) == told["loops closed there"]
     off = found.T_pc[:, 2, 3] - drawn.T_pc[:, 2, 3]
     there, here = np.arange(11, 50, 2), len(way) - np.arange(11, 50, 2)

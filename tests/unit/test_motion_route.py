@@ -98,9 +98,9 @@ def test_an_imu_that_cannot_be_right_is_refused_by_name() -> None:
     for given, mount in ((imu, wrong_mount), (short, MOUNT), (imu, None)):
         found = laid(run, given, mount=mount, warn=told.append)
         np.testing.assert_array_equal(found.T_pc, alone.T_pc)
-    assert "turns otherwise than the camera" in told[0]
-    assert "its readings last from" in told[1]
-    assert "how it sits on the camera" in told[2]
+    assert "shows other rotations than the camera" in told[0]
+    assert "its readings cover" in told[1]
+    assert "does not state its orientation" in told[2]
 
 
 def test_a_plan_of_another_pipe_is_refused() -> None:

@@ -11,7 +11,7 @@ import pytest
 from pipeline.arrays import Float32
 from pipeline.geometry.rigid import from_parts, rotation_from_vector
 from stages.motion import MotionParameters
-from stages.motion.tracking.normalisation import SOFTENING_PX, alike_samples, without_illumination
+from stages.motion.tracking.normalisation import SOFTENING_PX, correlated_samples, without_illumination
 from stages.motion.tracking.patches import cut
 from stages.motion.tracking.strips import Hidden, Strip, StripGrid, sample, softened, unroll
 from stages.motion.tracking.tracker import TextureTracker
@@ -247,4 +247,4 @@ def test_blurred_samples_that_err_alike(px_per_sample: float) -> None:
     seen = cv2.GaussianBlur(noise, (0, 0), blur)
     means = seen.reshape(64, side, 64, side).mean((1, 3))
     wanted = side**2 * means.var() / seen.var()
-    assert alike_samples(np.array([px_per_sample]))[0] == pytest.approx(wanted, rel=0.15)
+    assert correlated_samples(np.array([px_per_sample]))[0] == pytest.approx(wanted, rel=0.15)

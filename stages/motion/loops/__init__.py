@@ -1,1 +1,1 @@
-"""Loop closure: walls that the probe passes again are registered, and the drift they show is corrected."""
+"""Loop closure: registers wall that the probe passes again, and corrects the drift that this shows."""

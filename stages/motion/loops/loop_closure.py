@@ -1,4 +1,4 @@
-"""Loop closure: where the probe passes a wall again, the drift since the first time is measured and removed.
+"""Loop closure: where the probe passes wall again, measures and removes the drift since the first time.
 
 Distance and roll are measured by registering unrolled frames. Position across the pipe and direction are
 measured by the pipe's axis, which the rings determine well in every window. The differences are distributed
@@ -28,17 +28,17 @@ from stages.motion.windows.error_chain import ErrorChain, ErrorSums
 from stages.motion.windows.submap_joining import JoinedRun
 
 _LEAST_PROBABILITY = 1e-6
-"""A revisit counts as wrong if it lies as far off the prediction of all others as happens once in 10⁶."""
+"""A revisit is rejected if a deviation as large as its own from the prediction of all others has p < 10⁻⁶."""
 _REACH_SIGMA = 5.0
 _LEAST_REACH_PX = 4.0
-"""Shifts are looked for up to so many σ of their prediction, and some strip samples more for its rounding."""
+"""Shifts are searched up to so many σ of their prediction, and some strip samples more for its rounding."""
 _DISTANCE, _ROLL = 2, 5
 _ACROSS = (0, 1, 3, 4)
-"""Components of a closure that texture gives (along z and about z of the section) and that the axes give."""
+"""Components of a closure from texture (along z and about z of the section) and from the axes."""
 
 
 class View(Protocol):
-    """How frames are unrolled to show the wall."""
+    """Unrolls frames to strips of the wall."""
 
     @property
     def grid(self) -> StripGrid:
@@ -71,7 +71,7 @@ class LoopReport:
 
     def report(self, context: Context) -> None:
         """Report how many loops were closed, and why others were not."""
-        context.report("places where the wall was compared with what was seen before", len(self.revisits), "")
+        context.report("places where the wall was compared with an earlier pass", len(self.revisits), "")
         if not self.revisits:
             return
         at_weld = sum(t and r.at_weld for t, r in zip(self.closed, self.revisits, strict=True))
@@ -97,13 +97,13 @@ def close_loops(
     ----------
     joined
     passage
-        Which frames saw the wall.
+        Frames that saw the wall.
     features
-        Tells what makes the wall easy to recognise; called only where some wall was passed again.
+        Returns features by which the wall is recognised; called only if some wall was passed again.
     view
     parameters
     scratch
-        Where strips of the earlier passes wait for those of the later.
+        Storage for strips of earlier passes until the later ones are compared.
     """
     pairs = passage.seen_again(parameters.max_track_frames)
     if not len(pairs) or not parameters.most_loops:
@@ -127,20 +127,20 @@ def close_loops(
 
 @dataclass
 class ShiftPredictor:
-    """Where the wall should lie at each revisit, learning from the revisits already registered.
+    """Predicts the shift of the wall at each revisit from the revisits already registered.
 
-    Drift grows with the way between two frames. With every revisit learnt, the range searched at the next one
-    stays small, so that hardly any other wall can be taken for the right one. The prediction is the
-    conditional mean of a Gaussian.
+    Drift grows with the distance travelled between two frames. With every registered revisit, the range
+    searched at the next one stays small, so that other wall is hardly ever taken for the right one. The
+    prediction is the conditional mean of a Gaussian.
 
     Attributes
     ----------
     covariance : (2 M, 2 M)
-        Of the shifts, rows and columns by turns, before any is known.
+        Prior covariance of the shifts, with rows and columns alternating.
     known : list of int
-        Revisits learnt.
+        Registered revisits.
     shift, variance : list of (2,)
-        What was measured there.
+        Shifts measured there, and their variances.
     """
 
     covariance: Float
@@ -162,7 +162,7 @@ class ShiftPredictor:
         return ExpectedShift(mean, np.ceil(_REACH_SIGMA * sigma + _LEAST_REACH_PX))
 
     def learn(self, revisit: int, found: Registration) -> None:
-        """Take note of what registering a revisit gave."""
+        """Store the registration of a revisit."""
         if found.verdict is Verdict.SAME:
             self.known.append(revisit)
             self.shift.append(found.shift)
@@ -193,7 +193,7 @@ def _registered(
     parameters: MotionParameters,
     scratch: Scratch,
 ) -> list[Registration]:
-    """Return what registering the strips of each revisit gave; in memory is one earlier strip at a time."""
+    """Return the registration of each revisit's strips; one earlier strip at a time is in memory."""
     frames = np.unique([f for r in revisits for f in (*r.earlier, r.later)])
     earlier = {f for r in revisits for f in r.earlier}
     stored = scratch.spool(np.float16, (view.grid.rows, view.grid.columns))
@@ -211,7 +211,7 @@ def _registered(
         if frame in earlier:
             rows[frame] = (stored.count, strip.first_row)
             stored.append(StoredStrip.of(strip).contrast[None])
-    return [found.get(n, Registration.refused(Verdict.UNREAD)) for n in range(len(revisits))]
+    return [found.get(n, Registration.refused(Verdict.UNREADABLE)) for n in range(len(revisits))]
 
 
 def _closures(
@@ -251,7 +251,8 @@ def _judged(
 ) -> tuple[tuple[bool, ...], tuple[Verdict, ...]]:
     """Return which loops are closed, and every revisit's verdict.
 
-    If at least as many revisits contradict the rest as agree, it is unknown which are wrong: none is closed.
+    If at least as many revisits contradict the others as agree, it is unknown which are wrong: none is
+    closed.
     """
     verdicts = [r.verdict for r in registered]
     wrong: set[int] = set()

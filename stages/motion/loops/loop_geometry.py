@@ -1,7 +1,7 @@
-"""Geometry of loops: where frames are in the pipe, and how errors of poses enter what a loop measures.
+"""Geometry of loops: positions of frames in the pipe, and the influence of pose errors on loops.
 
-Each frame is placed by the axis of its own window. The one axis of the run is no good for this while loops
-are open: it is the mean of what the windows tell of a place, and turns where these are far apart.
+Each frame is located by the axis of its own window. The axis of the whole run cannot be used while loops are
+open: it is the mean of the windows' axes at a place, and turns where these are far apart.
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ from stages.motion.windows.submap_joining import JoinedRun, PlacedSubmap
 
 @dataclass(frozen=True)
 class PipeFrames:
-    """Where some frames of a run are in the pipe.
+    """Positions of some frames of a run in the pipe.
 
     Attributes
     ----------
     window : (n,) int
-        The window that each belongs to.
+        Window of each frame.
     distance_mm : (n,)
         Along the windows' axes, one after the other.
     axis_o : (n, 3)
@@ -45,10 +45,10 @@ class PipeFrames:
 
     @staticmethod
     def of(joined: JoinedRun, frame: Int) -> PipeFrames:
-        """Return where frames (n,) of the list of all are in the pipe.
+        """Return the positions of frames (n,) of the list of all.
 
         The camera's offset from the axis and its angles are known far better within a window than from window
-        to window, hence the own window's axis.
+        to window; therefore the axis of the frame's own window is used.
         """
         first = np.array([part.submap.window.first + part.submap.anchor for part in joined.placed])
         window = np.searchsorted(first, frame, side="right") - 1
@@ -67,7 +67,7 @@ class PipeFrames:
 
 @dataclass(frozen=True)
 class LoopEnds:
-    """The two ends of M loops: frames and where they are in the pipe."""
+    """The two ends of M loops: frames and their positions in the pipe."""
 
     earlier: Int
     later: Int
@@ -82,9 +82,9 @@ class LoopEnds:
         return LoopEnds(earlier, later, there, here)
 
     def by_error(self, joined: JoinedRun) -> ErrorSums:
-        """Return how errors at the chain's frames enter the difference of both ends, 6 M sums.
+        """Return the errors of the difference of both ends as sums of errors at the chain's frames, 6 M sums.
 
-        Six for each loop: along x, y and z of its section, mm, and turns about them, rad.
+        Six for each loop: along x, y and z of its section, mm, and rotations about them, rad.
         """
         at, loops = joined.chain.at, len(self.earlier)
         knots, weights = [], []
@@ -98,7 +98,7 @@ class LoopEnds:
         return ErrorSums.of(np.concatenate(knots), column, np.concatenate(weights), 6 * loops)
 
     def axis_difference(self) -> Float:
-        """Return by how much (M, 6) the later window's axis is off the earlier one's; 0 along, about it."""
+        """Return the offset (M, 6) of the later window's axis from the earlier's; 0 along and about it."""
         section = self.there.section_o
         shift = np.einsum("nji,nj->ni", section, self.here.axis_o - self.there.axis_o)
         lean = np.einsum("nji,nj->ni", section, self.here.section_o[..., 2])
@@ -107,7 +107,7 @@ class LoopEnds:
 
 
 def _in_section(frame: Int, view: PipeFrames, joined: JoinedRun) -> Float:
-    """Return (n, 6, 6): errors at frames (n,) as motions along and about the axes of their sections."""
+    """Return matrices (n, 6, 6) from errors at frames (n,) to motions along and about sections' axes."""
     back = np.swapaxes(view.section_o, 1, 2)
     seen = np.zeros((len(frame), 6, 6))
     seen[:, :3, :3], seen[:, 3:, 3:] = back, back @ joined.T_pc[frame, :3, :3]

@@ -35,7 +35,7 @@ class Closures:
     sigma : (C,)
         1 σ of the measurements, which are independent.
     place : (C,) int
-        Which revisit each belongs to: those of one revisit are judged together.
+        Revisit of each closure: those of one revisit are judged together.
     """
 
     by_error: ErrorSums
@@ -56,14 +56,14 @@ class Closures:
 
 @dataclass(frozen=True)
 class Conditioned:
-    """Estimated errors (K, 6), and by how much the closures reduce their covariances (K, 6, 6)."""
+    """Estimated errors (K, 6), and the reduction (K, 6, 6) of their covariances by the closures."""
 
     error: Float
     gained: Float
 
 
 def conditioned(chain: ErrorChain, closures: Closures) -> Conditioned:
-    """Return what closures together tell of the errors at the chain's frames."""
+    """Return the errors at the chain's frames, estimated from all closures together."""
     factor = cho_factor(closures.residual_covariance(chain), lower=True)
     error, gained = [], []
     for found in chain.covariances_with(closures.by_error):
@@ -77,8 +77,8 @@ def conditioned(chain: ErrorChain, closures: Closures) -> Conditioned:
 def contradicted_places(covariance: Float, closures: Closures, least_probability: float) -> set[int]:
     """Return the revisits whose closures contradict the motion and all other revisits.
 
-    The worst is removed first, then the rest is judged anew. Where two contradict each other and no third
-    tells which is wrong, both are removed. ``covariance`` (C, C) is `Closures.residual_covariance`.
+    The worst is removed first, then the others are tested again. If two contradict each other and no third
+    one shows which is wrong, both are removed. ``covariance`` (C, C) is `Closures.residual_covariance`.
     """
     out: set[int] = set()
     while True:
@@ -95,13 +95,13 @@ def contradicted_places(covariance: Float, closures: Closures, least_probability
 
 
 def corrected(joined: JoinedRun, found: Conditioned) -> JoinedRun:
-    """Return a run freed of the errors that its closures show: poses, slip, axis and covariance."""
+    """Return a run corrected for the errors that its closures show: poses, slip, axis and covariance."""
     frames, at = np.arange(len(joined.T_pc)), joined.chain.at
     error = interpolated(frames, at, found.error)
     tangent = frames_at(joined.axis, to_pipe(joined.axis, joined.T_pc[:, :3, 3])[0])[1][..., 2]
     covariance = joined.covariance - interpolated(frames, at, found.gained)
-    # Closed loops lower the variance of the distance in the proportion in which they lower that of the last
-    # pose along the pipe.
+    # Closed loops reduce the variance of the distance in the same proportion as that of the last pose along
+    # the pipe.
     before, after = (tangent[-1] @ c[-1, :3, :3] @ tangent[-1] for c in (joined.covariance, covariance))
     placed = [_corrected_submap(part, joined.T_pc, error) for part in joined.placed]
     return replace(
@@ -115,10 +115,10 @@ def corrected(joined: JoinedRun, found: Conditioned) -> JoinedRun:
 
 
 def _probabilities(covariance: Float, closures: Closures, out: set[int]) -> dict[int, float]:
-    """Return for each revisit how probable it is that it lies so far off what all others predict.
+    """Return for each revisit the probability of its deviation from the prediction of all others.
 
-    Predicted by all others, the residuals of a revisit have as covariance the inverse of its block of the
-    inverse covariance (that of a conditioned Gaussian).
+    Given all others, the covariance of a revisit's residuals is the inverse of its block of the inverse
+    covariance (that of a conditioned Gaussian).
     """
     keep = np.flatnonzero(~np.isin(closures.place, list(out)))
     information = np.asarray(np.linalg.inv(covariance[np.ix_(keep, keep)]), float)
@@ -132,7 +132,7 @@ def _probabilities(covariance: Float, closures: Closures, out: set[int]) -> dict
 
 
 def _corrected_submap(part: PlacedSubmap, T_oc: Float, error: Float) -> PlacedSubmap:
-    """Return a window whose poses and axis are freed of the errors (N, 6) of all frames (N, 4, 4).
+    """Return a window whose poses and axis are corrected for the errors (N, 6) of all frames (N, 4, 4).
 
     Every point of the axis moves with the frames that were beside it, or with the last one before it.
     """

@@ -1,4 +1,4 @@
-"""Revisits: where the probe passes a wall again, and which frames see the same wall twice."""
+"""Finds revisits: places where the probe passes wall again, and frames that see the same wall twice."""
 
 from __future__ import annotations
 
@@ -17,31 +17,31 @@ _BESIDE = 15
 length at usual ring spacings. Not measured."""
 _BAND_SIGMA = 6.0
 _LEAST_BAND_MM = 0.15
-"""Rings stand out, as welds do, if their radius is off by so many spreads and mm: beyond the noise of a mean
-radius by far. Not measured."""
+"""Rings stand out, as welds do, if their radius deviates by so many spreads and mm: far beyond the noise of a
+mean radius. Not measured."""
 _SAME_WALL = 0.25
-"""Share of the view by which two frames may be apart to be taken for seeing the same wall. Not measured."""
+"""Largest distance, as a share of the view, between frames that see the same wall. Not measured."""
 _STRIDE = 0.35
-"""Share of the view from one earlier frame that is compared to the next, so that any place
-within reach overlaps one of them by more than four fifths."""
+"""Spacing of compared earlier frames as a share of the view, so that any place within reach overlaps one of
+them by more than four fifths."""
 _MOST_STRIDES = 4
-"""Frames on either side of a place that are compared at most, for the time it takes."""
+"""Largest number of frames on either side of a place that are compared, to limit the time."""
 
 
 @dataclass(frozen=True)
 class Passage:
-    """Frames that see the wall, and how they drove along it.
+    """Frames that see the wall, and their passes along it.
 
     Attributes
     ----------
     frame : (K,) int
-        Places in the list of all frames, ascending.
+        Indices in the list of all frames, ascending.
     distance_mm : (K,)
-        Of the camera along the pipe.
+        Distance of the camera along the pipe.
     near_mm, far_mm : float
-        Wall ahead of the camera that a frame shows.
+        Range of wall ahead of the camera that a frame shows.
     number : (K,) int
-        Which pass each belongs to: a new one begins where the way turns back by more than a frame shows.
+        Number of each frame's pass: a new one begins where the probe turns back by more than a frame shows.
     """
 
     frame: Int
@@ -71,7 +71,7 @@ class Passage:
         return np.array(pairs, np.int64).reshape(-1, 2)
 
     def along(self, index: int, away_mm: Float) -> Int:
-        """Return the frames (n,) of one frame's pass that are nearest to so far away from it, mm."""
+        """Return the frames (n,) of one frame's pass nearest to distances ``away_mm`` from it."""
         same = np.flatnonzero(self.number == self.number[index])
         off = np.abs(self.distance_mm[same] - (self.distance_mm[index] + away_mm)[:, None])
         return np.asarray(self.frame[same[np.argmin(off, 1)]])
@@ -88,12 +88,12 @@ class Passage:
 
 @dataclass(frozen=True)
 class WallFeatures:
-    """What makes a wall easy to recognise.
+    """Features by which wall is recognised.
 
     Attributes
     ----------
     texture : (K,)
-        How well texture could be followed in each frame of a passage.
+        Information of the texture followed in each frame of a passage, 1/px².
     bands_mm : (B,)
         Distances of bands all round the wall, such as welds, ascending.
     """
@@ -130,12 +130,12 @@ def choose_revisits(
     ----------
     passage
     pairs : (M, 2) int
-        Of `Passage.seen_again`.
+        Result of `Passage.seen_again`.
     features
     spacing_mm : float
         Length of a stretch.
     most : int
-        Revisits kept, spread evenly.
+        Largest number of revisits, which are spread evenly.
     """
     earlier, later = pairs.T
     has_band = _in_view(passage, later, features.bands_mm)
@@ -160,9 +160,9 @@ def widened(place: Revisit, passage: Passage, reach_mm: float) -> Revisit:
 
 
 def bands_in_rings(distance_mm: Float, radius_mm: Float) -> Float:
-    """Return distances, ascending, of rings whose radius stands out from those beside: welds, joints.
+    """Return distances, ascending, of rings whose radius differs from their neighbours: welds, joints.
 
-    The radius (F,) is that of the circle through a ring, so what stands out does so all round.
+    The radius (F,) is that of the circle through a ring, so that only features all round are found.
     """
     ok = np.isfinite(radius_mm)
     if ok.sum() <= 2 * _BESIDE:
@@ -182,7 +182,7 @@ def texture_at(frame: Int, observations: Iterable[NDArray[np.void]]) -> Float:
 
 
 def _passes(distance_mm: Float, view_mm: float) -> Int:
-    """Return the pass of each frame (K,); a new one begins where the way turns back by ``view_mm``."""
+    """Return the pass of each frame (K,); a new one begins where the probe turns back by ``view_mm``."""
     turns: list[int] = []
     heading, farthest = 0.0, 0
     for k, distance in enumerate(distance_mm.tolist()):
@@ -207,7 +207,7 @@ def _nearest(distance_mm: Float, among: Int, of: Int) -> Int:
 
 
 def _in_view(passage: Passage, index: Int, bands_mm: Float) -> Bool:
-    """Return whether a band lies in the middle half of what frames (n,) show."""
+    """Return whether a band lies in the middle half of the view of frames (n,)."""
     first = passage.distance_mm[index] + passage.near_mm + passage.view_mm / 4
     low, high = (np.searchsorted(bands_mm, first + x) for x in (0.0, passage.view_mm / 2))
     return np.asarray(high > low)

@@ -1,8 +1,9 @@
-"""Strip registration: whether two unrolled strips show the same wall, and how far it is shifted between them.
+"""Strip registration: decides whether two unrolled strips show the same wall, and measures its shift.
 
-First all shifts within reach are tried at half resolution by normalised correlation of what is usable in both
-(D. Padfield, "Masked object registration in the Fourier domain", 2012); then patches are matched one by one.
-The wall is the same where most patches are found and move alike, and no other shift fits nearly as well.
+First all shifts within reach are tried at half resolution by normalised correlation of the samples usable in
+both (D. Padfield, "Masked object registration in the Fourier domain", 2012); then patches are matched one by
+one. The wall is the same if most patches are found with the same shift, and no other shift fits nearly as
+well.
 """
 
 from __future__ import annotations
@@ -21,8 +22,8 @@ from stages.motion.parameters import MotionParameters
 from stages.motion.tracking.patches import cornerness, cut, whole_patches
 from stages.motion.tracking.strips import Strip
 
-# The figures below refused all of 422 wrong pairs of equal welds at equal spacing and took 77 of 77 right
-# ones (`python -m tests.benchmarks.bench_loops OUT`); how near each is to failing was not measured.
+# The limits below rejected all of 422 wrong pairs of equal welds at equal spacing and accepted 77 of 77 right
+# ones (`python -m tests.benchmarks.bench_loops OUT`); their margins were not measured.
 _LEAST_OVERLAP = 0.3
 """Share of the usable samples of the poorer strip that must be usable in both."""
 _MOST_RIVAL = 0.75
@@ -30,16 +31,16 @@ _MOST_RIVAL = 0.75
 _FEWEST_PATCHES = 30
 """Patches that must be found, or else there is too little texture."""
 _FEWEST_AGREE = 0.5
-"""Share of the patches looked for that must be found and move alike."""
+"""Share of the searched patches that must be found with the same shift."""
 _AGREEING_PX = 1.5
-"""Difference, strip samples, up to which patches move alike; as in tracking."""
+"""Difference, strip samples, up to which shifts of patches count as the same; as in tracking."""
 _LEAN_PX = 3.0
-"""1 σ, strip samples, of the share of the shift that varies once around the pipe: a camera believed 0.5 mm
-off the axis, at 0.22 mm per sample, makes 2.3."""
+"""1 σ, strip samples, of the part of the shift that varies once around the pipe: an error of 0.5 mm of the
+camera's position across the pipe, at 0.22 mm per sample, makes 2.3."""
 _BEYOND = 3
-"""Patches by which shifts beyond the reach are tried too, to find out whether the wall repeats itself."""
+"""Number of patch sizes beyond the reach that are tried too, to find out whether the wall repeats itself."""
 _LEAST_SIGMA_PX = 0.05
-"""Smallest 1 σ, strip samples, believed of a shift: matching errs alike for all patches of a strip."""
+"""Smallest 1 σ, strip samples, of a shift: matching has a common error for all patches of a strip."""
 _LEAST_SPREAD_PX = 0.02
 """Smallest spread, strip samples, of the shifts of patches."""
 _ROUNDS = 8
@@ -47,19 +48,19 @@ _ROUNDS = 8
 
 
 class Verdict(Enum):
-    """The outcome of registering two strips; the value is what the report says."""
+    """The outcome of registering two strips; the value is its text in the report."""
 
     SAME = "the same wall"
     PLAIN = "too little texture"
-    ALIKE = "the wall looks the same elsewhere too"
+    REPEATED = "the wall looks the same elsewhere too"
     OTHER = "the wall is not recognised"
-    UNREAD = "a frame could not be read"
+    UNREADABLE = "a frame could not be read"
     CONTRADICTED = "contradicted by the motion or by other places"
 
 
 @dataclass(frozen=True)
 class StoredStrip:
-    """What is stored of a strip: its first row and its contrast (H, W), NaN where unusable."""
+    """The stored part of a strip: its first row and its contrast (H, W), NaN where unusable."""
 
     first_row: int
     contrast: Float32
@@ -71,13 +72,13 @@ class StoredStrip:
 
     @staticmethod
     def of(strip: Strip) -> StoredStrip:
-        """Return what is stored of a strip."""
+        """Return the stored part of a strip."""
         return StoredStrip(strip.first_row, np.where(strip.usable, strip.contrast, np.float32(np.nan)))
 
 
 @dataclass(frozen=True)
 class Registration:
-    """What registering a strip gave.
+    """Result of registering a strip.
 
     Attributes
     ----------
@@ -85,7 +86,7 @@ class Registration:
     shift : (2,)
         Rows and columns by which the wall lies farther in the later strip.
     sigma : (2,)
-        1 σ of it.
+        1 σ of the shift.
     """
 
     verdict: Verdict
@@ -109,14 +110,14 @@ class _Peak:
 
 @dataclass(frozen=True)
 class ExpectedShift:
-    """By how much the wall should lie farther in the later strip.
+    """Predicted shift of the wall in the later strip.
 
     Attributes
     ----------
     shift : (2,)
         Rows and columns.
     reach : (2,)
-        Largest difference from that.
+        Largest difference from the prediction.
     """
 
     shift: Float
@@ -132,8 +133,8 @@ def register(
 ) -> Registration:
     """Register a strip with earlier ones of the same place.
 
-    Shifts a little beyond the reach are tried too: a wall that repeats itself must not be taken for one that
-    is seen again.
+    Shifts a little beyond the reach are tried too: a repetition in the wall must not be taken for the same
+    wall.
     """
     row, column = _corners(later, parameters)
     if len(row) < _FEWEST_PATCHES:
@@ -149,7 +150,7 @@ def register(
     apart = 2 * parameters.patch_half_px
     rivals = [p.height for p in peaks if np.max(np.abs(p.shift - best.shift)) > apart]
     if max(rivals, default=0.0) > _MOST_RIVAL * best.height:
-        return Registration.refused(Verdict.ALIKE)
+        return Registration.refused(Verdict.REPEATED)
     return found
 
 
@@ -193,9 +194,9 @@ def _correlation(earlier: StoredStrip, later: StoredStrip) -> Float32:
 
 
 def _halved(strip: StoredStrip) -> tuple[Float32, Float32]:
-    """Return contrast and what is seen at half resolution, without what is the same all along the pipe.
+    """Return contrast and usability at half resolution, without structures that run all along the pipe.
 
-    A seam or a streak tells nothing of distance and would fit everywhere.
+    A seam or a streak has no information on distance and would fit everywhere.
     """
     seen = strip.usable
     value = np.where(seen, np.clip(np.nan_to_num(strip.contrast), -1, 1), 0).astype(np.float32)
@@ -252,8 +253,8 @@ def _inside(strip: StoredStrip, row: Float, column: Float, parameters: MotionPar
 def _fit(psi: Float, value: Float) -> tuple[float, float, Float]:
     """Return the robust mean, its 1 σ and the residuals of shifts (n,) at azimuths (n,).
 
-    Shifts may vary once around the pipe, where the camera's angles or offsets are estimated a little
-    differently in the two frames.
+    Shifts may vary once around the pipe, if the camera's angles or offsets are estimated slightly differently
+    in the two frames.
     """
     design = np.stack([np.ones_like(psi), np.cos(psi), np.sin(psi)], -1)
     known = np.diag([0.0, _LEAN_PX**-2, _LEAN_PX**-2])

@@ -1,1 +1,1 @@
-"""Route: which straight lengths and bends the pipe has, and where these and an IMU place it in space."""
+"""Route: finds the pipe's straight lengths and bends, and its course in space by these and an IMU."""

@@ -1,6 +1,6 @@
-"""Alignment: the straight lengths and bends of which a pipe's axis is made.
+"""Alignment: finds the straight lengths and bends of a pipe's axis.
 
-Pipes are laid of straight lengths joined by bends of constant radius. A bend is put in only where the axis
+Pipes consist of straight lengths joined by bends of constant radius. A bend is assumed only where the axis
 turns by more than its noise and the camera's drift of heading explain (binary segmentation: A. Olshen
 et al., "Circular binary segmentation for the analysis of array-based DNA copy number data", 2004).
 """
@@ -18,23 +18,23 @@ from pipeline.artefacts.measured import PipePiece
 from pipeline.geometry.axis import PipeAxis, frames_at
 
 HEADING_DRIFT = 1e-5
-"""1 σ, rad/mm, of a turn that the camera sees in a straight pipe, the same all the way. The straight 100 m of
-`tests.benchmarks.bench_long_run` came back 47 m aside, as a turn of 0.94e-5 rad/mm does; one run."""
+"""1 σ, rad/mm, of a constant curvature that the camera sees in a straight pipe. The straight 100 m of
+`tests.benchmarks.bench_long_run` ended 47 m aside, as a curvature of 0.94e-5 rad/mm explains; one run."""
 _DRIFTS = 4.0
-"""A bend turns by more than so many σ of that drift: radii up to 25 m. Larger ones pass for straight."""
+"""A bend turns by more than so many σ of that drift: radii up to 25 m. Larger ones are taken for straight."""
 _CELL_MM = 60.0
-"""Cells in which turns are summed: two knots of the axis' spline, so that cells are nearly independent."""
+"""Cells in which angles are summed: two knots of the axis' spline, so that cells are nearly independent."""
 _FEWEST_CELLS = 4
-"""Cells below which nothing is said: a bend cannot be told from the noise of three."""
+"""With fewer cells there is no decision: a bend cannot be distinguished from the noise of three."""
 _CELLS_IN_DIAMETERS = 0.5
 """In wide pipes cells are half a diameter long: the shortest standard bend, 1 D through 90°, has three."""
 _WORTH = 30.0
-"""Gain of χ² that a bend must bring: four numbers by the Bayesian information criterion (about 20 for 200
+"""Gain of χ² that a bend must bring: four parameters by the Bayesian information criterion (about 20 for 200
 cells), and 10 more for the places that were tried."""
 _SAME_WAY = 0.7
 """Least cosine of the directions of two touching bends that are one: 45°. A choice."""
 _LEAST_NOISE_RAD = 1e-4
-"""Smallest 1 σ of the turn of a cell that is believed: 3 µm across a knot of the axis."""
+"""Smallest 1 σ of the angle of a cell: 3 µm across a knot of the axis."""
 _STANDARD_DIAMETERS = (1.0, 1.5, 2.0, 2.5, 3.0, 5.0, 6.0, 8.0, 10.0)
 """Radii of bends over the diameter: ASME B16.9 (1 and 1.5), B16.49 and EN 10253 (2 to 10)."""
 _STANDARD_SHARE = 0.02
@@ -54,17 +54,17 @@ class _Bend:
 def find_pieces(
     axis: PipeAxis, from_mm: float, to_mm: float, diameter_mm: float, distance_sigma_mm: float
 ) -> tuple[PipePiece, ...]:
-    """Return the straight lengths and bends of an axis between two distances; none where these are near.
+    """Return the straight lengths and bends of an axis between two distances; none if these are close.
 
     Parameters
     ----------
     axis
     from_mm, to_mm : float
-        Between which the probe saw the pipe.
+        Ends of the range in which the probe saw the pipe.
     diameter_mm : float
         Bore, for the names of standard radii.
     distance_sigma_mm : float
-        1 σ of the way from one end to the other.
+        1 σ of the distance from one end to the other.
     """
     cell_mm = max(_CELL_MM, _CELLS_IN_DIAMETERS * diameter_mm)
     count = int((to_mm - from_mm) / cell_mm)
@@ -79,13 +79,13 @@ def find_pieces(
 
 
 def _turns(axis: PipeAxis, limits: Float) -> Float:
-    """Return by how much the axis turns (n, 2) from limit to limit, rad toward x and y of the section."""
+    """Return the angles (n, 2), rad, of the axis from limit to limit, toward x and y of the section."""
     section = frames_at(axis, limits)[1]
     return np.asarray(np.einsum("kij,ki->kj", section[:-1], section[1:, :, 2])[:, :2])
 
 
 def _bends_in(turn: Float, first: int, noise: float, cell_mm: float) -> list[tuple[int, int]]:
-    """Return ranges of cells that bend: the one that gains most, then those on both sides of it."""
+    """Return ranges of cells that bend: the one with the largest gain, then those on both sides of it."""
     n = len(turn)
     if not n:
         return []
@@ -116,7 +116,7 @@ def _merged(found: list[tuple[int, int]], turn: Float) -> list[tuple[int, int]]:
 
 
 def _refined(axis: PipeAxis, limits: Float, first: int, last: int, noise: float) -> _Bend:
-    """Return a bend with its ends fitted: the heading rises evenly between them and rests outside."""
+    """Return a bend with its ends fitted: the heading rises evenly between them and is constant outside."""
     n, cell = len(limits) - 1, float(limits[1] - limits[0])
     low, high = max(first - 1, 0), min(last + 1, n)
     s = np.linspace(limits[low], limits[high], max(4 * (high - low), 8) + 1)
@@ -144,7 +144,7 @@ def _pieces(
 ) -> list[PipePiece]:
     out, at = [], from_mm
     for bend in bends:
-        # Of the fitted end of the bend, and of the way up to it.
+        # σ of the fitted end of the bend, and of the distance up to it.
         share = (bend.to_mm - from_mm) / max(to_mm - from_mm, 1e-9)
         sigma = float(np.hypot(bend.limit_sigma_mm, share * way_sigma_mm))
         if bend.from_mm > at:

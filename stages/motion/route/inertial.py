@@ -1,4 +1,4 @@
-"""Preintegration: an IMU's readings as rotations from node to node and mean forces about them, in C.
+"""Preintegration: converts an IMU's readings to rotations between nodes and mean forces at them, in C.
 
 C. Forster et al., "On-manifold preintegration for real-time visual-inertial odometry", 2017, § V.
 """
@@ -20,25 +20,27 @@ from stages.motion.route.nodes import Inertia, Rest
 from stages.motion.route.rotation_graph import STANDARD_GRAVITY
 
 _MEAN_S = 1.0
-"""Time about a node over which forces are averaged: longer than a wobble of the probe (some Hz), shorter than
-the way between nodes. A choice."""
+"""Time around a node over which forces are averaged, s: longer than a wobble of the probe (some Hz), shorter
+than the time between nodes. A choice."""
 _LONGEST_GAP_S = 0.1
-"""A gap in the readings over which the rate is not taken as even: ten readings of a slow IMU at 100 Hz."""
+"""Longest gap in the readings over which the rate is interpolated: ten readings of a slow IMU at 100 Hz."""
 _STILL_S, _STILL_MM, _EASED_S = 2.0, 0.1, 0.3
-"""A probe stands that moves by less than 0.1 mm in 2 s; 0.3 s at both ends are left out. Not measured."""
+"""A probe stands if it moves by less than 0.1 mm in 2 s; 0.3 s at both ends are left out. Not measured."""
 _LEAST_BIAS_RAD_S = 2e-6
-"""Least 1 σ of a bias at rest: the Earth turns by 7e-5 rad/s, and a probe by some degrees on its way."""
+"""Least 1 σ of a bias at rest: the Earth turns by 7e-5 rad/s, and a probe by some degrees during a run."""
 _RESPONSE_ERROR = 0.01
-"""1 σ of a gyroscope's scale, and of what it shows of a turn about another axis: data sheets of consumer
-chips state 1 to 3 % and 1 to 2 %. The same all the way, so that bends that the camera sees tell them."""
+"""1 σ of a gyroscope's scale, and of its sensitivity to rotation about another axis: data sheets of consumer
+chips state 1 to 3 % and 1 to 2 %. Both are constant, so that bends that the camera sees determine them."""
 _LEAST_FORCE_M_S2 = 0.01
-"""Smallest 1 σ of a mean force that is believed: a milligravity."""
+"""Smallest 1 σ of a mean force: a milligravity."""
 _TURNING, _APART = 3.0, 0.5
-"""A gyroscope is judged if the camera turns by three of its σ or more. The two may then differ by half of the
-turn; a mount that is wrong by 30° makes them differ by as much."""
+"""A gyroscope is checked if the camera turns by three of its σ or more. The two may then differ by half of
+the
+rotation; a mount that is wrong by 30° makes them differ by as much."""
 _NOT_GRAVITY = 0.1
-"""Share by which the usual force may differ from gravity before it is not used. Consumer accelerometers err
-by 4 % at most (their data sheets)."""
+"""Largest relative difference of the usual force from gravity. Consumer accelerometers err by 4 % at most
+(data
+sheets)."""
 
 
 def inertia_at(
@@ -49,17 +51,17 @@ def inertia_at(
     still: Sequence[tuple[float, float]],
     context: Context,
 ) -> Inertia | None:
-    """Return what an IMU says at and between nodes; None, with a warning, where it does not cover the run.
+    """Return an IMU's measurements at and between nodes; None, with a warning, if it does not cover the run.
 
     Parameters
     ----------
     imu, mount
     time_s : (K,)
-        Of the nodes, on the recording's clock, which the IMU is taken to share; ascending.
+        Times of the nodes, on the recording's clock, which the IMU is assumed to share; ascending.
     R_pc : (K, 3, 3)
-        Camera's rotations there by vision, to see by how much forces scatter.
+        Camera's rotations at the nodes by vision, to estimate the scatter of forces.
     still
-        Times from and to which the probe stood: the gyroscope shows its bias then.
+        Times from and to which the probe stood, when the gyroscope shows its bias.
     context
     """
     refusal = _refusal(imu, time_s)
@@ -74,13 +76,14 @@ def inertia_at(
     turned, node = _rotations(imu, mount, at, bias_c), np.searchsorted(at, time_s)
     back = np.swapaxes(turned[node[1:]], 1, 2)
     R_step = np.swapaxes(turned[node[:-1]], 1, 2) @ turned[node[1:]]
-    # Bias turns in C as it lies at each moment, and the rest of the step turns on from there.
+    # The bias acts in C at each moment, and the rest of the step rotates it further.
     passed = np.concatenate([np.zeros((1, 3, 3)), np.cumsum(turned[1:] * np.diff(at)[:, None, None], 0)])
     by_bias = back @ (passed[node[1:]] - passed[node[:-1]])
     step_s = np.diff(time_s)
     force_c = _mean_forces(imu, mount, at, turned, node)
     shown = np.einsum("kij,kj->ki", R_pc, force_c)
-    # Second differences leave out gravity, of which vision's rotation is known only slowly: their σ is √6.
+    # Second differences remove gravity, since vision's rotation is reliable only over short times: their σ is
+    # √6.
     scatter = robust_spread(np.diff(shown, 2, axis=0).ravel()) / np.sqrt(6) if len(shown) > 4 else 0.0
     noise = mount.accelerometer_noise_density / np.sqrt(_MEAN_S)
     return Inertia(
@@ -92,9 +95,9 @@ def inertia_at(
 
 
 def contradicts(inertia: Inertia, R_pc: Float) -> bool:
-    """Return whether gyroscope and camera turn differently beyond a bias: another mount, unit or clock.
+    """Return whether gyroscope and camera rotate differently beyond a bias: another mount, unit or clock.
 
-    If the camera turns by no more than the gyroscope errs, nothing can be said, and the IMU is believed.
+    If the camera rotates by no more than the gyroscope's error, the test is impossible, and the IMU is used.
     """
     step_s = inertia.step_s[:, None]
     seen = vector_from_rotation(np.swapaxes(R_pc[:-1], 1, 2) @ R_pc[1:]) / step_s
@@ -138,7 +141,7 @@ def _refusal(imu: Imu, time_s: Float) -> str:
     """Return why an IMU cannot be used, empty where it can."""
     if imu.time_s[0] > time_s[0] + _LONGEST_GAP_S or imu.time_s[-1] < time_s[-1] - _LONGEST_GAP_S:
         return (
-            f"its readings last from {imu.time_s[0]:.2f} to {imu.time_s[-1]:.2f} s, the frames from "
+            f"its readings cover {imu.time_s[0]:.2f} to {imu.time_s[-1]:.2f} s, the frames "
             f"{time_s[0]:.2f} to {time_s[-1]:.2f} s"
         )
     inside = (imu.time_s >= time_s[0]) & (imu.time_s <= time_s[-1])
@@ -152,7 +155,7 @@ def _refusal(imu: Imu, time_s: Float) -> str:
 
 
 def _usual_bias(imu: Imu, mount: ImuMount, time_s: Float, R_pc: Float) -> Float:
-    """Return by how much (3,) the gyroscope usually turns more than the camera, rad/s in C."""
+    """Return the usual excess (3,) of the gyroscope's rate over the camera's, rad/s in C."""
     passed = np.concatenate(
         [np.zeros((1, 3)), np.cumsum(imu.rate_rad_s[1:] * np.diff(imu.time_s)[:, None], 0)]
     )
@@ -170,7 +173,7 @@ def _rotations(imu: Imu, mount: ImuMount, at: Float, bias_c: Float) -> Float:
 
 
 def _mean_forces(imu: Imu, mount: ImuMount, at: Float, turned: Float, node: Int) -> Float:
-    """Return the mean forces (K, 3) about nodes, in C as it lies there: turned back as the gyroscope says.
+    """Return the mean forces (K, 3) around nodes, in C at the node: rotated back by the gyroscope.
 
     ``turned`` (n, 3, 3) are the rotations at times ``at`` (n,), ``node`` (K,) the nodes' places among these.
     """

@@ -1,4 +1,4 @@
-"""Finds the pipe's straight lengths and bends, and turns the run to agree with them, a plan and an IMU."""
+"""Finds the pipe's straight lengths and bends, and aligns the run with them, a plan and an IMU."""
 
 from __future__ import annotations
 
@@ -19,16 +19,17 @@ from stages.motion.route.nodes import Inertia, Nodes, PlannedTurn, Rotations
 from stages.motion.route.rotation_graph import STRAIGHT_MM, RotationGraph
 
 _MOST_NODES = 120
-"""Nodes at most: the graph is solved densely, and a way between two is 0.8 % of the run."""
+"""Largest number of nodes: the graph is solved densely, and the spacing is then 0.8 % of the run."""
 _NODE_MM = 30.0
-"""Least way between nodes: a knot of the axis' spline."""
+"""Smallest distance between nodes: a knot of the axis' spline."""
 _LEAST_VARIANCE = 1e-10
-"""Least variance, rad², of a turn by vision between nodes: (10 µrad)², far below any pose's."""
+"""Least variance, rad², of a rotation by vision between nodes: (10 µrad)², far below any pose's."""
 _PLAN_RAD = np.radians(1.0)
-"""1 σ of the angle of a planned bend as it is built: elbows are within 1 % of their angle (EN 10253-2), and
-weld gaps add about half a degree. A choice."""
+"""1 σ of the angle of a planned bend as built: elbows are within 1 % of their angle (EN 10253-2), and weld
+gaps
+add about half a degree. A choice."""
 _TOO_FAR = 4.0
-"""σ by which a plan's angle may differ from the measured one before the plan is not believed."""
+"""Largest difference, σ, of a plan's angle from the measured one with which the plan is used."""
 _STEEP = 0.3
 """Least share of gravity across the pipe's start for which a 12 o'clock is defined: pipes up to 72° steep."""
 
@@ -36,13 +37,13 @@ _STEEP = 0.3
 def lay_route(
     trajectory: Trajectory, turn_variance: Float, recording: Recording, probe: Probe, context: Context
 ) -> Trajectory:
-    """Return the trajectory with its straight lengths and bends, laid as these, plan and IMU say.
+    """Return the trajectory with its straight lengths and bends, aligned with these, a plan and an IMU.
 
-    ``turn_variance`` (N, 3), rad², is that of the turns that the camera saw up to each frame, in C, without
-    its drift.
+    ``turn_variance`` (N, 3), rad², is the variance of the camera's rotations summed up to each frame, in C,
+    without its drift.
 
-    Over less than half of a tube straightness says nothing. So without plan and IMU, shorter runs are not
-    turned; they only get the list of their pieces.
+    Straightness is no evidence over less than half of a tube. So without plan and IMU, shorter runs are not
+    rotated; they only get the list of their pieces.
     """
     found = _with_pieces(trajectory)
     nodes, frame = _nodes(found, turn_variance)
@@ -53,7 +54,7 @@ def lay_route(
     way = float(np.ptp(nodes.distance_mm))
     if inertia is not None or planned or way > STRAIGHT_MM:
         rotations = RotationGraph(nodes, inertia, planned).solve()
-        is_upright = rotations.up_p is not None and _is_told(rotations, context)
+        is_upright = rotations.up_p is not None and _has_clock(rotations, context)
         found = relaid(found, nodes.distance_mm, rotations.about_up() if is_upright else rotations)
         if is_upright and rotations.up_p is not None:
             found = turned_upright(found, rotations.up_p)
@@ -75,7 +76,7 @@ def _with_pieces(trajectory: Trajectory) -> Trajectory:
 
 
 def _nodes(trajectory: Trajectory, turn_variance: Float) -> tuple[Nodes, Int]:
-    """Return nodes along the way ahead, and the frames (K,) in which the probe first came to them."""
+    """Return nodes along the pipe, and the frames (K,) in which the probe first came to them."""
     s = distance_along(trajectory.axis, trajectory.T_pc)
     count = int(np.clip((s.max() - s[0]) / _NODE_MM, 1, _MOST_NODES - 1)) + 1
     reached = np.maximum.accumulate(s)
@@ -84,8 +85,8 @@ def _nodes(trajectory: Trajectory, turn_variance: Float) -> tuple[Nodes, Int]:
     at = frames_at(trajectory.axis, distance)[1]
     variance = np.maximum(np.diff(turn_variance[frame], axis=0), _LEAST_VARIANCE)
     R = trajectory.T_pc[:, :3, :3]
-    # A drift about C's axes, of which C turns on the way: with the last node's axes alone, a roll by 0.3 rad
-    # in 28 m bent a straight pipe by a milliradian.
+    # The drift acts about C's axes, and C rotates between nodes: with the last node's axes alone, a roll by
+    # 0.3 rad in 28 m bent a straight pipe by a milliradian.
     about = np.cumsum((R[1:] + R[:-1]) / 2 * np.diff(s)[:, None, None], 0)[frame[1:] - 1]
     about = np.diff(about, axis=0, prepend=np.zeros((1, 3, 3)))
     by_drift = (np.swapaxes(R[frame[1:]], 1, 2) @ about)[:, :, :2]
@@ -115,7 +116,7 @@ def _planned_turns(
         return ()
     if len(planned) != len(bends):
         context.warn(
-            f"the plan in recording.yaml is not used: it has {len(planned)} bends, the pipe as measured "
+            f"the plan in recording.yaml is not used: it has {len(planned)} bends, the measured pipe "
             f"{len(bends)}. What to do: list the bends between the run's start and end, in order"
         )
         return ()
@@ -146,14 +147,14 @@ def _inertia(
     mount = probe.imu
     if mount is None:
         context.warn(
-            "the IMU is not used: probe.yaml does not say how it sits on the camera. What to do: give the "
-            "section imu with R_ci, the rotation from the IMU's to the camera's directions"
+            "the IMU is not used: probe.yaml does not state its orientation. What to do: add the "
+            "section imu with R_ci, the rotation from the IMU's axes to the camera's"
         )
         return None
-    return _believed(recording, mount, trajectory, frame, context)
+    return _consistent_inertia(recording, mount, trajectory, frame, context)
 
 
-def _believed(
+def _consistent_inertia(
     recording: Recording, mount: ImuMount, trajectory: Trajectory, frame: Int, context: Context
 ) -> Inertia | None:
     assert recording.imu is not None
@@ -163,20 +164,20 @@ def _believed(
     found = inertia_at(recording.imu, mount, trajectory.time_s[frame], R_pc, still, context)
     if found is not None and contradicts(found, R_pc):
         context.warn(
-            "the IMU is not used: its gyroscope turns otherwise than the camera. What to do: check R_ci in "
-            "probe.yaml, the unit (rad/s) and the clock (s, as in frames.csv) of imu.csv"
+            "the IMU is not used: its gyroscope shows other rotations than the camera. What to do: check "
+            "R_ci in probe.yaml, the unit (rad/s) and the clock (s, as in frames.csv) of imu.csv"
         )
         return None
     return found
 
 
-def _is_told(rotations: Rotations, context: Context) -> bool:
+def _has_clock(rotations: Rotations, context: Context) -> bool:
     """Report 12 o'clock and slope by gravity; return whether gravity determines 12 o'clock."""
     up_p = rotations.up_p
     assert up_p is not None
     across = float(np.hypot(up_p[0], up_p[1]))
     if across < _STEEP:
-        context.report("12 o'clock", "the pipe is too steep: as the camera at the first frame", "")
+        context.report("12 o'clock", "the pipe is too steep: that of the camera at the first frame", "")
         return False
     context.report("1 σ of 12 o'clock, by gravity", float(np.degrees(rotations.clock_sigma_rad)), "°")
     context.report(
@@ -190,19 +191,19 @@ def _report(trajectory: Trajectory, context: Context) -> None:
     context.report("straight lengths", len(trajectory.pieces) - len(bends), "")
     context.report("bends", len(bends), "")
     across = float(np.sqrt(np.diagonal(trajectory.covariance[-1])[:2].max()))
-    context.report("1 σ across the pipe at the end, its lengths taken as straight", across, "mm")
+    context.report("1 σ across the pipe at the end, if its lengths are straight", across, "mm")
     way = sum(p.to_mm - p.from_mm for p in trajectory.pieces)
     # A length that curves as evenly as the camera's heading drifts is off by κ L² / 2 at its end.
     curving = float(HEADING_DRIFT * way**2 / 2)
     context.report(
-        "1 σ across the pipe at the end, should its lengths curve", float(np.hypot(across, curving)), "mm"
+        "1 σ across the pipe at the end, if its lengths may curve", float(np.hypot(across, curving)), "mm"
     )
 
 
 def relaid(trajectory: Trajectory, distance_mm: Float, rotations: Rotations) -> Trajectory:
     """Return the trajectory with rotations at nodes (K,) along its axis applied, and their covariance.
 
-    Beside the axis nothing moves: each pose and its piece of axis turn together.
+    Nothing moves relative to the axis: each pose and its piece of axis rotate together.
     """
     old = trajectory.axis
     turn = _between(old.distance_mm, distance_mm, rotations.turn_p)
@@ -211,7 +212,7 @@ def relaid(trajectory: Trajectory, distance_mm: Float, rotations: Rotations) -> 
     moved = np.cumsum(np.einsum("kij,kj->ki", middle, step), 0)
     origin = old.origin_p[0] + np.concatenate([np.zeros((1, 3)), moved])
     first = int(np.searchsorted(old.distance_mm, distance_mm[0]))
-    # The first node stays where it is: it defines the frame.
+    # The first node is fixed: it defines the frame.
     origin = origin + (old.origin_p[first] - origin[first])
     axis = axis_through(origin, turn[0] @ old.R_pa[0, :, 0], float(old.distance_mm[0]))
     s = distance_along(old, trajectory.T_pc)
@@ -221,7 +222,7 @@ def relaid(trajectory: Trajectory, distance_mm: Float, rotations: Rotations) -> 
 
 
 def turned_upright(trajectory: Trajectory, up_p: Float) -> Trajectory:
-    """Return the trajectory in P turned about z until the direction up is −y, so that 12 o'clock is up."""
+    """Return the trajectory in P rotated about z until the direction up is −y, so that 12 o'clock is up."""
     angle = np.arctan2(up_p[0], -up_p[1])
     turn = rotation_from_vector(np.array([0.0, 0.0, -angle]))
     T = from_parts(turn, np.zeros(3))
@@ -232,7 +233,7 @@ def turned_upright(trajectory: Trajectory, up_p: Float) -> Trajectory:
         trajectory,
         T_pc=T @ trajectory.T_pc,
         covariance=six @ trajectory.covariance @ six.T,
-        # Azimuths are counted in the sections' frames: these turn back, so that azimuth 0 is P's new x.
+        # Azimuths are counted in the sections' frames: these rotate back, so that azimuth 0 is P's new x.
         axis=PipeAxis(axis.distance_mm, transform(T, axis.origin_p), turn @ axis.R_pa @ turn.T),
     )
 
@@ -256,15 +257,15 @@ def _carried(old: PipeAxis, new: PipeAxis, s: Float, turn: Float, T_pc: Float) -
 def _covariance(trajectory: Trajectory, s: Float, distance_mm: Float, rotations: Rotations) -> Float:
     """Return the poses' covariance (N, 6, 6).
 
-    Across the pipe, a place errs by the turns before it times the way since. Along the pipe, the earlier
-    variance is kept as an error in proportion to the way, so that behind a bend it acts across; the rest of
-    it is random.
+    Across the pipe, the error of a place is the sum of the rotations before it times the distance since.
+    Along the pipe, the earlier variance is treated as an error proportional to distance, so that after a bend
+    it acts across; the rest of it is random.
     """
     count, node = len(distance_mm), frames_at(trajectory.axis, distance_mm)
     step = np.diff(node[0], axis=0)
     at = trajectory.covariance[np.minimum(np.searchsorted(s, distance_mm), len(s) - 1)]
     lever = np.zeros((count, 3, count, 3))
-    for k, way in enumerate(step):  # a turn e moves what lies behind by e × way
+    for k, way in enumerate(step):  # a rotation e moves all that follows by e × way
         lever[k + 1 :, :, k] += -skew(way) / 2
         lever[k + 1 :, :, k + 1] += -skew(way) / 2
     by_turn = lever.reshape(3 * count, 3 * count)
@@ -283,7 +284,7 @@ def _covariance(trajectory: Trajectory, s: Float, distance_mm: Float, rotations:
     right = np.clip(np.searchsorted(distance_mm, s), 1, count - 1)
     share = np.clip((s - distance_mm[right - 1]) / np.diff(distance_mm)[right - 1], 0, 1)[:, None, None]
     found = own[right - 1] * (1 - share) + own[right] * share
-    # Rotations err about C's axes in the trajectory, about P's in the graph.
+    # Errors of rotations are about C's axes in the trajectory, about P's in the graph.
     to_c = np.zeros((len(s), 6, 6))
     to_c[:, :3, :3], to_c[:, 3:, 3:] = np.eye(3), np.swapaxes(trajectory.T_pc[:, :3, :3], 1, 2)
     return np.asarray(to_c @ found @ np.swapaxes(to_c, 1, 2))

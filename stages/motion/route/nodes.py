@@ -1,4 +1,4 @@
-"""A run's rotation at nodes along its axis: what vision, an IMU and a plan say of it, and the answer."""
+"""A run's rotation at nodes along its axis: measurements of vision, an IMU and a plan, and the result."""
 
 from __future__ import annotations
 
@@ -11,22 +11,22 @@ from pipeline.arrays import Float, Int
 
 @dataclass(frozen=True)
 class Nodes:
-    """Places along the axis at which the run may turn.
+    """Places along the axis at which the run may be rotated.
 
     Attributes
     ----------
     distance_mm : (K,)
     R_pc : (K, 3, 3)
-        Camera's rotations as vision has them.
+        Camera's rotations from vision.
     tangent_p : (K, 3)
-        Of the axis.
+        Direction of the axis.
     variance : (K - 1, 3)
-        Of vision's rotation from each node to the next, in C, rad².
+        Variance of vision's rotation from each node to the next, in C, rad².
     by_drift : (K - 1, 3, 2)
-        That rotation's derivatives by the camera's drift of heading, mm: the way about C's x and y, as the
-        camera lay on the way.
+        That rotation's derivatives by the camera's drift of heading about C's x and y, mm, with the camera's
+        orientations in between.
     length : (K,) int
-        Which straight length the node lies in, −1 in a bend.
+        Number of the straight length in which the node lies, −1 in a bend.
     """
 
     distance_mm: Float
@@ -39,7 +39,7 @@ class Nodes:
 
 @dataclass(frozen=True)
 class Rest:
-    """A stop of the probe next to a node: what the gyroscope then shows is its bias, (3,) rad/s in C."""
+    """A stop of the probe next to a node: the gyroscope's reading is then its bias, (3,) rad/s in C."""
 
     node: int
     rate_c: Float
@@ -48,26 +48,25 @@ class Rest:
 
 @dataclass(frozen=True)
 class Inertia:
-    """What an IMU says between and at the nodes, in C.
+    """Measurements of an IMU between and at the nodes, in C.
 
     Attributes
     ----------
     R_step : (K - 1, 3, 3)
-        Rotation from node to node by the gyroscope, `bias_c` taken off its readings.
+        Rotation from node to node by the gyroscope, after subtraction of `bias_c` from its readings.
     by_bias : (K - 1, 3, 3)
-        By how much that rotation, as a vector in C at its end, shrinks with more bias, s.
+        Decrease of that rotation, as a vector in C at its end, per bias, s.
     bias_c : (3,)
-        Rough bias, rad/s: what the gyroscope usually turns more than the camera.
+        Rough bias, rad/s: the usual excess of the gyroscope's rate over the camera's.
     step_s : (K - 1,)
     step_variance, walk_variance : (K - 1,)
-        Of that rotation, rad², and of the change of the bias, rad²/s².
+        Variances of that rotation, rad², and of the change of the bias, rad²/s².
     force_c : (K, 3)
-        Mean specific force about each node, m/s².
+        Mean specific force around each node, m/s².
     force_sigma, force_bias_sigma : float
-        1 σ of its changing and of its constant error, m/s².
+        1 σ of its variable and of its constant error, m/s².
     response_sigma : float
-        1 σ of each element of what the gyroscope adds to a turn: of its scales and of what one axis shows of
-        another's turn.
+        1 σ of each element of the gyroscope's scale error matrix: scales and cross-axis sensitivities.
     rests : tuple of Rest
     """
 
@@ -95,13 +94,13 @@ class PlannedTurn:
 
 @dataclass(frozen=True)
 class Rotations:
-    """The answer: rotations of the run in P at the nodes, and which way is up.
+    """The result: rotations of the run in P at the nodes, and the direction up.
 
     Attributes
     ----------
     turn_p : (K, 3, 3)
     covariance : (3 K, 3 K)
-        Of the nodes' rotations as rotation vectors in P.
+        Covariance of the nodes' rotations as rotation vectors in P.
     drift : (2,)
         The camera's drift of heading about its x and y, rad/mm.
     up_p : (3,) or None
@@ -125,7 +124,7 @@ class Rotations:
         return float(np.sqrt(by_up @ self.up_covariance @ by_up))
 
     def about_up(self) -> Rotations:
-        """Return them with the errors that they have once P is turned about z until up is its −y."""
+        """Return them with their errors after P is rotated about z until up is its −y."""
         by_up = self._clock_by_up()
         about_z = np.tile([0.0, 0.0, 1.0], len(self.turn_p))
         mixed = np.outer(self.turn_with_up @ by_up, about_z)

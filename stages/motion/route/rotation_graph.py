@@ -1,8 +1,8 @@
-"""The graph of rotations along a run: what vision, straight lengths, gyroscope and gravity say of them.
+"""The graph of rotations along a run, with measurements of vision, straight lengths, gyroscope and gravity.
 
-Unknown are a small rotation of the run at nodes along the axis, the direction of each straight length, the
-camera's constant drift of heading, and the biases of the IMU. R. Hartley et al., "Rotation averaging", IJCV
-2013; C. Forster et al., "On-manifold preintegration for real-time visual-inertial odometry", 2017.
+The unknowns are a small rotation of the run at nodes along the axis, the direction of each straight length,
+the camera's constant drift of heading, and the biases of the IMU. R. Hartley et al., "Rotation averaging",
+IJCV 2013; C. Forster et al., "On-manifold preintegration for real-time visual-inertial odometry", 2017.
 """
 
 from __future__ import annotations
@@ -21,33 +21,34 @@ from stages.motion.route.nodes import Inertia, Nodes, PlannedTurn, Rotations
 _Parts = list[tuple[Int, Float | float]]
 
 STRAIGHTNESS_RAD = 2e-3
-"""1 σ of the direction of a tube against its straight line: a bow of 0.0015 of the length, which EN 10217-1
-allows, leans by 3.5 mrad rms; taken as the limit of an even distribution, by 2 mrad."""
+"""1 σ of the direction of a tube relative to its straight line: a bow of 0.0015 of the length, which EN
+10217-1
+allows, deviates by 3.5 mrad rms; as the limit of a uniform distribution, by 2 mrad."""
 STRAIGHT_MM = 3000.0
-"""Way over which such a lean is the same: half of a tube of 6 m, the usual length. A choice."""
+"""Length over which this deviation is constant: half of a tube of 6 m, the usual length. A choice."""
 STANDARD_GRAVITY = 9.80665
 """m/s², by definition; on Earth gravity differs from it by less than 0.3 %."""
 _GRAVITY_SIGMA = 0.03
 _BIAS_RAD_S = 0.2
-"""1 σ of a gyroscope's bias beforehand: consumer chips state up to ±10 °/s uncalibrated."""
+"""Prior 1 σ of a gyroscope's bias: consumer chips state up to ±10 °/s uncalibrated."""
 _ROUNDS = 4
-"""Gauss-Newton steps: each squares what is left, so that these suffice from half a radian."""
+"""Gauss-Newton steps: each squares the rest, so that these suffice from half a radian."""
 _ORIGIN_RAD = 1e-6
 """1 σ of the first node, whose pose defines the frame."""
 _CHANCE = 1e-3
-"""Chance with which a straight pipe is taken for bent where an IMU is there. A choice."""
+"""Probability with which a straight pipe is taken for bent if there is an IMU. A choice."""
 _DIRECTION_SIGMA = 10.0
-"""1 σ of a length's direction beforehand: nothing is known."""
+"""Prior 1 σ of a length's direction: nothing is known."""
 _LEAST_FREE = 10.0
-"""Degrees of freedom below which it is not believed that vision errs by more than it says. A choice."""
+"""With fewer degrees of freedom, the variance of vision is not scaled up. A choice."""
 
 
 @dataclass(frozen=True)
 class _State:
     """Unknowns.
 
-    Rotations (K, 3, 3), drift (2,), directions (L, 3), biases beyond the rough one (K, 3), what the gyroscope
-    adds of a turn (3, 3), the accelerometer's constant error (3,), up (3,).
+    Rotations (K, 3, 3), drift (2,), directions (L, 3), biases beyond the rough one (K, 3), the gyroscope's
+    scale error matrix (3, 3), the accelerometer's constant error (3,), up (3,).
     """
 
     turn: Float
@@ -105,7 +106,7 @@ class _Equations:
 
 @dataclass(frozen=True)
 class RotationGraph:
-    """All that is known of the rotations along a run."""
+    """The measurements and priors of the rotations along a run."""
 
     nodes: Nodes
     inertia: Inertia | None = None
@@ -114,8 +115,8 @@ class RotationGraph:
     def solve(self) -> Rotations:
         """Return the rotations at the optimum.
 
-        Vision's variance is scaled by how well it fits the rest: where a long straight pipe shows that it
-        errs by more than it says, it is believed less.
+        Vision's variance is scaled by its residuals: if a long straight pipe shows larger errors than stated,
+        vision gets less weight.
         """
         if self._is_bent():
             free = replace(self.nodes, length=np.full(len(self.nodes.length), -1))
@@ -137,7 +138,8 @@ class RotationGraph:
     def _is_bent(self) -> bool:
         """Return whether an IMU contradicts that the lengths are straight.
 
-        Held straight, the equations cost more than free by about two for each node, and seldom by much more.
+        With straight lengths, the equations cost more than without by about two for each node, and seldom by
+        much more.
         """
         straight = self.nodes.length >= 0
         if self.inertia is None or not straight.any():
@@ -179,7 +181,7 @@ class RotationGraph:
         )
 
     def _excess(self) -> float:
-        """Return by how much vision's squared errors exceed what is left of their variance, at least 1."""
+        """Return the ratio of vision's squared errors to their remaining variance, at least 1."""
         state, variance = self._minimum(), self.nodes.variance
         if not len(variance):
             return 1.0
@@ -209,7 +211,7 @@ class RotationGraph:
         return np.asarray(error - self.nodes.by_drift @ state.drift)
 
     def _vision_parts(self, state: _State, at: dict[str, Int]) -> tuple[Int, Float]:
-        """Return the columns (K - 1, 8) of turns and drift, and vision's derivatives (K - 1, 3, 8)."""
+        """Return the columns (K - 1, 8) of rotations and drift, and vision's derivatives (K - 1, 3, 8)."""
         turn, to_c = at["turn"].reshape(-1, 3), np.swapaxes(state.turn @ self.nodes.R_pc, 1, 2)[1:]
         drift = np.broadcast_to(at["drift"], (len(to_c), 2))
         columns = np.concatenate([turn[1:], turn[:-1], drift], 1)

@@ -1,4 +1,4 @@
-"""Texture landmarks: those that are still looked for, and the observations of all of them."""
+"""Texture landmarks: the active ones, and the observations of all of them."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from stages.motion.tracking.patches import Patches
 _FEWEST_DROPPED = 256
 """Retired landmarks are removed in batches of at least so many, since the arrays are copied each time."""
 _FEWEST_SEEN = 3
-"""Observations below which a landmark is left out: two of them fix it and check nothing."""
+"""A landmark with fewer observations is left out: two of them determine it without a check."""
 OBSERVATION = np.dtype(
     [("landmark", "i8"), ("frame", "i8"), ("uv", "f8", 2), ("sigma", "f8"), ("at", "f8", 2)]
 )
@@ -24,16 +24,16 @@ the row and column of the strip where the landmark was found first."""
 
 
 _MOSTLY = 0.5
-"""Share of the frames without texture from which it tells nothing of the whole run. Chosen."""
+"""Share of the frames without texture from which texture is no evidence for the whole run. Chosen."""
 _MUCH = 0.25
-"""If a larger share of the lit pictures shows no texture, the rest contradicts neither encoder nor probe
-(chosen; in good recordings no picture is without). In VP9 at .5 Mbit/s half of the pictures had none. The
-texture left in the others made the way 4.8 % too short, and the encoder, which was right, was discarded."""
+"""If a larger share of the lit pictures shows no texture, the others must not contradict encoder or probe
+(chosen; in good recordings every picture shows some). In VP9 at .5 Mbit/s half of the pictures had none. The
+texture in the others made the distance 4.8 % too short, and the encoder, which was right, was discarded."""
 
 
 @dataclass
 class LandmarkMap:
-    """Strip positions, offsets, patches and history of the landmarks (L,) that may still be looked for.
+    """Strip positions, offsets, patches and history of the landmarks (L,) that may still be searched.
 
     Attributes
     ----------
@@ -44,13 +44,13 @@ class LandmarkMap:
     row, column : (L,)
         Strip position where the landmark was found first.
     offset : (L, 2)
-        How far it lies now from there, beside the common motion of all landmarks; rows and columns.
+        Its current displacement from there, without the common motion of all landmarks; rows and columns.
     born : (L,) int
         First frame.
     retired : (L,) bool
-        No longer looked for.
+        Whether it is no longer searched.
     misses : (L,) int
-        Times in a row that it was not found.
+        Number of times in a row that it was not found.
     patches : Patches
         Appearance of the first L; the arrays may have room for more.
     found : int
@@ -89,7 +89,7 @@ class LandmarkMap:
         return int(self.retired.sum()) > max(len(self.retired) // 2, _FEWEST_DROPPED)
 
     def drop_retired(self) -> Int:
-        """Forget retired landmarks, so that the work of a frame does not grow; return their numbers."""
+        """Remove retired landmarks, so that the work for a frame does not grow; return their numbers."""
         dropped, keep = self.number[self.retired], ~self.retired
         self.patches = self.patches.of(np.flatnonzero(keep))
         for name in ("number", "row", "column", "offset", "born", "retired", "misses"):
@@ -99,12 +99,12 @@ class LandmarkMap:
 
 @dataclass(frozen=True)
 class TrackedPoses:
-    """Where texture took the probe.
+    """Poses of the probe from texture.
 
     Attributes
     ----------
     frames : (K,) int
-        Frames that were tracked, as places in the list of all frames.
+        Tracked frames, as indices in the list of all frames.
     T_pc : (K, 4, 4)
         First guess of their poses in the straightened pipe.
     lost : (K,) bool
@@ -117,17 +117,17 @@ class TrackedPoses:
 
     @property
     def known(self) -> Int:
-        """Return the frames (k,) whose poses texture tells: not the lost ones, but the first."""
+        """Return the frames (k,) whose poses texture gives: the first one, and all that are not lost."""
         return np.asarray(self.frames[~self.lost | (np.arange(len(self.lost)) == 0)])
 
     @property
     def mostly_lost(self) -> bool:
-        """Whether most frames show too little texture: then it tells nothing of how the camera moves."""
+        """Whether most frames show too little texture: then it is no evidence of the camera's motion."""
         return bool(len(self.lost) > 1 and self.lost[1:].mean() > _MOSTLY)
 
     @property
     def much_lost(self) -> bool:
-        """Whether so many frames show too little texture that what the others show is in doubt."""
+        """Whether so many frames show too little texture that the evidence of the others is in doubt."""
         return bool(np.sum(self.lost[1:]) > _MUCH * len(self.lost[1:]))
 
     def between(self, first: int, last: int) -> TrackedPoses:
@@ -173,7 +173,7 @@ class Tracks:
         return np.asarray(np.arccos(np.clip(camera.unproject(self.uv).ray[:, 2], -1, 1)))
 
     def reduced(self, times: Float, centre_px: Float) -> Tracks:
-        """Return the tracks seen in pictures that were so many times (N,) too large about their centre."""
+        """Return the tracks corrected for pictures that were too large by the factor ``times`` (N,)."""
         return replace(self, uv=centre_px + (self.uv - centre_px) / times[self.frame, None])
 
 
@@ -189,15 +189,15 @@ class _Batch:
 
 @dataclass
 class ObservationStore:
-    """Observations of a whole run; in memory are only those of landmarks that are still looked for.
+    """Observations of a whole run; memory holds only those of active landmarks.
 
     Attributes
     ----------
     most : int
-        Observations of one landmark that are kept, spread evenly: those of neighbouring frames have nearly
-        the same error, so the rest would take room and add no information.
+        Largest number of observations kept of one landmark, spread evenly: those of neighbouring frames have
+        nearly the same error, so that more would need space without adding information.
     spool : Spool
-        Of `OBSERVATION`, on the disk.
+        Spool of `OBSERVATION` on the disk.
     open : list of arrays
         Observations of landmarks that may be seen again.
     batches : list
@@ -217,14 +217,14 @@ class ObservationStore:
         return ObservationStore(most, scratch.spool(OBSERVATION))
 
     def add(self, landmark: Int, frame: int, uv: Float, sigma: Float, at: Float) -> None:
-        """Keep the observations (N,) of one frame; ``at`` (N, 2) is where landmarks lie in the strip."""
+        """Store the observations (N,) of one frame; ``at`` (N, 2) are the landmarks' places in the strip."""
         seen = np.zeros(len(landmark), OBSERVATION)
         seen["landmark"], seen["frame"], seen["uv"], seen["sigma"] = landmark, frame, uv, sigma
         seen["at"] = at
         self.open.append(seen)
 
     def write(self, retired: Int | None = None) -> None:
-        """Put the observations of retired landmarks on the disk; None stands for all landmarks."""
+        """Write the observations of retired landmarks to the disk; None means all landmarks."""
         seen = np.concatenate(self.open) if self.open else np.zeros(0, OBSERVATION)
         complete = np.ones(len(seen), bool) if retired is None else np.isin(seen["landmark"], retired)
         self.open = [seen[~complete]]

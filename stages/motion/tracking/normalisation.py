@@ -1,7 +1,7 @@
-"""Contrast of an unrolled strip, freed of the illumination and equally sharp on the near and the far wall.
+"""Computes the contrast of an unrolled strip without the illumination, and equally sharp near and far.
 
-Both a gradient of the light and a change of sharpness within a patch shift its match, always the same way.
-The shift would be taken for a wrong lens or a wrong distance, so both are removed before patches are
+Both a gradient of the light and a change of sharpness within a patch shift its match, always in the same
+direction. The shift would look like an error of lens or distance, so both are removed before patches are
 compared.
 """
 
@@ -21,8 +21,9 @@ not alias into it. Chosen for the open recordings, not measured since."""
 _IMAGE_BLUR_PX = 1.5
 """σ, image px, of the whole blur: √(1.2² + 0.9²), where 0.9 px of lens and pixel are assumed."""
 _SMOOTHED_ROWS = 3.0
-"""σ, rows, over which the mean brightness of rows is smoothed: so few that what is left of the light within a
-patch of 21 rows is small, so many that single bright rows of the wall stay. Not measured."""
+"""σ, rows, over which the mean brightness of rows is smoothed: so few that the rest of the light within a
+patch
+of 21 rows is small, so many that single bright rows of the wall are kept. Not measured."""
 _FEWEST_USABLE = 0.1
 """Rows with a smaller usable share get the mean brightness of their neighbours. Not measured."""
 _LEAST_SMOOTHING = 0.7
@@ -34,9 +35,9 @@ _BLURS = 4
 def without_illumination(grey: Float32, usable: Bool) -> Float32:
     """Return grey (H, W) over the mean brightness of its rows, minus 1; 0 where unusable.
 
-    The predicted light has been divided out before. What the prediction left along the pipe, equal all round,
-    is removed here. A local mean would follow the light as well, but at the border of the usable part it sees
-    one side only and shifts the texture there.
+    The predicted light has been divided out before. The rest along the pipe, equal all round, is removed
+    here. A local mean would follow the light as well, but at the border of the usable part it sees one side
+    only and shifts the texture there.
     """
     mean, count = _row_means(grey, usable)
     row = np.arange(len(mean))
@@ -76,8 +77,8 @@ def equally_sharp(contrast: Float32, coarse_uv: Float32, steps: tuple[int, int])
     return out
 
 
-def alike_samples(px_per_sample: Float) -> Float:
-    """Return how many samples (M,) of a strip err alike: a blur of 1 σ s makes 4πs² of them one."""
+def correlated_samples(px_per_sample: Float) -> Float:
+    """Return the number of samples (M,) of a strip with one common error: 4πs² for a blur of 1 σ s."""
     blur = (SOFTENING_PX / np.maximum(px_per_sample, 1e-3)) ** 2 + _LEAST_SMOOTHING**2
     return np.asarray(1 + 4 * np.pi * blur)
 
@@ -85,8 +86,8 @@ def alike_samples(px_per_sample: Float) -> Float:
 def noise_of_rows(contrast: Float32, usable: Bool) -> Float32:
     """Return the noise (H,), 1 σ from one sample to the next, of each row of contrast (H, W).
 
-    It is measured by second differences around the pipe, over every other sample, which texture hardly
-    reaches.
+    It is measured by second differences around the pipe, over every other sample, which contain hardly any
+    texture.
     """
     power, share = _second_differences(contrast, usable)
     known = gaussian_filter1d(share, 2 * _SMOOTHED_ROWS)
@@ -94,7 +95,7 @@ def noise_of_rows(contrast: Float32, usable: Bool) -> Float32:
 
 
 def _blurred(contrast: Float32, part: slice, sigma_along: float, sigma_around: float) -> Float32:
-    """Return some rows of the blurred strip; only these, and the rows that the blur reaches, are computed."""
+    """Return some rows of the blurred strip; only these and the rows within the blur are computed."""
     more = int(np.ceil(5 * sigma_along)) + 1
     first = max(part.start - more, 0)
     wide = cv2.GaussianBlur(contrast[first : part.stop + more], (0, 0), sigma_around, None, sigma_along)
@@ -114,7 +115,7 @@ def _blur_variance(coarse_uv: Float32, steps: tuple[int, int], axis: int) -> Flo
 
 @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
 def _row_means(grey, usable):  # type: ignore[no-untyped-def]
-    """Return the mean (H,) of each row's usable samples, and how many there are."""
+    """Return the mean (H,) of each row's usable samples, and their number."""
     mean, count = np.zeros(len(grey)), np.zeros(len(grey), np.int64)
     for i in range(grey.shape[0]):
         total, many = np.float32(0), 0

@@ -35,7 +35,7 @@ class Patches:
     by_row, by_column : (N, n, n) float32
         Its derivatives along the pipe and around it.
     information : (N, 2, 2)
-        Of the position, for noise of variance 1.
+        Fisher information of the position, for noise of variance 1.
     """
 
     value: Float32
@@ -102,7 +102,7 @@ _FIELDS = tuple(Patches.__dataclass_fields__)
 
 @dataclass(frozen=True)
 class Matches:
-    """Where patches were found.
+    """Positions at which patches were found.
 
     Attributes
     ----------
@@ -111,7 +111,7 @@ class Matches:
     correlation : (N,)
         Normalised cross-correlation there.
     sigma : (N,)
-        1 σ of ``offset``, strip samples, from what differs between the patch and the strip.
+        1 σ of ``offset``, strip samples, from the difference between the patch and the strip.
     """
 
     offset: Float
@@ -136,7 +136,7 @@ def cut(contrast: Float32, row: Int, column: Int, half: int) -> Patches:
 
 
 def cornerness(contrast: Float32, usable: Bool, half: int, rows: slice) -> Float32:
-    """Return how well a patch (side 2 half + 1) around each sample of some rows can be matched; 0: cut off.
+    """Return the cornerness of a patch (side 2 half + 1) around each sample of some rows; 0: cut off.
 
     The smaller eigenvalue of the structure tensor: J. Shi, C. Tomasi, "Good features to track", CVPR 1994.
     """
@@ -179,8 +179,8 @@ def _wrapped(contrast: Float32, usable: Bool, side: int) -> tuple[Float32, Int32
     return wide, np.asarray(cv2.integral(unusable), np.int32)
 
 
-# These are inlined in one kernel: as a function of its own, a `fastmath` kernel rounds differently when it
-# was just compiled than when it comes from the cache, and results would differ in their last digits.
+# These are inlined in one kernel: a separate `fastmath` kernel rounds differently when it was just compiled
+# than when it comes from the cache, and results would differ in their last digits.
 @numba.njit(cache=True, nogil=True, forceinline=True)
 def _whole(unusable, i, j, n):  # type: ignore[no-untyped-def]
     """Whether the square of side n from (i, j) on holds no unusable sample."""

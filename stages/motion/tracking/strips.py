@@ -1,8 +1,8 @@
 """Unrolled strips: the wall in front of the camera as a picture over distance and azimuth.
 
 A strip has rows of constant distance (row 0 is distance 0 of the straightened pipe, spacing
-``grid.step_mm``) and columns of constant azimuth (column 0 is −π). Where a spot of the wall lies in a strip
-hardly depends on the camera's pose, so patches can be compared over many frames without warping.
+``grid.step_mm``) and columns of constant azimuth (column 0 is −π). The place of a spot of the wall in a strip
+hardly depends on the camera's pose, so that patches can be compared over many frames without warping.
 """
 
 from __future__ import annotations
@@ -34,12 +34,12 @@ _COARSE = (8, 4)
 pixels lie on a curve there, and interpolated between. `Strip.pixel` uses the same interpolation, so that
 positions have no error from it."""
 _LEAST_LIGHT = 0.05
-"""Predicted light is not believed below this share of the largest: the division would amplify noise."""
+"""Predicted light below this share of the largest is not used: the division would amplify noise."""
 _DARKEST, _BRIGHTEST = 5.0, 250.0
-"""Grey values of 8 bits between which a sample is usable: beyond, the sensor may clip."""
+"""Grey values of 8 bits between which a sample is usable: beyond them, the sensor may clip."""
 _LINE_HALF_WIDTH_SIGMA = 12
 """Half width, in σ of the laser line, of the wall hidden under it: the line is below 1e-4 of its peak beyond
-4.3 σ; what reaches farther is its glow, a gradient that `without_illumination` removes. Not measured."""
+4.3 σ; its glow reaches farther, a gradient that `without_illumination` removes. Not measured."""
 _DECODED_AHEAD = 4
 
 
@@ -50,13 +50,13 @@ class StripGrid:
     Attributes
     ----------
     radius_mm : float
-        Of the cylinder on which the strip lies.
+        Radius of the cylinder on which the strip lies.
     columns : int
-        Samples around, a multiple of 4.
+        Number of samples around, a multiple of 4.
     near_mm, far_mm : float
-        Wall ahead of the camera that is sampled.
+        Range of wall ahead of the camera that is sampled.
     bore : Bore
-        How much wider the pipe is than the cylinder. On a plain cylinder the texture of a reducer would be
+        Excess of the pipe's width over the cylinder. On a plain cylinder the texture of a reducer would be
         stretched more and more as the camera comes near, and its patches matched wrongly.
     """
 
@@ -121,7 +121,7 @@ class Strip:
 
 @dataclass(frozen=True)
 class Hidden:
-    """What hides the wall.
+    """Parts of a picture that hide the wall.
 
     Attributes
     ----------
@@ -137,7 +137,7 @@ class Hidden:
 
 @dataclass(frozen=True)
 class WallView:
-    """The lit frames of a recording, how they are unrolled, and what hides the wall in them."""
+    """Unrolls the lit frames of a recording, without the parts that hide the wall."""
 
     recording: Recording
     probe: Probe
@@ -145,22 +145,22 @@ class WallView:
 
     @property
     def lit(self) -> Int:
-        """Return the lit frames (K,) as places in the list of all frames."""
+        """Return the lit frames (K,) as indices in the list of all frames."""
         frames = self.recording.frames
         return self._place(frames.of(Illumination.LED, Illumination.BOTH))
 
     @property
     def hidden(self) -> Hidden:
-        """Return what hides the wall."""
+        """Return the parts of the pictures that hide the wall."""
         half = _LINE_HALF_WIDTH_SIGMA * self.probe.laser.line_sigma_mm if self._both else 0.0
         at_mm = self.probe.laser.baseline_mm
         stays = in_full(self.recording.stays, self.recording.source.image_size)
         return Hidden((at_mm - half, at_mm + half), stays)
 
     def images(self, place: Int) -> Iterator[tuple[int, Image | None]]:
-        """Yield places and softened grey pictures; with the laser on, the colour its light reaches least.
+        """Yield indices and softened grey pictures; with the laser on, of the colour its light reaches least.
 
-        A picture that cannot be decoded is None. Decoding goes on in a thread while a picture is worked on.
+        A picture that cannot be decoded is None. Decoding continues in a thread while a picture is processed.
         """
         for frame, image in in_background(self._softened(self.recording.frames.frame[place]), _DECODED_AHEAD):
             yield int(self._place(np.array(frame))), image
@@ -247,9 +247,9 @@ def _refined(coarse, steps):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
 def sample(image, coarse, steps):  # type: ignore[no-untyped-def]
-    """Return the image (H, W), looked up bilinearly on the coarse pixel grid refined so many times.
+    """Return the image (H, W), sampled bilinearly on the coarse pixel grid refined by ``steps``.
 
-    The second array (H, W) tells which samples lie in the image.
+    The second array (H, W) marks the samples that lie in the image.
     """
     rows, columns = (coarse.shape[0] - 1) * steps[0], (coarse.shape[1] - 1) * steps[1]
     grey = np.zeros((rows, columns), np.float32)

@@ -1,4 +1,4 @@
-"""The texture tracker: landmarks on the wall are followed from frame to frame in unrolled strips."""
+"""The texture tracker: follows landmarks on the wall from frame to frame in unrolled strips."""
 
 from __future__ import annotations
 
@@ -21,18 +21,18 @@ from stages.motion.tracking.patches import best_of_cells, cornerness, cut, whole
 from stages.motion.tracking.strips import Hidden, Strip, StripGrid, unroll
 
 _FEWEST = 12
-"""Landmarks found below which a frame's displacement, their median, is not believed. Not measured."""
+"""Fewest landmarks whose median gives a frame's displacement. Not measured."""
 _FEWEST_AGREEING = 0.25
 """Share of the landmarks in view that must move like their neighbour. On noise without texture up to 0.12 do
 by chance (`test_roll_is_not_invented_on_a_plain_wall`), in HEVC at crf 32 0.3 to 0.6, else nearly all."""
 _AGREEING_PX = 1.5
-"""Difference, strip samples, up to which neighbours move alike: five times ``landmark_sigma_px``."""
+"""Difference, strip samples, up to which neighbours move together: five times ``landmark_sigma_px``."""
 _LARGEST_SIGMA = 3.0
-"""Matches whose σ is larger than so many times ``landmark_sigma_px`` are refused. Not measured."""
+"""Matches whose σ is larger than so many times ``landmark_sigma_px`` are rejected. Not measured."""
 _LEAST_SIGMA = 0.02
-"""Smallest σ, strip samples, that is believed of a match: interpolation alone errs as much. Not measured."""
+"""Smallest σ, strip samples, of a match: interpolation alone errs as much. Not measured."""
 _MOST_MISSES = 8
-"""Frames in a row without the landmark after which it is given up. Not measured."""
+"""Frames in a row without the landmark after which it is retired. Not measured."""
 _BORDER_PX = 3
 """Rows and columns around a patch that must be usable too: ten times ``landmark_sigma_px``."""
 _FEWEST_ROWS = 32
@@ -43,7 +43,7 @@ _LEAST_RESPONSE = 0.05
 
 @dataclass(frozen=True)
 class TrackedTexture:
-    """What tracking the wall's texture through a run gave.
+    """Result of tracking the wall's texture through a run.
 
     Attributes
     ----------

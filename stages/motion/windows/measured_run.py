@@ -109,10 +109,8 @@ class MeasuredRun:
         T_pc[:, 2, 3] -= self.start_mm(window)
         z, grid = T_pc[:, 2, 3], self.texture.grid
         span = (float(z.min()) - _MARGIN_MM, float(z.max()) + grid.far_mm + _MARGIN_MM)
-        corrections, bore = (
-            measured.unsure.shape[1] + MATCH_BIASES,
-            self.bore.counted_from(self.start_mm(window)),
-        )
+        corrections = measured.unsure.shape[1] + MATCH_BIASES
+        bore = self.bore.counted_from(self.start_mm(window))
         straight = straight_start(
             T_pc, measured.tracks.xyz, *span, grid.radius_mm, parameters.axis_knot_mm, corrections
         )

@@ -21,7 +21,7 @@ from stages.motion.bundle_adjustment.solver import (
 )
 from stages.motion.bundle_adjustment.unknowns import State
 from stages.motion.parameters import MotionParameters
-from stages.motion.tracking.normalisation import alike_samples
+from stages.motion.tracking.normalisation import correlated_samples
 from stages.motion.windows.first_window import EncoderCheck, FirstWindow, adjust_first
 from stages.motion.windows.measured_run import MeasuredRun
 from stages.motion.windows.steady_scale import SteadyRun
@@ -99,7 +99,7 @@ class _End:
     def of(estimate: Estimate, measured: Measurements, step_mm: float) -> _End:
         adjusted = estimate.adjusted
         away_px = np.linalg.norm(measured.tracks.uv - measured.probe.camera.centre_px, axis=1)
-        alike = alike_samples(away_px * step_mm / estimate.state.nominal_radius_mm)
+        alike = correlated_samples(away_px * step_mm / estimate.state.nominal_radius_mm)
         sigma_px = measured.tracks.sigma_px * np.sqrt(alike)
         in_sigma = adjusted.equations.texture.residual / sigma_px[:, None]
         errors = excess_of(in_sigma), lasting_excess(in_sigma, measured.tracks.landmark)
