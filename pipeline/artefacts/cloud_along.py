@@ -1,4 +1,4 @@
-"""The points of a wall's cloud by where along the pipe they lie."""
+"""The points of a wall's cloud, indexed by their distance along the pipe."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from pipeline.arrays import Float, Int
 from pipeline.artefacts.measured import PointCloud
 
-# Points in a chunk: some MB, for memory's sake.
+# Points in a chunk: some MB, to limit memory.
 _AT_ONCE = 1 << 16
-# Rings closer than this part of the usual step are of a probe that stands; the same part as in premises
+# Rings closer than this part of the usual step belong to a probe that stands; the same part as in premises
 # (chosen).
 _MOVES = 0.25
 
@@ -24,9 +24,9 @@ class CloudAlong:
     Attributes
     ----------
     cloud : PointCloud
-        In order of rings, so that what lies near each other is in few chunks.
+        Points in the order of rings, so that neighbouring points are in few chunks.
     nearest_mm, farthest_mm : (n,)
-        Of every chunk.
+        Range of distance of every chunk.
     """
 
     cloud: PointCloud
@@ -42,7 +42,7 @@ class CloudAlong:
         return PointCloud(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
 
     def ring_spacing_mm(self) -> float:
-        """Return the median distance of neighbouring rings; of a probe that mostly stood, where it moved."""
+        """Return the median distance of neighbouring rings, mm; if the probe mostly stood, where it moved."""
         _, middle = self._rings()
         gone, apart = np.abs(np.diff(middle)), np.diff(np.sort(middle))
         moves = _MOVES * usual_way(gone)
@@ -51,7 +51,7 @@ class CloudAlong:
         return float(np.median(apart)) if len(apart) else 0.0
 
     def ways_mm(self) -> Float:
-        """Return how far the probe went to each frame's ring (F,) since the ring before, in order of time.
+        """Return the distance travelled to each frame's ring (F,), mm, since the ring before in time.
 
         It is 0 for frames without a ring, and for the first ring after missing ones.
         """
@@ -63,7 +63,7 @@ class CloudAlong:
         return ways
 
     def _rings(self) -> tuple[Int, Float]:
-        """Return the frames (R,) that show a ring, and how far along the pipe the middle of each lies."""
+        """Return the frames (R,) that show a ring, and the distance of each ring's middle along the pipe."""
         frames = int(self.cloud.frame.max(initial=-1)) + 1
         count, total = np.zeros(frames), np.zeros(frames)
         for first in range(0, len(self.cloud.frame), _AT_ONCE):
@@ -76,9 +76,9 @@ class CloudAlong:
 
 
 def usual_way(ways: Float) -> float:
-    """Return the step for which half of the way was gone in steps (n,) at least as long; 0 without any.
+    """Return the step such that half of the distance was travelled in steps (n,) at least as long, or 0.
 
-    A probe that stands adds pictures and no way, so that its pictures do not count.
+    A probe that stands adds pictures without distance, so that these do not count.
     """
     ways = np.sort(ways)
     gone = np.cumsum(ways)
@@ -86,7 +86,7 @@ def usual_way(ways: Float) -> float:
 
 
 def cloud_along(cloud: PointCloud) -> CloudAlong:
-    """Go through a cloud once and note where its chunks lie."""
+    """Return a cloud with the range of each chunk, in one pass."""
     parts = [cloud.distance_mm[k : k + _AT_ONCE] for k in range(0, len(cloud.frame), _AT_ONCE)]
     nearest, farthest = ([float(f(p)) for p in parts] for f in (np.min, np.max))
     return CloudAlong(cloud, np.array(nearest), np.array(farthest))

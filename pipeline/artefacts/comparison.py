@@ -1,7 +1,7 @@
-"""Two runs of one pipe beside each other: what a comparison is given, and what it finds.
+"""Inputs and results of a comparison of two runs of one pipe.
 
-Distances mm, azimuths rad in P; "earlier" and "now" (later) say of which run. Depths and their growth are
-positive into the wall.
+Distances are in mm, azimuths in rad in P; "earlier" and "now" (later) name the run. Depths and their growth
+are positive into the wall.
 """
 
 from __future__ import annotations
@@ -24,14 +24,14 @@ FAMILY_ERROR = 0.01
 
 @dataclass(frozen=True)
 class SurveyedWall:
-    """What one run knows of the wall.
+    """One run's measurement of the wall.
 
     Attributes
     ----------
     smoothing_mm : float
         1 σ with which the map was smoothed.
     ring_spacing_mm : float
-        Median distance of neighbouring rings.
+        Median distance of neighbouring rings along the pipe (`CloudAlong.ring_spacing_mm`).
     """
 
     wall: WallMap
@@ -50,7 +50,7 @@ class WallPair:
     welds_mm : (W,)
         Distances of the welds in the earlier run.
     is_one_calibration : bool
-        Whether both were measured with the same numbers of the instrument, whose error then drops out.
+        Whether both were measured with the same instrument parameters, whose errors then cancel.
     """
 
     earlier: SurveyedWall
@@ -61,7 +61,7 @@ class WallPair:
 
 @dataclass(frozen=True)
 class OutlinedFinding:
-    """A finding as its run's review left it, with the depth that the run reports."""
+    """A finding after its run's review, with the depth that the run reports."""
 
     id: str
     kind: DefectKind
@@ -96,7 +96,7 @@ class Registration:
         Stations, distances of the earlier run, increasing.
     shift_mm, shift_sigma_mm, roll_rad, roll_sigma_rad : (K,)
     scale, scale_sigma : float
-        Slope of s_now over s_earlier, over all.
+        Slope of s_now over s_earlier over the whole overlap.
     blocks, agreeing : int
         Pieces of wall that were matched, and those that agree with the result.
     correlation : float
@@ -105,7 +105,7 @@ class Registration:
         Probability that so many would agree if the walls had nothing in common.
     welds : tuple of WeldPair
     overlap_mm : (float, float)
-        What both runs saw, in distances of the later one.
+        Range that both runs saw, in distances of the later one.
     """
 
     at_mm: Float
@@ -123,16 +123,16 @@ class Registration:
     overlap_mm: tuple[float, float]
 
     def to_now(self, distance_mm: Float, azimuth_rad: Float) -> tuple[Float, Float]:
-        """Return where places of the earlier run lie in the later one; ψ runs on beyond ±π."""
+        """Return the places of the earlier run in the later one; ψ continues beyond ±π."""
         return distance_mm + self._shift_at(distance_mm), azimuth_rad + self._roll_at(distance_mm)
 
     def to_earlier(self, distance_mm: Float, azimuth_rad: Float) -> tuple[Float, Float]:
-        """Return where places of the later run lie in the earlier one."""
+        """Return the places of the later run in the earlier one."""
         before = self.earlier_distance(distance_mm)
         return before, azimuth_rad - self._roll_at(before)
 
     def earlier_distance(self, distance_mm: Float) -> Float:
-        """Return the earlier run's distances of the later run's; beyond the stations at the common scale."""
+        """Return the earlier run's distances for the later run's; extrapolated with the common scale."""
         now = self.at_mm + self.shift_mm
         inside = np.interp(distance_mm, now, self.at_mm)
         beyond = distance_mm - np.clip(distance_mm, now[0], now[-1])
@@ -164,7 +164,7 @@ class Value:
 
 @dataclass(frozen=True)
 class RegisteredWalls:
-    """How two walls lie on each other, and their difference on the later run's grid.
+    """The registration of two walls, and their difference on the later run's grid.
 
     Attributes
     ----------
@@ -174,7 +174,7 @@ class RegisteredWalls:
     limit_mm : float
         The difference is stored from −limit to limit, its σ from 0 to half of that.
     difference_level, sigma_level : (S, A) uint8
-        Later less earlier radius, and its 1 σ, as palette levels: 0 is "not measured", 1 to 255 linear.
+        Later minus earlier radius, and its 1 σ, as palette levels: 0 is "not measured", 1 to 255 linear.
     """
 
     registration: Registration
@@ -186,17 +186,17 @@ class RegisteredWalls:
 
 @dataclass(frozen=True)
 class Growth:
-    """What has become of a defect from the earlier run to the later one.
+    """Growth of a defect from the earlier run to the later one.
 
     Attributes
     ----------
     depth_now_mm, depth_before_mm : float
-        On both walls with one method, within one outline; positive into the wall.
+        Depths on both walls by one method, within one outline; positive into the wall.
     depth_mm, length_mm, width_mm : Value
         Growth of the depth (positive into the wall) and of the extents at ``level_mm``.
     area_mm2 : Value
     level_mm : float
-        Depth at which the extents are read on both walls.
+        Depth at which the extents are measured on both walls.
     """
 
     depth_now_mm: float
@@ -209,7 +209,7 @@ class Growth:
 
 
 class Fate(StrEnum):
-    """What became of a finding."""
+    """The outcome of comparing a finding in both runs."""
 
     GREW = "grew"
     SHRANK = "shrank"
@@ -231,13 +231,13 @@ class Fate(StrEnum):
 
 @dataclass(frozen=True)
 class Place:
-    """A finding of either run, or of both, where it lies in the later run.
+    """A finding of either run, or of both, in the coordinates of the later run.
 
     Attributes
     ----------
     now, earlier : OutlinedFinding or None
     outlines : tuple of Outline
-        Of those that are there, in the later run.
+        Outlines of the existing ones, in the later run's coordinates.
     """
 
     now: OutlinedFinding | None
@@ -263,7 +263,7 @@ class Place:
 
 @dataclass(frozen=True)
 class Change:
-    """A finding of either run and what became of it.
+    """A finding of either run and its change.
 
     Attributes
     ----------
@@ -273,9 +273,9 @@ class Change:
     growth : Growth or None
         None for welds, which registered the runs, and where a run did not see it.
     z, p, p_adjusted : float
-        Growth of the depth over its σ, how probable that is without any, and the same after Holm's step-down
-        over all findings (Scand. J. Statist. 6, 1979); NaN without growth. A finding of one run only is where
-        that run stands out most: its p is corrected for all such places.
+        Growth of the depth over its σ, its p-value without growth, and the p-value after Holm's step-down
+        over all findings (Scand. J. Statist. 6, 1979); NaN without growth. A finding of one run only was
+        selected as that run's extreme: its p is corrected for the number of such places.
     """
 
     place: Place
@@ -295,6 +295,6 @@ class Change:
 
 @dataclass(frozen=True)
 class Comparison:
-    """What became of every finding of either run."""
+    """The changes of all findings of either run."""
 
     changes: tuple[Change, ...]

@@ -1,4 +1,4 @@
-"""What is found in a measured wall: sections and defects, and the names that standards give them.
+"""Findings in a measured wall: sections and defects, and their names in standards.
 
 Lengths mm, azimuths rad in the pipe frame P. Clock positions are hours in [0, 12), 12 o'clock at −y,
 clockwise looking forward: azimuth = 30° · clock − 90°.
@@ -18,7 +18,7 @@ _KNOWN_SIGMA = 2.0
 
 
 class DefectKind(StrEnum):
-    """What a defect looks like by its shape alone."""
+    """The kind of a defect by its shape alone."""
 
     PIT = "pit"
     CORROSION = "corrosion"
@@ -30,15 +30,15 @@ class DefectKind(StrEnum):
 
     @property
     def is_metal_loss(self) -> bool:
-        """True where the kind takes wall away, so that a wall loss and a POF class have a meaning."""
+        """True if the kind removes wall, so that a wall loss and a POF class are defined."""
         return self in (DefectKind.PIT, DefectKind.CORROSION, DefectKind.GOUGE, DefectKind.CRACK)
 
 
 @dataclass(frozen=True)
 class Sections:
-    """Cross-sections at uniform stations; every measure comes with its 1 σ. NaN where too little was seen.
+    """Cross-sections at uniform stations; every measure has its 1 σ. NaN where too little was seen.
 
-    A calliper diameter is D(ψ) = r(ψ) + r(ψ + π) about the fitted centre, of the section's smooth shape.
+    A calliper diameter is D(ψ) = r(ψ) + r(ψ + π) around the fitted centre of the section's smooth shape.
 
     Attributes
     ----------
@@ -100,18 +100,18 @@ class Defect:
     clock_from, clock_to : float
         Hours, clockwise from one to the other; 0 to 12 all round.
     peak_distance_mm, peak_clock : float
-        Where the depth was read: the place of the extreme deviation.
+        Place of the extreme deviation, where the depth was measured.
     length_mm, width_mm : float
         Extent along the pipe and around it.
     depth_mm, depth_sigma_mm : float
         Extreme deviation from the pipe's own smooth shape, positive into the wall, and its 1 σ.
     wall_loss_percent : float
-        Depth over wall thickness for metal loss; NaN where it has no meaning or the thickness is unknown.
+        Depth over wall thickness for metal loss; NaN for other kinds, or if the thickness is unknown.
     probability : float
-        That something is there: from how many rings show it, against how many false ones such footage makes;
-        NaN where the photo alone shows it.
+        Probability that the finding is real, from the rings that show it and the number of false findings in
+        such footage; NaN if only the photo shows it.
     confidence : float
-        Probability that the defect is there and of this kind; NaN as above.
+        Probability that the finding is real and of this kind; NaN as above.
     frames : (N,) int
         Frames whose ring touched it.
     outline : (V, 2)
@@ -121,7 +121,7 @@ class Defect:
     pacp_suggestion, en13508_suggestion : str
         Codes that an inspector may choose: suggestions from the shape, not a coded inspection.
     statement : str
-        What it is and why it was called so, in words.
+        Description and reasons in words.
     """
 
     id: int
@@ -149,18 +149,19 @@ class Defect:
 
 @dataclass(frozen=True)
 class Defects:
-    """All defects in order of distance, and what the search could have found.
+    """All defects in order of distance, and the sensitivity of the search.
 
     Attributes
     ----------
     items : tuple of Defect
-        Each shown by two rings, or by one and the photo.
+        Defects that two rings show, or one ring and the photo.
     false_alarm_rate : float
-        Expected number of false ones among them: what their probabilities leave.
+        Expected number of false ones among them: the sum of 1 − probability.
     smallest_depth_mm : float
         Depth from which a defect of 3 mm × 3 mm is found in nine of ten cases.
     unconfirmed : tuple of Defect
-        What one ring alone shows, or what is more probably false than real: to be looked at, not counted.
+        Findings that one ring alone shows, or that are more likely false than real: to be checked, not
+        counted.
     """
 
     items: tuple[Defect, ...]
@@ -170,7 +171,7 @@ class Defects:
 
     @property
     def deepest(self) -> Defect | None:
-        """The one that is farthest off the wall, of those whose depth is known not to be zero (2 σ)."""
+        """The defect with the largest depth among those whose depth is certainly not zero (2 σ)."""
         known = [d for d in self.items if abs(d.depth_mm) >= _KNOWN_SIGMA * d.depth_sigma_mm]
         return max(known, key=lambda d: abs(d.depth_mm), default=None)
 

@@ -1,4 +1,4 @@
-"""Whether ring samples that were moved back behind dirt on the window were displaced by dirt.
+"""Decides whether ring samples that were moved back behind dirt on the window were displaced by dirt.
 
 Dirt displaces the line at one azimuth of the image in all rings. A groove or seam along the pipe does the
 same unless the probe rolls: then the wall behind the dirt changes.
@@ -16,12 +16,12 @@ from pipeline.artefacts.measured import RingSamples, RingValidity, Trajectory
 from pipeline.geometry.axis import distance_along, roll_at
 
 
-def told_by_roll(rings: RingSamples, trajectory: Trajectory) -> RingSamples:
-    """Return the rings without samples that were moved back where the probe's roll does not bear that out.
+def kept_by_roll(rings: RingSamples, trajectory: Trajectory) -> RingSamples:
+    """Return the rings without samples that were moved back, unless the probe's roll confirms dirt.
 
-    They were moved by the median of what their rings depart by. What is on the wall, and as wide as the
-    stretch of azimuths that was moved, is seen there while the probe rolls by that width: it makes the median
-    only if half of the rings have rolls within as much.
+    Samples were moved by the median departure of all rings. A feature of the wall that is as wide as the
+    moved stretch of azimuths is seen there only while the probe rolls by that width: it determines the median
+    only if half of the rings have rolls within that width.
     """
     if rings.moved_px is None:
         return rings
@@ -34,14 +34,14 @@ def told_by_roll(rings: RingSamples, trajectory: Trajectory) -> RingSamples:
 
 
 def _roll_of(rings: RingSamples, trajectory: Trajectory) -> Float:
-    """Return azimuth in P less azimuth in the image (F,)."""
+    """Return azimuth in P minus azimuth in the image (F,), rad."""
     last = len(trajectory.frame) - 1
     T_pc = trajectory.T_pc[np.minimum(np.searchsorted(trajectory.frame, rings.frame), last)]
     return roll_at(trajectory.axis, distance_along(trajectory.axis, T_pc), T_pc)
 
 
 def _widths(moved: Bool) -> Int:
-    """Return of azimuths (A,) around the circle how many are in the same stretch of those moved, else 0."""
+    """Return the length of the stretch of moved azimuths that each of (A,) belongs to, 0 if not moved."""
     start = int(np.argmin(moved))
     stretch = label(np.roll(moved, -start))[0]
     count = np.bincount(stretch)

@@ -1,6 +1,6 @@
-"""Accumulation: ring points and trajectory to a cloud and the wall's radius over distance and azimuth.
+"""Accumulation: computes a cloud and the wall's radius over distance and azimuth from rings and trajectory.
 
-The effect of the instrument's uncertainty on the radius is common to all rings: it does not average away.
+The effect of the instrument's uncertainty on the radius is common to all rings: it does not average out.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from pipeline.adjustment.shared_light import HeldOver
 from pipeline.arrays import Float, Int
 from pipeline.artefacts.findings import clock_of_azimuth
 from pipeline.artefacts.measured import RingPoints, RingSamples, RingValidity, Trajectory, Wall
-from pipeline.artefacts.moved_back import told_by_roll
+from pipeline.artefacts.moved_back import kept_by_roll
 from pipeline.artefacts.wall_map import FixedPlace, FixedToProbe
 from pipeline.errors import UnusableError
 from pipeline.geometry.axis import roll_at
@@ -31,7 +31,7 @@ from stages.accumulate.unmeasured import warn_of_unmeasured
 
 # Azimuths, 5° apart: the instrument's errors are harmonics up to the fourth, and linear between nodes.
 _AZIMUTHS = 72
-# Rings at which the instrument's share is worked out: at least so many, on long runs every 500th.
+# Rings for which the instrument's share is computed: at least so many, in long runs every 500th.
 _RINGS, _EVERY = 24, 500
 
 
@@ -57,10 +57,10 @@ def calibration_spread(
 ) -> CalibrationSpread:
     """Return the 1 σ of the radius from the instrument's uncertainty, computed for some rings.
 
-    The first harmonic of each change is taken out, because the pipe's axis follows the rings' centres.
+    The first harmonic of each change is removed, because the pipe's axis follows the rings' centres.
     """
     azimuth = np.linspace(-np.pi, np.pi, _AZIMUTHS, endpoint=False)
-    # Rings seen over less than 0.3 of their round hardly fix the first harmonic that is taken out (chosen).
+    # Rings seen over less than 0.3 of the circle hardly determine the first harmonic to be removed (chosen).
     usable = np.flatnonzero(survey.seen > min(0.3, 0.99 * survey.seen.max()))
     count = min(len(usable), max(_RINGS, len(usable) // _EVERY))
     some = usable[np.unique(np.linspace(0, len(usable) - 1, count).astype(int))]
@@ -86,7 +86,7 @@ def _nearest(distance: Float, wanted: Float) -> Int:
 
 
 def _by_scale(probe: Probe, rings: RingSamples, row: int) -> float:
-    """Return the gain of a ring's radius, mm, per relative gain of the picture's scale."""
+    """Return the change of a ring's radius, mm, per relative change of the picture's scale."""
     outward = np.stack([np.cos(rings.azimuth_rad), np.sin(rings.azimuth_rad)], -1)
     radius_px = float(np.median(rings.radius_px[row][rings.valid[row]]))
     by_pixel = probe.triangulate_jacobian(rings.centre_px + radius_px * outward)[0][:, :2]
@@ -108,11 +108,12 @@ def _around(probe: Probe, rings: RingSamples, row: int, azimuth_p: Float, roll: 
 
 __all__ = ["ACCUMULATE", "AccumulateParameters", "accumulate_wall"]
 
-# Rows that the report's medians are taken of.
+# Number of rows from which the report's medians are computed.
 _REPORTED_ROWS = 2000
 # A branch, step or collapse may take half of the radius somewhere, not from most of a pipe. Not measured.
 _IMPOSSIBLE, _MOST_IMPOSSIBLE = 0.5, 0.5
-# Share from which such wall is told. Chosen: a branch of half of the diameter in a metre of pipe has more.
+# Share from which such wall is reported. Chosen: a branch of half of the diameter in a metre of pipe has
+# more.
 _FEW_IMPOSSIBLE = 0.002
 # Places fixed to the image that are warned of one by one; the largest first.
 _TOLD_PLACES = 4
@@ -142,21 +143,21 @@ def accumulate_wall(
     parameters: AccumulateParameters,
     context: Context,
 ) -> Wall:
-    """Bring every ring into the pipe and estimate the wall's radius about the pipe's own axis.
+    """Transform every ring into the pipe frame and estimate the wall's radius around the pipe's own axis.
 
     Raises
     ------
     UnusableError
-        When no ring sample lies on the wall, or most of the wall is nowhere near the pipe's radius.
+        When no ring sample lies on the wall, or most of the wall is far from the pipe's radius.
     """
     found = probe.as_found_in(trajectory)
-    told = told_by_roll(rings, trajectory)
-    warn_of_left_out(rings, told, context)
-    rings = in_steady_pictures(told, trajectory)
+    kept = kept_by_roll(rings, trajectory)
+    warn_of_left_out(rings, kept, context)
+    rings = in_steady_pictures(kept, trajectory)
     on_wall = RingsOnWall(found, rings, points, trajectory)
     survey = survey_of(on_wall)
     if not survey.count.any():
-        hint = "see the rejected samples of stage rings"
+        hint = "the report lists the rejected samples of the stage rings by reason; see the warnings before"
         raise UnusableError("accumulate", "no valid ring sample", hint=hint)
     grid = map_grid(survey, parameters.distance_step_mm, parameters.azimuth_samples)
     spread = calibration_spread(found, rings, trajectory, survey)
@@ -183,31 +184,30 @@ def accumulate_wall(
 
 
 def _held_in(rings: RingSamples, survey: RingSurvey, radius_mm: float) -> HeldOver:
-    """Return how much of the line a codec repeated, estimated from its height, width and place together."""
+    """Return the share of the line's light that a codec repeated, from its height, width and position."""
     lines = (np.log(np.maximum(rings.amplitude, 1.0)), rings.width_px, rings.radius_px)
     known = [np.where(rings.valid, line, np.nan).astype(float) for line in lines]
     return held_over(known, survey.middle_mm, 2 * np.pi * radius_mm / len(rings.azimuth_rad))
 
 
 def warn_of_held(held: HeldOver, context: Context) -> None:
-    """Report how alike the finest structure of neighbouring rings is, and warn of a codec that repeats it."""
+    """Report the correlation of neighbouring rings' finest structure, and warn of a codec that repeats it."""
     alike = float(held.likeness[1:2].sum())
-    context.report("likeness of neighbouring rings in their finest structure", alike, "")
+    context.report("correlation of neighbouring rings in their finest structure", alike, "")
     if held.more_than_usual:
         context.warn(
-            f"neighbouring rings share {100 * alike:.0f} % of the line's finest structure, where good "
-            "recordings share 16 % at most: the codec, or a filter against noise, repeats light of earlier "
-            "pictures. The σ of radii includes this, and such rings count together where they confirm a "
-            "finding; yet single findings may be false, and small pits too shallow, which their σ includes, "
-            "or missed. What to do: look at the picture of every finding, record with less compression and "
-            "without noise reduction"
+            f"neighbouring rings share {100 * alike:.0f} % of the line's finest structure (good recordings: "
+            "16 % at most): the codec, or a noise filter, repeats light of earlier pictures. The σ of radii "
+            "includes this, and such rings count as one when they confirm a finding. But single findings may "
+            "be false, and small pits may be missed or too shallow, which their σ includes. What to do: look "
+            "at the picture of every finding, record with less compression and without noise reduction"
         )
 
 
 def _warn_of_fixed(fixed: FixedToProbe | None, context: Context) -> None:
-    """Warn of what stays at one place of the image while the wall goes by."""
+    """Warn of departures that stay at one place of the image while the wall moves."""
     places = () if fixed is None else fixed.places
-    context.report("places where the line departs in the image, not on the wall", len(places), "")
+    context.report("departures of the line that stay in the image, not on the wall", len(places), "")
     for place in sorted(places, key=lambda p: -abs(p.departure_mm))[:_TOLD_PLACES]:
         context.warn(_fixed_in_words(place))
 
@@ -216,7 +216,7 @@ def _fixed_in_words(place: FixedPlace) -> str:
     seen = (
         f"at {notation.clock(float(clock_of_azimuth(place.azimuth_rad)))} in the picture, over "
         f"{np.degrees(place.width_rad):.0f}°, the line departs by {abs(place.departure_mm):.2f} mm "
-        f"{'outward' if place.departure_mm > 0 else 'inward'} while {place.length_mm:.0f} mm of wall go by "
+        f"{'outward' if place.departure_mm > 0 else 'inward'} while {place.length_mm:.0f} mm of wall pass "
         f"(frames {place.frame_from} to {place.frame_to})"
     )
     if place.on_probe:
@@ -227,14 +227,14 @@ def _fixed_in_words(place: FixedPlace) -> str:
         )
     return (
         f"something on the window or fixed to the probe, or a groove or ridge along the pipe: {seen}. The "
-        "probe does not roll enough to tell which. The departure is added to σ there, and "
-        "findings there are not counted. What to do: clean the window and record once more with the probe "
+        "probe does not roll enough to decide. The departure is added to σ there, and "
+        "findings there are not counted. What to do: clean the window and record again with the probe "
         "rolled by 30° or more"
     )
 
 
 def _judge_radii(wall: Wall, trajectory: Trajectory, context: Context) -> None:
-    """Warn if part of the wall is off the pipe's radius by half of it; end the run if half of the wall is."""
+    """Warn of wall whose radius differs from the pipe's by half; end the run if half of the wall does."""
     rows = slice(None, None, max(len(wall.radius_map.distance_mm) // _REPORTED_ROWS, 1))
     radius = wall.radius_map.radius_mm[rows]
     known = radius[np.isfinite(radius)]
@@ -243,8 +243,8 @@ def _judge_radii(wall: Wall, trajectory: Trajectory, context: Context) -> None:
         context.warn(
             f"{100 * impossible.mean():.1f} % of the wall lies more than {100 * _IMPOSSIBLE:.0f} % off the "
             f"pipe's radius of {trajectory.radius_mm:.4g} mm, from {known.min():.4g} to {known.max():.4g} "
-            "mm: a branch, a joint that stands open, or rings that were measured wrongly. What to do: look "
-            "at the pictures there, and do not use their findings unchecked"
+            "mm: a branch, an open joint, or rings that were measured wrongly. What to do: look "
+            "at the pictures there, and check the findings there before you use them"
         )
     if known.size and impossible.mean() > _MOST_IMPOSSIBLE:
         raise UnusableError(
@@ -275,5 +275,5 @@ ACCUMULATE = Stage(
     "17",
     AccumulateParameters,
     accumulate_wall,
-    "point cloud and radius map about the pipe's own axis, with σ",
+    "point cloud and radius map around the pipe's own axis, with σ",
 )

@@ -1,10 +1,10 @@
-"""Departures that stay at one place of the image while the wall moves: on the window or the probe.
+"""Finds departures that stay at one place of the image while the wall moves: on the window or the probe.
 
 A droplet, a scratch, a reflection or a wave of the laser sheet moves the line at one azimuth of the image,
 whatever wall is there. Ring by ring it looks like a groove or a ridge along the pipe. Therefore every ring's
-departure from its smooth shape is followed in the image over a length of pipe that a defect does not have.
-Where the probe rolls, what is on the wall moves on in the image and what is on the probe does not; where it
-does not roll, a true groove cannot be told apart, and that is said.
+departure from its smooth shape is followed in the image over a length of pipe that is longer than a defect.
+If the probe rolls, a feature of the wall moves in the image and one of the probe does not. If it does not
+roll, a true groove cannot be distinguished, and the warning says so.
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ from pipeline.machine.scratch import Scratch
 from stages.accumulate.grid import MapGrid
 from stages.accumulate.survey import RingSurvey
 
-# What stays longer than the pipe is wide is judged, in a short pass half of the pass, but no less than half
-# of the diameter: the longest of the defects of the open recordings, 30 mm in a pipe of 101 mm, is shorter.
-# In a pass that is shorter still, all of it: a defect so long looks like a droplet there, and that is said.
+# A departure must stay over this length: the pipe's diameter, in a short pass half of the pass, but no less
+# than half of the diameter: the longest of the defects of the open recordings, 30 mm in a pipe of 101 mm, is
+# shorter. In a still shorter pass, all of it: a defect of that length looks like a droplet, as the text says.
 _LONGEST, _SHORTEST = 1.0, 0.5
 # Blocks of rings in that length, of two rings at least. Their medians leave out what is shorter than half of
 # the length.
@@ -32,26 +32,26 @@ _BLOCKS = 8
 _FEWEST_RINGS = 2 * _BLOCKS
 # Of the length itself, so much must be covered: a block at either end may be missed.
 _COVERED = 0.8
-# A place is found by 8 robust σ of what all sectors depart by over such a length, and reaches as far as 3. In
+# A place is found from 8 robust σ of all sectors' departures over such a length on, and extends to 3 σ. In
 # the three open recordings nothing reached 5 σ; a droplet on the window of one of them made 54.
 _FOUND, _REACHED = 8.0, 3.0
-# A block shows a place where it departs itself by half of what the blocks about it do.
+# A block shows a place if its own departure is at least half of that of the blocks around it.
 _SHOWN = 0.5
-# Of a departure, 1 σ of the share that a ring's smooth fit takes for shape, for each radian of its width; the
-# departure is also the largest of its place. Of 294 drawn bumps of 6 to 120° and .08 to 1.5 mm in noise of
-# .02 to .1 mm the true height lay off by .7 σ r.m.s. where this is counted, by 1.0 at widths about 1 rad;
-# without, by 1.8 and 2.9.
+# 1 σ of the share of a departure that a ring's smooth fit takes for shape, per radian of its width; the
+# stated departure is also the largest of its place. Of 294 drawn bumps of 6 to 120° and .08 to 1.5 mm in
+# noise of .02 to .1 mm the error of the height was .7 σ r.m.s. with this share included, 1.0 σ at widths
+# about 1 rad; without, 1.8 and 2.9 σ.
 _TAKEN_FOR_SHAPE = 0.2
 # Share of the circle that a ring must show.
 _LEAST_SEEN = 0.3
-# On the probe or on the wall: that one is taken in which the place scatters so many times less.
+# A place is on the probe or on the wall if it scatters so many times less there.
 _TOLD = 2.0
 _EIGHT = np.ones((3, 3), int)
 
 
 @dataclass(frozen=True)
 class _Blocks:
-    """Rings put together over a short way: rows are blocks (B,), columns sectors of the image (K,)."""
+    """Medians of rings over short distances: rows are blocks (B,), columns sectors of the image (K,)."""
 
     rings: tuple[Int, ...]
     first_mm: Float
@@ -67,7 +67,7 @@ class _Blocks:
 def fixed_to_probe(
     survey: RingSurvey, frame: Int, radius_mm: float, grid: MapGrid, scratch: Scratch
 ) -> FixedToProbe | None:
-    """Return departures that stay in the image; None without any, or where there are too few rings.
+    """Return departures that stay in the image; None without any, or with too few rings.
 
     ``frame`` (F,) are the frames of the rings, ``radius_mm`` is that of the pipe.
     """
@@ -109,14 +109,14 @@ def _blocks_of(survey: RingSurvey, rings: Int, length_mm: float) -> _Blocks:
 
 
 def _median(rows: Float) -> Float:
-    """Return the medians (K,) of what is known in rows (n, K); NaN where less than half of them is."""
+    """Return the medians (K,) of the known values in rows (n, K); NaN where less than half are known."""
     known = np.isfinite(rows).sum(0)
     middle = row_median(np.where(known > 0, rows, 0.0).T)
     return np.where(2 * known > len(rows), middle, np.nan)
 
 
 def _running_median(departure_mm: Float) -> Float:
-    """Return the medians (B, K) over the length about each block; at the ends, over the last whole length."""
+    """Return the medians (B, K) over the length around each block; at the ends over the last whole length."""
     last = max(len(departure_mm) - _BLOCKS - 1, 0)
     starts = np.clip(np.arange(len(departure_mm)) - _BLOCKS // 2, 0, last)
     return np.stack([_median(departure_mm[k : k + _BLOCKS + 1]) for k in starts])
@@ -144,7 +144,7 @@ def _where_it_shows(row: Int, sector: Int, steady: Float, blocks: _Blocks) -> tu
 
 
 def _is_on_probe(row: Int, sector: Int, steady: Float, blocks: _Blocks) -> bool | None:
-    """Return whether a place stays in the image while the probe rolls; None where this is not known."""
+    """Return whether a place stays in the image while the probe rolls; None if this is unknown."""
     each, index = np.unique(row, return_inverse=True)
     weight = np.abs(steady[row, sector])
     step = 2 * np.pi / steady.shape[1]
@@ -165,7 +165,7 @@ def _circular_spread(angle: Float) -> float:
 
 
 def _draw(departure: Float, row: Int, sector: Int, steady: Float, blocks: _Blocks, grid: MapGrid) -> None:
-    """Draw how far a place departs, mm without sign, on the wall (S, A) that was seen through it."""
+    """Write a place's departure, mm without sign, to the wall (S, A) that was seen through it."""
     sectors = steady.shape[1]
     for block in np.unique(row):
         here = np.zeros(sectors)
@@ -179,7 +179,7 @@ def _draw(departure: Float, row: Int, sector: Int, steady: Float, blocks: _Block
 
 
 def _gap(blocks: _Blocks) -> float:
-    """Return the usual length of a block, mm: as far as a block's departure is taken to hold beside it."""
+    """Return the usual length of a block, mm, over which a block's departure is assumed to hold."""
     return float(np.median(blocks.last_mm - blocks.first_mm)) / 2
 
 

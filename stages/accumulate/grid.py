@@ -1,4 +1,4 @@
-"""From scattered rings to the regular radius map: binned in azimuth, local linear regression in distance.
+"""Interpolates rings to the regular radius map: bins in azimuth, local linear regression in distance.
 
 J. Fan, I. Gijbels, "Local polynomial modelling and its applications", 1996: a local line has no bias from the
 rings' uneven spacing, and its variance follows from its weights.
@@ -20,17 +20,17 @@ from pipeline.arrays import Float, Float32, Int
 from pipeline.system.parallel import in_threads
 from stages.accumulate.survey import RingSurvey, WallSamples
 
-# Columns a thread takes at a time, and threads: see `pipeline.system.parallel`.
+# Columns that a thread processes at a time, and threads: see `pipeline.system.parallel`.
 _BLOCK, _THREADS = 64, 2
 # Least 1 σ of the kernel in ring spacings: narrower ones leave rows between rings with one ring. Debt:
 # data/debts.md.
 WIDTH_IN_RINGS = 0.4
-# Cells of the running median that roughness is counted from. Debt: data/debts.md.
+# Cells of the running median relative to which roughness is measured. Debt: data/debts.md.
 _FINE_CELLS = (9, 9)
 # Share of a ring from which its distance belongs to the map: half and twice as much change nothing on open-1
 # and open-3, whose rings end within a cell.
 _SEEN_SHARE = 0.1
-# Columns of which the scatter of rings far apart is taken: every fourth, 2° apart, errs by 1 % of it.
+# Columns from which the scatter of distant rings is estimated: every fourth, 2° apart, errs by 1 % of it.
 _SOME_COLUMNS = 4
 
 
@@ -53,9 +53,9 @@ class RingColumns:
     Attributes
     ----------
     distance_mm, radius_mm, variance, misalignment_mm : (A, F)
-        Of each ring in each column; distance is NaN where the ring was not seen there.
+        Means of each ring in each column; distance is NaN where the ring was not seen.
     count : (A, F) int
-        Samples averaged.
+        Number of averaged samples.
     """
 
     distance_mm: Float
@@ -117,7 +117,8 @@ def gridded(
 
     The noise of single samples is not the whole error: speckle is correlated between neighbouring azimuths,
     and each ring has a pose error. The scatter of rings is therefore measured from two maps of every other
-    ring, and where a codec ``held`` light over, from rings that share none.
+    ring. If a codec carried light over from ring to ring (``held``), it is measured from rings that share
+    none.
     """
     spacing = _usual_spacing(columns)
     width = max(smoothing_mm, WIDTH_IN_RINGS * spacing)
@@ -158,7 +159,7 @@ def _excess(halves: list[tuple[Float32, Float32]], grid: MapGrid) -> Float32:
 
 
 def _with_shared(rough: Float32, sigma: Float32, shared: float) -> Float32:
-    """Return σ (S, A) with what rings share added alike everywhere: flanks of defects scatter anyway."""
+    """Return σ (S, A) with the error that rings share, everywhere the same: flanks scatter anyway."""
     if shared <= 1.0 or not (known := np.isfinite(sigma)).any():
         return rough
     lacking = (shared * float(np.median(sigma[known]))) ** 2 - float(np.median(rough[known])) ** 2
@@ -166,10 +167,10 @@ def _with_shared(rough: Float32, sigma: Float32, shared: float) -> Float32:
 
 
 def _shared(columns: RingColumns, held: HeldOver, width: float) -> float:
-    """Return how many times σ is that of neighbouring rings, in a mean over ``width`` rings; at least 1.
+    """Return the true σ over that from neighbouring rings, for a mean of ``width`` rings; at least 1.
 
-    Rings are compared as far apart as nothing is held over. The wall's own shape over that length counts as
-    error, too: nothing tells it from what is held over.
+    Rings are compared at a distance at which no light is carried over. The wall's own shape over that length
+    counts as error, too, because it cannot be distinguished from light that is carried over.
     """
     if held.rings <= 1 or columns.distance_mm.shape[1] < 2 * held.rings + 1:
         return 1.0
@@ -178,7 +179,7 @@ def _shared(columns: RingColumns, held: HeldOver, width: float) -> float:
 
 
 def _scatter(columns: RingColumns, apart: int) -> float:
-    """Return the robust spread of rings about the line through those ``apart`` on both sides, over its σ."""
+    """Return the robust spread of rings around the line through those ``apart`` on both sides, over its σ."""
     some = slice(None, None, _SOME_COLUMNS)
     at, radius, variance = (v[some] for v in (columns.distance_mm, columns.radius_mm, columns.variance))
     before, middle, after = slice(None, -2 * apart), slice(apart, -apart), slice(2 * apart, None)
@@ -193,7 +194,7 @@ def _roughness(radius: Float32, sigma: Float32, grid: MapGrid) -> Float32:
     """Return the ratio (S, A) of the map's roughness from cell to cell to its stated σ; at least 1.
 
     Reflectance under the line displaces neighbouring rings equally, so that comparing rings does not show it.
-    Relief finer than a few cells cannot be told from it and counts as noise.
+    Relief finer than a few cells cannot be distinguished from it and counts as noise.
     """
     filled = np.where(np.isfinite(radius), radius, np.nanmedian(radius))
     fine = radius - running_median(filled, _FINE_CELLS)
@@ -201,10 +202,10 @@ def _roughness(radius: Float32, sigma: Float32, grid: MapGrid) -> Float32:
 
 
 def _spread_by_place(ratio: Float | Float32, grid: MapGrid) -> Float32:
-    """Return the robust spread (S, A) of ratios about each cell, at least 1.
+    """Return the robust spread (S, A) of ratios around each cell, at least 1.
 
     Grease on a part of the window, or a codec's blocks, make the line worse at some azimuths and for some
-    time: one spread for the whole wall states too small a σ there, and findings are made of noise.
+    time: with one spread for the whole wall, σ would be too small there, and noise would become findings.
     """
     spread = local_spread(lambda rows: ratio[rows], grid.distance_mm, ratio.shape[1])
     return np.maximum(spread.at(grid.distance_mm), 1.0).astype(np.float32)
@@ -265,7 +266,7 @@ def _regress(  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True)
 def _near_rings(d, width, gap):  # type: ignore[no-untyped-def]
-    """Tell if rings at signed distances ``d``, ascending, are near: on both sides, or one very near."""
+    """Return whether rings at ascending signed distances ``d`` are near: on both sides, or one very near."""
     before, after = np.inf, np.inf
     for x in d:
         if x <= 0:
@@ -277,7 +278,7 @@ def _near_rings(d, width, gap):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True)
 def _line_at(d, kernel, radius, variance, width):  # type: ignore[no-untyped-def]
-    """Return value at d = 0 of the weighted line and its 1 σ, from the scatter about it where larger."""
+    """Return value at d = 0 of the weighted line and its 1 σ, from the scatter around it if larger."""
     m0, m1, m2, b0, b1, sum1, sum2 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for k in range(len(d)):
         w = kernel[k] / variance[k]
@@ -295,5 +296,5 @@ def _line_at(d, kernel, radius, variance, width):  # type: ignore[no-untyped-def
         misfit += w * (radius[k] - value - slope * d[k]) ** 2
         spread += share * share * variance[k]
     freedom = sum1 - 2.0 * sum2 / max(sum1, 1e-12)
-    excess = misfit / freedom if freedom > 0.2 else 1.0  # a choice: scatter of fewer says nothing
+    excess = misfit / freedom if freedom > 0.2 else 1.0  # a choice: the scatter of fewer is unreliable
     return value, np.sqrt(spread * max(1.0, excess))

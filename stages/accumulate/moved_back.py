@@ -1,4 +1,4 @@
-"""What ring samples that were moved back behind dirt on the window leave unsure, and what is told of them."""
+"""Uncertainty of the wall, and warnings, from ring samples that were moved back behind dirt on the window."""
 
 from __future__ import annotations
 
@@ -16,25 +16,25 @@ from stages.accumulate.survey import RingsOnWall, some_at_a_time
 _ROWS_AT_ONCE = 512
 
 
-def warn_of_left_out(rings: RingSamples, told: RingSamples, context: Context) -> None:
-    """Warn of samples of ``rings`` that are not in those told by the probe's roll."""
-    lost = rings.valid & ~told.valid
+def warn_of_left_out(rings: RingSamples, kept: RingSamples, context: Context) -> None:
+    """Warn of samples of ``rings`` that are not among those ``kept`` thanks to the probe's roll."""
+    lost = rings.valid & ~kept.valid
     if not lost.any():
         return
     context.report("ring samples behind dirt left out: the probe does not roll", int(lost.sum()), "samples")
     context.warn(
         f"behind dirt on the window, over {360 * lost.any(0).mean():.0f}° of the picture, the line "
-        "lies aside alike in all rings. The probe does not roll enough to tell this from a groove or ridge "
-        "along the pipe, so nothing is measured there. What to do: clean the window, or record once more "
-        "with the probe rolled by 30° or more"
+        "is displaced equally in all rings. The probe does not roll enough to distinguish this from a groove "
+        "or ridge along the pipe, so that nothing is measured there. What to do: clean the window, or record "
+        "again with the probe rolled by 30° or more"
     )
 
 
 def shared_on_wall(rings: RingsOnWall, grid: MapGrid, gap_mm: float, scratch: Scratch) -> Float32 | None:
-    """Return by how much the wall (S, A) was moved, mm without sign; None where nothing was.
+    """Return by how much the wall (S, A) was moved, mm without sign; None if nothing was moved.
 
-    All rings err by it alike, so it counts to the σ of the map whole. A cell takes the largest of the samples
-    within a column and ``gap_mm`` along the pipe, because the map bridges as much.
+    All rings share this error, so that it is added to the map's σ without averaging. A cell takes the largest
+    of the samples within a column and ``gap_mm`` along the pipe, because the map bridges as much.
     """
     moved_px = rings.rings.moved_px
     if moved_px is None:

@@ -1,4 +1,4 @@
-"""A long wall computed stretch by stretch, each from the rings that reach into it, to bound the memory."""
+"""Computes a long wall stretch by stretch, each from the rings that reach into it, to limit memory."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from pipeline.machine.scratch import Scratch
 from stages.accumulate.grid import WIDTH_IN_RINGS, MapGrid, gridded, rings_on_columns
 from stages.accumulate.survey import RingsOnWall, RingSurvey, WallSamples, centred, some_at_a_time
 
-# Rows of a stretch, for memory's sake.
+# Rows of a stretch, to limit memory.
 _ROWS = 1000
 # A stretch is computed from the rings within so many reaches of it. In stretches of a tenth of the length
 # 1 to 16 reaches change no radius of open-1 by more than 6 µm; its random σ is 20 µm.
@@ -32,9 +32,9 @@ class Stretch:
     Attributes
     ----------
     first, last : int
-        Rows of its own, ``last`` exclusive.
+        Its own rows, ``last`` exclusive.
     from_row, to_row : int
-        Rows worked out: its own rings lie on them whole.
+        Computed rows: its own rings lie completely on them.
     near : (n,) int
         Rings that contribute to these rows.
     own : (m,) int
@@ -70,7 +70,7 @@ def map_of(
     gap_mm: float,
     held: HeldOver,
 ) -> RadiusMap:
-    """Return the radius map of the rows that a stretch works out, of which ``systematic_mm`` is a 1 σ."""
+    """Return the radius map of a stretch's computed rows; ``systematic_mm`` is the systematic part of σ."""
     part = grid.rows(stretch.from_row, stretch.to_row)
     samples = (s for _, s in _centred_samples(rings, survey, stretch.near))
     columns = rings_on_columns(samples, len(stretch.near), part)

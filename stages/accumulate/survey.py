@@ -15,20 +15,20 @@ from pipeline.geometry.axis import frames_at, to_pipe
 from pipeline.instrument.probe import Probe
 from pipeline.system.parallel import in_threads
 
-# Times the weights are computed anew: 24 change no radius of open-1 and open-3 by 0.1 µm, 6 by 2 µm at most.
+# Number of reweightings: 24 change no radius of open-1 and open-3 by 0.1 µm, 6 by 2 µm at most.
 _ITERATIONS = 12
 # Robust spreads at which a sample's weight falls to a quarter. Half and twice as many change radii of open-1
 # and open-3 by 7 µm at most, by an eighth of their random σ in r.m.s.
 _REDESCENT = 2.5
-# Share of the circle that must be seen for a first harmonic to be told from shape.
+# Share of the circle that must be seen for a first harmonic to be distinguished from shape.
 _FEWEST = 0.5
 # Rings of the running median. Debt: data/debts.md.
 _RINGS = 31
 # Rings of the mean after it: 3 and 15 change no radius of open-1 and open-3 by more than 3 µm.
 _SMOOTH_RINGS = 7
-# Rings worked out at a time, for memory's sake.
+# Rings processed at a time, to limit memory.
 _AT_ONCE = 512
-# Of them, rings that one thread works out, and threads.
+# Of these, rings that one thread processes, and threads.
 _SIDE_BY_SIDE, _THREADS = 32, 2
 # Sectors of the image in which a ring's departure from its smooth shape is kept: a degree each.
 _SECTORS = 360
@@ -48,7 +48,7 @@ class WallSamples:
     sigma_mm : (F, A)
         1 σ of the radius from image noise.
     misalignment_mm : (F, A)
-        Radius with the sheet taken as square to the camera, minus ``radius_mm``.
+        Radius computed as if the sheet were perpendicular to the camera's axis, minus ``radius_mm``.
     section : (F, A, 3, 3)
         The pipe's section frame at each sample.
     """
@@ -66,7 +66,7 @@ class WallSamples:
 
 @dataclass
 class RingsOnWall:
-    """All rings of a run; samples are worked out for some of them at a time."""
+    """All rings of a run; samples are computed for some of them at a time."""
 
     probe: Probe
     rings: RingSamples
@@ -75,7 +75,7 @@ class RingsOnWall:
     _last: tuple[Int, WallSamples] | None = None
 
     def samples(self, rows: Int) -> WallSamples:
-        """Return the samples of some rings (n,); those asked for last are kept at hand."""
+        """Return the samples of some rings (n,); the last ones returned are cached."""
         if self._last is None or not np.array_equal(self._last[0], rows):
             self._last = None
             parts = np.array_split(rows, max(len(rows) // _SIDE_BY_SIDE, 1))
@@ -92,7 +92,7 @@ def _joined(parts: Sequence[WallSamples]) -> WallSamples:
 
 
 def in_steady_pictures(rings: RingSamples, trajectory: Trajectory) -> RingSamples:
-    """Return the rings as seen in pictures of one scale, where the motion shows that the scale drifted."""
+    """Return the rings corrected to pictures of one scale, if the motion shows that the scale drifted."""
     if trajectory.image_scale is None:
         return rings
     last = len(trajectory.frame) - 1
@@ -104,7 +104,7 @@ def in_steady_pictures(rings: RingSamples, trajectory: Trajectory) -> RingSample
 def wall_samples(
     probe: Probe, rings: RingSamples, points: RingPoints, trajectory: Trajectory, rows: Int
 ) -> WallSamples:
-    """Triangulate rings ``rows`` (n,) with the probe as found in the run and place the points on the wall."""
+    """Triangulate rings ``rows`` (n,) with the run's corrected probe, and transform the points to P."""
     frame, last = rings.frame[rows], len(trajectory.frame) - 1
     index = np.minimum(np.searchsorted(trajectory.frame, frame), last)
     T_pc = trajectory.T_pc[index]
@@ -125,7 +125,7 @@ def wall_samples(
 
 
 def _on_sheet(probe: Probe, knock: LaserKnock | None, frame: Int, ray: Float) -> Float:
-    """Return where rays (F, A, 3) of frames (F,) meet the laser sheet, which may have been knocked."""
+    """Return the points at which rays (F, A, 3) of frames (F,) meet the laser sheet, perhaps knocked."""
     xyz_c = probe.laser.intersect(ray)
     if knock is not None:
         after = frame >= knock.frame
@@ -154,14 +154,15 @@ def smoothed_shift(shift: Float) -> Float:
 
 
 def smooth_shape(samples: WallSamples) -> tuple[Float, Float]:
-    """Return the first harmonic (F, 2), mm, of every ring's sound wall, and what departs from its shape.
+    """Return the first harmonic (F, 2), mm, of every ring's sound wall, and the departures from its shape.
 
-    The harmonic is 0 where it is not determined. The departure (F, A), mm, is that of each sample from mean,
-    first and second harmonic; NaN where it is unknown.
+    The harmonic is 0 where it is not determined. The departure (F, A), mm, of each sample is its distance
+    from mean, first and second harmonic; NaN where it is unknown.
 
-    The radius is counted from the pipe's own axis, so a first harmonic of a whole ring is no shape but a pose
-    error. It is found with Geman-McClure weights beside mean and ovality, so that a dent or a deposit does
-    not pull the ring (S. Geman, D. McClure, 1987). Rings seen over less than half of the circle count as 0.
+    The radius is measured from the pipe's own axis, so that a first harmonic of a whole ring is not shape but
+    a pose error. It is fitted with Geman-McClure weights together with mean and ovality, so that a dent or a
+    deposit does not shift the ring (S. Geman, D. McClure, 1987). It is 0 for rings seen over less than half
+    of the circle.
     """
     psi = np.where(samples.valid, samples.azimuth_rad, 0.0)
     radius = np.where(samples.valid, samples.radius_mm, 0.0)
@@ -197,20 +198,20 @@ def _in_sectors(values: Float) -> Float:
 
 @dataclass(frozen=True)
 class RingSurvey:
-    """What is known of each ring (F,) without holding its samples.
+    """Properties of each ring (F,), without its samples.
 
     Attributes
     ----------
     shift_mm : (F, 2)
-        By how much it lies off the axis, to be taken out.
+        Its offset from the axis, which is to be removed.
     nearest_mm, middle_mm, farthest_mm : (F,)
         Least, median and largest distance of its samples; NaN where it has none.
     seen : (F,)
         Share of the circle that it shows.
     count : (F,) int
-        Its valid samples.
+        Number of its valid samples.
     roll_rad : (F,)
-        Azimuth in P less azimuth in the image.
+        Azimuth in P minus azimuth in the image.
     departure_mm : (F, K)
         Departure from its mean, first and second harmonic in sectors of the image; NaN where unknown.
     """
@@ -231,7 +232,7 @@ class RingSurvey:
 
 
 def survey_of(rings: RingsOnWall) -> RingSurvey:
-    """Look at all rings, some at a time."""
+    """Return the properties of all rings, computed some rings at a time."""
     every, azimuths = np.arange(len(rings.rings.frame)), len(rings.rings.azimuth_rad)
     image_rad = rings.rings.azimuth_rad
     parts = [_of(rings.samples(rows), image_rad) for rows in some_at_a_time(every)]
@@ -252,7 +253,7 @@ def _of(samples: WallSamples, image_rad: Float) -> tuple[Float, ...]:
     harmonic, departure = smooth_shape(samples)
     turn = np.exp(1j * (np.where(samples.valid, samples.azimuth_rad, 0.0) - image_rad))
     roll = np.angle(np.where(samples.valid, turn, 0.0).sum(1))
-    # Sorted once, with what is not valid last: quicker than three functions that pass over NaN.
+    # Sorted once, with invalid samples last: faster than three functions that skip NaN.
     distance = np.sort(np.where(samples.valid, samples.distance_mm, np.nan), axis=1)
     ring, last = np.arange(len(distance)), np.maximum(np.isfinite(distance).sum(1), 1) - 1
     middle = (distance[ring, last // 2] + distance[ring, (last + 1) // 2]) / 2

@@ -1,4 +1,4 @@
-"""Places inside the wall that the probe passed and no ring measured: a defect there is not found."""
+"""Finds places inside the wall that the probe passed and no ring measured: a defect there is not found."""
 
 from __future__ import annotations
 
@@ -13,20 +13,20 @@ from pipeline.artefacts.measured import RadiusMap
 from pipeline.machine.stage import Context
 from pipeline.pages import notation
 
-# Places that are told one by one, the largest first.
+# Number of places that are listed one by one, the largest first.
 _TOLD = 4
-# Rows that are looked at together; a place that reaches from one lot into the next counts as two.
+# Rows that are examined together; a place that reaches from one part into the next counts as two.
 _ROWS = 4096
-# Rings lie askew and hidden sectors end anywhere: inside is where nine in ten columns have begun and none of
-# the last tenth has ended.
+# Rings are oblique and hidden sectors end anywhere: the inside begins where nine in ten columns have begun
+# and ends before the last tenth has ended.
 _BEGUN = 0.9
-# Share of the way round that a place between two rings reaches at least: most of it (chosen), as a hidden
-# sector that meets it changes nothing.
+# Smallest share of the circle that a place between two rings covers: most of it (chosen), so that an adjacent
+# hidden sector changes nothing.
 _ALL_ROUND = 0.9
-# Holes between rings, each nearer to the next than what is bridged, from which on rings are sparse: something
-# that hides a place leaves one, or two with an edge between (chosen).
+# Number of holes between rings, nearer to each other than the bridged length, from which rings are sparse: an
+# object that hides a place leaves one, or two with an edge between (chosen).
 _IN_A_ROW = 3
-# What `configs/long.yaml` bridges, mm.
+# Length that `configs/long.yaml` bridges, mm.
 LONG_GAP_MM = 12.0
 
 
@@ -43,13 +43,13 @@ class Unmeasured:
 
 @dataclass(frozen=True)
 class SparseRings:
-    """Where rings lie farther apart than is bridged: ends of such stretches (N, 2), and how far, mm."""
+    """Stretches in which rings are farther apart than is bridged: their ends (N, 2), and the spacing, mm."""
 
     ends_mm: Float
     spacing_mm: float
 
     def lost(self, place: Unmeasured, pipe_radius_mm: float) -> bool:
-        """Return whether a place lies there and reaches round the wall, as what lies between rings does."""
+        """Return whether a place lies there and reaches round the wall, like all wall between rings."""
         first, last = self.ends_mm.T
         beyond = np.maximum(first - place.distance_mm, place.distance_mm - last)
         all_round = place.width_mm > _ALL_ROUND * 2 * np.pi * pipe_radius_mm
@@ -59,9 +59,9 @@ class SparseRings:
 def warn_of_unmeasured(
     radius_map: RadiusMap, pipe_radius_mm: float, gap_mm: float, ring_at_mm: Float, context: Context
 ) -> None:
-    """Warn of places inside the wall that are not measured, larger than gaps that are bridged.
+    """Warn of unmeasured places inside the wall that are larger than the bridged gaps.
 
-    Where rings (F,) lie farther apart than that, one after the other, that is told instead of their places.
+    If several rings (F,) in a row lie farther apart than that, the warning names this instead of the places.
     """
     places = unmeasured_places(radius_map, pipe_radius_mm, gap_mm)
     context.report("places inside the wall that are not measured", len(places), "")
@@ -77,7 +77,7 @@ def warn_of_unmeasured(
 def sparse_rings(ring_at_mm: Float, gap_mm: float) -> SparseRings:
     """Return where several steps in a row from ring to ring (F,) along the wall are longer than ``gap_mm``.
 
-    The rings' order in time does not matter: the probe may pass twice, or rest. NaN is a ring that was not
+    The rings' order in time does not matter: the probe may pass twice, or rest. NaN means that no ring was
     found.
     """
     at = np.sort(ring_at_mm[np.isfinite(ring_at_mm)])
@@ -102,8 +102,8 @@ def _warn_of_places(places: list[Unmeasured], context: Context) -> None:
     many = f"{len(places)} place{'s' * (len(places) > 1)} inside the wall, {area_mm2:.0f} mm² in all"
     context.warn(
         f"{many}, could not be measured{', the largest' * (len(places) > _TOLD)}: {where}. Defects there are "
-        "not found. What to do: look at these places in the lit pictures; clean window and wall, let water "
-        "off, shade reflections, and record again"
+        "not found. What to do: look at these places in the lit pictures; clean window and wall, drain the "
+        "pipe, shade reflections, and record again"
     )
 
 
@@ -118,9 +118,9 @@ def _warn_of_sparse_rings(
         else ""
     )
     context.warn(
-        f"along {length_mm:.0f} mm of the pipe rings that were found lie {sparse.spacing_mm:.1f} mm apart, "
-        f"and {gap_mm:g} mm are bridged at most: {100 * share:.0f} % of the wall there was passed and not "
-        f"measured. Defects are missed, large ones as well. What to do: pull the probe more slowly "
+        f"along {length_mm:.0f} mm of the pipe the rings lie {sparse.spacing_mm:.1f} mm apart, but at most "
+        f"{gap_mm:g} mm are bridged: {100 * share:.0f} % of the wall there was passed and not "
+        f"measured. Even large defects are missed there. What to do: pull the probe more slowly "
         f"there{coarser}"
     )
 
@@ -149,7 +149,7 @@ def unmeasured_places(radius_map: RadiusMap, pipe_radius_mm: float, gap_mm: floa
 
 
 def _ends_of(radius: Float32) -> tuple[int, int, int]:
-    """Return between which rows (S) the wall is there all round, and the column that is known best."""
+    """Return the first and last row with wall all round, and the column that is known best."""
     rows, columns = radius.shape
     known = np.zeros(columns, np.int64)
     begun, ended = np.full(columns, rows), np.zeros(columns, np.int64)

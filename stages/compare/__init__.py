@@ -1,4 +1,4 @@
-"""Two runs through one pipe compared: registration of the walls, their difference, each finding's fate."""
+"""Compares two runs through one pipe: registers the walls, takes their difference, follows each finding."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class CompareParameters(Parameters):
 
 
 def register_walls(walls: WallPair, parameters: RegisterParameters, context: Context) -> RegisteredWalls:
-    """Lay an earlier wall on a later one and take their difference.
+    """Register an earlier wall on a later one and take their difference.
 
     Raises
     ------
@@ -59,25 +59,25 @@ def compare_findings(
     parameters: CompareParameters,
     context: Context,
 ) -> Comparison:
-    """Put the findings of both runs together and measure each on both walls."""
+    """Match the findings of both runs and measure each on both walls."""
     pair = PairedWalls(walls.earlier.wall, walls.now.wall, registered.registration)
     places = put_together(findings.earlier, findings.now, pair.registration, pair.radius_mm)
     return Comparison(changes(places, pair, _resolution(walls, pair), context.progress))
 
 
 def _resolution(walls: WallPair, pair: PairedWalls) -> Resolution:
-    """Return what limits the reading of depths: smoothing of the coarser map, and calibration."""
+    """Return the resolution of depths: smoothing of the coarser map, and calibration."""
     both = (walls.earlier, walls.now)
     smoothing, spacing = max(w.smoothing_mm for w in both), max(w.ring_spacing_mm for w in both)
-    # neighbouring rings are joined by a triangle of that foot, whose 1 σ is foot / √6
+    # the map joins neighbouring rings by a triangular kernel of that half width, whose 1 σ is width / √6
     along = float(np.hypot(smoothing, spacing / np.sqrt(6)))
     return Resolution(along, smoothing, pair.calibration_mm / pair.radius_mm, walls.is_one_calibration)
 
 
 REGISTER = Stage(
-    "register", "3", RegisterParameters, register_walls, "Lay an earlier run's wall on a later one's."
+    "register", "3", RegisterParameters, register_walls, "Register an earlier run's wall on a later one's."
 )
-COMPARE = Stage("compare", "4", CompareParameters, compare_findings, "Tell what became of every finding.")
+COMPARE = Stage("compare", "4", CompareParameters, compare_findings, "Find the change of every finding.")
 COMPARISON: tuple[Stage, ...] = (REGISTER, COMPARE)
 
 
@@ -91,7 +91,7 @@ _IMPOSSIBLE = 1e3
 
 
 def moved_outline(finding: OutlinedFinding, registration: Registration) -> Float:
-    """Return an earlier finding's outline (V, 2) where it lies in the later run."""
+    """Return an earlier finding's outline (V, 2) in the later run's coordinates."""
     point = np.asarray(finding.outline, float)
     s, psi = registration.to_now(point[:, 0], point[:, 1])
     turns = 2 * np.pi * np.round(psi.mean() / (2 * np.pi))
@@ -162,7 +162,7 @@ def _apart(one: Float, other: Float, gate: tuple[float, float]) -> float:
 
 
 def _way(finding: OutlinedFinding) -> int:
-    """Return the group in which findings can be the same: welds, what takes wall away, what stands inward."""
+    """Return the group within which findings can be the same: welds, loss of wall, inward features."""
     return 0 if finding.kind is DefectKind.WELD else 1 if finding.kind.is_metal_loss else -1
 
 
@@ -173,7 +173,7 @@ def _corners(outline: Float) -> Outline:
 def changes(
     places: Sequence[Place], pair: PairedWalls, resolution: Resolution, progress: Progress
 ) -> tuple[Change, ...]:
-    """Return what became of every place."""
+    """Return the change of every place."""
     outlines = [np.asarray(o) for p in places if p.kind is not DefectKind.WELD for o in p.outlines]
     cutter = Cutter(pair, outline_mask(outlines, pair))
     measured = []
@@ -210,14 +210,14 @@ def _measured(place: Place, number: int, cutter: Cutter, resolution: Resolution)
         return Change(place, unseen, seen_now, seen_earlier, None)
     growth = _growth(place, patch, cutter.pair, resolution)
     z = growth.depth_mm.value / growth.depth_mm.sigma
-    # half the pieces overlap with the other half; so many are what the σ rests on
+    # half the pieces overlap with the other half, so that only this many are independent for σ
     freedom = len(patch.noise_mm) / 2
     p = min(2 * float(student.sf(abs(z), freedom)) * _places_alike(place, patch, cutter.pair), 1.0)
     return Change(place, Fate.UNCHANGED, seen_now, seen_earlier, growth, z, p)
 
 
 def _places_alike(place: Place, patch: Patch, pair: PairedWalls) -> float:
-    """Return from how many places of its size on the wall a finding was picked; 1 where both runs have it."""
+    """Return the number of places of its size from which a finding was selected; 1 if both runs have it."""
     if place.now is not None and place.earlier is not None:
         return 1.0
     return pair.now.radius_mm.size / float(patch.inside.sum())
@@ -238,7 +238,7 @@ def _judged(change: Change, p_adjusted: float) -> Change:
 
 
 def _fate(change: Change) -> Fate:
-    """Return what became of a place, by the sign of a significant change.
+    """Return the fate of a place by the sign of a significant change.
 
     Depth is positive into the wall: metal loss grows where it rises, a deposit or dent where it falls.
     """

@@ -1,4 +1,4 @@
-"""How much a defect has grown, measured on both walls alike, and how sure that is."""
+"""Measures the growth of a defect in the same way on both walls, with its σ."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from stages.compare.patch import Patch, at_its_peak, smoothed
 _ALIKE = 0.5
 # Extents are read at half the lesser depth, as a full width at half maximum.
 _LEVEL = 0.5
-# 1 σ of the smoothing that makes a noise-free stand-in of the defect, onto which clean wall is then laid.
+# 1 σ of the smoothing that makes a noise-free model of the defect, to which clean wall is then added.
 _BASE_MM = 1.0
 # From so many pieces of clean wall on the defect's own rings, their scatter counts where it is larger.
 _LEAST_OWN = 8
@@ -23,7 +23,7 @@ _LEAST_OWN = 8
 
 @dataclass(frozen=True)
 class Resolution:
-    """What limits the maps: 1 σ of their own smoothing along and around, and calibration of heights.
+    """Resolution of the maps: 1 σ of their own smoothing along and around, and calibration of heights.
 
     Attributes
     ----------
@@ -45,10 +45,10 @@ def measure_growth(
 ) -> Growth:
     """Return a defect's growth; ``sign`` is +1 for one that goes into the wall, −1 for one inward.
 
-    A defect that only one wall shows is read on the other wall at the place of its peak, because the extreme
-    of mere noise is no depth. The maps' resolution flattens a peak; by how much is estimated by smoothing
-    once more, and the whole correction counts as its own 1 σ. Noise is taken from the same reading of pieces
-    of clean wall; the σ of registration and calibration are added to it.
+    A defect that only one wall shows is measured on the other wall at the place of its peak, because the
+    extreme of mere noise is no depth. The maps' resolution flattens a peak; this is estimated by smoothing
+    once more, and the whole correction counts as its own 1 σ. Noise is estimated by the same measurement on
+    pieces of clean wall; the σ of registration and calibration are added to it.
     """
     now, before = sign * patch.now_mm, sign * patch.before_mm
     extremes = [float(h[patch.inside].max()) for h in (now, before)]
@@ -102,14 +102,14 @@ def _lost_of_both(
     resolution: Resolution,
     in_both: bool,
 ) -> Float:
-    """Return by how much (2,), mm, the maps' resolution lowers each wall's peak; 0 on a wall without one."""
+    """Return the loss (2,), mm, of each wall's peak by the maps' resolution; 0 on a wall without a peak."""
     lost = np.array([_lost(h, p, patch, resolution) for h, p in zip((now, before), peaks, strict=True)])
     has_peak = in_both or np.array([now[peaks[0]] >= before[peaks[1]], now[peaks[0]] < before[peaks[1]]])
     return np.where(has_peak, lost, 0.0)
 
 
 def _lost(height: Float, peak: tuple[int, int], patch: Patch, resolution: Resolution) -> float:
-    """Return by how much, mm, a peak falls when the map is smoothed once more as it was made."""
+    """Return the loss of a peak, mm, when the map is smoothed a second time with its own kernel."""
     kernel = [s / c for s, c in zip((resolution.along_mm, resolution.around_mm), patch.cell_mm, strict=True)]
     reach = [int(np.ceil(4 * k)) + 1 for k in kernel]
     near = tuple(slice(max(p - r, 0), p + r + 1) for p, r in zip(peak, reach, strict=True))
@@ -118,7 +118,7 @@ def _lost(height: Float, peak: tuple[int, int], patch: Patch, resolution: Resolu
 
 
 def _size(height: Float, patch: Patch, level: float, peak: tuple[int, int]) -> Float:
-    """Return length, width and area of what lies beyond a level about a peak."""
+    """Return length, width and area of the part beyond a level around a peak."""
     part = at_its_peak((height > level) & patch.inside, peak)
     if not part.any():
         return np.zeros(3)
@@ -137,7 +137,7 @@ def _extent(profile: Float, level: float) -> float:
 
 
 def _spread(now: Float, before: Float, patch: Patch, level: float, in_both: bool) -> Float:
-    """Return 1 σ of growth of depth, length, width and area where the walls differ as clean wall does."""
+    """Return 1 σ of the growth of depth, length, width and area if the walls differ as clean wall does."""
     base = smoothed((now + before) / 2 if in_both else np.maximum(now, before), patch.cell_mm, _BASE_MM)
     at = _argmax(base, patch.inside)
     without = np.array([base[at], *_size(base, patch, level, at)])
@@ -145,7 +145,7 @@ def _spread(now: Float, before: Float, patch: Patch, level: float, in_both: bool
     for piece in patch.noise_mm:
         other = base + piece
         peak = _argmax(other, patch.inside) if in_both else at
-        # an extreme that may choose its cell scatters less than any one cell; the safe side is taken
+        # an extreme over several cells scatters less than any one cell; the larger value is used
         drawn.append(np.array([other[at], *_size(other, patch, level, peak)]) - without)
     errors = np.array(drawn)
     spread = np.sqrt((errors**2).mean(0))

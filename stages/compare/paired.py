@@ -1,6 +1,7 @@
 """Two registered walls on one grid, and their difference, as numbers and as palette levels.
 
-What single rings differ in (mean, centre, ovality) is taken out: it is motion and calibration, not growth.
+Differences of single rings in mean, centre and ovality are removed: they are motion and calibration, not
+growth.
 """
 
 from __future__ import annotations
@@ -22,9 +23,11 @@ from pipeline.machine.stage import Progress
 
 # A bound on memory alone.
 _ROWS_AT_ONCE = 512
-# Rows in the middle of what both saw from which the difference's typical σ is taken: a bound on time alone.
+# Rows in the middle of the common wall from which the difference's typical σ is estimated: a bound on time
+# alone.
 _SAMPLED_ROWS = 2000
-# Colours end at so many typical σ of the difference, so that noise shows as the palette's middle only.
+# The colour scale ends at so many typical σ of the difference, so that noise has the palette's middle
+# colours.
 _ENDS = 8.0
 
 
@@ -36,12 +39,12 @@ class Stretch:
     ----------
     distance_mm : (R,)
     now_mm, before_mm : (R, A)
-        Radius. The earlier one is raised by what its rings differ in mean, centre and ovality from the
-        later ones, so that neither motion nor calibration shows as growth. NaN where not seen.
+        Radii. The earlier one is corrected to the mean, centre and ovality of the later rings, so that
+        neither motion nor calibration shows as growth. NaN where not seen.
     sigma_mm : (R, A)
         Random 1 σ of their difference.
     diameter_mm : (R,)
-        Later mean diameter less earlier one; NaN where too little was seen.
+        Later mean diameter minus the earlier one; NaN where too little was seen.
     """
 
     distance_mm: Float
@@ -52,13 +55,13 @@ class Stretch:
 
     @property
     def difference_mm(self) -> Float:
-        """(R, A) later less earlier, positive where wall was lost."""
+        """(R, A) later minus earlier radius, mm, positive where wall was lost."""
         return self.now_mm - self.before_mm
 
 
 @dataclass(frozen=True)
 class PairedWalls:
-    """An earlier and a later wall and how they lie on each other."""
+    """An earlier and a later wall and their registration."""
 
     earlier: WallMap
     now: WallMap
@@ -66,7 +69,7 @@ class PairedWalls:
 
     @cached_property
     def radius_mm(self) -> float:
-        """Median radius of both walls, so that it is known where the later one was hardly seen."""
+        """Median radius of both walls, mm, so that it is known even if the later one was hardly seen."""
         rows = [self._thinned(wall.radius_mm) for wall in (self.now, self.earlier)]
         return float(np.nanmedian(np.concatenate([r.ravel() for r in rows])))
 
@@ -111,7 +114,7 @@ class PairedWalls:
 
 
 def _between(values: Float, row: Float, column: Float) -> Float:
-    """Return values at fractional rows and columns, linear; NaN next to what was not seen."""
+    """Return values at fractional rows and columns, linear; NaN next to unseen cells."""
     wide = np.concatenate([values, values[:, :1]], 1)
     return np.asarray(map_coordinates(wide, [row, column], order=1, mode="constant", cval=np.nan))
 
@@ -138,7 +141,7 @@ def registered_walls(pair: PairedWalls, is_one_calibration: bool, progress: Prog
 
 
 def _diameter(grown_mm: Float, pair: PairedWalls, is_one_calibration: bool) -> Value:
-    """Return growth of the mean diameter; its σ holds both calibrations where there are two."""
+    """Return the growth of the mean diameter; its σ includes both calibrations if there are two."""
     known = grown_mm[np.isfinite(grown_mm)]
     wander = float(known.std()) * np.sqrt(np.pi / 2 / independent_count(known))  # π/2: of a median
     systematic = 0.0 if is_one_calibration else 2 * np.sqrt(2) * pair.calibration_mm
@@ -146,7 +149,7 @@ def _diameter(grown_mm: Float, pair: PairedWalls, is_one_calibration: bool) -> V
 
 
 def _typical_sigma(pair: PairedWalls) -> float:
-    """Return the median σ of the difference about the middle of what both runs saw."""
+    """Return the median σ of the difference in the middle of the wall that both runs saw."""
     middle = pair.now.row(float(np.mean(pair.registration.overlap_mm)))
     part = pair.stretch(middle - _SAMPLED_ROWS // 2, middle + _SAMPLED_ROWS // 2)
     return float(np.nanmedian(part.sigma_mm))

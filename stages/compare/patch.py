@@ -1,4 +1,4 @@
-"""A place on both walls, cut out: heights, what belongs to the defect, and clean wall to compare with."""
+"""Cuts a place out of both walls: heights, the mask of the defect, and clean wall for comparison."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from pipeline.arrays import Bool, Float, Int
 from pipeline.artefacts.wall_map import cells_within
 from stages.compare.paired import PairedWalls, Stretch, ring_values
 
-# Wall around a finding that is cut out with it, as wide as the review measures depths against.
+# Wall around a finding that is cut out with it, as wide as the reference for depths in the review.
 _MARGIN_MM = 6.0
 # 1 σ with which heights are smoothed: that of the run's own map, by default.
 _SMOOTHING_MM = 0.3
-# A piece of wall counts as clean when this share of it was seen and is of no finding. Chosen.
+# A piece of wall counts as clean when this share of it was seen and belongs to no finding. Chosen.
 _LEAST_CLEAN = 0.9
 # Pieces of clean wall, of the defect's own rings and then of its neighbours: 40 give a σ to 11 %, and with
 # fewer than 4 Student's t says hardly anything.
@@ -29,7 +29,7 @@ _FOOT_MM = 2.0
 
 @dataclass(frozen=True)
 class Patch:
-    """A piece of both walls about a defect.
+    """A piece of both walls around a defect.
 
     Attributes
     ----------
@@ -40,9 +40,9 @@ class Patch:
         Within an outline.
     cell_mm : (float, float)
     noise_mm : (K, R, C)
-        The walls' difference over clean wall elsewhere: what it is where nothing has happened.
+        The walls' difference over clean wall elsewhere, which has not changed.
     own_pieces : int
-        How many of those, the first, are of the defect's own rings.
+        Number of these pieces, the first ones, that belong to the defect's own rings.
     """
 
     now_mm: Float
@@ -85,7 +85,7 @@ class Cutter:
     defective: Bool
 
     def patch(self, outlines: Sequence[Float], random: np.random.Generator) -> Patch:
-        """Return the patch about outlines (V, 2) of the later run."""
+        """Return the patch around outlines (V, 2) of the later run."""
         wall = self.pair.now
         radius = self.pair.radius_mm
         corner = np.concatenate(outlines)
@@ -124,7 +124,7 @@ class Cutter:
         self, own: Stretch, rows: Int, shape: tuple[int, int], cell: tuple[float, float],
         random: np.random.Generator,
     ) -> tuple[Float, int]:  # fmt: skip
-        """Return differences (K, R, C) of clean pieces, its own rings' first, and how many these are."""
+        """Return differences (K, R, C) of clean pieces, first those of its own rings, and their number."""
         reach = len(rows)
         steps = (0, -1, 1, -2, 2, -3, 3, -4, 4, -6, 6, -8, 8)
         starts = [int(rows[0]) + k * reach for k in steps]
@@ -156,7 +156,7 @@ def smoothed(height_mm: Float, cell_mm: tuple[float, float], sigma_mm: float = _
 
 
 def at_its_peak(mask: Bool, peak: tuple[int, int]) -> Bool:
-    """Return the connected part of a mask to which the cell ``peak`` belongs; nothing where it is outside."""
+    """Return the connected part of a mask to which the cell ``peak`` belongs; empty if it is outside."""
     parts, _ = label(mask)
     return np.asarray(parts == parts[peak]) if parts[peak] else np.zeros_like(mask)
 

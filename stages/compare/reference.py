@@ -1,6 +1,6 @@
-"""The files that a run is verified against: another map of the radius, a mesh or a cloud of the wall.
+"""Reads the files that a run is verified against: another map of the radius, a mesh or a cloud of the wall.
 
-Commands read them; what computes takes what they return.
+Commands read the files; the stages take the objects that these functions return.
 """
 
 from __future__ import annotations
@@ -79,7 +79,7 @@ def read_wall_points(run: Path, at_most: int = 200_000) -> WallPoints:
     try:
         vertex = PlyData.read(str(file))["vertex"].data
     except (PlyParseError, OSError, KeyError, ValueError, EOFError, MemoryError) as error:
-        raise InputError(file, f"is no point cloud: {error}") from error
+        raise InputError(file, f"is not a point cloud: {error}") from error
     missing = [name for name in _POINT_FIELDS if name not in (vertex.dtype.names or ())]
     if missing:
         raise InputError(
@@ -142,13 +142,13 @@ def _only_map(folder: Path) -> Path:
 
 @contextmanager
 def _opened(file: Path) -> Iterator[np.lib.npyio.NpzFile]:
-    """Open an archive of arrays; whatever is wrong with it, here or when an array is read, names the file."""
+    """Open an archive of arrays; any error in it, here or when an array is read, names the file."""
     expected = "a NumPy .npz archive"
     try:
         with file.open("rb") as stream:
             content = np.load(stream, allow_pickle=False)
             if not isinstance(content, np.lib.npyio.NpzFile):
-                raise InputError(file, "is no archive", expected=expected)
+                raise InputError(file, "is not an archive", expected=expected)
             _refuse_bomb(file, content)
             yield content
     except (OSError, ValueError, zipfile.BadZipFile, zlib.error, EOFError, MemoryError,
@@ -170,7 +170,7 @@ def _check_grid(file: Path, distance: Float, azimuth: Float, radius: Float) -> N
                          expected=f"{len(distance)} × {len(azimuth)}, at least 4 × 4")  # fmt: skip
     for name, axis in (("distance_mm", distance), ("azimuth_rad", azimuth)):
         step = np.diff(axis)
-        # A thousandth of a step: coordinates kept in single precision vary by that much.
+        # A thousandth of a step: coordinates stored in single precision vary by that much.
         if not (np.isfinite(axis).all() and step.min() > 0 and np.ptp(step) < 1e-3 * step.mean()):
             raise InputError(file, "is not uniform and increasing", place=name)
     if not np.isfinite(radius).any():

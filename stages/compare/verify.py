@@ -1,4 +1,4 @@
-"""How accurate a run is: its differences from a reference, point by point, and their figures."""
+"""Measures a run's accuracy: its differences from a reference, point by point, and their statistics."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from stages.compare.registration.by_radius import (
 
 # Half the width of the 95 % interval of a normal distribution, in σ.
 _NORMAL_95 = 1.959964
-# With fewer points a 95th percentile rests on five of them.
+# With fewer points a 95th percentile depends on at most five of them.
 _LEAST_POINTS = 100
 
 
@@ -38,9 +38,9 @@ class Differences:
     Attributes
     ----------
     distance_mm, azimuth_rad : (N,)
-        Of the run.
+        Pipe coordinates in the run.
     error_mm, sigma_mm, sigma_random_mm : (N,)
-        Differences, and 1 σ of them: with the instrument's part, and without it.
+        Differences, and their 1 σ with and without the instrument's part.
     """
 
     distance_mm: Float
@@ -134,7 +134,7 @@ def map_differences(run: WallMap, reference: WallMap, alignment: Alignment) -> D
     known = np.isfinite(run.radius_mm)
 
     cell, weight = cells_around(reference, samples, alignment.placement)
-    # the random part of neighbouring cells averages in the interpolation, the instrument's does not
+    # interpolation averages the random part of neighbouring cells, but not the instrument's
     its_random = np.sum(weight**2 * reference.sigma_random_mm[cell] ** 2, 0)[on]
     shared = np.maximum(reference.sigma_mm**2 - reference.sigma_random_mm**2, 0.0)
     its_shared = np.sum(weight * shared[cell], 0)[on]
@@ -173,23 +173,23 @@ _UNITS_MM = {"mm": 1.0, "m": 1000.0}
 
 
 class VerifyParameters(Parameters):
-    """How far run and reference may be apart."""
+    """Limits of the alignment of run and reference."""
 
     max_shift_mm: float = Field(
-        8.0, ge=0, le=1000, description="how far apart the origins of distance may be, mm"
+        8.0, ge=0, le=1000, description="largest difference of the origins of distance, mm"
     )
     max_roll_deg: float = Field(
-        5.0, ge=0, le=180, description="how far apart the origins of roll may be, deg"
+        5.0, ge=0, le=180, description="largest difference of the origins of roll, deg"
     )
     reference_unit: Literal["mm", "m"] = Field("mm", description="unit of a mesh or cloud")
     reach_mm: float = Field(
-        5.0, ge=0.01, description="points farther from a mesh or cloud do not lie on it, mm"
+        5.0, ge=0.01, description="points farther than this from a mesh or cloud are left out, mm"
     )
 
 
 @dataclass(frozen=True)
 class KnownBore:
-    """A bore's diameter and the ± of it, mm."""
+    """A bore's diameter and its ± tolerance, mm."""
 
     diameter_mm: float
     tolerance_mm: float
@@ -248,7 +248,7 @@ def _verification(
     return Verification(kind, alignment, differences, figures)
 
 
-_SUMMARY = "Compare a run's wall with what is known of it."
+_SUMMARY = "Compare a run's wall with a reference."
 VERIFY_BORE, VERIFY_MAP, VERIFY_SURFACE = (
     Stage("verify", "2", VerifyParameters, function, _SUMMARY)
     for function in (verify_bore, verify_map, verify_surface)

@@ -31,7 +31,7 @@ from pipeline.arrays import Float, Float32
 from pipeline.artefacts.cloud_along import cloud_along
 from pipeline.artefacts.findings import Defect, Defects
 from pipeline.artefacts.measured import RingSamples, Trajectory, Wall, WallTexture
-from pipeline.artefacts.moved_back import told_by_roll
+from pipeline.artefacts.moved_back import kept_by_roll
 from pipeline.artefacts.wall_map import FixedToProbe
 from pipeline.errors import UnusableError
 from pipeline.instrument.probe import Probe
@@ -219,7 +219,7 @@ def _defects_of_run(
 ) -> Defects:
     """Find the defects of a run, with the evidence of its rings and lit pictures."""
     pictures = LitPictures(frames.applied_to(recording), probe.as_found_in(trajectory), trajectory)
-    on_wall = told_by_roll(rings, trajectory)
+    on_wall = kept_by_roll(rings, trajectory)
     return find_defects(recording, wall, texture, parameters, context, on_wall, pictures)
 
 

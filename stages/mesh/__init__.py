@@ -23,12 +23,12 @@ from stages.mesh.join import OpenMesh
 from stages.mesh.poisson import folded_cells, joined_pieces, piece_cuts, poisson_surface, seen_part
 from stages.mesh.surface import Decimated, Surface, decimate, with_normals
 
-# Rows and points of which medians are taken: a bound on time.
+# Rows and points from which medians are computed: a bound on time.
 _SAMPLED_ROWS, _SAMPLED_POINTS = 2000, 1 << 20
 
 
 class MeshParameters(Parameters):
-    """How the surface is made, thinned out and textured."""
+    """Parameters of the surface, its decimation and its texture."""
 
     surface: Literal["auto", "grid", "poisson"] = Field(
         "auto",
@@ -41,23 +41,23 @@ class MeshParameters(Parameters):
     least_folded_cells: int = Field(20, ge=1, description="cells with a fold from which auto takes poisson")
     poisson_cell_mm: float = Field(0.5, ge=0.05, le=10, description="mm; finest cell of the Poisson solver")
     poisson_reach_mm: float = Field(
-        2.0, ge=0.1, le=50, description="mm; surface further from every point is left out as not seen"
+        2.0, ge=0.1, le=50, description="mm; surface farther from every point is left out as not seen"
     )
     error_mm: float = Field(
         0.02,
         gt=0,
         le=5,
-        description="mm; how far the surface may lie off the wall, beyond the wall's own noise",
+        description="mm; largest distance of the surface from the wall, beyond the wall's own noise",
     )
     noise_factor: float = Field(
         4.0,
         ge=0,
         le=6,
-        description="how many random 1 σ of a cell are added to error_mm; 0: the bound is strict",
+        description="number of random 1 σ of a cell that are added to error_mm; 0: the bound is strict",
     )
-    # C. Mallows' criterion for the least error of prediction asks 2 of every vertex, 1 of a triangle, and of
-    # noise that two to three rows of a radius map share as many times more. Against truth, open-1 errs by
-    # 14.3 µm with 3 (bias left out), 14.3 with 10, 15.4 with 20.
+    # C. Mallows' criterion for the least error of prediction requires 2 per vertex, 1 per triangle, and two
+    # to three times more since as many rows of a radius map share noise. Compared with truth, open-1 errs by
+    # 14.3 µm with 3 (without bias), 14.3 with 10, 15.4 with 20.
     triangle_cost: float = Field(
         3.0, ge=0, le=1e6, description="least drop of χ² for each further triangle; higher: fewer triangles"
     )
@@ -68,7 +68,7 @@ class MeshParameters(Parameters):
     tile_mm: float = Field(100.0, ge=10, le=1000, description="mm; length of the pieces the model is made of")
     atlas_px: int = Field(4096, ge=512, le=16384, description="px; largest side of a texture")
     time_limit_s: float = Field(
-        600.0, ge=1, description="s; after this a reconstruction of one piece is given up"
+        600.0, ge=1, description="s; a reconstruction of one piece is stopped after this time"
     )
 
 
@@ -165,7 +165,7 @@ def _poisson_pieces(wall: Wall, parameters: MeshParameters, context: Context) ->
 
 
 def _reconstructed(cloud: PointCloud, parameters: MeshParameters) -> OpenMesh:
-    """Return a cloud's Poisson surface, made in a process of its own: it may crash or find no end."""
+    """Return a cloud's Poisson surface, made in a separate process: the library may crash or never return."""
     xyz, normal = cloud.xyz_p.astype(float), cloud.normal_p.astype(float)
     limits = parameters.poisson_cell_mm, parameters.poisson_reach_mm
     try:
@@ -181,7 +181,7 @@ def _typical_sigma(cloud: PointCloud) -> float:
 
 
 def _thin_out(surface: Surface, parameters: MeshParameters, allowance_mm: float) -> Decimated:
-    """Return the surface decimated to the density wished, if its error allows."""
+    """Return the surface decimated to the requested density, if its error allows."""
     a, b, c = np.moveaxis(surface.vertex_p[surface.face], 1, 0)
     area = 0.5 * float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum())
     target = max(1, round(parameters.triangles_per_mm2 * area))

@@ -1,8 +1,8 @@
 """Triangles of a regular grid by longest-edge bisection: as few as noise allows, and no gap between them.
 
-A block of squares is two triangles; each is cut from its right angle to the middle of its longest side, over
-and over, down to halves of single squares. Which cuts are worth their triangles is decided as in the pruning
-of regression trees (R. Willett, R. Nowak, "Platelets", 2003); cuts that a neighbour needs follow
+A block of squares is two triangles; each is cut from its right angle to the middle of its longest side,
+repeatedly, down to halves of single squares. The cuts that are worth their triangles are chosen as in the
+pruning of regression trees (R. Willett, R. Nowak, "Platelets", 2003); cuts that a neighbour needs follow
 (P. Lindstrom, V. Pascucci, "Visualization of large terrains made easy", 2001).
 """
 
@@ -21,7 +21,7 @@ from pipeline.arrays import Bool, Float, Int, Int32
 
 # A block spans at most 1/32 of the way around, 11°: its points are then a function over its own plane.
 _LEAST_BLOCKS_AROUND = 32
-_SQUARES_AT_ONCE = 1 << 19  # for memory's sake
+_SQUARES_AT_ONCE = 1 << 19  # to limit memory
 _MOMENTS = np.triu_indices(4)  # 1, x, y, z by pairs
 
 
@@ -44,7 +44,7 @@ class Lattice:
 
     @property
     def block(self) -> int:
-        """Squares that a block is wide and long."""
+        """Width and length of a block in squares."""
         return 1 << self.depth
 
     @property
@@ -54,7 +54,7 @@ class Lattice:
 
     @property
     def blocks(self) -> tuple[int, int]:
-        """How many blocks there are along and around."""
+        """Numbers of blocks along and around."""
         return max(1, -(-(self.rows - 1) // self.block)), self.columns // self.block
 
     @property
@@ -97,7 +97,7 @@ class Lattice:
         return slice(first * self.columns, last * self.columns)
 
     def slabs(self) -> list[slice]:
-        """Return the rows of blocks, some at a time."""
+        """Return slices of some rows of blocks each."""
         at_once = max(1, _SQUARES_AT_ONCE // (self.columns * self.block))
         cut = [*range(0, self.blocks[0], at_once), self.blocks[0]]
         return [slice(a, b) for a, b in pairwise(cut)]
@@ -117,7 +117,7 @@ class Cuts:
 
 
 def worthwhile(lattice: Lattice, xyz: Float, weight: Float, triangle_cost: float) -> Cuts:
-    """Return the cuts of some blocks that take away more χ² than their triangles cost.
+    """Return the cuts of some blocks that reduce χ² by more than their triangles cost.
 
     ``xyz`` (n, n, N, 3) are the nodes of N blocks, x and y along the block's plane, and ``weight`` (n, n, N)
     their 1/σ², 0 where nothing was measured. χ² is that of a triangle's best plane.
@@ -162,7 +162,7 @@ def triangles(lattice: Lattice, cuts: Cuts, measured: Bool, along: slice) -> Int
 
 
 def beside_holes(lattice: Lattice, measured: Bool, along: slice) -> Int:
-    """Return the triangle (T, 3) that is left of each square in which one end of the diagonal is a hole."""
+    """Return the remaining triangle (T, 3) of each square in which one end of the diagonal is a hole."""
     apex, a, b = np.moveaxis(lattice.corner[lattice.finest], 1, 0)
     once = (apex[:, 0] < (a + b - apex)[:, 0])[:, None]  # of the square's two triangles
     numbers = [lattice.number(place, along) for place in (apex, a, a + b - apex, b)]

@@ -25,7 +25,7 @@ _LEAST_FACING = 0.35
 
 @dataclass(frozen=True)
 class Unrolled:
-    """Where a surface's triangles lie on the unrolled wall.
+    """A surface's triangles on the unrolled wall.
 
     Attributes
     ----------
@@ -54,7 +54,7 @@ class Chart:
     corner : (T, 3) int
         Vertices of its triangles, numbered within the chart.
     vertex : (V,) int
-        Vertices of the surface that they are.
+        Their numbers among the surface's vertices.
     xy_mm : (V, 2)
         Flat coordinates.
     origin : (2,) or None
@@ -99,7 +99,7 @@ def unroll(surface: Surface, axis: PipeAxis) -> Unrolled:
 
 
 def tile_length(wished_mm: float, radius_mm: float, texel_mm: float, atlas_px: int) -> float:
-    """Return the length of tiles, mm: as wished, or shorter where their atlas would grow too large.
+    """Return the length of tiles, mm: as requested, or shorter if their atlas would become too large.
 
     The charts are near square, so half of the atlas is a safe share to fill.
     """
@@ -107,7 +107,7 @@ def tile_length(wished_mm: float, radius_mm: float, texel_mm: float, atlas_px: i
 
 
 def tile_count(length_mm: float, tile_mm: float) -> int:
-    """Return in how many tiles of one length a pipe is cut."""
+    """Return the number of tiles of one length into which a pipe is cut."""
     return max(1, round(length_mm / tile_mm))
 
 
@@ -115,7 +115,7 @@ def cut_charts(unrolled: Unrolled, surface: Surface, tile_mm: float, texel_mm: f
     """Return the charts of every tile, in order of distance.
 
     Triangles that face the axis at about the reference radius are unrolled, in sectors as wide as a tile is
-    long; what folds over (a branch, say) is flattened by xatlas.
+    long; folded parts, such as a branch, are flattened by xatlas.
     """
     tile, tiles = _tile_numbers(unrolled.distance_mm, tile_mm)
     sectors = max(_LEAST_SECTORS, int(np.ceil(2 * np.pi * unrolled.reference_mm / tile_mm)))
@@ -133,7 +133,7 @@ def cut_charts(unrolled: Unrolled, surface: Surface, tile_mm: float, texel_mm: f
 def pack(charts: list[Chart], texel_mm: float) -> Atlas:
     """Return the charts packed by xatlas, which is given their bounding boxes: they never overlap."""
     low = [c.xy_mm.min(axis=0) for c in charts]
-    # xatlas takes two meshes at one address for the same mesh, so all arrays live until the packing is done.
+    # xatlas takes two meshes at one address for the same mesh, so all arrays are kept until packing is done.
     boxes = [_box(np.maximum(c.xy_mm.max(axis=0) - o, texel_mm)) for c, o in zip(charts, low, strict=True)]
     packer = xatlas.Atlas()
     for corner, face in boxes:

@@ -1,4 +1,4 @@
-"""A radius map's surface of few triangles: vertices fitted to all cells, more of them where the wall asks."""
+"""Fits a surface of few triangles to a radius map, with more vertices where the wall needs them."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from stages.mesh.bisection import Cuts, Lattice, beside_holes, triangles, withou
 from stages.mesh.surface import Decimated, Surface
 
 # Steps of the conjugate gradients: the matrix, scaled by its diagonal, has eigenvalues between 1/2 and 2
-# (A. Wathen, "Realistic eigenvalue bounds for the Galerkin mass matrix", 1987): each takes away two thirds.
+# (A. Wathen, "Realistic eigenvalue bounds for the Galerkin mass matrix", 1987): each removes two thirds.
 _STEPS = 14
 # Scatter of cells without noise, as a share of the bound ``error_mm`` (chosen).
 _SCATTER = 0.25
@@ -25,7 +25,7 @@ _SCATTER = 0.25
 
 @dataclass(frozen=True)
 class Cells:
-    """The radius map on the nodes of its lattice, row by row, and how closely a surface is to follow it.
+    """The radius map on the nodes of its lattice, row by row, and the largest error of a surface through it.
 
     Attributes
     ----------
@@ -35,7 +35,7 @@ class Cells:
         Distance along the axis, and the axis' point and frame in P, at every row.
     azimuth_rad : (A,)
     error_mm, noise_factor : float
-        The surface may lie off a cell by ``error_mm`` and ``noise_factor`` of its noise.
+        The surface may differ from a cell by ``error_mm`` plus ``noise_factor`` times its noise.
     """
 
     lattice: Lattice
@@ -49,7 +49,7 @@ class Cells:
     noise_factor: float
 
     def sigma_mm(self, node: Int | slice) -> Float:
-        """Return the 1 σ that cells count by."""
+        """Return the 1 σ that weights cells."""
         return np.asarray(np.hypot(self.noise_mm[node].astype(float), _SCATTER * self.error_mm))
 
     def outward(self, rows: slice) -> Float:
@@ -59,7 +59,7 @@ class Cells:
 
 
 def cells_of(wall: Wall, error_mm: float, noise_factor: float) -> Cells:
-    """Return a wall's cells; a surface may lie off them by ``error_mm`` and ``noise_factor`` of their 1 σ."""
+    """Return a wall's cells; a surface may differ by ``error_mm`` plus ``noise_factor`` times their 1 σ."""
     found = wall.radius_map
     rows, columns = found.radius_mm.shape
     lattice = Lattice(rows, columns)
@@ -76,7 +76,7 @@ def cells_of(wall: Wall, error_mm: float, noise_factor: float) -> Cells:
 def fitted_surface(cells: Cells, axis: PipeAxis, pieces: int, triangle_cost: float) -> Iterator[Decimated]:
     """Yield the wall's surface in pieces, in order of distance, that share the vertices where they meet.
 
-    Triangles are cut where that takes away more χ² than they cost, and where a cell is too far off.
+    Triangles are cut where that reduces χ² by more than they cost, and where a cell is too far off.
     """
     lattice = cells.lattice
     wanted = _joined([worthwhile(lattice, *_in_blocks(cells, s), triangle_cost) for s in lattice.slabs()])
@@ -129,10 +129,10 @@ def _in_blocks(cells: Cells, along: slice) -> tuple[Float, Float]:
 
 
 def _fit(cells: Cells, cuts: Cuts) -> tuple[Float, Float32]:
-    """Return the radius (nodes,) of each vertex, and how far each cell (nodes,) lies outside of the surface.
+    """Return the radius (nodes,) of each vertex, and the distance of each cell (nodes,) outside the surface.
 
-    Radii are the weighted least squares' over all cells, some rows of blocks after the other, each with the
-    next row of blocks, on which it hardly depends.
+    Radii are the weighted least-squares solution over all cells, some rows of blocks after the other, each
+    with the next row of blocks, on which it hardly depends.
     """
     lattice = cells.lattice
     radius, off = cells.radius_mm.astype(float), np.zeros(lattice.nodes, np.float32)
@@ -150,11 +150,11 @@ def _fit(cells: Cells, cuts: Cuts) -> tuple[Float, Float32]:
 
 
 def _equations(cells: Cells, cuts: Cuts, along: slice) -> tuple[Int, Int, Float, Float]:
-    """Return how the surface at each cell follows from its vertices.
+    """Return the linear equations of the surface at each cell in terms of its vertices.
 
     The surface's radius at node (M,) is the sum over its triangle's vertices (M, 3) of weight (M, 3) times
-    radius, plus shift (M,); what slopes displace along a triangle is left out. Nodes are counted from the
-    first of these rows of blocks.
+    radius, plus shift (M,); displacements along a triangle by its slope are neglected. Nodes are counted from
+    the first of these rows of blocks.
     """
     lattice = cells.lattice
     owner, level = _owners(lattice, cuts, along)
@@ -181,7 +181,7 @@ def _equations(cells: Cells, cuts: Cuts, along: slice) -> tuple[Int, Int, Float,
 
 
 def _owners(lattice: Lattice, cuts: Cuts, along: slice) -> tuple[Int, Int]:
-    """Return number and level (T, N) of the triangle that each half square is part of; level −1: none."""
+    """Return number and level (T, N) of the triangle that contains each half square; level −1: none."""
     blocks = lattice.of_blocks(along)
     level_of = np.full((len(lattice.corner[-1]), blocks.stop - blocks.start), -1)
     for level in range(lattice.finest + 1):
@@ -205,7 +205,7 @@ def _least_squares(
 ) -> Float:
     """Return ``radius`` (nodes,) with those vertices fitted whose number is ``known`` or higher.
 
-    Of each cell (M,), ``share`` (M, 3) times its vertices' radii is to be ``wanted``, counted by ``weight``.
+    For each cell (M,), ``share`` (M, 3) times its vertices' radii should be ``wanted``, with ``weight``.
     M. Hestenes, E. Stiefel, "Methods of conjugate gradients", 1952, scaled by the diagonal.
     """
     used = np.zeros(len(radius), bool)

@@ -1,4 +1,4 @@
-"""Cuts meshes at a plane and joins two that end there, so that no gap is left.
+"""Cuts meshes at a plane and joins two that end there, without a gap.
 
 Both borders follow the same wall, a few hundredths of a millimetre apart. The course of the first border is
 kept. The vertices of the second are moved onto it, and each border takes over the vertices of the other.
@@ -32,7 +32,7 @@ class OpenMesh:
     face : (T, 3) int
         Counter-clockwise seen from inside the pipe.
     joined : (V,) bool
-        Vertices that the neighbouring piece has too, to the bit.
+        Vertices that the neighbouring piece has too, with identical coordinates.
     """
 
     vertex_p: Float
@@ -177,7 +177,7 @@ def course_of(mesh: OpenMesh, vertices: Index) -> Course:
 def join(
     first: OpenMesh, first_cut: Cut, second: OpenMesh, second_cut: Cut, apart_mm: float
 ) -> tuple[OpenMesh, OpenMesh, int]:
-    """Return both meshes with shared borders, and how many borders found no partner within ``apart_mm``."""
+    """Return both meshes with shared borders, and the number of borders unmatched within ``apart_mm``."""
     theirs = {k: loop for k, loop in enumerate(second_cut.loops())}
     open_borders = 0
     for mine in first_cut.loops():
@@ -193,7 +193,7 @@ def join(
 
 
 def _belongs(course: Course, mesh: OpenMesh, cut: Cut, loop: Index, apart_mm: float) -> bool:
-    """Tell whether a border runs along a course, once around and against its direction."""
+    """Return whether a border runs along a course, once around and against its direction."""
     at, far = course.nearest(mesh.vertex_p[cut.start[loop]])
     return float(np.median(far)) <= apart_mm and abs(_travelled(at, course) / course.length_mm + 1) < _CLOSED
 
@@ -203,7 +203,7 @@ def _travelled(at_mm: Float, course: Course) -> float:
 
 
 def _steps(at_mm: Float, length_mm: float) -> Float:
-    """Return the way (N,) from each place on a closed course to the next, the shorter one."""
+    """Return the shorter distance (N,) from each place on a closed course to the next, mm."""
     return np.asarray((np.roll(at_mm, -1) - at_mm + length_mm / 2) % length_mm - length_mm / 2)
 
 
@@ -224,7 +224,7 @@ def _zipped(course: Course, first: _Border, second: _Border) -> tuple[OpenMesh, 
 
 
 def _onward(course: Course, xyz_p: Float) -> Float:
-    """Return where on the course points (M, 3) belong, never going back from one to the next, mm."""
+    """Return the places on the course, mm, of points (M, 3), never decreasing from one to the next."""
     at, far = course.nearest(xyz_p)
     start = int(np.argmin(far))
     at = np.roll(at, -start)
@@ -234,7 +234,7 @@ def _onward(course: Course, xyz_p: Float) -> Float:
 
 
 def _knots(course: Course, at_mm: Float) -> tuple[Float, Index]:
-    """Return the places on the course (K,) at which both borders get a vertex, and which are those asked for.
+    """Return the places on the course (K,) at which both borders get a vertex, and the indices of ``at_mm``.
 
     Places next to a vertex of the course, or to each other, are one.
     """

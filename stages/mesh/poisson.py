@@ -26,19 +26,19 @@ _OUTLIER_SIGMA = 3.0
 # See `piece_cuts`: a deeper octree would take more memory than a machine has.
 _LARGEST_DEPTH = 10
 _BOX = 1.1  # the solver's box over the points'
-# Points are measured to a small part of a cell: the surface is held to them more than by the usual 4.
+# Points are accurate to a small part of a cell: they get more weight than the usual 4.
 _POINT_WEIGHT = 10.0
-# Points worked on at a time, for memory's sake.
+# Points processed at a time, to limit memory.
 _AT_ONCE = 1 << 20
 # Fewer points than this make no surface. Debt: data/debts.md.
 _LEAST_POINTS = 100
-_APART_MM = 1.0  # farther apart than this, borders of two pieces are not of one wall
-# How far pieces overlap, so that the surface at a cut does not depend on where the points end.
+_APART_MM = 1.0  # borders farther apart than this do not belong to one wall
+# Overlap of pieces, so that the surface at a cut does not depend on the end of the points.
 OVERLAP_MM = 25.0
 
 
 def folded_cells(cloud: PointCloud, cell_mm: float, fold: float) -> int:
-    """Return in how many cells of the unrolled wall the radius takes several values.
+    """Return the number of cells of the unrolled wall in which the radius has several values.
 
     Such cells, ``cell_mm`` wide and long, hold points whose radii differ by more than ``fold`` times the
     median radius: a branch, say, or a lifted flap.
@@ -62,7 +62,7 @@ def folded_cells(cloud: PointCloud, cell_mm: float, fold: float) -> int:
 
 
 def piece_cuts(first_mm: float, last_mm: float, tile_mm: float, cell_mm: float) -> Float:
-    """Return where along the pipe (n + 1,) a surface is cut: no piece outgrows the finest octree.
+    """Return the distances (n + 1,) at which a surface is cut: no piece exceeds the finest octree.
 
     A deeper one would take more memory than a machine has; a longer piece would get larger cells.
     """
@@ -129,7 +129,7 @@ def _without_outliers(xyz_p: Float) -> Int:
 
 
 def seen_part(mesh: OpenMesh, reach_mm: float) -> Surface:
-    """Return the triangles within ``reach_mm`` of a measured point: what was not seen stays a hole."""
+    """Return the triangles within ``reach_mm`` of a measured point: unseen wall stays a hole."""
     corners = mesh.face
     whole = (np.roll(corners, 1, axis=1) != corners).all(1)
     used, compact = np.unique(corners[whole & (mesh.gap_mm <= reach_mm)[corners].all(1)], return_inverse=True)

@@ -62,7 +62,7 @@ def vertex_normals(surface: Surface) -> Float:
 
 
 def with_normals(pieces: Iterable[Surface]) -> Iterator[tuple[Surface, Float]]:
-    """Yield pieces with their vertices' normals (V, 3), which go on smoothly from piece to piece.
+    """Yield pieces with their vertices' normals (V, 3), which are smooth from piece to piece.
 
     Unused vertices and pieces without triangles are dropped. Pieces must be given in order; three are held in
     memory at a time.
@@ -103,7 +103,7 @@ def _at_border(piece: Surface) -> Surface:
 
 @dataclass(frozen=True)
 class Decimated:
-    """A surface of fewer triangles, the original's size, and how far its vertices lie from the new surface.
+    """A surface of fewer triangles, the original's size, and the distance of its vertices from the new one.
 
     ``largest_error_mm`` and ``mean_square_mm2`` are the largest and the mean square distance.
     """
@@ -116,12 +116,12 @@ class Decimated:
 
 
 def decimate(original: Surface, target_faces: int, allowance_mm: float) -> Decimated:
-    """Return ``original`` with about ``target_faces`` triangles, or more where the allowance asks for it.
+    """Return ``original`` with about ``target_faces`` triangles, or more if the allowance requires it.
 
     The distance of every original vertex from the new surface is measured (one-sided Hausdorff distance), and
-    that of the new vertices from the original, as a collapse on a flat wall may throw a vertex far along it.
-    Where one is larger than the allowance, the original is decimated again to twice as many triangles; if
-    that takes away less than a tenth of them, the original itself is returned.
+    that of the new vertices from the original, as a collapse on a flat wall may move a vertex far along it.
+    If one exceeds the allowance, the original is decimated again to twice as many triangles; if that removes
+    less than a tenth of them, the original itself is returned.
     """
     goal = target_faces
     while goal < _WORTHWHILE * len(original.face):
@@ -153,7 +153,7 @@ def _decimated(original: Surface, found: Surface, distance: Float) -> Decimated:
 
 
 def _collapse(surface: Surface, goal: int) -> Surface:
-    """Return the surface with about ``goal`` faces; vertices at its borders stay where they are.
+    """Return the surface with about ``goal`` faces; vertices at its borders are not moved.
 
     M. Garland, P. Heckbert, "Surface simplification using quadric error metrics", 1997, by pyfqmr. It keeps
     its mesh in variables of the process: one call at a time.

@@ -29,7 +29,7 @@ from stages.texture.surface import wall_surface
 from stages.texture.views import LitViews, TileViews, lit_views, seen_by, shared, thinned
 
 _WHITE = 250.0
-# A place more times brighter than the median wall is no matt wall, but a glint, or noise where light is
+# A place brighter than this many times the median wall is not matt wall, but a glint, or noise where light is
 # scarce. Derived: dirty steel and concrete reflect .2, white lime and paint .8 of the light.
 _MATT_RATIO = 4.0
 Read = TypeVar("Read")
@@ -51,11 +51,11 @@ class TextureParameters(Parameters):
     most_views: int = Field(
         48, ge=3, le=64, description="most frames blended into one place; fewer if pictures have little noise"
     )
-    tile_mm: float = Field(10.0, ge=1.0, le=200.0, description="length of the tiles worked on, mm")
+    tile_mm: float = Field(10.0, ge=1.0, le=200.0, description="length of the processed tiles, mm")
     smoothing_mm: float = Field(0.2, ge=0.0, le=10.0, description="1 σ of the radius map's smoothing, mm")
     shading_mm: float = Field(0.4, ge=0.1, le=20.0, description="1 σ of the wall slopes' smoothing, mm")
     laser_band_mm: float = Field(
-        1.0, ge=0.0, le=20.0, description="half width left out about the laser line when it is on, mm"
+        1.0, ge=0.0, le=20.0, description="half width left out around the laser line when it is on, mm"
     )
     views_at_once: int = Field(
         1500,
@@ -113,16 +113,16 @@ def photograph_wall(
 
 
 def _plan(gauge: NoiseGauge, seen: list[TileViews], most: int, context: Context) -> list[TileViews]:
-    """Return the views to blend into each tile: as many as the pictures' noise asks for."""
+    """Return the views to blend into each tile: as many as the pictures' noise requires."""
     noise = gauge.noise(seen)
     if np.isfinite(noise):
-        context.report("noise of lit pictures, one against another", noise, "grey levels")
+        context.report("noise of lit pictures, from their differences", noise, "grey levels")
     asked = views_against(noise, most)
     return thinned(seen, most) if asked == most else shared(seen, asked)
 
 
 class _Images:
-    """The frames that some tile wants, read twice: for the light and for the picture."""
+    """The frames that some tile uses, read twice: for the light and for the picture."""
 
     def __init__(self, recording: Recording, views: LitViews, wanted: int, context: Context) -> None:
         self._recording, self._views, self._wanted, self._context = recording, views, wanted, context
@@ -161,7 +161,7 @@ def _flat_picture(picture: Blended, grid: FlatGrid, white_quantile: float, conte
         views += np.bincount(count.ravel(), minlength=len(views))
     white = brightest_wall(brightness, white_quantile)
     gain = np.float32(min(1 / REFLECTANCE_SCALE, _WHITE / white))
-    context.report("brightness of the photo against the recorded frames", float(gain * REFLECTANCE_SCALE), "")
+    context.report("brightness of the photo over the recorded frames", float(gain * REFLECTANCE_SCALE), "")
     bgra = context.scratch.zeros((grid.rows, grid.columns, 4), np.uint8)
     for part in parts:
         bgra[part, :, :3] = np.minimum(picture.colour[part] * gain + 0.5, 255)
@@ -172,14 +172,14 @@ def _flat_picture(picture: Blended, grid: FlatGrid, white_quantile: float, conte
 
 
 def brightest_wall(counts: Int, quantile: float) -> float:
-    """Return the brightness below which the wall's ``quantile`` lies, glints left out; 1 where none is seen.
+    """Return the ``quantile`` of the wall's brightness without glints; 1 if no wall is seen.
 
     Parameters
     ----------
     counts
         Pixels (N,) of each brightness 0 to N - 1.
     quantile
-        Share of the wall that is to be no brighter.
+        Share of the wall that is no brighter than the result.
     """
     if not counts.any():
         return 1.0
@@ -205,8 +205,7 @@ def _texture_of_run(
 ) -> WallTexture:
     """Photograph the wall from the frames that the pictures show to be lit.
 
-    Poses and wall belong to the probe as the stage motion found it, so the pixels are projected with that
-    one.
+    Poses and wall belong to the probe as corrected by the stage motion, so the pixels are projected with it.
     """
     found = probe.as_found_in(trajectory)
     return photograph_wall(frames.applied_to(recording), found, trajectory, wall, parameters, context)

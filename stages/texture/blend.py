@@ -18,15 +18,15 @@ from stages.texture.project import TileProjection
 
 Short = NDArray[np.uint16]
 
-# Reflectance is kept as multiples of 1 / 32 of a grey level at the reference brightness.
+# Reflectance is stored as multiples of 1 / 32 of a grey level at the reference brightness.
 REFLECTANCE_SCALE = 32.0
 _SCALE = np.float32(REFLECTANCE_SCALE)
 _SATURATED = np.uint8(250)
-# A key is brightness, 16 bits, above weight, 8 bits; samples without weight come last and weigh nothing.
+# A key is brightness, 16 bits, above weight, 8 bits; samples without weight come last and have no influence.
 _BITS, _WEIGHT = np.int32(8), np.int32(255)
 _NO_SAMPLE = np.int32((1 << 31) - 256)
 _ZERO, _ONE_COUNT, _TWO = np.int32(0), np.int32(1), np.int32(2)
-# Pixels that are worked on side by side: two registers of 16 numbers of 32 bits where there are such.
+# Pixels that are processed side by side: two registers of 16 numbers of 32 bits, if available.
 _AT_ONCE = 32
 _BLOCKS_AT_ONCE = _AT_ONCE // 2
 # A map of pairs needs no second one, and is read without a copy.
@@ -37,7 +37,7 @@ _HALF, _ONE = np.float32(0.5), np.float32(1.0)
 _LUMA_OF_BGR = (0.114, 0.587, 0.299)
 """ITU-R BT.601, as OpenCV's BGR2GRAY."""
 _LEAST_KNOWN = np.float32(0.25)
-"""Share of the nearest block in the interpolation of its colour: no pixel has less of its own block."""
+"""Smallest weight of a pixel's own block in the interpolation of its colour."""
 
 
 class TileStack:
@@ -70,7 +70,7 @@ class TileStack:
         self._used += 1
 
     def blend(self) -> tuple[Short, Byte]:
-        """Return the blended colours (rows, columns, 3) and how many samples are behind each; start anew."""
+        """Return the blended colours (rows, columns, 3) and their numbers of samples; clear the stack."""
         luma, colour, count = blend_samples(self._luma, self._colour, self._weights)
         self._weights[:] = 0
         self._used = 0
@@ -90,7 +90,7 @@ def _colours_at(image: SplitImage, uv: Float32) -> list[Image]:
 
 @njit(cache=True, nogil=True)
 def _store(grey, colours, inverse_brightness, weight, lumas, values, weights):  # type: ignore[no-untyped-def]
-    """Write a view's samples and weights; values of weight 0 mean nothing."""
+    """Write a view's samples and weights; values of weight 0 are undefined."""
     most, half, steps = np.float32(65535.0), np.float32(0.5), np.float32(254.0)
     for i in range(len(weight)):
         own, gain, worth, seen, out = weight[i], inverse_brightness[i], weights[i], grey[i], lumas[i]
@@ -107,7 +107,7 @@ def _store(grey, colours, inverse_brightness, weight, lumas, values, weights):  
             for q in range(len(colour)):
                 out[q] = np.int32(min(most, np.float32(colour[q]) * (_SCALE * gain[2 * q]) + half))
         for q in range(len(blue)):
-            # A clipped sample counts only where there is no other.
+            # A clipped sample counts only if there is no other.
             if max(blue[q], max(green[q], red[q])) >= _SATURATED:
                 for worth in (weights[2 * i], weights[2 * i + 1]):
                     for p in (2 * q, 2 * q + 1):
@@ -115,10 +115,10 @@ def _store(grey, colours, inverse_brightness, weight, lumas, values, weights):  
 
 
 def _sorting_network(keys: int) -> Int:
-    """Return the pairs (N, 2) of places to be put in order one after the other to sort so many keys.
+    """Return the pairs (N, 2) of places to be compared and exchanged in turn to sort ``keys`` keys.
 
-    K. Batcher, "Sorting networks and their applications", 1968: odd-even merge sort. Which pairs there are
-    does not depend on the keys, so that many pixels are sorted by the same instructions.
+    K. Batcher, "Sorting networks and their applications", 1968: odd-even merge sort. The pairs do not depend
+    on the keys, so that many pixels are sorted by the same instructions.
     """
     pairs, size = [], 1
     while size < keys:
@@ -150,7 +150,7 @@ def _weighted_median(key, network, total, below, middle):  # type: ignore[no-unt
 
 @njit(cache=True, nogil=True)
 def _write_keys(luma, weight, middle, key):  # type: ignore[no-untyped-def]
-    """Write the keys of how far the luma is from ``middle`` (pixels,)."""
+    """Write the keys of the luma's absolute distance from ``middle`` (pixels,)."""
     for k in range(len(key)):
         for p in range(_AT_ONCE):
             own = (abs(np.int32(luma[k, p]) - middle[p]) << _BITS) + np.int32(weight[k, p])
@@ -178,7 +178,7 @@ def _biweight_mean(luma, weight, middle, spread, worth, mean):  # type: ignore[n
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _mean_colour(values, worth, mean):  # type: ignore[no-untyped-def]
-    """Write the mean colours of blocks (3, blocks); a block's samples weigh what its pixels' do (2, ...)."""
+    """Write the mean colours of blocks (3, blocks), with the weights of their pixels' samples (2, ...)."""
     total, own = np.zeros(_BLOCKS_AT_ONCE, np.float32), np.empty(_BLOCKS_AT_ONCE, np.float32)
     mean[:] = 0
     for k in range(len(values)):
@@ -208,14 +208,14 @@ def _summed(weight, total, count):  # type: ignore[no-untyped-def]
 def blend_samples(luma: Short, colour: Short, weights: Byte) -> tuple[Short, Short, Byte]:
     """Return robust weighted means of luma (rows, columns) and colours (blocks), and counts (rows, columns).
 
-    Tukey's biweight on luma about the weighted median, with the weighted median of absolute deviations as
+    Tukey's biweight on luma around the weighted median, with the weighted median of absolute deviations as
     scale, but at least 3 %: a glint or a passing shadow is left out, noise is averaged. Colours (rows / 2,
-    columns / 2, 3) are weighted as the luma of their pixels.
+    columns / 2, 3) have the weights of their pixels' luma.
 
     Parameters
     ----------
     luma : (views, rows, columns) uint16
-        So many columns that 32 of them can be worked on at once.
+        The number of columns is a multiple of 32, which are processed at once.
     colour : (views, rows / 2, 3, columns / 2) uint16
     weights : (views, rows, columns) uint8
         0 where a view does not show the pixel.
@@ -229,7 +229,7 @@ def blend_samples(luma: Short, colour: Short, weights: Byte) -> tuple[Short, Sho
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _gathered(luma, colour, weights, i, near, tint, weight):  # type: ignore[no-untyped-def]
-    """Write the samples of a pair of rows so that those worked on at once lie side by side."""
+    """Write the samples of a pair of rows so that those processed at once lie side by side."""
     for k in range(luma.shape[0]):
         for b in range(near.shape[1]):
             for p in range(_AT_ONCE):
@@ -276,7 +276,8 @@ def _blend(lumas, colours, weights, network, out, out_colour, counts):  # type: 
 def _in_colour(luma: Short, colour: Short) -> Short:
     """Return luma (rows, columns) with the colours (rows / 2, columns / 2, 3) of its blocks.
 
-    Differences of colour from luma go over linearly from block to block; blocks without a sample have none.
+    Differences of colour from luma are interpolated linearly between blocks; blocks without a sample have
+    none.
     """
     known = (colour.max(2) > 0).astype(np.float32)
     small = colour.astype(np.float32)

@@ -63,7 +63,7 @@ class FlatGrid:
     def node_patch(self, tile: Tile, surface: WallSurface) -> SurfacePatch:
         """Return the wall at the tile's nodes, one in `NODE_PX` pixels, with one more all round.
 
-        Nodes lie where enlarging them by `NODE_PX` with cv2.resize puts the pixels' centres.
+        Enlarging the nodes by `NODE_PX` with cv2.resize gives the pixels' centres.
         """
         rows = tile.first_row + self._nodes(self.tile_rows)
         azimuth = self.azimuth_from_rad + self.rad_per_px * self._nodes(self.columns)
@@ -86,7 +86,7 @@ def flat_grid(surface: WallSurface, probe: Probe, oversampling: float, tile_mm: 
     oversampling
         Grid pixels per camera pixel.
     tile_mm
-        Wished length of a tile.
+        Requested length of a tile.
     """
     radius = surface.mean_radius_mm
     spacing = footprint_mm(probe, radius) / oversampling

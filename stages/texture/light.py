@@ -1,4 +1,4 @@
-"""How brightly the probe's lights show the wall: LED ring, smooth correction over the image, frame gains."""
+"""Model of the wall's illumination by the probe: LED ring, smooth correction over the image, frame gains."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from scipy.ndimage import map_coordinates
 from pipeline.arrays import Float
 from pipeline.instrument.probe import Lighting
 
-# Places with less than this share of the reference light tell nothing: a grey level or two (chosen).
+# Places with less than this share of the reference light are not used: a grey level or two (chosen).
 LEAST_LIGHT = 0.01
 
 
@@ -19,7 +19,7 @@ def irradiance(lighting: Lighting, xyz_c: Float, normal_c: Float) -> Float:
     """Return the irradiance (...), 1/mm², of wall points (..., 3) with unit normals, lit by unit LEDs.
 
     Each LED is a Lambert source facing forward: cos(at LED) cos(at wall) / distance²; mean over the LEDs.
-    The wall is Lambertian, so this is also what the camera sees up to a factor.
+    The wall is Lambertian, so this is also the brightness in the picture up to a factor.
     """
     turn = 2 * np.pi * np.arange(lighting.leds) / lighting.leds
     led_xy = lighting.radius_mm * np.stack([np.cos(turn), np.sin(turn)], -1)
@@ -53,7 +53,7 @@ class LightField:
     theta_from, theta_step : float
         Polar angles, rad, of the correction's rows.
     log_correction : (T, P)
-        Of the irradiance, over polar angle and image azimuth (columns uniform from −π).
+        Log correction of the irradiance over polar angle and image azimuth (columns uniform from −π).
     reference : float
         Irradiance that counts as 1.
     """

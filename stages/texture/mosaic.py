@@ -1,4 +1,4 @@
-"""The flat picture while it is made: tiles are opened by their first view and blended after their last."""
+"""Assembles the flat picture: tiles are opened by their first view and blended after their last."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class Blended:
     colour : (H, W, 3) uint16
         Reflectance in units of 1 / `REFLECTANCE_SCALE` grey level.
     count : (H, W) uint8
-        Samples behind each pixel; 0 where there was none.
+        Number of samples of each pixel.
     """
 
     colour: NDArray[np.uint16]
@@ -40,7 +40,7 @@ class Blended:
 
     @staticmethod
     def empty(grid: FlatGrid, scratch: Scratch) -> Blended:
-        """Return room for the picture of a grid."""
+        """Return storage for the picture of a grid."""
         shape = (grid.rows, grid.columns)
         return Blended(scratch.zeros((*shape, 3), np.uint16), scratch.zeros(shape, np.uint8))
 
@@ -75,10 +75,10 @@ class Mosaic:
         self._picture = picture
 
     def fill(self, images: Iterator[tuple[int, SplitImage | None]], threads: int) -> None:
-        """Sample views, in order, into every tile that wants them; None where there is no such image.
+        """Sample views, in order, into every tile that uses them; None stands for a missing image.
 
         A tile takes its views one after the other, but does not wait for other tiles: two views at a time are
-        worked on.
+        processed.
         """
         latest: dict[int, Future[None]] = {}
         before: list[Future[None]] = []
@@ -100,7 +100,7 @@ class Mosaic:
             self._open[tile] = patch, self._spare.pop()
 
     def _take(self, tile: int, view: int, image: SplitImage | None, before: Future[None] | None) -> None:
-        """Sample a view into a tile once the view before is in, and blend the tile after its last."""
+        """Sample a view into a tile after the view before, and blend the tile after its last view."""
         if before is not None:
             before.result()
         if image is not None and np.isfinite(self._light.gain[view]):

@@ -1,4 +1,4 @@
-"""How noisy the lit pictures are, and from how many of them a place of the photo is therefore averaged."""
+"""Estimates the noise of the lit pictures, and the number of them that the photo therefore averages."""
 
 from __future__ import annotations
 
@@ -21,16 +21,16 @@ from stages.texture.surface import WallSurface
 from stages.texture.views import LitViews, TileViews
 
 _ROUNDED = 1 / np.sqrt(12)
-"""1 σ, grey levels, of the photo's rounding to 8 bits: noise below it is not seen."""
+"""1 σ, grey levels, of the photo's rounding to 8 bits: noise below it is not visible."""
 _FEWEST = 16
-"""Views that are blended even of pictures without noise, so that a glint or a drop in some of them is told
-from the wall. In open-1-field 16 in place of 48 views cost 0.1 dB of 44.7, 24 cost 0.04 dB."""
+"""Number of views blended even without noise, so that a glint or a drop in some of them is distinguished from
+the wall. In open-1-field 16 instead of 48 views cost 0.1 dB of 44.7, 24 cost 0.04 dB."""
 _TILES, _ROWS = 8, 32
-"""Tiles that are looked at, and rows of each: 10^5 pixels a tile, whose spread is known to 1 %."""
+"""Number of tiles that are examined, and rows of each: 10^5 pixels a tile, whose spread is known to 1 %."""
 _LIGHT_PX = 8.0
-"""σ over which brightness is levelled: exposure and light differ from view to view, but broadly."""
+"""σ, px, over which brightness is equalised: exposure and light differ between views, but only broadly."""
 _LEAST_SEEN = 1000
-"""Pixels from which a spread is told to 5 %."""
+"""Number of pixels that determine a spread to 5 %."""
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ class NoiseGauge:
     reference : float
         Irradiance that counts as 1.
     laser_band_mm : float
-        Half width left out about the laser line when it is on.
+        Half width left out around the laser line when it is on.
     left_out
         Places of the image that are not used.
     """
@@ -58,10 +58,10 @@ class NoiseGauge:
     left_out: ImagePlaces
 
     def noise(self, plan: Sequence[TileViews]) -> float:
-        """Return 1 σ, grey levels, of what a view shows otherwise than the next; NaN where nothing tells it.
+        """Return 1 σ, grey levels, of the random differences between views; NaN if it cannot be estimated.
 
-        Compared are two views of a tile that are a fifth of its views apart: compression gives neighbours
-        the same errors, and distant ones show the wall unlike in sharpness.
+        Two views of a tile are compared that are a fifth of its views apart: compression gives neighbours
+        the same errors, and distant ones show the wall with different sharpness.
         """
         tiles = np.unique(np.linspace(0, len(plan) - 1, _TILES + 2).astype(int)[1:-1])
         found = [self._between(int(t), _apart(plan[t].views), plan[t].reach_mm) for t in tiles]
@@ -80,7 +80,7 @@ class NoiseGauge:
         return robust_spread(fine[both]) if both.sum() >= _LEAST_SEEN else float("nan")
 
     def _seen(self, tile: int, pair: Int, reach_mm: float) -> Iterator[tuple[Float32, Bool]]:
-        """Yield what views show of a tile's middle rows, as if evenly lit, and where (rows, columns)."""
+        """Yield a tile's middle rows in each view, as if evenly lit, and the mask (rows, columns) of wall."""
         first = self.grid.tiles()[tile].first_row + max(self.grid.tile_rows - _ROWS, 0) // 2
         patch = replace(self.grid, tile_rows=_ROWS).node_patch(Tile(first, first + _ROWS), self.surface)
         field = LightField(self.probe.lighting, 0.0, 1.0, np.zeros((2, 1)), self.reference)
@@ -95,7 +95,7 @@ class NoiseGauge:
 
 
 def _apart(views: Int) -> Int:
-    """Return two of the views of a tile, or fewer where it has no two."""
+    """Return two of the views of a tile, or fewer if it does not have two."""
     return np.unique(views[[2 * len(views) // 5, 3 * len(views) // 5]]) if len(views) else views
 
 
@@ -105,9 +105,9 @@ def _evenly_lit(luma: Image, uv: Float32, inverse_brightness: Float32) -> Float3
 
 
 def views_against(noise: float, most: int) -> int:
-    """Return how many views average noise (1 σ, grey levels) to no more than rounding.
+    """Return the number of views whose mean has no more noise (1 σ, grey levels) than rounding.
 
-    At most ``most``, and so many where the noise is not known.
+    It is ``most`` at most, and ``most`` if the noise is unknown.
     """
     if not np.isfinite(noise):
         return most

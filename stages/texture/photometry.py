@@ -1,9 +1,10 @@
-"""Photometry from the overlap of frames: what changes with the place in the image is light, not wall.
+"""Photometry from the overlap of frames: variations with the place in the image are light, not wall.
 
 Model: log I = log ρ(cell) + log E(point, normal) + f(θ) + g(θ, φ) + log gain(frame), with ρ free in every
-cell, f and g hat functions over polar angle and image azimuth, all but ρ drawn weakly to zero. Least squares
-with Huber weights; the cells are eliminated (Schur complement), so that only light and gains are solved for.
-A long pipe is photographed stretch by stretch: each has its own light, joined to the next by shared views.
+cell, f and g hat functions over polar angle and image azimuth, all but ρ with weak priors at zero. Least
+squares with Huber weights; the cells are eliminated (Schur complement), so that only light and gains are
+solved for. A long pipe is photographed stretch by stretch: each has its own light, joined to the next by
+shared views.
 """
 
 from __future__ import annotations
@@ -35,7 +36,7 @@ _ANGLES = 32
 
 @dataclass(frozen=True)
 class Light:
-    """Light over the image, exposure of the views, and how well both explain the samples.
+    """Light over the image, exposure of the views, and the residual of the samples.
 
     Attributes
     ----------
@@ -100,10 +101,10 @@ def _design(samples: LightSamples, views: int, theta_from: float, theta_step: fl
 
 
 def _along(samples: LightSamples, views: int) -> Float:
-    """Return (V,) how far along the wall each view looked, zero mean; all alike when nothing moved.
+    """Return the distance along the wall of each view (V,), with zero mean; all equal when nothing moved.
 
-    A wall that grows brighter along the pipe, a light that falls off less and an exposure that sinks from
-    frame to frame explain the same pictures: exposure is taken to have no trend along this.
+    A wall that becomes brighter along the pipe, a light that falls off less and an exposure that decreases
+    from frame to frame explain the same pictures: exposure is assumed to have no trend over this distance.
     """
     count = np.bincount(samples.view, minlength=views)
     mean = np.bincount(samples.view, samples.cell, minlength=views) / np.maximum(count, 1)
@@ -135,7 +136,7 @@ def _solve_robust(
 ) -> tuple[Float, float]:
     """Return the solution of the reduced normal equations with Huber weights, and the robust residual.
 
-    The gains, the last unknowns, are held square to ``along`` by a Lagrange multiplier.
+    The gains, the last unknowns, are kept orthogonal to ``along`` by a Lagrange multiplier.
     """
     border = sparse.csc_array(np.concatenate([np.zeros(design.shape[1] - len(along)), along])[:, None])
     weight = np.ones(len(value))
@@ -158,14 +159,14 @@ def _solve_robust(
 
 @dataclass(frozen=True)
 class TextureStretch:
-    """Tiles that follow each other, and the views (W,) that they want, ascending."""
+    """Consecutive tiles, and the views (W,) that they use, ascending."""
 
     tiles: range
     wanted: Int
 
 
 def cut_plan(plan: Sequence[TileViews], views_at_once: int) -> list[TextureStretch]:
-    """Return stretches of tiles that want about so many views; a short pipe is one."""
+    """Return stretches of tiles that use about ``views_at_once`` views; a short pipe is one stretch."""
     stretches: list[TextureStretch] = []
     first, wanted = 0, np.zeros(0, np.int64)
     for tile, chosen in enumerate(plan):
@@ -178,14 +179,14 @@ def cut_plan(plan: Sequence[TileViews], views_at_once: int) -> list[TextureStret
 
 
 class LightChain:
-    """The lights of stretches, each as bright as the one before it in the views that both want.
+    """The lights of stretches, each as bright as the one before it in the views that both use.
 
     The first is as bright as recorded where the median view sees the laser ring, at ``ring_polar_rad``.
 
     Attributes
     ----------
     gain : (V,)
-        Exposure of every view, as found in the last stretch that wants it; NaN where there is none.
+        Exposure of every view, from the last stretch that uses it; NaN without one.
     wanted : (W,) int
         Views of all stretches so far.
     """
@@ -223,7 +224,7 @@ def _one_at(light: Light, polar_rad: float) -> Light:
     """Return the light with a brightness of 1 at a polar angle in the median view.
 
     Wall, light and exposures are known up to common factors, which are chosen so that the wall's photo is as
-    bright as recorded.
+    bright as the recording.
     """
     if not np.isfinite(light.gain).any():
         return light
@@ -233,7 +234,7 @@ def _one_at(light: Light, polar_rad: float) -> Light:
 
 
 def _ratio(before: Light, light: Light) -> float:
-    """Return by how much the shared views are brighter in the light before; 1 where none is shared."""
+    """Return the ratio of the shared views' exposures to those in the light before; 1 if none is shared."""
     shared = np.isfinite(before.gain) & np.isfinite(light.gain)
     if not shared.any():
         return 1.0

@@ -1,4 +1,4 @@
-"""Where a tile's pixels lie in a view, how bright white wall is there, and what the sample is worth."""
+"""Projects a tile's pixels into a view, with the brightness of white wall and the weight of each sample."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _BORDER_PX = 3.0
 class TileProjection:
     """Per pixel of a tile: ``uv`` (n, m, 2), ``inverse_brightness`` (n, m) and ``weight`` (n, m), 0 to 1.
 
-    ``block_uv`` (n / 2, m / 2, 2) is where the middles of blocks of 2 by 2 pixels lie.
+    ``block_uv`` (n / 2, m / 2, 2) are the middles of blocks of 2 by 2 pixels.
     """
 
     uv: Float32
@@ -51,9 +51,9 @@ def project_tile(
     T_cp, probe, light, gain
         Pose, instrument, light over the image, and exposure of the view.
     reach_mm
-        Distance from the laser sheet at which the weight has fallen to nothing.
+        Distance from the laser sheet at which the weight is zero.
     gap_mm
-        Half width of the band about the laser line that is not used; 0 where the laser was off.
+        Half width of the band around the laser line that is not used; 0 if the laser was off.
     left_out
         Places of the image that are not used.
     """

@@ -1,4 +1,4 @@
-"""Samples of wall cells in lit frames: what the photometry is estimated from."""
+"""Samples wall cells in lit frames, as data for the photometry."""
 
 from __future__ import annotations
 
@@ -34,9 +34,9 @@ class LightSamples:
     log_ratio
         log of grey level over irradiance.
     theta_rad, azimuth_rad
-        Where in the image.
+        Place in the image.
     cell, view
-        Which wall cell, which view.
+        Indices of the wall cell and of the view.
     """
 
     log_ratio: Float
@@ -121,7 +121,7 @@ class LightSampler:
 
 
 def joined(parts: Sequence[LightSamples], views: Int) -> LightSamples:
-    """Return the samples of several views; ``view`` becomes the place in the ascending ``views`` (W,)."""
+    """Return the samples of several views; ``view`` becomes the index in the ascending ``views`` (W,)."""
     if not parts:
         return LightSamples.none()
     samples = LightSamples(

@@ -58,7 +58,7 @@ class WallSurface:
     def patch(self, distance_mm: Float, azimuth_rad: Float) -> SurfacePatch:
         """Return the points and normals on the grid of distances (n,) and azimuths (m,).
 
-        Beyond its ends the wall goes on with the radii of its last row.
+        Beyond its ends the wall has the radii of its last row.
         """
         where = self._indices(distance_mm, azimuth_rad)
         r, along, around = (self._sample(a, where) for a in (self.radius_mm, self.along, self.around))
@@ -96,7 +96,7 @@ def wall_surface(
     shading_mm
         1 σ of the smoothing of the slopes, which are noisier.
     scratch
-        Room for long walls.
+        Storage for long walls.
 
     Raises
     ------
@@ -108,7 +108,7 @@ def wall_surface(
     if len(seen) < 2:
         raise UnusableError(
             "texture", f"{len(seen)} rows of the radius map hold radii", limit="two rows",
-            hint="look at the counts of the stages rings and accumulate",
+            hint="check the counts of valid samples of the stages rings and accumulate in the report",
         )  # fmt: skip
     rows = slice(seen[0], seen[-1] + 1)
     distance = wall.radius_map.distance_mm[rows]
@@ -140,7 +140,7 @@ def _blocks(radius_mm: Float32) -> Iterator[tuple[slice, slice, slice]]:
 
 
 def smoothed(radius_mm: Float32, sigma_px: tuple[float, ...]) -> Float32:
-    """Return radii (S, A) smoothed by a Gaussian, NaN filled from ever farther neighbours.
+    """Return radii (S, A) smoothed by a Gaussian, with NaN filled from increasingly distant neighbours.
 
     Normalised convolution (H. Knutsson, C.-F. Westin, CVPR 1993), wrapped around the pipe.
     """
@@ -151,7 +151,7 @@ def smoothed(radius_mm: Float32, sigma_px: tuple[float, ...]) -> Float32:
     while np.isnan(out).any():
         total = _gaussian(weight, sigma)
         mean = _gaussian(value, sigma) / np.maximum(total, 1e-12)
-        # Below a thousandth of the weight neighbours lie beyond 3.7 σ: the next, wider round reaches them.
+        # Below a thousandth of the weight, neighbours lie beyond 3.7 σ: the next, wider pass reaches them.
         out = np.where(np.isnan(out) & (total > 1e-3), mean, out)
         sigma = 2 * sigma
     return out.astype(np.float32)

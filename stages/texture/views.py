@@ -1,4 +1,4 @@
-"""Lit frames with their poses, and which of them shows which tile best."""
+"""Lit frames with their poses, and the choice of the best ones for each tile."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from pipeline.recording.base import Illumination, Recording
 from stages.texture.grid import FlatGrid
 from stages.texture.surface import WallSurface
 
-# Shares that add up to a whole number must not stay below it for their last bits.
+# Shares whose sum is a whole number must not stay below it by rounding.
 _ROUNDING = 1e-9
 
 
@@ -31,7 +31,7 @@ class LitViews:
     T_cp : (V, 4, 4)
         Pipe to camera.
     distance_mm : (V,)
-        Of the camera along the axis.
+        Distance of the camera along the axis.
     lean : (V,)
         Sine of the angle between optical axis and pipe axis.
     """
@@ -64,7 +64,7 @@ def lit_views(recording: Recording, trajectory: Trajectory) -> LitViews:
 
 
 def sheet_distance_mm(laser: LaserSheet, xyz_c: Float) -> Float:
-    """Return how far points (..., 3) in C lie beyond the laser sheet along the optical axis."""
+    """Return the distance (...), mm, of points (..., 3) in C from the laser sheet along the optical axis."""
     psi = np.arctan2(xyz_c[..., 1], xyz_c[..., 0])
     rho = np.hypot(xyz_c[..., 0], xyz_c[..., 1])
     return np.asarray(xyz_c[..., 2] - laser.height(psi) - rho * laser.slope(psi))
@@ -76,9 +76,9 @@ def seen_by(
     """Return the views of each tile: those in which it lies near the laser sheet.
 
     Near the sheet a picture point and the wall point that the ring measured coincide, whatever the errors of
-    camera and motion. Where views are rare, the reach is widened until three of them show every row. If the
-    probe passes a tile several times, the pass with the most views is taken, so that the tile need not be
-    kept until the probe returns.
+    camera and motion. If views are rare, the reach is widened until three of them show every row. If the
+    probe passes a tile several times, the pass with the most views is used, so that the tile need not be
+    stored until the probe returns.
     """
     half_tile, lean_mm = grid.tile_rows * grid.mm_per_px / 2, views.lean * surface.mean_radius_mm
     row = _InOrder(views.distance_mm)
@@ -97,8 +97,8 @@ def shared(plan: Sequence[TileViews], most: int) -> list[TileViews]:
     """Return the plan with at most ``most`` views a tile; neighbouring tiles keep the same views.
 
     Frames that no tile keeps need not be read. But the views of a tile are spread less evenly than by
-    `thinned`: where the pictures' noise asks for all views that may be had, the photo would lie farther off
-    its place (open-3-field: 0.155 instead of 0.085 mm in the worst of twenty patches).
+    `thinned`: if the pictures' noise requires all available views, the photo would be displaced more
+    (open-3-field: 0.155 instead of 0.085 mm in the worst of twenty patches).
     """
     rate = np.zeros(1 + max((int(t.views[-1]) for t in plan if len(t.views)), default=0))
     for tile in plan:
@@ -108,7 +108,7 @@ def shared(plan: Sequence[TileViews], most: int) -> list[TileViews]:
 
 
 class _InOrder:
-    """Views in the order of distance, so that those near a place are found without looking at all."""
+    """Views in the order of distance, so that those near a place are found without a search of all."""
 
     def __init__(self, distance_mm: Float) -> None:
         self._order = np.argsort(distance_mm, kind="stable")
@@ -116,13 +116,13 @@ class _InOrder:
         self.distance_mm = distance_mm
 
     def third_nearest_mm(self, place_mm: float) -> float | None:
-        """Return the distance of the third nearest view, with fewer views of the farthest; None of none."""
+        """Return the distance of the third nearest view, or the farthest of fewer; None without any."""
         at = int(np.searchsorted(self._sorted, place_mm))
         near = np.sort(np.abs(self._sorted[max(at - 3, 0) : at + 3] - place_mm))[:3]
         return float(near[-1]) if len(near) else None
 
     def within(self, place_mm: float, reach_mm: float) -> Int:
-        """Return the views not farther than ``reach_mm`` from a place, in the order of frames.
+        """Return the views within ``reach_mm`` of a place, in the order of frames.
 
         One view beyond the reach may be among them.
         """
@@ -141,7 +141,7 @@ def _tile_views(
 
 
 def _evenly(views: Int, most: int) -> Int:
-    """Return at most so many views (n,), spread evenly."""
+    """Return at most ``most`` views (n,), spread evenly."""
     places = np.round(np.linspace(0, len(views) - 1, min(most, len(views)))).astype(int)
     return np.asarray(views[np.unique(places)])
 

@@ -11,7 +11,7 @@ import pytest
 
 from pipeline.arrays import Float
 from pipeline.artefacts.measured import RingSamples, Trajectory, Wall
-from pipeline.artefacts.moved_back import told_by_roll
+from pipeline.artefacts.moved_back import kept_by_roll
 from pipeline.geometry.axis import straight_axis
 from pipeline.geometry.rigid import from_parts, rotation_from_vector
 from pipeline.machine.scratch import Scratch
@@ -97,10 +97,10 @@ def test_with_roll_the_wall_behind_the_rim_of_a_drop_is_known_with_the_whole_mov
 
 
 @pytest.mark.parametrize("roll_rad", [0.0, ROLL])
-def test_points_of_the_wall_are_those_of_the_rings_told_by_roll(roll_rad: float) -> None:
+def test_points_of_the_wall_are_those_of_the_rings_kept_by_roll(roll_rad: float) -> None:
     """Where they are not as many, the defects stage cannot tell how bright the line was at a finding."""
     run = motion(roll_rad)
-    told = told_by_roll(put_right(run, rim_px=RIM_PX), run)
+    told = kept_by_roll(put_right(run, rim_px=RIM_PX), run)
     points = np.bincount(measured(roll_rad, rim_px=RIM_PX).cloud.frame, minlength=RINGS)
     np.testing.assert_array_equal(points, told.valid.sum(1))
 

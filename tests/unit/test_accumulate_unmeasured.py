@@ -89,7 +89,7 @@ def test_rings_too_far_apart_are_named_as_the_cause(ring_at_mm: Float, apart: st
     known = ring_at_mm[np.isfinite(ring_at_mm)]
     words = told_of(between_rings(known, 0.8), 3.0, ring_at_mm)
     assert len(words) == 1
-    assert f"rings that were found lie {apart} mm apart" in words[0]
+    assert f"of the pipe the rings lie {apart} mm apart" in words[0]
     assert "--config long" in words[0]
 
 

@@ -1,4 +1,4 @@
-"""How an earlier run's wall lies on a later one's, by marks: shift along the pipe and roll, by distance."""
+"""Registers an earlier run's wall on a later one's by marks: shift along the pipe and roll, over distance."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ from stages.compare.registration.matching import AGREE, Matches, best_place, coa
 
 # A shift needs two stations to have a slope.
 _LEAST_STATIONS = 2
-# A weld's bead is looked for in a profile this long to each side, this far from where texture has it, in
-# radii: a bead is a few mm wide on a 4 inch pipe. Chosen; only welds of 4 inch pipes were tried.
+# A weld's bead is searched in a profile this long to each side, up to this distance from its place by
+# texture, in radii: a bead is a few mm wide on a 4 inch pipe. Chosen; only welds of 4 inch pipes were tried.
 _HALF_RADII, _ROOM_RADII = 0.2, 0.06
 _SAMPLES_PER_CELL = 2
 _LEAST_CORRELATION = 0.8
@@ -27,7 +27,7 @@ _AZIMUTHS = 360
 
 
 class RegisterParameters(Parameters):
-    """When two walls are taken for the same."""
+    """Limits for two walls to count as the same."""
 
     largest_chance: float = Field(
         1e-4, gt=0, lt=1,
@@ -40,7 +40,7 @@ class RegisterParameters(Parameters):
 
 
 def register(earlier: Surface, now: Surface, welds_mm: Float, parameters: RegisterParameters) -> Registration:
-    """Return how the earlier wall lies on the later one; ``welds_mm`` (W,) are those of the earlier run.
+    """Return the earlier wall's registration on the later one; ``welds_mm`` (W,) are the earlier run's welds.
 
     Raises
     ------
@@ -78,12 +78,12 @@ def _refuse_other_bore(earlier: Surface, now: Surface, alike: float) -> None:
             "compare",
             f"the bores are {2 * earlier.radius_mm:.1f} mm and {2 * now.radius_mm:.1f} mm",
             limit=f"{alike:.0%} apart",
-            hint="give two runs of one pipe",
+            hint="compare two runs of one pipe",
         )
 
 
 def _chance(matches: Matches) -> float:
-    """Return how probable so many agreeing blocks are when every block lands anywhere in its room.
+    """Return the probability of so many agreeing blocks if every block lands anywhere in its search area.
 
     A block agrees by chance with the share of its search area that lies within the limit. The factor 3
     allows for the median being taken from the same blocks, which makes agreement easier; it is not derived.
@@ -99,9 +99,9 @@ def _refuse_strangers(matches: Matches, chance: float, limits: RegisterParameter
         raise UnusableError(
             "compare",
             f"the runs do not show the same wall, or too little of it: {good} of {count} pieces of wall "
-            f"lie on each other, which chance does in {min(chance, 1.0):.2g} of cases",
+            f"agree, which happens by chance with a probability of {min(chance, 1.0):.2g}",
             limit=f"{limits.least_share:.0%} of the pieces, chance below {limits.largest_chance:g}",
-            hint="give two runs of one pipe, driven in the same direction",
+            hint="compare two runs of one pipe, recorded in the same direction",
         )
 
 
@@ -181,7 +181,7 @@ def _registration(
 
 
 def _weld_place(before_mm: float, expected_mm: float, earlier: Surface, now: Surface) -> float | None:
-    """Return the later run's distance of the weld at ``before_mm``; None where it does not show it."""
+    """Return the later run's distance, mm, of the weld at ``before_mm``; None if it does not show it."""
     step = now.wall.step_mm / _SAMPLES_PER_CELL
     half, room = (round(share * now.radius_mm / step) for share in (_HALF_RADII, _ROOM_RADII))
     bead = _ring_radius(earlier, before_mm, step, half)

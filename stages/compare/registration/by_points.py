@@ -1,4 +1,4 @@
-"""How a run's wall points lie on a reference mesh or cloud: a pose in space, by distances along normals."""
+"""Registers a run's wall points on a reference mesh or cloud: a pose in space, by distances along normals."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ from pipeline.geometry.rigid import from_parts, rotation_from_vector, transform
 from pipeline.system.native import open3d
 from stages.compare.reference import ReferenceSurface, WallPoints
 
-# Points that are fitted, and that each start is tried with: bounds on time alone.
+# Points used in the fit, and in the trial of each start: bounds on time alone.
 _FIT_POINTS, _TRIAL_POINTS = 5000, 800
-# Starts every 30°, so that the nearest is at most 15° off; that all come home from there was not measured.
+# Starts every 30°, so that the nearest is at most 15° off; whether all converge from there was not measured.
 _ROLLS = 12
-# Twice the six coefficients of the quadric that is laid through them.
+# Twice the six coefficients of the quadric that is fitted to them.
 _NEIGHBOURS = 12
-# Surfaces that stay this share of their size apart are not of one pipe: no run comes near it.
+# Surfaces that stay this share of their size apart do not belong to one pipe: no run comes near it.
 _FARTHEST = 0.05
 
 
 @dataclass(frozen=True)
 class PointsPose:
-    """Pose ``T_rp`` (4, 4) of the run in the reference, and the weighted distances that stay."""
+    """Pose ``T_rp`` (4, 4) of the run in the reference, and the remaining weighted distances, mm."""
 
     T_rp: Float
     rms_mm: float
@@ -36,8 +36,8 @@ class PointsPose:
 def register_points(points: WallPoints, reference: ReferenceSurface) -> PointsPose:
     """Return the pose of least squared distances along the wall's normals, robustly.
 
-    The fit is started from the run's own frame, and from the long axes of both laid together, either way
-    round, at twelve rolls each. A pipe without features determines neither roll nor shift: then any will do.
+    The fit is started from the run's own frame, and with the long axes of both aligned, in either direction,
+    at twelve rolls each. A pipe without features determines neither roll nor shift: then any is valid.
 
     Raises
     ------
@@ -93,7 +93,7 @@ class NearestPoints:
 
 
 def _on_quadric(xyz: Float, patch: Float) -> Float:
-    """Return points (N, 3) brought along the normal onto the quadric through their patch (N, K, 3).
+    """Return points (N, 3) projected along the normal onto the quadric through their patch (N, K, 3).
 
     A plane would lie inside a pipe's wall by the sagitta of the patch.
     """
@@ -126,7 +126,7 @@ def _long_axis(xyz: Float) -> tuple[Float, Float]:
     """Return the middle and a right-handed frame (3, 3) whose first column is the longest direction."""
     middle = xyz.mean(0)
     vectors = np.linalg.eigh(np.cov((xyz - middle).T))[1][:, ::-1].copy()
-    # of a short wide pipe the axis is the direction unlike the other two
+    # in a short wide pipe the axis is the direction that differs from the other two
     values = np.linalg.eigvalsh(np.cov((xyz - middle).T))[::-1]
     if values[0] - values[1] < values[1] - values[2]:
         vectors = vectors[:, ::-1].copy()
@@ -145,7 +145,7 @@ def _refined(xyz: Float, outward: Float, nearest: NearestPoints, start: Float, s
         pivot = here.mean(0)
         design = np.concatenate([np.cross(here - pivot, normal), normal], -1)
         root = np.sqrt(weight)[:, None]
-        # a smooth pipe fixes neither roll nor shift: leave such directions alone
+        # a smooth pipe determines neither roll nor shift: do not change such directions
         move = np.linalg.lstsq(design * root, -error * root[:, 0], rcond=1e-3)[0]
         rotation = rotation_from_vector(move[:3])
         T = from_parts(rotation, move[3:] + pivot - rotation @ pivot) @ T

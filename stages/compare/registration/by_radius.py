@@ -1,8 +1,8 @@
-"""How a wall lies on a reference map, by least squares of the radius.
+"""Registers a wall on a reference map by least squares of the radius.
 
-A run cannot know where the reference has its origin. So shift along the pipe, roll, and the first pose, which
-shows as a constant, linear and quadratic offset of the centre line, are taken out of the difference. The
-distance scale is estimated and reported. Differences of radius and shape stay.
+A run does not contain the origin of the reference. So shift along the pipe, roll, and the first pose, which
+appears as a constant, linear and quadratic offset of the centre line, are removed from the difference. The
+distance scale is estimated and reported. Differences of radius and shape remain.
 """
 
 from __future__ import annotations
@@ -19,18 +19,18 @@ from pipeline.arrays import Float, Int
 from pipeline.artefacts.wall_map import WallMap
 from pipeline.errors import UnusableError
 
-# Cells that are fitted, and that the search of shift and roll looks at: bounds on time alone.
+# Cells used in the fit, and in the search of shift and roll: bounds on time alone.
 _FIT_POINTS, _SEARCH_POINTS = 10_000, 2000
 # Steps of that search: finer than half the width of the smallest defect that is reported, 3 mm.
 _SHIFT_STEP_MM, _ROLL_STEP_RAD = 0.5, math.radians(1)
-# Least 1 σ of the smoothing beforehand. Interpolation halfway between cells lowers white noise, and the
-# alignment would be drawn to such places.
+# Least 1 σ of the smoothing before the fit. Interpolation halfway between cells reduces white noise, and the
+# alignment would prefer such places.
 _SMOOTH_MM, _SMOOTH_CELLS = 1.0, 1.5
 
 
 @dataclass(frozen=True)
 class Alignment:
-    """How a run is moved onto the reference.
+    """The transformation of a run onto the reference.
 
     Its distance on the reference is middle + (1 + scale_error) (distance − middle) + shift, its azimuth is
     azimuth + roll. ``pose_mm`` (6,) are the amplitudes of cos ψ, sin ψ, and of both times x and x², with x
@@ -80,7 +80,7 @@ def align_maps(run: WallMap, reference: WallMap, max_shift_mm: float, max_roll_d
 
 
 def samples_of(wall: WallMap, at_most: int) -> WallSamples:
-    """Return the measured cells of a map, drawn from evenly where they are more than ``at_most``."""
+    """Return the measured cells of a map, evenly thinned to ``at_most``."""
     station, azimuth = np.nonzero(np.isfinite(wall.radius_mm))
     if len(station) > at_most:
         chosen = np.sort(np.random.default_rng(0).choice(len(station), at_most, replace=False))
@@ -117,19 +117,19 @@ def _search(samples: WallSamples, reference: WallMap, max_shift_mm: float, max_r
         raise UnusableError(
             "verify", "run and reference do not overlap",
             limit=f"half of the run within ±{max_shift_mm:g} mm",
-            hint="give a reference of the same stretch, or raise --max-shift-mm",
+            hint="use a reference of the same stretch, or raise --max-shift-mm",
         )  # fmt: skip
     return best[1]
 
 
 def _residual(parameters: Float, samples: WallSamples, reference: WallMap) -> Float:
-    """Return run minus aligned reference (N,), 0 where the reference knows nothing."""
+    """Return run minus aligned reference (N,), mm, 0 where the reference has no value."""
     error = samples.radius_mm - looked_up(reference.radius_mm, reference, samples, parameters)
     return np.where(np.isfinite(error), error - _nuisance_design(samples) @ parameters[3:], 0.0)
 
 
 def pose_design(samples: WallSamples) -> Float:
-    """Return (N, 6) what the amplitudes of `Alignment.pose_mm` do to the radius."""
+    """Return the derivatives (N, 6) of the radius by the amplitudes of `Alignment.pose_mm`."""
     c, s, x = np.cos(samples.azimuth_rad), np.sin(samples.azimuth_rad), samples.x
     return np.stack([c, s, x * c, x * s, x * x * c, x * x * s], -1)
 
@@ -164,7 +164,7 @@ def cells_around(grid: WallMap, samples: WallSamples, at: Float) -> tuple[tuple[
 
 
 def _smoothed(wall: WallMap) -> WallMap:
-    """Return a map whose noise spans cells, else interpolating between them looks like a better match."""
+    """Return a map smoothed over cells, since interpolation between noisy cells would look like a match."""
     step = wall.distance_mm[1] - wall.distance_mm[0]
     arc = float(np.nanmean(wall.radius_mm)) * (wall.azimuth_rad[1] - wall.azimuth_rad[0])
     size = tuple(max(_SMOOTH_MM / s, _SMOOTH_CELLS) for s in (step, arc))

@@ -1,4 +1,4 @@
-"""A run's wall as a picture of marks by which another run of the same pipe is recognised."""
+"""A run's wall as a picture of marks, by which another run of the same pipe is recognised."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from pipeline.artefacts.wall_map import WallMap
 COLUMNS = 640
 # Cells are about square on the wall, whatever the bore.
 CELLS_PER_RADIUS = 100
-# What is broader than this share of the radius is the pipe's shape, the lighting or the instrument.
+# Structures broader than this share of the radius are the pipe's shape, the lighting or the instrument.
 _BROAD = 0.4
 _BLUR_CELLS = 0.8
 _CLIP = 3.0
@@ -53,10 +53,10 @@ class Surface:
         return float(self.wall.distance_mm[-1] - self.wall.distance_mm[0])
 
     def marks(self, from_mm: float, rows: int, cell_mm: float) -> Float32:
-        """Return (rows, `COLUMNS`) of what stands out of its surroundings, 0 where nothing was seen.
+        """Return the contrast (rows, `COLUMNS`) to the surroundings, 0 where nothing was seen.
 
-        Relief and grey count alike, each over its own spread. What goes all round is left out: welds are
-        matched by their own positions, and every pipe has them.
+        Relief and grey have equal weight, each divided by its spread. Features all round are left out: welds
+        are matched by their own positions, and every pipe has them.
         """
         margin = round(_BROAD * self.radius_mm / cell_mm)
         s = np.asarray(from_mm + cell_mm * np.arange(-margin, rows + margin), float)
@@ -115,7 +115,7 @@ def _grey(texture: WallTexture, s: Float) -> Float32:
 
 
 def _standing_out(values: Float32, reach: int) -> Float32:
-    """Return values less their surroundings and their rings' means, over their spread; 0 where unknown."""
+    """Return values minus their surroundings and their rings' means, over their spread; 0 where unknown."""
     known = np.isfinite(values).astype(np.float32)
     if not known.any():
         return np.zeros_like(values)
@@ -124,7 +124,7 @@ def _standing_out(values: Float32, reach: int) -> Float32:
     away = np.asarray(
         (filled - _around(filled, size) / np.maximum(_around(known, size), 1e-6)) * known, np.float32
     )
-    # every ring for itself too: a probe that shakes moves whole rings
+    # the means of single rings, too: a probe that shakes moves whole rings
     along_ring = (size[0], 1)
     away -= _around(away, along_ring) / np.maximum(_around(known, along_ring), 1e-6) * known
     smooth = _periodic(away, lambda a: cv2.GaussianBlur(a, (0, 0), _BLUR_CELLS), 8)
@@ -138,7 +138,7 @@ def _around(values: Float32, size: tuple[int, int]) -> Float32:
 
 
 def _periodic(values: Float32, work: Callable[[Float32], Any], margin: int) -> Float32:
-    """Return ``work`` of an image whose columns go all round."""
+    """Return ``work`` applied to an image whose columns are periodic."""
     margin = min(margin, values.shape[1])
     wide = np.concatenate([values[:, -margin:], values, values[:, :margin]], 1)
     return np.asarray(work(wide)[:, margin:-margin], np.float32)

@@ -19,7 +19,7 @@ _STRETCH_RADII, _BLOCK_RADII, _COARSER = 0.8, 0.5, 2
 # Stretches searched everywhere, stretches then searched near those, distances at which blocks are searched,
 # and rows of marks made at a time: bounds on time and memory alone.
 _ANCHORS, _MOST_STRETCHES, _MOST_STATIONS, _CHUNK_ROWS = 12, 96, 400, 1024
-# By how many of its cells a rough match may be wrong: half and twice as many change no fate of 48 made pits.
+# Largest error of a rough match, in its cells: half and twice as many change no fate of 48 made pits.
 _ROOM_CELLS = 3.0
 # Largest relative difference of distances between two runs: ten times the 0.2 to 0.3 % that probes state.
 _LARGEST_STRAIN = 0.03
@@ -40,7 +40,7 @@ class Course:
     ----------
     at_mm, shift_mm, roll_rad : (K,)
     room_mm : float
-        By how much the shift, and the arc of the roll, may be wrong.
+        Largest error of the shift, and of the arc of the roll.
     """
 
     at_mm: Float
@@ -81,7 +81,7 @@ def _starts(last: int, count: int) -> Int:
 
 
 def _window(start: int, anchors: Int, places: Float, rows: int, end: int) -> slice:
-    """Return the rows among which a stretch must lie, given where the anchors do."""
+    """Return the rows within which a stretch must lie, given the places of the anchors."""
     expected = float(np.interp(start, anchors, places - anchors)) + start
     room = 2 * rows + int(_LARGEST_STRAIN * np.abs(anchors - start).min())
     first = int(np.clip(expected - room, 0, max(end - rows, 0)))
@@ -89,7 +89,7 @@ def _window(start: int, anchors: Int, places: Float, rows: int, end: int) -> sli
 
 
 def best_place(template: Float32, image: Float32) -> tuple[float, float, float]:
-    """Return the row and column, to a part of a cell, at which a template fits best, and its correlation."""
+    """Return the sub-cell row and column at which a template fits best, and its correlation."""
     score = cv2.matchTemplate(image, template, cv2.TM_CCOEFF_NORMED)
     score = np.where(np.isfinite(score), score, -1.0)
     r, c = np.unravel_index(int(np.argmax(score)), score.shape)
@@ -114,7 +114,7 @@ def _coarse(surface: Surface, cell_mm: float) -> Float32:
 
 
 def _place(stretch: Float32, wall: Float32, first: int) -> tuple[float, float, float]:
-    """Return where a stretch lies on a wall whose rows begin with ``first``, its turn, the correlation."""
+    """Return a stretch's row on a wall whose rows begin with ``first``, its roll, and the correlation."""
     row, column, score = best_place(stretch, np.concatenate([wall, wall[:, :-1]], 1))
     return first + row, column, score
 
@@ -138,7 +138,7 @@ def _wrapped(angle: Float) -> Float:
 
 
 def _vertex(three: Any) -> float:
-    """Return where the parabola through three equidistant values has its vertex, from the middle one."""
+    """Return the vertex of the parabola through three equidistant values, relative to the middle one."""
     bend = float(three[0] - 2 * three[1] + three[2])
     return 0.5 * float(three[0] - three[2]) / bend if bend < 0 else 0.0
 
@@ -153,7 +153,7 @@ class Matches:
         Middle of the block, distance of the earlier run.
     shift_mm, roll_rad, correlation : (N,)
     agree : (N,) bool
-        Whether the block lies where its neighbours put it.
+        Whether the block agrees with its neighbours.
     overlapping : float
         Number of blocks that share a piece of wall and therefore count as one.
     """
@@ -167,7 +167,7 @@ class Matches:
 
 
 def matched_blocks(earlier: Surface, now: Surface, course: Course) -> Matches:
-    """Return blocks along all of the earlier wall that lies on the later one."""
+    """Return blocks along the whole part of the earlier wall that the later one contains."""
     cell = now.radius_mm / CELLS_PER_RADIUS
     rows = round(_BLOCK_RADII * now.radius_mm / cell)
     starts = np.arange(earlier.from_mm, earlier.from_mm + earlier.length_mm - rows * cell, rows * cell / 2)
