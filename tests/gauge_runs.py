@@ -26,11 +26,12 @@ from pipeline.recording.base import (
     Recording,
 )
 from stages.calibrate.gauge import MeasuredRun
-from stages.calibrate.gauge.adjust import Measurements, RingSource, first_unknowns, solve
+from stages.calibrate.gauge.adjust import Measurements
 from stages.calibrate.gauge.edges import Edges, Sighting, joined, predicted_edges
 from stages.calibrate.gauge.geometry import Gauge, gauge_of
 from stages.calibrate.gauge.poses import FirstPose, PosedFrames, poses_of_all_frames
 from stages.calibrate.gauge.result import GaugeCalibration, calibration_of
+from stages.calibrate.gauge.solve import RingSource, first_unknowns, solve
 from stages.calibrate.gauge.state import GaugeParameters
 
 USUAL = GaugeParameters.model_validate({"ring_bins": 120})

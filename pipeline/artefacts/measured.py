@@ -1,7 +1,7 @@
-"""What stages hand to each other: frozen dataclasses of arrays.
+"""Results that stages pass to each other: frozen dataclasses of arrays.
 
 Conventions: lengths mm, angles rad, times s, pixels with integer centres. Frames: C camera (x right, y down,
-z forward), P pipe (z along the pipe). ``T_pc`` maps C to P. NaN marks what was not measured.
+z forward), P pipe (z along the pipe). ``T_pc`` maps C to P. NaN means not measured.
 A field may be an array, a number, a string, a tuple of such, a nested artefact, or None:
 `pipeline.machine.store` writes and reads any of these without further code.
 """
@@ -15,6 +15,7 @@ import numpy as np
 
 from pipeline.adjustment.shared_light import NOTHING_HELD, HeldOver
 from pipeline.arrays import Bool, Byte, Float, Float32, Int
+from pipeline.artefacts.motion import LaserKnock, MotionEvent, PipePiece
 from pipeline.artefacts.wall_map import FixedToProbe, WallMap
 from pipeline.geometry.axis import PipeAxis
 
@@ -52,8 +53,9 @@ class RingSamples:
     validity : (F, A) uint8
         `RingValidity`; a saturated but usable sample stays VALID with a larger ``sigma_px``.
     moved_px : (F, A) float32 or None
-        By how much samples were moved inward because dirt on the window displaces the line there alike in
-        all rings, 0 elsewhere; None where nothing was. Only a probe that rolls tells this from a groove.
+        Distance by which samples were moved inward because dirt on the window displaces the line there
+        equally in all rings, 0 elsewhere; None if nothing was moved. Only a probe that rolls distinguishes
+        this from a groove.
     """
 
     frame: Int
@@ -83,7 +85,7 @@ class RingSamples:
         return replace(self, moved_px=moved_px, **{name: getattr(self, name)[rows] for name in per_frame})
 
     def reduced(self, times: Float) -> RingSamples:
-        """Return the rings with each picture's radii divided by ``times`` (F,), its excess in size."""
+        """Return the rings with each picture's radii divided by its relative size ``times`` (F,)."""
         return replace(self, radius_px=(self.radius_px / times[:, None]).astype(np.float32))
 
     def placed_in(self, points: RingPoints) -> RingSamples:
@@ -101,7 +103,7 @@ class RingPoints:
     frame : (F,) int
     azimuth_rad : (A,)
     xyz_c : (F, A, 3) float32
-        Ray and calibrated laser surface intersected; NaN where invalid.
+        Intersection of the ray with the calibrated laser sheet; NaN where invalid.
     noise_direction : (F, A, 3) float32
         Change of ``xyz_c`` for +1 σ of image noise along the line's normal: the noise covariance is its
         outer product with itself (rank one).
@@ -114,72 +116,8 @@ class RingPoints:
 
 
 @dataclass(frozen=True)
-class MotionEvent:
-    """An event of the motion: slip, stop, reversal, dropped or duplicated frame, lost track."""
-
-    kind: str
-    frame_from: int
-    frame_to: int
-    size: float
-    unit: str
-    note: str
-
-
-@dataclass(frozen=True)
-class PipePiece:
-    """A straight length or a bend of the pipe, as the axis was found.
-
-    Attributes
-    ----------
-    kind : str
-        ``straight`` or ``bend``.
-    from_mm, to_mm : float
-        Distances along the axis.
-    sigma_mm : float
-        1 σ of each of these limits; for the ends of the run, of the way between them.
-    angle_rad, angle_sigma_rad : float
-        By how much the piece turns the pipe; 0 for a straight length.
-    toward_rad : float
-        Azimuth in P toward which a bend turns; NaN for a straight length.
-    radius_mm, radius_sigma_mm : float
-        Of the bend's axis; NaN for a straight length.
-    standard : str
-        Name of the one standard radius that fits, such as ``1.5 D``; empty where none or several do.
-    """
-
-    kind: str
-    from_mm: float
-    to_mm: float
-    sigma_mm: float
-    angle_rad: float = 0.0
-    angle_sigma_rad: float = 0.0
-    toward_rad: float = float("nan")
-    radius_mm: float = float("nan")
-    radius_sigma_mm: float = float("nan")
-    standard: str = ""
-
-
-@dataclass(frozen=True)
-class LaserKnock:
-    """A laser that moved against the camera from one ring to the next, and stayed there.
-
-    Attributes
-    ----------
-    frame : int
-        First frame after it.
-    change : (3,)
-        Of the sheet's baseline, mm, and of its slopes along x and y of C.
-    covariance : (3, 3)
-    """
-
-    frame: int
-    change: Float
-    covariance: Float
-
-
-@dataclass(frozen=True)
 class Trajectory:
-    """Pose of the camera in P at every frame, the pipe's axis, and what the motion showed.
+    """Pose of the camera in P at every frame, the pipe's axis, and other results of the stage motion.
 
     Attributes
     ----------
@@ -187,9 +125,10 @@ class Trajectory:
         All frames of the recording that have a pose.
     time_s : (N,)
     T_pc : (N, 4, 4)
-        Camera to pipe.
+        Transform from camera to pipe.
     covariance : (N, 6, 6)
-        Of (translation in P, mm; rotation vector in C, rad): T = [R exp(w), t + d]. Relative to frame 0.
+        Covariance of (translation in P, mm; rotation vector in C, rad), relative to frame 0, with
+        T = [R exp(w), t + d].
     axis : PipeAxis
     radius_mm : float
         Mean radius of the pipe as used in the estimate.
@@ -197,24 +136,24 @@ class Trajectory:
         Estimated true distance over encoder distance; NaN without encoder.
     encoder_scale_sigma : float
     scale_sigma : float
-        Relative 1 σ of the distance scale from calibration (it does not average away).
+        Relative 1 σ of the distance scale from calibration (it does not average out).
     events : tuple of MotionEvent
     instrument : (P,) or None
         The probe's parameters as estimated in this run (stated values, moved within their uncertainty);
-        None where they are as stated. `Probe.as_found_in` applies them.
+        None if they are as stated. `Probe.as_found_in` applies them.
     instrument_covariance : (P, P) or None
         Their covariance.
     distance_sigma_mm : float
-        1 σ of the distance along the axis from the first frame to the last, calibration included; NaN where
-        it was not worked out.
+        1 σ of the distance along the axis from the first frame to the last, calibration included; NaN if
+        it was not computed.
     pieces : tuple of PipePiece
-        Straight lengths and bends in the order of distance; empty where they were not looked for.
+        Straight lengths and bends in the order of distance; empty if they were not searched.
     image_scale, image_scale_sigma : (N,) or None
-        Size of the pictures over that of the probe's camera, and its 1 σ; None where the scale did not drift.
+        Size of the pictures over that of the probe's camera, and its 1 σ; None if the scale did not drift.
     radius_doubt : float
-        Relative 1 σ of all radii where encoder and stated diameter contradict the probe, else 0.
+        Relative 1 σ of all radii if encoder and stated diameter contradict the probe, else 0.
     knock : LaserKnock or None
-        A laser knocked in the run; ``instrument`` is the probe before it.
+        A knock of the laser in the run; ``instrument`` is the probe before it.
     """
 
     frame: Int
@@ -239,12 +178,12 @@ class Trajectory:
 
 @dataclass(frozen=True)
 class RadiusMap(WallMap):
-    """A run's own map of the wall, about the pipe's axis; float32.
+    """A run's own map of the wall, around the pipe's axis; float32.
 
     Attributes
     ----------
     count : (S, A) int64
-        Ring samples that contributed.
+        Number of ring samples that contributed.
     misalignment_mm : (S, A) float32
         Radius without laser misalignment correction minus ``radius_mm``.
     """
@@ -275,10 +214,10 @@ class PointCloud:
 
 @dataclass(frozen=True)
 class Wall:
-    """Result of accumulation: cloud, radius map, and the axis both refer to.
+    """Result of accumulation: cloud, radius map, and the axis to which both refer.
 
-    ``fixed`` is what stays at one place of the image, None for nothing; ``held`` how alike a codec made
-    rings.
+    ``fixed`` are departures that stay at one place of the image, None without any; ``held`` is the light that
+    a codec carried over from ring to ring.
     """
 
     cloud: PointCloud
@@ -295,8 +234,8 @@ class WallTexture:
     Attributes
     ----------
     bgra : (H, W, 4) uint8
-        Grey levels in B, G, R as the camera recorded them where the laser ring meets the wall; alpha 0 where
-        nothing was textured.
+        Grey levels in B, G, R as the camera records them at the laser ring; alpha 0 where the wall has no
+        texture.
     distance_from_mm, mm_per_px : float
         Row i's centre is at ``distance_from_mm + i * mm_per_px``.
     azimuth_from_rad, rad_per_px : float

@@ -13,7 +13,8 @@ import numpy as np
 
 from pipeline.arrays import Float
 from pipeline.artefacts.findings import Defect, Defects, Sections
-from pipeline.artefacts.measured import PipePiece, Trajectory
+from pipeline.artefacts.measured import Trajectory
+from pipeline.artefacts.motion import PipePiece
 from pipeline.geometry.axis import distance_along, frames_at
 from pipeline.geometry.rigid import quaternion_from_rotation
 from pipeline.pages import notation

@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipeline.arrays import Float
-from pipeline.artefacts.measured import LaserKnock, Trajectory
+from pipeline.artefacts.measured import Trajectory
+from pipeline.artefacts.motion import LaserKnock
 from pipeline.instrument.camera import Camera
 from pipeline.instrument.laser import LaserSheet
 

@@ -10,7 +10,8 @@ from scipy.ndimage import median_filter, uniform_filter1d
 
 from pipeline.adjustment.robust import robust_spreads
 from pipeline.arrays import Bool, Float, Int
-from pipeline.artefacts.measured import LaserKnock, RingPoints, RingSamples, RingValidity, Trajectory
+from pipeline.artefacts.measured import RingPoints, RingSamples, RingValidity, Trajectory
+from pipeline.artefacts.motion import LaserKnock
 from pipeline.geometry.axis import frames_at, to_pipe
 from pipeline.instrument.probe import Probe
 from pipeline.system.parallel import in_threads

@@ -7,7 +7,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from pipeline.arrays import Bool, Float, Int, runs_of
-from pipeline.artefacts.measured import MotionEvent, Trajectory
+from pipeline.artefacts.measured import Trajectory
+from pipeline.artefacts.motion import MotionEvent
 from pipeline.geometry.axis import distance_along
 from pipeline.machine.stage import Context
 from pipeline.recording.base import FrameTable

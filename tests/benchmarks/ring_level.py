@@ -29,9 +29,10 @@ from pipeline.simulator.scene import Scene
 from pipeline.simulator.sheet import SheetTable, sheet_table
 from pipeline.simulator.truth import SceneTruth
 from stages.calibrate.gauge import MeasuredRun
-from stages.calibrate.gauge.adjust import Measurements, RingSource, first_unknowns
+from stages.calibrate.gauge.adjust import Measurements
 from stages.calibrate.gauge.edges import Edges, joined, predicted_edges
 from stages.calibrate.gauge.geometry import Gauge, gauge_of
+from stages.calibrate.gauge.solve import RingSource, first_unknowns
 from stages.calibrate.gauge.state import GaugeParameters
 
 _AZIMUTHS = 360

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from pipeline.errors import Cancelled
-from stages.calibrate.gauge.adjust import solve
+from stages.calibrate.gauge.solve import solve
 from stages.diagnose.effects.library import LIBRARY
 from stages.diagnose.gauge.examine import examine
 from stages.motion import MotionParameters

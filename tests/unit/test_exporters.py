@@ -12,7 +12,8 @@ import pytest
 import zarr
 from scipy.spatial.transform import Rotation
 
-from pipeline.artefacts.measured import PipePiece, PointCloud, RadiusMap, RingSamples, Trajectory, Wall
+from pipeline.artefacts.measured import PointCloud, RadiusMap, RingSamples, Trajectory, Wall
+from pipeline.artefacts.motion import PipePiece
 from pipeline.export.arrays import write_radius_map, write_rings
 from pipeline.export.tables import write_centreline, write_trajectory
 from pipeline.geometry.axis import PipeAxis

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from pipeline.arrays import Float
-from pipeline.artefacts.measured import MotionEvent, Trajectory
+from pipeline.artefacts.measured import Trajectory
+from pipeline.artefacts.motion import MotionEvent
 from pipeline.geometry.axis import PipeAxis, axis_through, frames_at, straight_axis
 from pipeline.recording.base import FrameTable
 from stages.motion.events import find_events, warn_of_slips

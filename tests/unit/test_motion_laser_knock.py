@@ -10,7 +10,7 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from pipeline.artefacts.measured import LaserKnock
+from pipeline.artefacts.motion import LaserKnock
 from pipeline.geometry.axis import distance_along
 from pipeline.instrument.laser import LaserSheet
 from stages.accumulate import AccumulateParameters, accumulate_wall

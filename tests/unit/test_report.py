@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipeline.artefacts.measured import MotionEvent, RingSamples, RingValidity, Trajectory
+from pipeline.artefacts.measured import RingSamples, RingValidity, Trajectory
+from pipeline.artefacts.motion import MotionEvent
 from pipeline.export import report
 from pipeline.export.report import page_of, write_report
 from pipeline.export.report.tables import RunSummary, tables

@@ -176,7 +176,7 @@ def test_the_noise_of_the_pictures_is_told(sigma):
     context = replace(quiet_context(), report=lambda name, value, unit="": told.setdefault(name, value))
     texture_of(noisy, T, context=context)
     # Interpolation takes up to a third of white noise away; on waves of 4 px it errs by 1.6 grey levels.
-    found = told["noise of lit pictures, one against another"]
+    found = told["noise of lit pictures, from their differences"]
     assert 0.65 * sigma < found < np.hypot(1.1 * sigma, 1.7)
 
 

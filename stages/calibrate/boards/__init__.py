@@ -1,4 +1,4 @@
-"""A camera from pictures of a chessboard or ChArUco board: from corners to a judged camera."""
+"""Calibrates a camera from pictures of a chessboard or ChArUco board, and tests it on held-out views."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ def calibrate_boards(
     ------
     UnusableError
         When there are too few views, when plane boards all lie in one plane or in parallel ones, when the
-        views leave the image scale undetermined, or when no model reaches all corners.
+        views leave the image scale undetermined, or when no model can project all corners.
     """
     refuse_too_few(views, parameters)
     first = start(views, image_size)
@@ -112,8 +112,8 @@ def board_as_it_is(
 ) -> tuple[BoardCalibrationParameters, Part, tuple[Part, ...]]:
     """Return parameters with the board's shape decided, and the views divided for held-out tests.
 
-    Where ``board_shape`` is "best", a Kannala-Brandt camera is fitted with each shape, and the shape that
-    predicts held-out views best is taken.
+    If ``board_shape`` is "best", a Kannala-Brandt camera is fitted with each shape, and the shape that
+    predicts held-out views best is used.
     """
     if parameters.board_shape != "best":
         return parameters, *deal(views, first, parameters)

@@ -42,7 +42,7 @@ class Corners:
         On the flat board, mm.
     uv : (M, 2)
     sag : (M, 3)
-        How far each corner leaves the plane, mm, for 1 mm of each of the three shape parameters.
+        Distance of each corner from the plane, mm, for 1 mm of each of the three shape parameters.
     views : int
     """
 
@@ -67,7 +67,7 @@ class Corners:
 
 @dataclass(frozen=True)
 class Free:
-    """What is estimated beside the poses: indices of camera parameters, and of the shape's parameters."""
+    """Parameters estimated in addition to the poses: indices of camera and of shape parameters."""
 
     camera: Int
     shape: Int
@@ -92,7 +92,7 @@ class Estimate:
     shape_mm: Float
 
     def residuals(self, corners: Corners) -> Float:
-        """Return projected minus observed (M, 2), px; NaN where the model does not reach."""
+        """Return projected minus observed (M, 2), px; NaN where the model has no projection."""
         return np.asarray(self.camera.project(self.points(corners)).uv - corners.uv)
 
     def points(self, corners: Corners) -> Float:
@@ -113,7 +113,7 @@ class Estimate:
 
 @dataclass(frozen=True)
 class Linearised:
-    """An estimate with its robust cost; its normal equations are formed when they are first asked for."""
+    """An estimate with its robust cost; its normal equations are computed at first use."""
 
     estimate: Estimate
     corners: Corners
@@ -135,7 +135,7 @@ class Linearised:
         return self.normal.step(damping)
 
     def decrease(self, step: tuple[Float, Float]) -> float:
-        """Return by how much the cost falls with a step where the residuals are linear."""
+        """Return the decrease of the cost by a step if the residuals are linear."""
         return self.normal.decrease(step)
 
 
@@ -145,7 +145,7 @@ def solve(start: Estimate, corners: Corners, free: Free, huber_px: float, stop: 
     Parameters
     ----------
     free
-        What to estimate beside the poses.
+        Parameters to estimate in addition to the poses.
     huber_px
         Residual length beyond which a corner counts linearly.
     stop
@@ -165,13 +165,13 @@ def solve(start: Estimate, corners: Corners, free: Free, huber_px: float, stop: 
 
 
 def cost(residual: Float, huber_px: float) -> float:
-    """Return Huber's cost of (M, 2) residuals; corners out of the model's reach count as very far."""
+    """Return Huber's cost of (M, 2) residuals; corners without a projection count as very far."""
     length = np.nan_to_num(np.hypot(residual[:, 0], residual[:, 1]), nan=_OUT_OF_MODEL_PX)
     return float(np.sum(np.where(length <= huber_px, length**2, huber_px * (2 * length - huber_px))))
 
 
 def weights(residual: Float, huber_px: float) -> Float:
-    """Return Huber's weights (M,) of residuals; 0 out of the model's reach."""
+    """Return Huber's weights (M,) of residuals; 0 without a projection."""
     length = np.hypot(residual[:, 0], residual[:, 1])
     return np.nan_to_num(huber_px / np.maximum(length, huber_px), nan=0.0)
 
@@ -203,9 +203,9 @@ def linearise(estimate: Estimate, corners: Corners, free: Free, huber_px: float)
 def covariance(estimate: Estimate, corners: Corners, free: Free, huber_px: float) -> tuple[Float, float]:
     """Return the covariance (F, F) of the shared parameters and the 1 σ of a corner coordinate, px.
 
-    The residuals of one picture tend to err together (a board that bends, a pattern that the model cannot
-    follow), so that a picture tells less than its corners' number says. The covariance is scaled up by the
-    factor by which the pictures' gradients scatter more than independent corners would make them.
+    The residuals of one picture are often correlated (a board that bends, a pattern that the model cannot
+    follow), so that a picture has less information than the number of its corners suggests. The covariance is
+    scaled up by the ratio of the scatter of the pictures' gradients to that of independent corners.
     """
     residual = estimate.residuals(corners)
     weight = weights(residual, huber_px)
@@ -214,13 +214,13 @@ def covariance(estimate: Estimate, corners: Corners, free: Free, huber_px: float
     variance = squares / max(freedom, 1)
     information, gradients = linearise(estimate, corners, free, huber_px).marginal()
     inverse = covariance_of(information)
-    return variance * _togetherness(gradients, inverse, variance) * inverse, float(np.sqrt(variance))
+    return variance * _correlation_factor(gradients, inverse, variance) * inverse, float(np.sqrt(variance))
 
 
 def pose_covariances(estimate: Estimate, corners: Corners, huber_px: float) -> Float:
     """Return the covariance (V, 6, 6) of the poses' tangents, rad and mm, with the camera held.
 
-    Each is that of independent corners which scatter as those of its own picture do.
+    Each is computed for independent corners with the scatter of its own picture.
     """
     residual = estimate.residuals(corners)
     weight = weights(residual, huber_px)
@@ -230,8 +230,8 @@ def pose_covariances(estimate: Estimate, corners: Corners, huber_px: float) -> F
     return np.stack([v * covariance_of(b) for v, b in zip(variance, block, strict=True)])
 
 
-def _togetherness(gradients: Float, inverse: Float, variance: float) -> float:
-    """Return how many times more the gradients of pictures (V, F) scatter than independent corners would.
+def _correlation_factor(gradients: Float, inverse: Float, variance: float) -> float:
+    """Return the scatter of the pictures' gradients (V, F) over that of independent corners.
 
     At least 1: the covariance is never narrowed.
     """

@@ -1,7 +1,7 @@
-"""How good a camera calibration is.
+"""Measures the quality of a camera calibration.
 
-It is judged by the reprojection of views that it was not fitted to, by its uncertainty over the image, and by
-how far it displaces the image of another camera.
+The measures are the reprojection of held-out views, the uncertainty over the image, and the displacement
+relative to the image of another camera.
 """
 
 from __future__ import annotations
@@ -41,12 +41,12 @@ class Part:
     Attributes
     ----------
     inside, outside
-        Views fitted to, and views held out; ``outside`` is empty where all views are fitted to. Both have the
-        board's corners where the views inside show them.
+        Fitted views, and held-out views; ``outside`` is empty if all views are fitted. Both have the board's
+        corners as measured in the fitted views.
     first
         Start of the fit: a camera and the poses of the views inside.
     survey
-        The board as measured in the views inside; None where the board was not measured.
+        The board as measured in the fitted views; None if the board was not measured.
     """
 
     inside: list[BoardView]
@@ -87,9 +87,9 @@ def _part(
 def score(
     whole: Part, parts: Sequence[Part], model: ModelName, parameters: BoardCalibrationParameters
 ) -> ModelScore:
-    """Return how well a model fits, and how well it predicts views that it was not fitted to.
+    """Return the residuals of a model, for the fitted and for the held-out views.
 
-    ``parameters.board_shape`` must be the one that the parts were dealt with, not "best".
+    ``parameters.board_shape`` must be the shape with which the parts were made, not "best".
     """
     try:
         fitted = fit(whole.inside, whole.first, model, parameters)
@@ -99,7 +99,7 @@ def score(
     held_out = np.concatenate(residuals)
     if np.isnan(held_out).any():
         return ModelScore(
-            model, fitted, 0, fitted.rms_px, np.nan, "fails to reach corners that were held out"
+            model, fitted, 0, fitted.rms_px, np.nan, "cannot project corners that were held out"
         )
     free = int(np.count_nonzero(np.diag(fitted.covariance)))
     return ModelScore(model, fitted, free, fitted.rms_px, rms(held_out), "")
@@ -113,10 +113,10 @@ def ranked(scores: Sequence[ModelScore]) -> list[CameraCalibration]:
 
 
 def uncertainty_map(calibration: CameraCalibration) -> UncertaintyMap:
-    """Return 1 σ, px, of where the camera projects a direction, over the image.
+    """Return 1 σ, px, of the projection of a direction, over the image.
 
-    A small rotation of the camera together with all boards changes no picture. So ``sigma_px`` leaves out the
-    rotation that best undoes a change of parameters over the image; ``raw_sigma_px`` contains it.
+    A small rotation of the camera together with all boards changes no picture. So ``sigma_px`` excludes the
+    rotation that best compensates a change of parameters over the image; ``raw_sigma_px`` includes it.
     """
     camera = calibration.camera
     uv, ray, valid = _grid_rays(camera)
@@ -131,9 +131,9 @@ def uncertainty_map(calibration: CameraCalibration) -> UncertaintyMap:
 
 
 def displacement_map(camera: Camera, other: Camera) -> DisplacementMap:
-    """Return how far, px, ``other`` projects a direction from the pixel at which ``camera`` sees it.
+    """Return the displacement, px, between the projections of a direction by ``camera`` and ``other``.
 
-    The rotation between the two cameras that makes the displacement least is taken out and returned.
+    The rotation between the two cameras that minimises the displacement is removed and returned.
     """
     uv, ray, valid = _grid_rays(camera)
     rotation = np.zeros(3)

@@ -1,9 +1,9 @@
-"""Calibration boards, in mm in the board's frame B, and their corners found in strongly distorted images.
+"""Calibration boards, in mm in the board's frame B, and detection of their corners in distorted images.
 
 Chessboards are found by OpenCV's sector-based detector (A. Duda, U. Frese, "Accurate detection and
 localization of checkerboard corners for calibration", BMVC 2018). A board that is not found whole is searched
-again with more contrast and in the darkest colour channel, and at last in part: part of a board serves as
-well as the whole, since the pose of every view is free. Corners are refined to a fraction of a pixel where
+again with more contrast and in the darkest colour channel, and at last in part: a part of a board is as
+useful as the whole, since the pose of every view is free. Corners are refined to a fraction of a pixel if
 that brings them nearer to a smooth image of the board.
 """
 
@@ -114,7 +114,7 @@ def _chessboard(image: Image, board: Chessboard, name: str) -> BoardView | None:
 
 
 def _part_of_chessboard(image: Image, board: Chessboard, name: str) -> BoardView | None:
-    """Look for the largest part of the board in a reduced picture, and refine its corners in the image."""
+    """Search the largest part of the board in a reduced picture, and refine its corners in the image."""
     grey = grey_of(image)
     scale = min(_SEARCHED_SIDE_PX / max(grey.shape), 1.0)
     small = np.asarray(cv2.resize(grey, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA), np.uint8)
@@ -158,7 +158,7 @@ def grey_of(image: Image) -> Image:
 
 
 def _pictures(image: Image) -> list[Image]:
-    """Return the ways to look at an image: as it is, its darkest channel, and with local contrast."""
+    """Return versions of an image: unchanged, its darkest channel, and with local contrast."""
     grey = grey_of(image)
     enhanced = np.asarray(cv2.createCLAHE(_CONTRAST_LIMIT, _CONTRAST_TILES).apply(grey), np.uint8)
     coloured = image.ndim == 3 and bool(np.any(image != grey[..., None]))
@@ -195,22 +195,22 @@ def _in_one_line(xyz_b: Float) -> bool:
 WINDOW_SHARE = 0.33
 """Half the window of refinement over the distance to the next corner: no other corner's edges are in it."""
 _SMALLEST_WINDOW, _LARGEST_WINDOW = 2, 20
-# A corner stays when it moves by less than a thousandth of what corners err by, px.
+# A corner has converged when it moves by less than a thousandth of the corners' errors, px.
 _STOP = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_COUNT, 100, 1e-4)
 _DEGREE = 4
-"""Degree of the polynomial that stands for the board's smooth image; it fits a fisheye's to 0.1 to 0.5 px."""
+"""Degree of the polynomial that models the board's smooth image; it fits a fisheye's to 0.1 to 0.5 px."""
 _ROUNDS = 3
 _WORSE_VIEW, _WORSE = 1.3, 3.0
-"""From when refined places are given up: a view's misfit over that of the detected places, and a corner's
-excess of distance in robust σ. In 33 rendered boards, blurred by 0 to 5 px, the places so chosen err by
+"""Limits above which refined places are rejected: a view's misfit over that of the detected places, and a
+corner's excess of distance in robust σ. In 33 rendered boards, blurred by 0 to 5 px, the chosen places err by
 0.16 px rms; the detected ones by 0.42, the refined ones by 0.25."""
 
 
 def refine(picture: Image, uv: Float, xyz_b: Float, share: float) -> Float:
     """Refine detected corners, and keep the detected places where refining fails.
 
-    Where blur is as wide as the squares, refining runs to other edges; where squares are seen at a slant, the
-    detector errs by some px. Lens and board are smooth: a polynomial of the place on the board tells which of
+    If the blur is as wide as the squares, refining moves to other edges; if squares are seen obliquely, the
+    detector errs by some px. Lens and board are smooth: a polynomial of the place on the board shows which of
     the two is wrong, for a view as a whole and then for each corner.
 
     Parameters
@@ -248,7 +248,7 @@ def _misfit(terms: Float, uv: Float) -> float:
 def refine_in_windows(picture: Image, uv: Float, share: float) -> Float:
     """Return corners (N, 2), px, each refined in a window of ``share`` of the squares around it.
 
-    Corners that the detector places beside the picture stay where they are.
+    Corners that the detector places outside the picture are not changed.
     """
     spacing = np.asarray(cKDTree(uv).query(uv, 2)[0])[:, 1]
     halves = np.clip(np.floor(share * spacing), _SMALLEST_WINDOW, _LARGEST_WINDOW).astype(int)

@@ -1,4 +1,4 @@
-"""Fitting one camera model to board views, its parameters, and the views that cannot determine a camera."""
+"""Fits one camera model to board views, and refuses views that cannot determine a camera."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ MODEL_NAMES: tuple[ModelName, ...] = ("kannala_brandt", "scaramuzza", "unified",
 
 
 class BoardCalibrationParameters(Parameters):
-    """How a camera is fitted to board views, and what makes views unfit for it."""
+    """Parameters of fitting a camera to board views, and of refusing views."""
 
     huber_px: float = Field(
         default=1.0, gt=0, le=20, description="residual beyond which a corner counts linearly, px"
@@ -61,12 +61,12 @@ class BoardCalibrationParameters(Parameters):
 def fit(
     views: Sequence[BoardView], first: Estimate, model: ModelName, parameters: BoardCalibrationParameters
 ) -> CameraCalibration:
-    """Fit a camera model to board views, and refuse a fit that is not to be trusted: see `adjust`.
+    """Fit a camera model to board views, and refuse an unreliable fit: see `adjust`.
 
     Raises
     ------
     UnusableError
-        When the model cannot see the boards, or the views leave the image scale undetermined.
+        When the model cannot project the boards, or the views leave the image scale undetermined.
     """
     calibration = adjust(views, first, model, parameters)
     _refuse_unseen(calibration)
@@ -121,10 +121,10 @@ def held_out_residuals(
 
 
 def shared_parameters(camera: Camera, corners: Corners, parameters: BoardCalibrationParameters) -> Free:
-    """Return what is estimated beside the poses.
+    """Return the parameters that are estimated in addition to the poses.
 
-    Scaramuzza's e stays 0: a turn of the sensor about the optical axis is undone by turning all board poses,
-    so that c, d, e and the polynomial's scale hold only three independent numbers.
+    Scaramuzza's e stays 0: a rotation of the sensor about the optical axis is compensated by rotating all
+    board poses, so that c, d, e and the polynomial's scale have only three degrees of freedom.
     """
     plane = bool(np.ptp(corners.xyz_b[:, 2]) < 1e-9)
     shape = BENT if plane and parameters.board_shape == "bent" else FLAT
@@ -196,7 +196,7 @@ def _refuse_unseen(calibration: CameraCalibration) -> None:
     if lost:
         raise UnusableError(
             NAME,
-            f"the model {calibration.camera.model} does not reach {lost} of {len(calibration.uv)} corners",
+            f"the model {calibration.camera.model} cannot project {lost} of {len(calibration.uv)} corners",
             hint="choose a model that sees this far from its axis: kannala_brandt, scaramuzza or unified",
         )
 

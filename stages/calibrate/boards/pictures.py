@@ -1,4 +1,4 @@
-"""Pictures of a board: their files, the board's corners in them, and warnings of a pattern not as stated."""
+"""Pictures of a board: their files, the board's corners in them, and refusal of another pattern."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class Pictures:
         return Source(Pictures, self, key, self.refuse_changed)
 
     def refuse_changed(self) -> None:
-        """Raise `InputError` when a file is no longer what it was."""
+        """Raise `InputError` when a file has changed."""
         for file in self.files:
             file.refuse_changed()
 
@@ -60,12 +60,12 @@ class Target:
 
 @dataclass(frozen=True)
 class FoundBoards:
-    """What was found in the pictures.
+    """The boards found in the pictures.
 
     Attributes
     ----------
     views : tuple of BoardView
-        Of the pictures with a board.
+        Corners in each picture with a board.
     image_size : (int, int)
         Width and height of every picture, px.
     rejected : tuple of (str, str)
@@ -200,7 +200,7 @@ def _of_squares(grey: Image, stated: Board) -> tuple[str, str] | None:
 def refuse_another_pattern(files: Sequence[Path], board: Board) -> None:
     """Raise `UnusableError` where the first pictures show another pattern than the board that was stated.
 
-    A full search takes seconds a picture, so only the first `_FIRST` pictures are looked at, until one of
+    A full search takes seconds per picture, so only the first `_FIRST` pictures are examined, until one of
     them shows the board.
     """
     for file in files[:_FIRST]:

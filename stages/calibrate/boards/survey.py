@@ -1,9 +1,9 @@
-"""Measuring the board itself: where its corners really are, from the same views that calibrate the camera.
+"""Measures the true positions of the board's corners, from the same views that calibrate the camera.
 
 Printed boards are neither flat nor true to scale everywhere. Every corner gets an offset in mm, shared by all
-views, held near zero by a prior (K. Strobl, G. Hirzinger, "More accurate pinhole camera calibration with
-imperfect planar target", ICCV workshops 2011). Camera and poses are solved with the offsets held, then the
-offsets with camera and poses held, by turns: held so, the corners do not depend on each other.
+views, with a prior at zero (K. Strobl, G. Hirzinger, "More accurate pinhole camera calibration with
+imperfect planar target", ICCV workshops 2011). Camera and poses are solved with the offsets fixed, then the
+offsets with camera and poses fixed, alternately: the corners are then independent of each other.
 """
 
 from __future__ import annotations
@@ -34,13 +34,13 @@ _QUARTER_TURNS = tuple(rotation_from_vector(np.array([0.0, 0.0, k * np.pi / 2]))
 
 
 def nominal_board(views: Sequence[BoardView]) -> BoardSurvey:
-    """Return the board that the views show, with its corners where the pattern is meant to have them."""
+    """Return the board that the views show, with its corners at their nominal places."""
     points = np.unique(np.round(np.concatenate([v.xyz_b for v in views]) / _SAME_MM), axis=0) * _SAME_MM
     return BoardSurvey(points, np.zeros_like(points))
 
 
 def applied(survey: BoardSurvey, view: BoardView) -> BoardView:
-    """Return a view with its corners where they were measured to be."""
+    """Return a view with its corners at their measured places."""
     index = _index(survey, view.xyz_b)
     known = index < len(survey.nominal_mm)
     offset = np.where(known[:, None], survey.offset_mm[np.where(known, index, 0)], 0.0)
@@ -51,7 +51,7 @@ def placed(survey: BoardSurvey, view: BoardView, camera: Camera, huber_px: float
     """Return a view with its corners numbered as they agree best with the measured board.
 
     A chessboard may be seen upside down or in part, and a part turned sideways. All placements that its grid
-    allows look alike but for the board's own irregularities, so each is tried.
+    allows differ only by the board's own irregularities, so each is tried.
     """
     places = [view] if view.numbered else _placements(survey, view) or [view]
     return min(places, key=lambda v: _pose_cost(applied(survey, v), camera, huber_px))
@@ -66,7 +66,7 @@ def survey_board(
     -------
     survey
     views
-        Each at its place on the board, corners not yet moved.
+        Views placed on the board, with nominal corners.
     estimate
         A Kannala-Brandt camera and the poses.
     """
@@ -88,7 +88,7 @@ def _refined(
     estimate: Estimate,
     parameters: BoardCalibrationParameters,
 ) -> tuple[BoardSurvey, Estimate]:
-    """Return board and estimate after solving camera and poses, then the offsets, `_TURNS` times by turns."""
+    """Return board and estimate after solving camera and poses, then the offsets, `_TURNS` times."""
     index = np.concatenate([_index(survey, view.xyz_b) for view in views])
     for _ in range(_TURNS):
         corners = Corners.of([applied(survey, view) for view in views])
@@ -104,7 +104,7 @@ def _offsets(
     estimate: Estimate,
     parameters: BoardCalibrationParameters,
 ) -> Float:
-    """Return the offsets (N, 3) of least cost with camera and poses held: one Gauss-Newton step each."""
+    """Return the offsets (N, 3) of least cost with camera and poses fixed: one Gauss-Newton step each."""
     residual = estimate.residuals(corners)
     weight = weights(residual, parameters.huber_px)
     rotation = estimate.T_cb[corners.view][:, :3, :3]

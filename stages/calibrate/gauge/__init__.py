@@ -1,4 +1,4 @@
-"""Camera, laser sheet and poses from a run through a gauge of known bore."""
+"""Calibrates camera, laser sheet and poses from a run through a gauge of known bore."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from pipeline.recording.base import Illumination, Recording
 from pipeline.recording.checks import CheckedFrames
 from pipeline.recording.images import luma_of_white
 from stages.calibrate.gauge import premises
-from stages.calibrate.gauge.adjust import Finding, Measurements, RingSource, first_unknowns, solve
+from stages.calibrate.gauge.adjust import Measurements
 from stages.calibrate.gauge.edges import Edges, Sighting, find_fiducials, joined, measure_edges
 from stages.calibrate.gauge.geometry import BoreRings, Gauge
 from stages.calibrate.gauge.poses import (
@@ -32,6 +32,7 @@ from stages.calibrate.gauge.poses import (
 )
 from stages.calibrate.gauge.premises import require_gauge
 from stages.calibrate.gauge.result import GaugeCalibration, calibration_of, warn_of_misfit
+from stages.calibrate.gauge.solve import Finding, RingSource, first_unknowns, solve
 from stages.calibrate.gauge.state import GaugeParameters, Unknowns
 
 __all__ = ["GAUGE", "GaugeCalibration", "GaugeParameters", "calibrate_gauge", "require_gauge"]
@@ -39,7 +40,7 @@ __all__ = ["GAUGE", "GaugeCalibration", "GaugeParameters", "calibrate_gauge", "r
 
 @dataclass(frozen=True)
 class MeasuredRun:
-    """A gauge run measured, before any adjustment.
+    """The measurements of a gauge run before any adjustment.
 
     Attributes
     ----------
@@ -48,11 +49,11 @@ class MeasuredRun:
     measured : Measurements
     source : RingSource
     posed : (K,) int
-        Places in the recording of the frames whose fiducials gave a pose.
+        Indices in the recording of the frames whose fiducials gave a pose.
     wrong_fiducials : (J,) int
-        Places of fiducials that most frames outvote.
+        Indices of fiducials that contradict most frames.
     overexposed : int
-        Edges of fiducials that are left out, since the white beside them is overexposed.
+        Number of fiducials' edges that are left out because the white beside them is overexposed.
     """
 
     start: Unknowns
@@ -155,7 +156,7 @@ def _edges(
     parameters: GaugeParameters,
     context: Context,
 ) -> tuple[Edges, int]:
-    """Measure the borders of the fiducials that fit, in all posed frames; count those overexposed."""
+    """Measure the borders of the consistent fiducials in all posed frames; count overexposed edges."""
     parts, overexposed = [], 0
     frames = recording.frames.frame[posed.index]
     white = _brightest_grey(recording, frames)
@@ -208,7 +209,7 @@ def _calibrate_run(
     parameters: GaugeParameters,
     context: Context,
 ) -> GaugeCalibration:
-    """Calibrate with frames and encoder as the pictures bear them out: see `calibrate_gauge`."""
+    """Calibrate with frames and encoder as corrected by the stage premises: see `calibrate_gauge`."""
     return calibrate_gauge(frames.applied_to(recording), rings, probe, parameters, context)
 
 

@@ -1,7 +1,7 @@
-"""Fiducials found in the lit frames, and offsets across their borders to sub-pixel accuracy.
+"""Finds fiducials in the lit frames, and measures offsets across their borders to sub-pixel accuracy.
 
-Refining a corner by itself displaces it where the marker is seen foreshortened. A straight stretch of edge
-is measured without such an error, because blur is the same on both of its sides.
+Refining a corner alone displaces it where the marker is foreshortened. A straight stretch of edge has no such
+error, because blur is the same on both of its sides.
 """
 
 from __future__ import annotations
@@ -47,11 +47,11 @@ class Sighting:
     ----------
     frame : int
     marker : (M,) int
-        Places in the gauge's list.
+        Indices in the gauge's list.
     corner_px : (M, 4, 2)
         Corners, clockwise from the pattern's top left, to about a pixel.
     strangers : (K,) int
-        Numbers of markers seen that the gauge does not have.
+        Numbers of seen markers that do not belong to the gauge.
     """
 
     frame: int
@@ -61,7 +61,7 @@ class Sighting:
 
 
 def detector(dictionary: str) -> cv2.aruco.ArucoDetector:
-    """Return a detector of the markers of OpenCV's dictionary so named."""
+    """Return a detector of the markers of OpenCV's ``dictionary``."""
     parameters = cv2.aruco.DetectorParameters()
     parameters.adaptiveThreshWinSizeMin = 7
     parameters.adaptiveThreshWinSizeMax = 47
@@ -73,7 +73,7 @@ def detector(dictionary: str) -> cv2.aruco.ArucoDetector:
 def find_fiducials(
     images: Iterable[tuple[int, Image | None]], gauge: Gauge
 ) -> Iterator[tuple[Sighting, Image]]:
-    """Yield what is seen in each image that could be read, with the image."""
+    """Yield the fiducials seen in each readable image, and the image."""
     finder = detector(gauge.fiducials.dictionary)
     place = {int(number): k for k, number in enumerate(gauge.ids)}
     readable = ((frame, image) for frame, image in images if image is not None)
@@ -99,13 +99,13 @@ class Edges:
     Attributes
     ----------
     frame, marker, side : (M,) int
-        Index of the frame in the recording, place of the fiducial in the gauge's list, edge 0 to 3.
+        Index of the frame in the recording, index of the fiducial in the gauge's list, edge 0 to 3.
     xyz_p, outward_p : (M, 3)
         Point of the border on the wall, and unit direction along the wall out of the fiducial, in P.
     uv : (M, 2)
-        Where it was measured; only its place along ``normal`` counts.
+        Measured pixel; only its place along ``normal`` is used.
     normal : (M, 2)
-        Across the edge in the image, out of the fiducial.
+        Unit direction across the edge in the image, out of the fiducial.
     sigma_px : (M,)
     """
 
@@ -142,8 +142,8 @@ def measure_edges(
 
     ``white`` is the brightest grey level that the video's range allows.
 
-    Returned beside the edges is how many are left out because the white beside them is overexposed: its blur
-    is cut off at the brightest level, so that the edge seems to lie inside of the black square.
+    Also return the number of edges left out because the white beside them is overexposed: its blur is cut
+    off at the brightest level, so that the edge seems to lie inside the black square.
     """
     predicted, border_px, half = predicted_edges(index, marker, T_pc, camera, gauge, parameters)
     keep = (border_px >= parameters.least_border_px) & _inside(predicted.uv, image.shape, half)
@@ -210,7 +210,7 @@ def _step_model(p: Float, t: Float, grey: Float) -> tuple[Float, Float]:
 def predicted_edges(
     index: int, marker: Int, T_pc: Float, camera: Camera, gauge: Gauge, parameters: GaugeParameters
 ) -> tuple[Edges, Float, Float]:
-    """Return border points as predicted, the width of the border there and the half profile length, px."""
+    """Return predicted border points, the width of the border there and the half profile length, px."""
     along = np.linspace(-_SPAN, _SPAN, parameters.edge_samples)
     m, side, k = (x.ravel() for x in np.meshgrid(marker, np.arange(4), np.arange(len(along)), indexing="ij"))
     outward = _SIDES[side]

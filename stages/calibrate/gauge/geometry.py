@@ -49,7 +49,7 @@ class Gauge:
         return np.clip(np.searchsorted(self.start_mm, distance_mm, "right") - 1, 0, len(self.start_mm) - 1)
 
     def from_step_mm(self, distance_mm: Float) -> Float:
-        """Return how far (...) a distance is from the nearest step; infinite for a plain bore."""
+        """Return the distance (...), mm, from the nearest step; infinite for a plain bore."""
         if len(self.start_mm) < 2:
             return np.full(np.shape(distance_mm), np.inf)
         return np.asarray(np.abs(np.asarray(distance_mm)[..., None] - self.start_mm[1:]).min(-1))
@@ -79,9 +79,9 @@ class Gauge:
         )
 
     def from_fiducial_edge_mm(self, distance_mm: Float, azimuth_rad: Float) -> Float:
-        """Return how far (N,) wall points are from the nearest border of a fiducial, mm; inside counts as 0.
+        """Return the distance (N,), mm, of wall points from the nearest fiducial's border; 0 inside.
 
-        Inside a fiducial its pattern is as near as its border.
+        Inside a fiducial its pattern disturbs the line as its border does.
         """
         at = np.array([[m.distance_mm, np.radians(m.azimuth_deg)] for m in self.fiducials.markers])
         radius = self.radius_mm[self.section(distance_mm)]
@@ -92,7 +92,7 @@ class Gauge:
 def _from_squares(distance_mm, azimuth_rad, radius_mm, at, half_mm):  # type: ignore[no-untyped-def]
     """Return the distance (N,), mm, of wall points from the nearest square; 0 inside.
 
-    Squares lie about (distance, azimuth) ``at`` (K, 2), with ``half_mm`` from the middle to a side.
+    Squares have their middle at (distance, azimuth) ``at`` (K, 2), and half sides ``half_mm``.
     """
     out = np.full(len(distance_mm), np.inf)
     for n in range(len(distance_mm)):
@@ -131,11 +131,11 @@ class BoreRings:
     radius_mm : (M,)
         Stated radius of the bore there.
     wall_mm : (M, 2)
-        Distance and way around (azimuth × radius) of the point: neighbours on the wall err alike.
+        Distance and arc length (azimuth × radius) of the point: neighbours on the wall have common errors.
     across_px : (M,)
-        By how much the image radius changes from one side of the bin to the other.
+        Change of the image radius from one side of the bin to the other.
     left_out : dict of str to int
-        Samples left out, by reason.
+        Numbers of samples left out, by reason.
     """
 
     frame: Int
@@ -157,7 +157,7 @@ class BoreRings:
 def bore_rings(
     rings: RingSamples, index: Int, T_pc: Float, probe: Probe, gauge: Gauge, parameters: GaugeParameters
 ) -> BoreRings:
-    """Return the bins of all rings, in frames (F,) ``index``, as poses (N, 4, 4) and probe place them."""
+    """Return the bins of all rings, in frames (F,) ``index``, at poses (N, 4, 4) with a probe."""
     uv = rings.pixels()
     xyz_p = transform(T_pc[index][:, None], probe.triangulate(np.where(rings.valid[..., None], uv, np.nan)))
     distance, azimuth = xyz_p[..., 2], np.arctan2(xyz_p[..., 1], xyz_p[..., 0])

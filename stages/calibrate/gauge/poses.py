@@ -1,6 +1,6 @@
-"""First poses of all frames: from fiducials where they are read, interpolated or carried on elsewhere.
+"""First poses of all frames: from fiducials where they are read, interpolated or extrapolated elsewhere.
 
-Perspective-n-Point places each lit frame, and fiducials that do not fit are outvoted.
+Perspective-n-Point gives the pose of each lit frame; fiducials that contradict the majority are rejected.
 """
 
 from __future__ import annotations
@@ -32,13 +32,13 @@ _LEAST_SAMPLES = 90
 LEAST_MARKERS = 3
 _DRAWS = 12
 _FITS_PX = 6.0
-# Normalised coordinates tan θ overrate corners near 90°.
+# Normalised coordinates tan θ give too much weight to corners near 90°.
 _WIDEST = np.radians(80.0)
 
 
 @dataclass(frozen=True)
 class FirstPose:
-    """Pose ``T_pc`` (4, 4) of a frame, and which of its sighting's fiducials fit it (M,)."""
+    """Pose ``T_pc`` (4, 4) of a frame, and which of its seen fiducials (M,) fit it."""
 
     T_pc: Float
     fits: Bool
@@ -84,7 +84,7 @@ def refined_pose(camera: Camera, uv: Float, xyz_p: Float, T_pc: Float) -> Float:
 
 
 def disagreeing(poses: Sequence[tuple[Sighting, FirstPose]], markers: int) -> tuple[Int, Bool]:
-    """Return how often each fiducial was seen in posed frames, and which were outvoted in most of them."""
+    """Return how often each fiducial was seen in posed frames, and which were rejected in most of them."""
     seen, outvoted = np.zeros(markers, np.int64), np.zeros(markers, np.int64)
     for sighting, pose in poses:
         np.add.at(seen, sighting.marker, 1)
@@ -112,7 +112,7 @@ def _fits(camera: Camera, uv: Float, xyz_p: Float, T_pc: Float) -> Bool:
 
 @dataclass(frozen=True)
 class PosedFrames:
-    """Frames whose fiducials gave a pose: ``index`` (K,) in the recording, what was seen, and the poses."""
+    """Frames whose fiducials gave a pose: ``index`` (K,) in the recording, seen fiducials, and poses."""
 
     index: Int
     sightings: tuple[Sighting, ...]
@@ -134,15 +134,15 @@ def posed_frames(
 
 
 def frame_index(recording: Recording, frame: Int) -> Int:
-    """Return the places of frame numbers in the recording's frame table."""
+    """Return the indices of frame numbers in the recording's frame table."""
     return np.asarray(np.searchsorted(recording.frames.frame, frame), np.int64)
 
 
 def poses_of_all_frames(recording: Recording, posed: PosedFrames, rings: RingSamples, probe: Probe) -> Float:
     """Return first guesses (N, 4, 4) of all poses.
 
-    Before the first and after the last posed frame the turn stays, the encoder gives the distance, and the
-    middle of the ring the place across.
+    Before the first and after the last posed frame the rotation is constant, the encoder gives the distance,
+    and the middle of the ring the position across.
     """
     time, known = recording.frames.time_s, posed.T_pc
     at = np.clip(time, time[posed.index[0]], time[posed.index[-1]])

@@ -1,4 +1,4 @@
-"""What a gauge run must fulfil before and after the adjustment; each refusal says what is wrong."""
+"""Requirements on a gauge run before and after the adjustment; each refusal says what is wrong."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _LOOKED_AT = 6
 _SIZE_TOLERANCE, _SIDE_ERROR_PX = 0.05, 2.0
 # Added to hints, since a recorder that scales or cuts the pictures looks like a wrong gauge: with pictures
 # scaled by 3 % the bores were blamed, with cut ones 24 fiducials.
-_PICTURES = "see whether the recorder scales, stretches, cuts or frames the pictures"
+_PICTURES = "check whether the recorder scales, stretches, cuts or frames the pictures"
 _WRONG_BORE_MM = 4.0
 _WRONG_SHARE = 0.2
 _OTHERS = ("DICT_4X4_1000", "DICT_5X5_1000", "DICT_6X6_1000", "DICT_7X7_1000", "DICT_ARUCO_ORIGINAL")
@@ -75,8 +75,8 @@ def warn_of_overexposed(left_out: int, kept: int, context: Context) -> None:
     if left_out:
         context.warn(
             f"{left_out} of {left_out + kept} edges of fiducials are left out, since the white beside them "
-            "is overexposed and seems to reach into the black. What to do: nothing, if the σ serves; else "
-            "expose less, or turn the LEDs down, where the bore is narrow"
+            "is overexposed and seems to reach into the black. What to do: nothing, if σ is small enough; "
+            "else expose less, or turn the LEDs down, where the bore is narrow"
         )
 
 
@@ -87,13 +87,13 @@ def require_poses(
     camera: Camera,
     parameters: GaugeParameters,
 ) -> None:
-    """Refuse fiducials that lie elsewhere than stated, or are of another size."""
+    """Refuse fiducials that lie elsewhere than stated, or have another size."""
     looked = sum(len(s.marker) >= 3 for s in sightings)
     if len(posed.index) < max(parameters.least_posed_frames, looked / 2):
         raise UnusableError(
             STAGE,
-            f"in {looked - len(posed.index)} of {looked} frames no pose of the camera brings half of the "
-            "fiducials to where they are seen: they are mirrored, swapped or placed otherwise than stated",
+            f"in {looked - len(posed.index)} of {looked} frames no pose of the camera explains the places of "
+            "half of the fiducials: they are mirrored, swapped or placed otherwise than stated",
             limit=f"{parameters.least_posed_frames} frames, and half of those with fiducials",
             hint=f"check columns_along, rows_along and the distance and azimuth of each id; {_PICTURES}",
         )
@@ -109,7 +109,7 @@ def require_poses(
 
 
 def outvoted_fiducials(posed: PosedFrames, gauge: Gauge) -> Int:
-    """Return the places of fiducials that most frames outvote; refuse when they are many."""
+    """Return the indices of fiducials that contradict most frames; refuse when there are many."""
     seen, wrong = disagreeing(list(zip(posed.sightings, posed.poses, strict=True)), len(gauge.ids))
     if wrong.sum() > max(_WRONG_SHARE * (seen > 0).sum(), 1):
         raise UnusableError(
@@ -151,10 +151,10 @@ def require_offset(T_pc: Float, parameters: GaugeParameters) -> None:
     if offset < parameters.least_offset_mm:
         raise UnusableError(
             STAGE,
-            f"the camera stays within {offset:.2f} mm (r.m.s.) of the gauge's axis: the weak direction is a "
-            "tilt of the sheet against a shift of the principal point, which look alike there",
+            f"the camera stays within {offset:.2f} mm (r.m.s.) of the gauge's axis: there a tilt of the "
+            "sheet and a shift of the principal point cannot be distinguished",
             limit=f"{parameters.least_offset_mm:g} mm",
-            hint="drive the probe off-centre by several mm to all sides while it passes the bores",
+            hint="move the probe off-centre by several mm to all sides while it passes the bores",
         )
 
 
@@ -163,7 +163,8 @@ def require_determined(sigma_mm: float, direction: str, parameters: GaugeParamet
     if sigma_mm > parameters.largest_radius_sigma_mm:
         raise UnusableError(
             STAGE,
-            f"the run leaves 1 σ of {sigma_mm:.3f} mm in the radius; the weak direction is {direction}",
+            f"the run determines the radius only to 1 σ of {sigma_mm:.3f} mm; the weak direction is "
+            f"{direction}",
             limit=f"{parameters.largest_radius_sigma_mm:g} mm",
             hint="record more of the gauge: all bores, off-centre, with roll, and fiducials in view",
         )  # fmt: skip
@@ -184,7 +185,7 @@ def _size_ratio(posed: PosedFrames, gauge: Gauge, camera: Camera) -> tuple[float
 
 
 def _likely_cause(recording: Recording, gauge: Gauge, strangers: Sequence[int]) -> str:
-    """Return the end of a message: mirrored, another dictionary, other numbers, or "" where none fits."""
+    """Return the end of a message: mirrored, another dictionary, other numbers, or "" if none fits."""
     lit = recording.frames.of(Illumination.LED, Illumination.BOTH)
     chosen = lit[:: max(len(lit) // _LOOKED_AT, 1)]
     images = [image.copy() for _, image in recording.read(chosen, "grey") if image is not None]
@@ -194,7 +195,7 @@ def _likely_cause(recording: Recording, gauge: Gauge, strangers: Sequence[int]) 
         len(known & set(detect(own, np.ascontiguousarray(i[:, ::-1]))[0].tolist())) for i in images
     )
     if mirrored >= max(2 * len(images), 1):
-        return "; they are seen once the pictures are mirrored: pictures or fiducials are mirrored"
+        return "; they are seen after mirroring the pictures: pictures or fiducials are mirrored"
     for name in _OTHERS:
         count = sum(len(detect(detector(name), i)[0]) for i in images)
         if name[:8] != gauge.fiducials.dictionary[:8] and count >= max(3 * len(images), 1):

@@ -10,15 +10,16 @@ from pipeline.adjustment.robust import robust_spread
 from pipeline.arrays import Float, Int
 from pipeline.instrument.probe import Probe
 from pipeline.machine.stage import Context
-from stages.calibrate.gauge.adjust import Finding, Measurements, instrument_covariance, spread
+from stages.calibrate.gauge.adjust import Measurements, instrument_covariance, spread
 from stages.calibrate.gauge.geometry import Gauge
+from stages.calibrate.gauge.solve import Finding
 from stages.calibrate.gauge.state import ENCODER, SheetModel
 
 # A parameter is named in a direction that moves it by this share of its own σ or more (chosen, for reading).
 _NAMED_SHARE = 0.3
 _AZIMUTHS = 72
-# Edges or rings that err by more than so many times their noise contradict the calibration. In eleven gauge
-# runs of open-1, open-2 and blind-a, with their concealed faults, they err by 1.5 to 2.7 times: speckle,
+# Edges or rings with errors above this many times their noise contradict the calibration. In eleven gauge
+# runs of open-1, open-2 and blind-a, with their concealed faults, the errors are 1.5 to 2.7 times: speckle,
 # paint and compression. A baseline that drifts by .3 mm makes it 7.5, a seam of 2 px 7 and 9, pixels 2 % too
 # wide 35.
 _MOST_SPREAD = 5.0
@@ -28,8 +29,8 @@ _MOST_SPREAD = 5.0
 class RadiusError:
     """Error of the radius by azimuth (A,), in a bore of ``radius_mm`` with the probe on its axis.
 
-    ``before_mm`` (A,) is by how much the stated probe would measure the radius too large, by the calibrated
-    one, and ``stated_sigma_mm`` (A,) its stated 1 σ. ``sigma_mm`` (A,) is 1 σ of the calibrated probe.
+    ``before_mm`` (A,) is the error of the radius with the stated probe, relative to the calibrated one, and
+    ``stated_sigma_mm`` (A,) its stated 1 σ. ``sigma_mm`` (A,) is 1 σ of the calibrated probe.
     """
 
     radius_mm: float
@@ -41,16 +42,16 @@ class RadiusError:
 
 @dataclass(frozen=True)
 class WeakDirection:
-    """A combination of parameters that the run determines little.
+    """A combination of parameters that the run hardly determines.
 
     Attributes
     ----------
     change : dict of str to float
         Change of each parameter of importance, one posterior σ of the combination.
     radius_mm : float
-        By how much that moves the measured radius, at the azimuth where it does most.
+        Largest change of the measured radius by it over the azimuths.
     prior_share : float
-        Posterior σ over prior σ of the combination; 1 where the run has told nothing.
+        Posterior σ over prior σ of the combination; 1 if the run has no information on it.
     """
 
     change: dict[str, float]
@@ -60,17 +61,17 @@ class WeakDirection:
 
 @dataclass(frozen=True)
 class GaugeCalibration:
-    """The calibrated probe and all that the report tells.
+    """The calibrated probe and the content of the report.
 
     Attributes
     ----------
     name : str
-        Of the gauge run.
+        Name of the gauge run.
     stated, probe : Probe
-        Before and after; the latter with full covariance.
+        The probe before and after; the latter with full covariance.
     sheet : SheetModel
     evidence : dict of SheetModel to float
-        Drop of χ², corrected for residuals that err alike, of the models that were tried.
+        Drop of χ², corrected for correlated residuals, of the tried models.
     encoder, encoder_sigma : (3,)
         Scale, offset in mm and delay in s; NaN without encoder.
     bore_mm, bore_sigma_mm : (S,)
@@ -83,7 +84,7 @@ class GaugeCalibration:
     edge_spread, ring_spread : float
         Robust spread of residuals in σ of noise.
     wrong_fiducials, wrong_rings : (K,) int
-        Numbers of fiducials and frames outvoted.
+        Numbers of rejected fiducials and frames.
     left_out : dict of str to int
     radii : tuple of RadiusError
     weak : tuple of WeakDirection
@@ -114,7 +115,7 @@ class GaugeCalibration:
 
 
 def calibration_of(name: str, frame: Int, gauge: Gauge, finding: Finding) -> GaugeCalibration:
-    """Return the calibration that a finished adjustment stands for."""
+    """Return the calibration that follows from a finished adjustment."""
     solution, state = finding.solution, finding.solution.state
     unsure = state.unsure
     covariance = unsure @ instrument_covariance(solution) @ unsure.T
@@ -138,7 +139,7 @@ def calibration_of(name: str, frame: Int, gauge: Gauge, finding: Finding) -> Gau
 
 
 def warn_of_misfit(result: GaugeCalibration, context: Context) -> None:
-    """Warn where fiducials or rings lie farther from where the result has them than noise explains."""
+    """Warn if fiducials or rings differ from the result by more than noise explains."""
     edge_px, ring_mm = robust_spread(result.edge_residual_px), robust_spread(result.ring_residual_mm)
     for name, off, times in (
         ("the edges of the fiducials", f"{edge_px:.2g} px", result.edge_spread),
@@ -146,10 +147,10 @@ def warn_of_misfit(result: GaugeCalibration, context: Context) -> None:
     ):
         if times > _MOST_SPREAD:
             context.warn(
-                f"{name} lie {off} (1 σ) from where the calibrated probe sees them, {times:.0f} times their "
-                "noise: a camera and laser as modelled cannot have seen this gauge like that. The "
-                "calibration may be wrong by more than its σ. What to do: look whether the recorder scales, "
-                "stretches, cuts or stabilises the pictures, whether the camera sits tight, and whether "
+                f"{name} lie {off} (1 σ) from their places by the calibrated probe, {times:.0f} times their "
+                "noise: the model of camera and laser does not explain these pictures of the gauge. The "
+                "calibration may be wrong by more than its σ. What to do: check whether the recorder scales, "
+                "stretches, cuts or stabilises the pictures, whether the camera is tight, and whether "
                 "gauge and fiducials are as described; boresight diagnose may name the cause"
             )
 
@@ -169,7 +170,7 @@ def radius_jacobian(probe: Probe, radius_mm: float, azimuth_rad: Float) -> Float
 
 
 def radius_error(stated: Probe, probe: Probe, radius_mm: float) -> RadiusError:
-    """Return how far off the stated probe is in a bore, and how well the calibrated one is known."""
+    """Return the error of the stated probe in a bore, and the σ of the calibrated one."""
     azimuth = np.linspace(-np.pi, np.pi, _AZIMUTHS, endpoint=False)
     xyz_c = stated.triangulate(ring_pixels(probe, radius_mm, azimuth))
     sigma = []
@@ -181,7 +182,7 @@ def radius_error(stated: Probe, probe: Probe, radius_mm: float) -> RadiusError:
 
 
 def weak_directions(probe: Probe, unsure: Float, radius_mm: float) -> tuple[WeakDirection, ...]:
-    """Return combinations of parameters, the one that moves the radius most first.
+    """Return combinations of parameters in the order of their effect on the radius.
 
     They are principal directions of the probe's covariance; ``unsure`` (P, Q) holds one prior σ of each
     correction.

@@ -18,35 +18,29 @@ ENCODER = 3
 
 
 class GaugeParameters(Parameters):
-    """What the gauge calibration lets the user choose.
+    """Parameters of the gauge calibration.
 
-    The laser's priors are wide on purpose: a gauge run is to find a misaligned sheet, which the stated
-    uncertainty would hold back. The camera's priors are its stated uncertainties times a factor.
+    The laser's priors are wide on purpose: a gauge run should find a misaligned sheet, which the stated
+    uncertainty would suppress. The camera's priors are its stated uncertainties times a factor.
     """
 
-    baseline_prior_mm: float = Field(1.0, gt=0, le=20, description="1 σ, mm, of the baseline beforehand")
-    tilt_prior_deg: float = Field(
-        2.0, gt=0, le=20, description="1 σ, deg, of each tilt of the sheet beforehand"
-    )
-    cone_prior_deg: float = Field(
-        1.0, gt=0, le=20, description="1 σ, deg, of the sheet's elevation beforehand"
-    )
+    baseline_prior_mm: float = Field(1.0, gt=0, le=20, description="prior 1 σ, mm, of the baseline")
+    tilt_prior_deg: float = Field(2.0, gt=0, le=20, description="prior 1 σ, deg, of each tilt of the sheet")
+    cone_prior_deg: float = Field(1.0, gt=0, le=20, description="prior 1 σ, deg, of the sheet's elevation")
     decentre_prior_mm: float = Field(
         0.5,
         gt=0,
         le=5,
-        description="1 σ, mm, of the sheet's decentring beforehand, where the data ask for it",
+        description="prior 1 σ, mm, of the sheet's decentring, if the data require it",
     )
     waviness_prior_rad: float = Field(
-        0.002, gt=0, le=0.05, description="1 σ, rad, of each wave of the sheet beforehand, where asked for"
+        0.002, gt=0, le=0.05, description="prior 1 σ, rad, of each wave of the sheet, if the data require it"
     )
     camera_prior_scale: float = Field(
-        1.0, ge=1, le=1000, description="factor on the camera's stated uncertainty beforehand"
+        1.0, ge=1, le=1000, description="factor on the camera's stated uncertainty in its prior"
     )
-    placement_sigma_mm: float = Field(
-        0.05, gt=0, le=5, description="1 σ, mm, by which a fiducial may be off its stated place"
-    )
-    delay_prior_s: float = Field(0.05, gt=0, le=1, description="1 σ, s, of the encoder's delay beforehand")
+    placement_sigma_mm: float = Field(0.05, gt=0, le=5, description="1 σ, mm, of a fiducial's place")
+    delay_prior_s: float = Field(0.05, gt=0, le=1, description="prior 1 σ, s, of the encoder's delay")
     encoder_sigma_mm: float = Field(0.1, gt=0, le=10, description="1 σ, mm, of an encoder reading")
     encoder_slip_sigma_mm: float = Field(
         0.02, gt=0, le=1, description="1 σ, mm, of the encoder's slip from one frame to the next"
@@ -76,13 +70,13 @@ class GaugeParameters(Parameters):
     )  # fmt: skip
     evidence: float = Field(
         25.0, ge=0, le=1e6,
-        description="drop of χ², beyond ln n for each parameter, for which decentring or waviness is taken",
+        description="drop of χ², beyond ln n for each parameter, from which decentring or waviness is used",
     )  # fmt: skip
     iterations: int = Field(12, ge=3, le=100, description="most Gauss-Newton steps of each adjustment")
 
 
 class SheetModel(StrEnum):
-    """What the laser sheet is allowed to be."""
+    """Models of the laser sheet."""
 
     PLAIN = "baseline, tilt and cone"
     DECENTRED = "baseline, tilt, cone and decentring"
@@ -92,7 +86,7 @@ class SheetModel(StrEnum):
 
 @dataclass(frozen=True)
 class Layout:
-    """Where each global unknown lies in the border.
+    """Indices of the global unknowns in the border.
 
     First the encoder's scale, offset and delay, then the radii of the bores, then the shift of each
     fiducial's four edges, then the instrument.
@@ -125,7 +119,7 @@ class Layout:
 
 @dataclass(frozen=True)
 class Unknowns:
-    """All that the adjustment estimates.
+    """The unknowns of the adjustment.
 
     Attributes
     ----------
@@ -157,7 +151,7 @@ class Unknowns:
 
     @property
     def layout(self) -> Layout:
-        """Where each global unknown lies."""
+        """Indices of the global unknowns."""
         return Layout(len(self.bore_mm), len(self.edge_mm), len(self.instrument))
 
     @property

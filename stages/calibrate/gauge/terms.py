@@ -20,17 +20,17 @@ from stages.calibrate.gauge.state import ENCODER, GaugeParameters, Unknowns
 # Half the span over which the encoder's speed is differenced, and 1 σ with which the first frame's slip is
 # held at 0: half and twice of them move no parameter of drawn gauge runs by 1e-9 of its σ.
 _STEP_S, _ORIGIN_SIGMA_MM = 1e-3, 1e-3
-# A ring farther than this from where it is expected is an outlier, and its derivatives are of no interest.
+# A ring farther than this from its expected place is an outlier, and its derivatives have no influence.
 _FARTHEST_PX = 3.0
 # Half the step of a derivative along the image radius, px: its error is of the third order, below 1e-6.
 _APART = 0.1
-# Side of the cells of wall in which errors are taken as alike. Debt: data/debts.md.
+# Side of the cells of wall in which errors are assumed equal. Debt: data/debts.md.
 WALL_CELL_MM = 10.0
 
 
 @dataclass(frozen=True)
 class Equations:
-    """Linearised measurements: ``rows``, residuals in σ, and where on the wall each was made (cluster)."""
+    """Linearised measurements: ``rows``, residuals in σ, and the cell of wall of each (cluster)."""
 
     rows: Rows
     in_sigma: Float
@@ -38,7 +38,7 @@ class Equations:
 
 
 def edge_equations(state: Unknowns, edges: Edges) -> Equations:
-    """Return the equations of borders: each is seen where it was measured; its edge may be a little off."""
+    """Return the equations of borders: each is projected to its measured place, up to a shift of its edge."""
     return _weighted(edge_rows(state, edges), edges.sigma_px, 4 * edges.marker + edges.side)
 
 
@@ -65,10 +65,10 @@ def edge_rows(state: Unknowns, edges: Edges) -> Rows:
 
 
 def ring_equations(state: Unknowns, rings: BoreRings) -> Equations:
-    """Hold each triangulated ring point to the bore of its section.
+    """Return the equations: each triangulated ring point lies on the bore of its section.
 
-    Derivatives are taken where the ring is expected, not where it was measured: taken there they hold the
-    measurement's own noise, and its product with the residual's has a mean, which moves baseline and cone
+    Derivatives are taken at the expected, not at the measured place of the ring: there they contain the
+    measurement's own noise, and its product with the residual has a mean, which biases baseline and cone
     (W. A. Fuller, "Measurement Error Models", 1987, ch. 3).
     """
     residual, uv = expected_ring(state, rings)
@@ -97,7 +97,7 @@ def ring_rows(state: Unknowns, rings: BoreRings, residual: Float, uv: Float) -> 
 
 
 def expected_ring(state: Unknowns, rings: BoreRings) -> tuple[Float, Float]:
-    """Return how far (M,) ring points lie off the bore, mm, and where (M, 2) in the image they should be."""
+    """Return the distances (M,), mm, of ring points from the bore, and their expected pixels (M, 2)."""
     residual = ring_residual(state, rings, rings.uv)
     higher, lower = (ring_residual(state, rings, rings.uv + way * rings.outward) for way in (_APART, -_APART))
     away = np.clip(2 * _APART * residual / (higher - lower), -_FARTHEST_PX, _FARTHEST_PX)
@@ -105,7 +105,7 @@ def expected_ring(state: Unknowns, rings: BoreRings) -> tuple[Float, Float]:
 
 
 def ring_residual(state: Unknowns, rings: BoreRings, uv: Float) -> Float:
-    """Return how far (M,) ring points seen at ``uv`` (M, 2) lie off the bore, mm."""
+    """Return the distances (M,), mm, from the bore of ring points seen at ``uv`` (M, 2)."""
     return np.asarray(_wall_at(state, state.T_pc[rings.frame], uv)[2] - _bore_radius(state, rings))
 
 
@@ -193,7 +193,7 @@ def _weighted(rows: Rows, sigma: Float, cluster: Int) -> Equations:
 
 
 def frame_spread(frame: Int, in_sigma: Float) -> Float:
-    """Return (M,) the robust spread of each equation's frame, in σ, not below that of the typical frame."""
+    """Return the robust spread (M,) of each equation's frame, in σ, not below that of the typical frame."""
     numbers, place = np.unique(frame, return_inverse=True)
     spread = np.array([robust_spread(in_sigma[place == k]) for k in range(len(numbers))])
     typical = np.median(spread) if len(spread) else 1.0

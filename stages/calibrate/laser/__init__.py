@@ -1,4 +1,4 @@
-"""The laser plane from boards with the laser line across them: board pose, line on the board, plane."""
+"""Calibrates the laser plane from boards with the laser line across them: board pose, line, plane."""
 
 from __future__ import annotations
 
@@ -40,11 +40,11 @@ class BoardLine:
     Attributes
     ----------
     name : str
-        Of the picture.
+        Name of the picture.
     T_cb : (4, 4)
-        Board to camera, mm.
+        Transform from board to camera, mm.
     pose_covariance : (6, 6)
-        Of its rotation vector, rad, and translation, mm, in C, by the scatter of the board's corners.
+        Covariance of its rotation vector, rad, and translation, mm, in C, from the scatter of the corners.
     pose_rms_px : float
         Root mean square distance of the board's corners from their projection.
     xyz_c : (N, 3)
@@ -81,7 +81,7 @@ def calibrate_laser(
     Raises
     ------
     InputError
-        When the camera's images are not of the pictures' size, or two pictures have one name.
+        When the camera's images have another size than the pictures, or two pictures have the same name.
     """
     known = camera.camera
     if known is None or found.image_size != known.image_size:
@@ -109,7 +109,7 @@ def _lit_boards(pictures: Pictures, found: FoundBoards) -> list[LaserPicture]:
 def calibrate_laser_plane(
     pictures: Sequence[LaserPicture], camera: Camera, parameters: LaserPlaneParameters, context: Context
 ) -> LaserCalibration:
-    """Return the laser plane that lines on boards of several poses lie in.
+    """Return the laser plane through the lines on boards in several poses.
 
     Raises
     ------
@@ -179,7 +179,7 @@ def _refuse_too_few(
 
 
 def _refuse_one_line(xyz_c: Float, parameters: LaserPlaneParameters) -> None:
-    """Raise when the lines are nearly one: the plane of a board that was not moved holds them as well."""
+    """Raise when the lines nearly coincide: the plane of a board that was not moved contains them, too."""
     along, across = np.linalg.svd(xyz_c - xyz_c.mean(0), compute_uv=False)[:2] / np.sqrt(len(xyz_c))
     if not across >= parameters.least_spread * along:
         raise UnusableError(

@@ -1,4 +1,4 @@
-"""The laser line on a board of known pose, measured in the board's plane.
+"""Measures the laser line on a board of known pose, in the board's plane.
 
 On a plane board the laser plane draws a straight line, whatever the camera. So the picture is resampled on a
 grid in the board's plane, and the line is found there by consensus of the brightest points. Then it is
@@ -28,20 +28,20 @@ _OUTLIER_SIGMAS = 3.0
 _LARGEST_GRID = 4000
 _OUTSIDE = -1e3
 _STEPS = 12
-# From where, and by which steps of place and log width, a peak is fitted: half and twice change nothing.
+# Start, and steps of place and log width, of the fit of a peak: half and twice change nothing.
 _LARGEST_STEP, _START_WIDTH, _LEAST_WIDTH = np.array([2.0, 0.3]), 3.0, 0.8
 _WIDEST_SHARE = 0.4
 
 
 class LaserPlaneParameters(Parameters):
-    """Where the laser line is looked for, what counts as line, and what makes pictures unfit."""
+    """Parameters of the search of the laser line, of its detection, and of refusing pictures."""
 
     wavelength_nm: float = Field(default=520.0, ge=380, le=750, description="wavelength of the laser, nm")
     margin_squares: float = Field(
         default=1.0,
         ge=0,
         le=50,
-        description="how far beyond the outermost corners found the board is still flat, squares",
+        description="margin of flat board beyond the outermost corners found, squares",
     )
     huber_px: float = Field(
         default=1.0, gt=0, le=20, description="residual beyond which a corner counts linearly, px"
@@ -116,7 +116,7 @@ def _linear_part(x: Float, y: Float, centre: Float, log_width: Float) -> tuple[F
 
 
 def _without(jacobian: Float, bell: Float) -> Float:
-    """Return the columns (S, X, 2) with what a constant and the bell explain taken out."""
+    """Return the columns (S, X, 2) without their components along a constant and the bell."""
     varying = bell - bell.mean(1, keepdims=True)
     unit = varying / np.maximum(np.linalg.norm(varying, axis=1, keepdims=True), 1e-12)
     centred = jacobian - jacobian.mean(1, keepdims=True)
@@ -124,7 +124,7 @@ def _without(jacobian: Float, bell: Float) -> Float:
 
 
 class BoardPatch(NamedTuple):
-    """The part of a board's plane that is looked at.
+    """The examined part of a board's plane.
 
     ``T_cb`` (4, 4), corners ``low_mm`` and ``high_mm`` (2,) in B, ``mm_per_px`` of the picture there.
     """
@@ -145,7 +145,7 @@ class StraightLine(NamedTuple):
 
     @property
     def across(self) -> Float:
-        """(2,) unit vector square to the line."""
+        """(2,) unit vector perpendicular to the line."""
         return np.array([-self.direction[1], self.direction[0]])
 
 
@@ -165,7 +165,7 @@ def measure_line(
     Parameters
     ----------
     excess : (H, W)
-        How much of the laser's colour each pixel has beyond grey, grey levels.
+        Excess of the laser's colour over grey in each pixel, grey levels.
     """
     candidates, height = _candidates(excess, camera, patch, parameters)
     line = _consensus(candidates, height, _LINE_PX * patch.mm_per_px)
@@ -183,7 +183,7 @@ def measure_line(
 def _candidates(
     excess: Float32, camera: Camera, patch: BoardPatch, parameters: LaserPlaneParameters
 ) -> tuple[Float, Float]:
-    """Return the board points (K, 2) that stand out most from around them, and their heights (K,)."""
+    """Return the board points (K, 2) with the largest contrast to their surroundings, and heights (K,)."""
     step = max(patch.mm_per_px, float(np.max(patch.high_mm - patch.low_mm)) / _LARGEST_GRID)
     columns, rows = (np.arange(a, b, step) for a, b in zip(patch.low_mm, patch.high_mm, strict=True))
     grid = np.stack(np.meshgrid(columns, rows), -1)
@@ -200,14 +200,14 @@ def _candidates(
 
 
 def _raised(face: Float, window_px: float) -> Float:
-    """Return a picture smoothed by a pixel, minus what is there on a wider scale."""
+    """Return a picture smoothed by a pixel, minus its wider-scale background."""
     single = face.astype(np.float32)
     fine, coarse = (cv2.GaussianBlur(single, (0, 0), s) for s in (1.0, window_px))
     return np.asarray(fine - coarse, np.float64)
 
 
 def _ridge(raised: Float) -> Bool:
-    """Return where a picture is highest along its row or its column among neighbours."""
+    """Return where a picture has a maximum along its row or its column."""
     highest = np.zeros(raised.shape, bool)
     for kernel in (np.ones((1, 3), np.uint8), np.ones((3, 1), np.uint8)):
         highest |= raised >= cv2.dilate(raised, kernel)
@@ -215,7 +215,7 @@ def _ridge(raised: Float) -> Bool:
 
 
 def _consensus(points: Float, height: Float, tolerance_mm: float) -> StraightLine | None:
-    """Return the straight line that most height of points (K, 2) agrees with (RANSAC, fixed draws)."""
+    """Return the straight line with the largest summed height of points (K, 2) (RANSAC, fixed draws)."""
     if len(points) < 2:
         return None
     random = np.random.default_rng(0)
@@ -241,7 +241,7 @@ def _line_through(points: Float, weight: Float) -> StraightLine:
 
 
 def _stations(line: StraightLine, patch: BoardPatch) -> Float:
-    """Return (S, 2) points along the line, a pixel apart, no farther than a line is seen."""
+    """Return points (S, 2) along the line, a pixel apart, within its seen part."""
     along = np.arange(line.start, line.stop, _STATION_PX * patch.mm_per_px)
     return np.asarray(line.origin + along[:, None] * line.direction)
 

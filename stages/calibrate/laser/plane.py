@@ -1,8 +1,8 @@
-"""The plane through laser lines on boards, robustly, with a covariance that holds the boards' poses.
+"""Fits a plane through laser lines on boards, robustly, with a covariance that includes the boards' poses.
 
-The plane of least squared distances passes through the centroid, square to the direction of least scatter
-(K. Pearson, "On lines and planes of closest fit to systems of points in space", 1901). Outliers are weighted
-down after Tukey by iterated reweighting.
+The plane of least squared distances passes through the centroid, perpendicular to the direction of least
+scatter (K. Pearson, "On lines and planes of closest fit to systems of points in space", 1901). Outliers are
+weighted down after Tukey by iterated reweighting.
 """
 
 from __future__ import annotations
@@ -15,22 +15,22 @@ from pipeline.adjustment.robust import TUKEY, cluster_sums, robust_spread, root_
 from pipeline.arrays import Float, Int
 from pipeline.instrument.laser import LaserPlane
 
-# Weights have settled when none changes by more: half and twice of it move the plane by 1e-9 of its σ.
+# Weights have converged when none changes by more: half and twice of it move the plane by 1e-9 of its σ.
 _MOST_STEPS, _SETTLED = 50, 1e-9
-# A straight line in a picture has two numbers; the plane takes three of all of them.
+# A straight line in a picture has two parameters; the plane takes three of all of them.
 _NUMBERS_PER_LINE, _UNKNOWNS = 2, 3
 
 
 @dataclass(frozen=True)
 class BoardErrors:
-    """How the points of every board err together, since the board's pose errs.
+    """Common errors of the points of every board, which follow from the errors of the board's pose.
 
     Attributes
     ----------
     arm_c : (N, 3)
-        Every point, from the origin of its board, mm.
+        Vector of every point from the origin of its board, mm.
     pose_covariance : (G, 6, 6)
-        Of the boards' rotation vectors, rad, and translations, mm, in C.
+        Covariance of the boards' rotation vectors, rad, and translations, mm, in C.
     """
 
     arm_c: Float
@@ -43,9 +43,9 @@ def fit_plane(xyz_c: Float, group: Int, boards: BoardErrors | None = None) -> La
     Parameters
     ----------
     group : (N,)
-        Which points err together, such as the number of the picture that each comes from: 0, 1, ...
+        Number of the group of each point with common errors, such as the number of its picture: 0, 1, ...
     boards : BoardErrors, optional
-        What is known of how they do.
+        The errors of the boards' poses.
     """
     return _weighted(xyz_c, group, np.ones(len(xyz_c)), boards)
 
@@ -90,15 +90,15 @@ def _covariance(
 ) -> Float:
     """Return the covariance (4, 4) of (n, d) from the residuals' own spread and the boards' poses.
 
-    An error of a board's pose displaces all points of its picture. What the plane follows of it leaves no
-    residual, so it is taken from the poses' covariance. The whole is scaled up where the groups' gradients
+    An error of a board's pose displaces all points of its picture. The part that the plane follows leaves no
+    residual, so it is taken from the poses' covariance. The covariance is scaled up if the groups' gradients
     scatter more than that.
     """
     jacobian = np.concatenate([xyz_c @ tangents, -np.ones((len(xyz_c), 1))], 1)
     inverse = np.linalg.pinv((jacobian * weight[:, None]).T @ jacobian, hermitian=True)
     variance = float(weight @ residual**2) / max(int(np.count_nonzero(weight)) - _UNKNOWNS, 1)
     spread = variance * inverse
-    found = spread * _togetherness(jacobian * (weight * residual)[:, None], group, inverse, variance)
+    found = spread * _correlation_factor(jacobian * (weight * residual)[:, None], group, inverse, variance)
     if boards is not None:
         moved = np.concatenate([np.cross(boards.arm_c, normal), np.broadcast_to(normal, xyz_c.shape)], 1)
         products = (jacobian * weight[:, None])[:, :, None] * moved[:, None]
@@ -110,8 +110,8 @@ def _covariance(
     return np.asarray(embedding @ spread @ embedding.T)
 
 
-def _togetherness(gradient: Float, group: Int, inverse: Float, variance: float) -> float:
-    """Return the scatter of the groups' gradients (N, 3) against that of independent points, at least 1."""
+def _correlation_factor(gradient: Float, group: Int, inverse: Float, variance: float) -> float:
+    """Return the scatter of the groups' gradients (N, 3) over that of independent points, at least 1."""
     summed = cluster_sums(gradient, group)
     groups = len(summed)
     freedom = _NUMBERS_PER_LINE * groups - _UNKNOWNS

@@ -15,7 +15,8 @@ from numpy.lib.stride_tricks import sliding_window_view
 
 from pipeline.adjustment.robust import robust_spreads
 from pipeline.arrays import Bool, Float, Int
-from pipeline.artefacts.measured import LaserKnock, RingPoints
+from pipeline.artefacts.measured import RingPoints
+from pipeline.artefacts.motion import LaserKnock
 from pipeline.geometry.axis import to_pipe
 from pipeline.instrument.probe import Probe
 from pipeline.machine.stage import Context

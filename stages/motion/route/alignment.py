@@ -14,7 +14,7 @@ from scipy.optimize import least_squares
 
 from pipeline.adjustment.robust import robust_spread
 from pipeline.arrays import Float
-from pipeline.artefacts.measured import PipePiece
+from pipeline.artefacts.motion import PipePiece
 from pipeline.geometry.axis import PipeAxis, frames_at
 
 HEADING_DRIFT = 1e-5

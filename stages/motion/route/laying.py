@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from pipeline.arrays import Float, Int
-from pipeline.artefacts.measured import PipePiece, Trajectory
+from pipeline.artefacts.measured import Trajectory
+from pipeline.artefacts.motion import PipePiece
 from pipeline.geometry.axis import PipeAxis, axis_through, distance_along, frames_at
 from pipeline.geometry.rigid import from_parts, rotation_from_vector, skew, transform, vector_from_rotation
 from pipeline.instrument.probe import ImuMount, Probe

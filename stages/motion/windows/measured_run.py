@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipeline.arrays import Float, Int
-from pipeline.artefacts.measured import LaserKnock, RingSamples
+from pipeline.artefacts.measured import RingSamples
+from pipeline.artefacts.motion import LaserKnock
 from pipeline.instrument.probe import Probe
 from stages.motion.bore import Bore
 from stages.motion.bundle_adjustment.equations import MATCH_BIASES, Measurements

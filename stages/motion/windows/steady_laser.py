@@ -8,7 +8,7 @@ import numpy as np
 
 from pipeline.adjustment.levenberg_marquardt import Watch
 from pipeline.arrays import Bool, Float
-from pipeline.artefacts.measured import LaserKnock
+from pipeline.artefacts.motion import LaserKnock
 from stages.motion.bundle_adjustment.equations import Measurements, Scales, linearised, scales_of
 from stages.motion.bundle_adjustment.extra_columns import ExtraColumns
 from stages.motion.bundle_adjustment.laser_knock import (

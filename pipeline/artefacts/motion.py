@@ -1,0 +1,74 @@
+"""Parts of a trajectory: events of the motion, pieces of the pipe, and a knock of the laser.
+
+Lengths are in mm, angles in rad, times in s; frames C (camera) and P (pipe) as in `measured`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from pipeline.arrays import Float
+
+
+@dataclass(frozen=True)
+class MotionEvent:
+    """An event of the motion: slip, stop, reversal, dropped or duplicated frame, lost track."""
+
+    kind: str
+    frame_from: int
+    frame_to: int
+    size: float
+    unit: str
+    note: str
+
+
+@dataclass(frozen=True)
+class PipePiece:
+    """A straight length or a bend of the pipe, found in its axis.
+
+    Attributes
+    ----------
+    kind : str
+        ``straight`` or ``bend``.
+    from_mm, to_mm : float
+        Distances along the axis.
+    sigma_mm : float
+        1 σ of each of these limits; for the ends of the run, of the distance between them.
+    angle_rad, angle_sigma_rad : float
+        Angle by which the piece turns the pipe; 0 for a straight length.
+    toward_rad : float
+        Azimuth in P toward which a bend turns; NaN for a straight length.
+    radius_mm, radius_sigma_mm : float
+        Radius of the bend's axis; NaN for a straight length.
+    standard : str
+        Name of the one standard radius that fits, such as ``1.5 D``; empty if none or several fit.
+    """
+
+    kind: str
+    from_mm: float
+    to_mm: float
+    sigma_mm: float
+    angle_rad: float = 0.0
+    angle_sigma_rad: float = 0.0
+    toward_rad: float = float("nan")
+    radius_mm: float = float("nan")
+    radius_sigma_mm: float = float("nan")
+    standard: str = ""
+
+
+@dataclass(frozen=True)
+class LaserKnock:
+    """A permanent displacement of the laser relative to the camera between two rings.
+
+    Attributes
+    ----------
+    frame : int
+        First frame after it.
+    change : (3,)
+        Change of the sheet's baseline, mm, and of its slopes along x and y of C.
+    covariance : (3, 3)
+    """
+
+    frame: int
+    change: Float
+    covariance: Float
