@@ -1,1 +1,1 @@
-"""The public face: what `import boresight` offers; the command line is built on it."""
+"""The public API: the functions of `import boresight`; the command line is built on it."""

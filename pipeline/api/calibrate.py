@@ -1,4 +1,4 @@
-"""A probe calibrated from a script, as `boresight calibrate` calibrates it."""
+"""Calibrates a probe from a script, in the same way as `boresight calibrate`."""
 
 from __future__ import annotations
 
@@ -32,9 +32,9 @@ class Calibration:
     path : Path
         Folder with probe.yaml, calibration.json and calibration.html.
     result : GaugeCalibration
-        The probe before (``stated``) and after (``probe``, with its covariance), and what it rests on.
+        The probe before (``stated``) and after (``probe``, with its covariance), and the measurements.
     warnings : tuple of str
-        What the reader of the recording noticed and what the stages warn of.
+        Warnings of the reader of the recording and of the stages.
     """
 
     path: Path
@@ -58,7 +58,7 @@ def calibrate(
 ) -> Calibration:
     """Find camera and laser sheet, with covariance, from a run through a gauge of known bore.
 
-    What the folder already holds of the same inputs, parameters and program is not computed again.
+    Results that the folder already holds for the same inputs, parameters and program are used again.
 
     Parameters
     ----------
@@ -67,13 +67,13 @@ def calibrate(
     output : path
         Folder for probe.yaml, calibration.json and calibration.html.
     probe : path, optional
-        The stated probe's file; the one that the recording names when it is left out.
+        File of the stated probe; by default the one that the recording names.
     config : path or str, optional
         A file of parameters of the stages `premises`, `rings` and `gauge`.
     settings : sequence of str
         Single parameters, each ``stage.name=value``; they override those of ``config``.
     display : Display, optional
-        Is told how the stages stand; nothing is shown when it is left out.
+        Receives the progress of the stages; by default nothing is shown.
 
     Returns
     -------
@@ -82,9 +82,9 @@ def calibrate(
     Raises
     ------
     InputError
-        When the recording, the probe, a parameter or the folder cannot be used, or it is no gauge run.
+        When the recording, the probe, a parameter or the folder cannot be used, or it is not a gauge run.
     UnusableError
-        When the recording is well formed, but a stage cannot measure what it must.
+        When the recording is well formed, but a stage cannot measure what it needs.
     Cancelled
         When the user stopped it with Ctrl-C; the same call continues from there.
     """

@@ -36,7 +36,7 @@ def write_report(result: GaugeCalibration, made_by: MadeBy, folder: Path) -> Non
 
 
 def report_document(result: GaugeCalibration) -> dict[str, Any]:
-    """Return the report as plain data; what is not known is None."""
+    """Return the report as plain data; unknown values are None."""
     free = np.flatnonzero(np.diag(result.probe.covariance) > 0)
     sigma = np.sqrt(np.diag(result.probe.covariance))[free]
     covariance = result.probe.covariance[np.ix_(free, free)]
@@ -64,7 +64,7 @@ def report_document(result: GaugeCalibration) -> dict[str, Any]:
 
 
 def report_page(result: GaugeCalibration, document: dict[str, Any]) -> str:
-    """Return the report as one file that needs nothing else."""
+    """Return the report as one self-contained file."""
     figures = {
         "image": image_figure(result),
         "run": run_figure(result),
@@ -79,7 +79,7 @@ def advice(names: tuple[str, ...]) -> str:
     """Return which motion would determine a combination of these parameters better."""
     sideways = {"cx", "cy", "tilt_x", "tilt_y", "decentre_x_mm", "decentre_y_mm"}
     if set(names) & sideways:
-        return "drive the probe farther off-centre, to all sides, and roll it"
+        return "move the probe farther off-centre, to all sides, and roll it"
     if any(name.startswith("wave") for name in names):
         return "roll the probe by a full turn"
     if "baseline_mm" in names and len(names) == 1:

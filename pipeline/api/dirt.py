@@ -1,4 +1,4 @@
-"""Parameters of a run that leave dirt and drops, which a twin found, out of photo and rings."""
+"""Settings of a run that exclude dirt and drops, which a twin found, from photo and rings."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ _WIDER = 1.5
 # At the radius found for a drop, texture is still displaced by 0.3 px; most of that ends within a quarter
 # more.
 _WIDER_DROP = 1.2
-# 1 σ of a sharp line, and how far a rim may move it: light that changes by a share g per px across a line of
-# width w moves it by g w². A ring's sample is measured to about as much.
+# 1 σ of a sharp line, and its largest displacement by a rim: light that changes by a share g per px across a
+# line of width w moves it by g w². A ring's sample is measured to about as much.
 _LINE_PX, _MOVED_PX = 1.2, 0.03
 
 
 def dirt_of(twin: Path | str | None) -> tuple[str, ...]:
-    """Return the settings that leave out of photo and rings what a twin found on window or lens.
+    """Return the settings that exclude from photo and rings what a twin found on window or lens.
 
-    A speck that dims the line alike on both its flanks leaves it where it is, and stays in the rings.
+    A speck that dims both flanks of the line equally does not displace it, and stays in the rings.
 
     Raises
     ------
@@ -41,7 +41,7 @@ def dirt_of(twin: Path | str | None) -> tuple[str, ...]:
         more = [_WIDER_DROP if "aside" in m["parameters"] else _WIDER for m in on_image]
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise InputError(
-            file, "is not a result of boresight twin", expected="its twin.json", hint="name its folder"
+            file, "is not a result of boresight twin", expected="its twin.json", hint="state its folder"
         ) from error
     wider = [[u, v, by * r] for by, (u, v, r) in zip(more, places, strict=True)]
     of_line = [p for p, m in zip(wider, moved, strict=True) if m]
@@ -49,9 +49,9 @@ def dirt_of(twin: Path | str | None) -> tuple[str, ...]:
 
 
 def _moves_line(found: dict[str, Any], radius_px: float) -> bool:
-    """Return whether what is on the window moves the line: a drop, or a rim that is steep for its width."""
+    """Return whether a finding on the window moves the line: a drop, or a rim that is steep for its width."""
     if found["name"] is None or "glint" in found["name"].split(" or "):
-        return bool(found["channel"] == "line")  # the LEDs mirrored somewhere do not show in laser frames
+        return bool(found["channel"] == "line")  # mirrored LEDs do not show in laser frames
     share = found["parameters"].get("share")
     if share is None:
         return True

@@ -1,4 +1,4 @@
-"""One piece of work: sources, stages and exporters, from opened inputs to a finished folder."""
+"""A job: sources, stages and exporters, from opened inputs to a finished folder."""
 
 from __future__ import annotations
 
@@ -37,22 +37,22 @@ Kind = TypeVar("Kind")
 
 @dataclass(frozen=True)
 class Job:
-    """What is to be computed, and where its results go.
+    """A computation and the folder of its results.
 
     Attributes
     ----------
     command : str
-        Of boresight; it goes into run.json and into what exporters write.
+        Command of boresight, which run.json and the exported files state.
     sources : tuple of Source
     stages, exporters
     configuration : Configuration
     folder : Path
     about : mapping of str to JSON
-        What run.json says of the sources beyond their hashes.
+        Entries of run.json on the sources in addition to their hashes.
     lent : tuple of Path
-        Folders of other runs, whose results are used where they are those of the plan.
+        Folders of other runs, whose results are used if they match the plan.
     at_once : int
-        How many stages may run side by side.
+        Largest number of stages that run at the same time.
     """
 
     command: str
@@ -77,20 +77,20 @@ class Job:
 
     @property
     def recording(self) -> Recording:
-        """The recording that is worked on."""
+        """The recording that the job processes."""
         return self.source(Recording)
 
     @cached_property
     def plan(self) -> Plan:
-        """The wired plan; raises `PipelineError` when stages do not fit together.
+        """The plan of the stages; raises `PipelineError` when stages do not fit together.
 
-        It is made once: keys follow the program's text, which may be changed while a job is at work.
+        It is made once: keys depend on the program's text, which may change while a job is running.
         """
         return make_plan(self.stages, self.configuration, self.sources)
 
 
 def recording_source(recording: Recording, role: str = "") -> Source:
-    """Return a recording as a source, in the role it has where a job works on several."""
+    """Return a recording as a source, with a role if a job has several recordings."""
     kind = of_role(Recording, role)
     return Source(kind, recording, recording.content_key, partial(refuse_changed, recording))
 
@@ -106,7 +106,7 @@ def probe_source(probe: Probe) -> Source:
 
 
 def recording_record(recording: Recording) -> dict[str, Json]:
-    """Return what run.json says of a recording."""
+    """Return the entries of run.json on a recording."""
     return {
         "name": recording.name,
         "kind": recording.kind,
@@ -117,7 +117,7 @@ def recording_record(recording: Recording) -> dict[str, Json]:
 
 
 def probe_record(probe: ProbeSource) -> dict[str, Json]:
-    """Return what run.json says of a probe file."""
+    """Return the entries of run.json on a probe file."""
     return {
         "path": str(probe.path.resolve()),
         "calibrated_from": probe.calibrated_from,
@@ -164,20 +164,20 @@ def open_job(
     opened = open_recording(recording)
     file = probe or opened.probe_file
     if file is None:
-        noticed = "; ".join(("has no probe to measure with", *opened.warnings))
-        raise InputError(recording, noticed, expected="a probe file", hint="give one with --probe FILE")
+        noticed = "; ".join(("has no probe file", *opened.warnings))
+        raise InputError(recording, noticed, expected="a probe file", hint="state one with --probe FILE")
     believed, source = read_with_source(file)
     check_probe_fits(opened, believed)
     return recording_job(opened, believed, source, stages, exporters, configuration, folder, command)
 
 
 def result_of(job: Job, kind: type[Kind]) -> Kind:
-    """Return what a stage of a job that was run has made, from its store or from one lent to it.
+    """Return the result of a stage of a finished job, from its store or a lent one.
 
     Raises
     ------
     InputError
-        When it is not there, since somebody changed the folder meanwhile.
+        When it is missing, since somebody changed the folder meanwhile.
     """
     step = job.plan.maker(kind)
     for folder in (job.folder, *job.lent):
@@ -207,12 +207,12 @@ def run_job(job: Job, selection: Selection, display: Display) -> RunOutcome:
 
 
 def run_shown(job: Job, console: Console) -> RunOutcome:
-    """Run a job with its progress shown; print those of its warnings that were not shown with it.
+    """Run a job and show its progress; then print its warnings that were not shown yet.
 
     Raises
     ------
     BoresightError
-        As `run_job` raises it.
+        In the same cases as `run_job`.
     """
     with ProgressDisplay(console) as display:
         outcome = run_job(job, Selection(), display)

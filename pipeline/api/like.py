@@ -1,4 +1,4 @@
-"""A scene like a run: its pipe, its path, its probe and its light, for `boresight simulate --like`."""
+"""Makes a scene from a run: its pipe, path, probe and light, for `boresight simulate --like`."""
 
 from __future__ import annotations
 
@@ -39,14 +39,14 @@ from stages.twin.scene import SHADING_MM, SMOOTHING_MM
 
 MEASURED = "measured.npz"
 _BEYOND_MM = 250.0
-"""Length of photo that is mirrored beyond each end: a camera looks farther ahead than the run has seen."""
+"""Length of photo that is mirrored beyond each end: a camera looks farther ahead than the measured wall."""
 _ROUNDS, _LOOKED_AT = 3, 3
-"""Rounds in which the lights are set (several, because clipped light is not linear), and frames of each light
-compared."""
+"""Iterations that set the lights (several, because clipped light is not linear), and compared frames of each
+light."""
 _LIT = 10.0
-"""Grey levels above black from which a pixel tells of a light."""
+"""Grey levels above black from which a pixel counts as lit."""
 _LARGE_WELL_E = 1e9
-"""Full well, electrons, of a camera without shot noise: at full scale 3e-5 of the signal are left. Chosen."""
+"""Full well, electrons, of a camera without shot noise: at full scale 3e-5 of the signal remain. Chosen."""
 # Grey levels above this are clipped or nearly so.
 _CLEAR_OF_WHITE = 250.0
 _DEFECT = ("kind", "distance_mm", "azimuth_deg", "length_mm", "width_mm", "depth_mm")
@@ -54,7 +54,7 @@ _DEFECT = ("kind", "distance_mm", "azimuth_deg", "length_mm", "width_mm", "depth
 
 @dataclass(frozen=True)
 class Changed:
-    """What differs from the run.
+    """The differences from the run.
 
     Attributes
     ----------
@@ -63,7 +63,7 @@ class Changed:
     probe : Path or None
         File of another probe.
     defects : sequence of str
-        Defects to put in, each ``KIND,DISTANCE,AZIMUTH,LENGTH,WIDTH,DEPTH`` in mm and deg, as in
+        Defects to add, each ``KIND,DISTANCE,AZIMUTH,LENGTH,WIDTH,DEPTH`` in mm and deg, as in
         ``pit,120,45,6,5,1.2``.
     """
 
@@ -83,7 +83,7 @@ def scene_like(run: Path, name: str, folder: Path, changed: Changed) -> Scene:
     InputError
         When the run, its recording, the probe or a defect cannot be used.
     UnusableError
-        When the run's wall or frames tell too little.
+        When the run's wall or frames do not contain enough information.
     """
     record, opened, files = read_run_record(run), open_run(run), RunFiles(run)
     recording = opened.recording()
@@ -102,7 +102,7 @@ def _values(run: Run, recording: Recording, frames: CheckedFrames, probe: Path, 
     radius = float(np.nanmean(run.wall.radius_map.radius_mm))
     return {
         "name": name,
-        "summary": f"like the run {run.path.name} of {recording.name}",
+        "summary": f"made from the run {run.path.name} of {recording.name}",
         "frames": len(run.trajectory.frame),
         "frame_rate": recording.frame_rate,
         "pattern": frames.illumination[np.isin(frames.frame, run.trajectory.frame)].tolist(),
@@ -148,7 +148,7 @@ def _wall(measured: MeasuredWall, photo: WallTexture) -> Wall:
 
 
 def photo_as_reflectance(photo: WallTexture) -> Float32:
-    """Return the photo (H, W, 3) as reflectance from 0 to 1; what was not seen takes the mean about it."""
+    """Return the photo (H, W, 3) as reflectance from 0 to 1; unseen wall gets the mean around it."""
     known = (photo.bgra[..., 3] > 0).astype(np.float32)
     colour = photo.bgra[..., :3].astype(np.float32) / 255
     if known.all():
@@ -162,7 +162,7 @@ def photo_as_reflectance(photo: WallTexture) -> Float32:
 
 
 def _photometry(run: Run, frames: CheckedFrames, recording: Recording, folder: Path) -> Photometry:
-    """Return the photometric state, worked out under the runner."""
+    """Return the photometric state, computed by the runner."""
     parts: tuple[tuple[type, object], ...] = (
         (CheckedFrames, frames), (RingSamples, run.rings), (Trajectory, run.trajectory),
         (MeasuredWall, run.wall), (WallTexture, run.texture),
@@ -192,10 +192,9 @@ def _grey_of_colour(recording: Recording, frames: CheckedFrames) -> tuple[float,
 
 
 def _seen_light(found: Photometry, offset: float, slope: float) -> dict[str, Any]:
-    """Return lights and sensor of the photometric state, as a scene has them.
+    """Return lights and sensor of the photometric state, as entries of a scene.
 
-    ``offset`` and ``slope`` lead from the luma of a colour picture, which is rendered, to the grey levels
-    that the state is in.
+    ``offset`` and ``slope`` convert the luma of a rendered colour picture to the grey levels of the state.
     """
     state = found.state
     noise, line, lamp = state.noise, state.line, state.lamp
@@ -215,10 +214,10 @@ def _seen_light(found: Photometry, offset: float, slope: float) -> dict[str, Any
 
 
 def _sensor_noise(noise: CameraNoise, slope: float) -> dict[str, float]:
-    """Return the noise of a sensor whose grey is as noisy as the recorded one; nothing where that is unknown.
+    """Return the noise of a sensor whose grey has the recorded noise; empty if that is unknown.
 
-    Noise is drawn for each colour, and grey, the sum of all by their shares, has less of it. A camera without
-    shot noise has a well so large that it has hardly any.
+    Noise is drawn for each colour, and grey, the weighted sum of all, has less of it. A camera without shot
+    noise gets a very large full well.
     """
     less, read = float(np.linalg.norm(LUMA_BGR)), noise.read_variance.value - 1 / 12
     if read <= 0 and math.isinf(noise.variance_per_level.sd):
@@ -229,7 +228,7 @@ def _sensor_noise(noise: CameraNoise, slope: float) -> dict[str, float]:
 
 
 def _with_lights(scene: Scene, file: Path, recording: Recording) -> Scene:
-    """Return the scene with laser and LEDs so bright that frames are as bright as the recorded ones."""
+    """Return the scene with laser and LEDs set so that frames are as bright as the recorded ones."""
     light = np.array([scene.pattern[k % len(scene.pattern)] for k in range(scene.frames)])
     for _ in range(_ROUNDS):
         renderer = renderer_of(plain_truth(scene, file))
@@ -252,7 +251,7 @@ def _with_lights(scene: Scene, file: Path, recording: Recording) -> Scene:
 
 
 def _ratio(recorded: Sequence[Float], rendered: Sequence[Float], black: float) -> float:
-    """Return how much brighter recorded frames are where both are lit."""
+    """Return the ratio of recorded to rendered brightness where both are lit."""
     above = [np.stack(recorded) - black, np.stack(rendered) - black]
     use = (above[0] > _LIT) & (above[1] > _LIT)
     if not use.any():
@@ -280,7 +279,7 @@ def _defect(text: str) -> dict[str, Any]:
     except ValueError as error:
         raise InputError(
             "--defect",
-            f"{text!r} is not understood",
+            f"{text!r} is not a defect",
             expected="KIND,DISTANCE,AZIMUTH,LENGTH,WIDTH,DEPTH",
-            hint="write, for instance, pit,120,45,6,5,1.2: mm and deg",
+            hint="write KIND,DISTANCE,AZIMUTH,LENGTH,WIDTH,DEPTH in mm and deg, such as pit,120,45,6,5,1.2",
         ) from error

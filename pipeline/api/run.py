@@ -1,4 +1,4 @@
-"""A recording run from a script, as `boresight run` runs it."""
+"""Processes a recording from a script, in the same way as `boresight run`."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def run(
 ) -> Run:
     """Turn a recording into a run folder and return the run, opened.
 
-    What the folder already holds of the same inputs, parameters and program is not computed again.
+    Results that the folder already holds for the same inputs, parameters and program are used again.
 
     Parameters
     ----------
@@ -50,22 +50,22 @@ def run(
     folder : path
         The run folder: a new one, an empty one, or that of an earlier run.
     probe : path, optional
-        The probe file to use; the one that the recording names when it is left out.
+        The probe file to use; by default the one that the recording names.
     config : path or str, optional
         A file of parameters, or the name of a shipped one (`shipped_names`).
     settings : sequence of str
         Single parameters, each ``stage.name=value``; they override those of ``config``.
     twin : path, optional
-        Folder of `twin` on an earlier run of this recording: dirt and drops that it found are kept out of
-        photo and rings, and so of findings.
+        Folder of `twin` on an earlier run of this recording: dirt and drops that it found are excluded from
+        photo and rings, and so from findings.
     from_stage : str
         Compute this stage and all after it again.
     only : str
         Run this stage alone.
     resume : bool
-        Whether to use what the folder holds; False computes everything again.
+        Whether to use existing results; False computes everything again.
     display : Display, optional
-        Is told how the stages stand; nothing is shown when it is left out.
+        Receives the progress of the stages; by default nothing is shown.
 
     Returns
     -------
@@ -76,7 +76,7 @@ def run(
     InputError
         When the recording, the probe, a parameter or the folder cannot be used.
     UnusableError
-        When the recording is well formed, but a stage cannot measure what it must.
+        When the recording is well formed, but a stage cannot measure what it needs.
     Cancelled
         When the user stopped it with Ctrl-C; the same call continues from there.
     """
@@ -113,15 +113,15 @@ TableName = Literal["sections", "defects", "trajectory"]
 
 
 class MissingPackageError(BoresightError):
-    """A package that boresight can do without is needed for what was asked; the text says how to get it."""
+    """An optional package is needed for this call; the text says how to install it."""
 
 
 @dataclass(frozen=True)
 class Run:
-    """A run folder. Everything is read when it is first asked for; big arrays are mapped from their files.
+    """A run folder. Everything is read at first use; big arrays are mapped from their files.
 
-    Lengths are mm, angles rad unless a name says deg, times s. Frame C is the camera (x right, y down, z
-    forward), P the pipe (z along it); ``T_pc`` maps C to P. A σ is one standard deviation. NaN marks what was
+    Lengths are in mm, angles in rad unless a name says deg, times in s. Frame C is the camera (x right, y
+    down, z forward), P the pipe (z along it); ``T_pc`` maps C to P. A σ is one standard deviation. NaN means
     not measured. The arrays are read-only.
 
     Attributes
@@ -139,7 +139,7 @@ class Run:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What the reader of the recording noticed and what the stages warn of."""
+        """Warnings of the reader of the recording and of the stages."""
         record = self._files.record()
         return (*record["reader_warnings"], *record["warnings"])
 
@@ -179,7 +179,7 @@ class Run:
         return self._files.artefact(Defects)
 
     def findings(self) -> tuple[Finding, ...]:
-        """Return the findings as they stand in the review: decided, edited, merged, split and added.
+        """Return the findings with the decisions of the review: accepted, edited, merged, split and added.
 
         Raises
         ------
@@ -202,7 +202,7 @@ class Run:
         return self._files.probe()
 
     def recording(self) -> Recording:
-        """Return the recording that the run was made from, opened.
+        """Return the opened recording of the run.
 
         Raises
         ------
@@ -234,7 +234,7 @@ class Run:
             ) from error
         file = self._files.file(f"{name}.csv")
         if not file.is_file():
-            raise InputError(file, "is not there", hint="give one of: sections, defects, trajectory")
+            raise InputError(file, "does not exist", hint="state one of: sections, defects, trajectory")
         return pandas.read_csv(file)
 
     @property

@@ -1,4 +1,4 @@
-"""Recordings rendered from a script, as `boresight simulate` renders them."""
+"""Renders recordings from a script, in the same way as `boresight simulate`."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from pipeline.simulator.produce import Order, Places, beside, produce
 from pipeline.simulator.scene import Scene, read_scene
 from stages.diagnose.drill.cases import ANSWER
 
-# Is told the name of a scene, how many of its frames are rendered, and how many it has.
+# Receives the name of a scene, the number of rendered frames, and the number of all.
 Progress = Callable[[str, int, int], None]
 
 
@@ -31,12 +31,12 @@ class Simulated:
     recording : Path
         Folder that `run`, `calibrate` and `diagnose` take.
     truth : Path
-        Folder of everything that was drawn or chosen: wall, motion, instrument, effects.
+        Folder with all that was drawn or chosen: wall, motion, instrument, effects.
     frames : int
     sealed : bool
         Whether the recording holds hashes of its truth.
     premises : tuple of Premise
-        What was checked so that the scene shows what it is meant to show.
+        Checks that the scene shows its effects.
     """
 
     recording: Path
@@ -64,27 +64,27 @@ def simulate(
     scene : path or str
         A scene file, or the name of a shipped one (`shipped_names`).
     recording : path
-        Folder of the recording, which must not be there yet.
+        Folder of the recording, which must not exist yet.
     truth : path, optional
-        Folder of the truth; beside the recording, with ``-truth`` added to its name, when it is left out.
+        Folder of the truth; by default beside the recording, with ``-truth`` added to its name.
     effects : sequence of str
         Effects to switch on, each as on the command line: ``laser_tilt`` at its typical size, or with its
         sizes, such as ``laser_tilt=0.6@40``.
     seed : int, optional
-        Seed in place of the scene's.
+        Seed instead of the scene's.
     frames : int, optional
-        Render only so many, from the first.
+        Render only the first ``frames`` frames.
     seal : bool
-        Give the recording hashes of its truth, so that the truth can be checked later.
+        Add hashes of the truth to the recording, so that the truth can be checked later.
     progress : callable, optional
-        Is told the scene's name, the frames rendered and the frames in all.
+        Receives the scene's name, the number of rendered frames and the number of all.
 
     Raises
     ------
     InputError
         When the scene, an effect or a folder cannot be used.
     UnusableError
-        When the scene cannot show what it is meant to show; says what to change.
+        When the scene cannot show its effects; says what to change.
     """
     file = file_or_shipped(Path(scene), SCENES)
     described = read_scene(file)
@@ -112,26 +112,26 @@ def simulate_like(
     frames: int | None = None,
     progress: Progress | None = None,
 ) -> Simulated:
-    """Render a recording of a run's pipe with its probe and its light, changed where asked.
+    """Render a recording of a run's pipe with its probe and its light, with the requested changes.
 
-    The truth holds the scene and the measured pipe, so that `simulate` takes it again.
+    The truth holds the scene and the measured pipe, so that `simulate` can render it again.
 
     Parameters
     ----------
     run : path
-        Folder of a completed run, whose recording is still there.
+        Folder of a completed run, whose recording still exists.
     recording : path
-        Folder of the recording, which must not be there yet.
+        Folder of the recording, which must not exist yet.
     truth : path, optional
         As in `simulate`.
     effects : sequence of str
-        Effects to switch on, as in `simulate`; the folder of a diagnosis stands for all that it found.
+        Effects to switch on, as in `simulate`; the folder of a diagnosis means all effects that it found.
     speed : float
         Factor on the speed of the probe.
     probe : path, optional
         File of another probe.
     defects : sequence of str
-        Defects to put in: each ``KIND,DISTANCE,AZIMUTH,LENGTH,WIDTH,DEPTH`` in mm and deg.
+        Defects to add: each ``KIND,DISTANCE,AZIMUTH,LENGTH,WIDTH,DEPTH`` in mm and deg.
     seed : int
         Seed of the noise and of the defects' shapes.
     frames : int, optional
@@ -144,7 +144,7 @@ def simulate_like(
     InputError
         When run, probe, diagnosis, effect, defect or folder cannot be used.
     UnusableError
-        When the run tells too little, or the scene cannot show what it is meant to show.
+        When the run does not contain enough information, or the scene cannot show its effects.
     """
     folder = Path(recording)
     places = Places(folder, beside(folder) if truth is None else Path(truth))
@@ -165,7 +165,7 @@ def _existing(folder: Path) -> Path:
 
 
 def _switched(effects: Sequence[str]) -> tuple[Switch, ...]:
-    """Return the switches of texts; the folder of a diagnosis stands for what it found."""
+    """Return the switches of texts; the folder of a diagnosis means the effects that it found."""
     found: list[Switch] = []
     for text in effects:
         answer = Path(text) / ANSWER
@@ -190,13 +190,13 @@ def simulate_pairs(
     Parameters
     ----------
     prior : path or str
-        What to draw from: a file, or the name of a shipped one (`shipped_names`).
+        The prior: a file, or the name of a shipped one (`shipped_names`).
     folder : path
-        Gets a folder for each recording.
+        Folder of the recordings, each in its own folder.
     count, first : int
         Draw ``count`` pairs, from pair number ``first`` on.
     truth : path, optional
-        Folder of all truths; beside ``folder`` when it is left out.
+        Folder of all truths; by default beside ``folder``.
     seed : int
         Seed of the draw; the same seed draws the same pairs.
     frames, seal, progress
@@ -207,7 +207,7 @@ def simulate_pairs(
     InputError
         When the prior, a scene or a folder cannot be used.
     UnusableError
-        When a scene cannot show what it is meant to show; says what to change.
+        When a scene cannot show its effects; says what to change.
     """
     file = file_or_shipped(Path(prior), PRIORS)
     drawn_from, recordings = read_prior(file), Path(folder)

@@ -1,4 +1,4 @@
-"""A run's frames beside the same frames re-rendered, from a script, as `boresight twin` makes them."""
+"""Compares a run's frames with re-rendered ones from a script, in the same way as `boresight twin`."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from stages.catalogue import PIPELINE
 from stages.texture import TEXTURE
 from stages.twin import PHOTOMETRY, TWIN
 
-# Compressed this far, forty frames make one page of a few MB; the figures come from whole frames.
+# With this compression, forty frames make one page of a few MB; the figures come from uncompressed frames.
 _JPEG_QUALITY = 85
 _MEASURED = PIPELINE[: PIPELINE.index(TEXTURE) + 1]
 
@@ -41,23 +41,22 @@ def twin(
 ) -> Twin:
     """Re-render frames of a run, compare them with the recorded ones, and say where and why they differ.
 
-    What the run holds is not computed again, unless the program has changed or ``diagnosis`` brings another
-    probe.
+    The run's results are used, unless the program has changed or ``diagnosis`` has another probe.
 
     Parameters
     ----------
     run : path
-        A run folder; best of a run with ``premises.withhold=10``, of which no stage has measured the frames
-        withheld.
+        A run folder, preferably of a run with ``premises.withhold=10``, whose withheld frames no stage has
+        used.
     output : path
         Folder for twin.json and twin.html.
     diagnosis : path, optional
-        Folder of a diagnosis, whose corrected probe takes the place of the run's: wall, motion and photo are
-        worked out again with it.
+        Folder of a diagnosis, whose corrected probe replaces the run's: wall, motion and photo are computed
+        again with it.
     settings : sequence of str
         Single parameters, each ``stage.name=value``; they override those of the run.
     display : Display, optional
-        Is told how the stages stand; nothing is shown when it is left out.
+        Receives the progress of the stages; by default nothing is shown.
 
     Raises
     ------
@@ -76,7 +75,7 @@ def twin(
 
 @dataclass(frozen=True)
 class TwinOf:
-    """The folder of the run whose frames are re-rendered, and what differs from that run.
+    """The folder of the run whose frames are re-rendered, and the differences from that run.
 
     Attributes
     ----------
@@ -84,7 +83,7 @@ class TwinOf:
     again : tuple of str
         Stages that are computed again because the program or their parameters have changed.
     diagnosed : bool
-        Whether the corrected probe of a diagnosis takes the place of the run's, and all is computed again.
+        Whether the corrected probe of a diagnosis replaces the run's, so that all is computed again.
     """
 
     run: str
@@ -121,7 +120,7 @@ def twin_job(
 
 
 def twin_document(found: Twin, tried: DiagnosisTried, of: TwinOf) -> dict[str, Any]:
-    """Return a twin as plain data; what is not known is None."""
+    """Return a twin as plain data; unknown values are None."""
     gauge = None if tried.gauge is None else _gauge(tried.gauge)
     return {
         "format": 1,
@@ -171,7 +170,7 @@ def _figures(figures: Sequence[NamedFigure]) -> dict[str, Any]:
 
 
 def psnr_without_noise(found: Twin) -> str:
-    """Return in words the peak signal to noise ratio of lit wall whose noise is taken off."""
+    """Return in words the peak signal-to-noise ratio of lit wall after subtraction of the noise."""
     if math.isnan(found.psnr_db):
         return "not compared"
     if math.isinf(found.psnr_noise_free_db):

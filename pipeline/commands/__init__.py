@@ -1,4 +1,4 @@
-"""One thin command each, which `pipeline.cli` attaches by name; here are the options that several take."""
+"""One module for each command, which `pipeline.cli` attaches by name; here are the common options."""
 
 from pathlib import Path
 from typing import Annotated

@@ -43,7 +43,7 @@ def batch(
 ) -> None:
     """Run every recording below a folder; one that fails stops no other.
 
-    Writes OUT/NAME for each, batch.json and batch.html. What is complete already is not computed again.
+    Writes OUT/NAME for each, batch.json and batch.html. Completed runs are not computed again.
     """
     resolve(PIPELINE, config, assignments or ())
     cluster = _cluster(count, scheduler, config)
@@ -73,7 +73,7 @@ def _cluster(count: int | None, scheduler: str, config: Path | None) -> Cluster:
         raise InputError(
             "--workers",
             "and --scheduler exclude each other",
-            hint="give one of them: a scheduler brings its own workers",
+            hint="use one of them: a scheduler has its own workers",
         )
     if scheduler:
         return RunningScheduler(address=scheduler)

@@ -35,7 +35,7 @@ class BoardKind(StrEnum):
 
 
 class ModelChoice(StrEnum):
-    """Camera models, or all of them against each other."""
+    """Camera models, or a comparison of all of them."""
 
     BEST = "best"
     KANNALA_BRANDT = "kannala_brandt"
@@ -108,7 +108,7 @@ def calibrate_camera(
 
 @dataclass(frozen=True)
 class WantedFormat:
-    """The format in which the camera is written beside camera.yaml; empty for none."""
+    """The format in which the camera is written in addition to camera.yaml; empty for none."""
 
     name: str
 

@@ -55,7 +55,7 @@ def residual_figure(report: CalibrationReport) -> Figure:
 
 
 def displacement_figure(report: CalibrationReport) -> Figure:
-    """Return by how much the camera compared with sees directions elsewhere, as colours and arrows."""
+    """Return the displacement of directions in the compared camera, as colours and arrows."""
     map_ = report.displacement
     if map_ is None:
         raise ValueError("nothing was compared")
@@ -80,7 +80,7 @@ def png(figure: Figure) -> bytes:
 def _heat(
     figure: Figure, axes: Axes, report: CalibrationReport, uv: Float, values: Float, label: str
 ) -> None:
-    """Draw a map with a colour range of its inner 90 %, so that extrapolated corners do not drown it."""
+    """Draw a map with a colour range of its inner 90 %, so that extrapolated corners do not dominate."""
     seen = values[np.isfinite(values)]
     top = float(np.percentile(seen, 90)) if seen.size else 1.0
     mesh = axes.pcolormesh(
@@ -105,7 +105,7 @@ def write_report(report: CalibrationReport, compared_file: str, made_by: MadeBy,
 
 
 def report_document(report: CalibrationReport, compared_file: str) -> dict[str, Any]:
-    """Return the report as plain data; what is not known is None."""
+    """Return the report as plain data; unknown values are None."""
     fitted = report.calibration
     sigma = np.sqrt(np.diag(fitted.covariance))
     map_ = report.uncertainty
@@ -139,7 +139,7 @@ def report_document(report: CalibrationReport, compared_file: str) -> dict[str, 
 
 
 def report_page(report: CalibrationReport, document: dict[str, Any]) -> str:
-    """Return the report as one file that needs nothing else."""
+    """Return the report as one self-contained file."""
     pictures = {"uncertainty": png(uncertainty_figure(report)), "residuals": png(residual_figure(report))}
     if report.displacement is not None:
         pictures["displacement"] = png(displacement_figure(report))
@@ -147,7 +147,7 @@ def report_page(report: CalibrationReport, document: dict[str, Any]) -> str:
 
 
 def _board(report: CalibrationReport) -> dict[str, Any]:
-    """Return the board's shape, and by how much its corners leave their nominal places."""
+    """Return the board's shape, and the distances of its corners from their nominal places."""
     sag, survey = report.calibration.shape_mm, report.survey
     largest = float(np.abs(sag).max() if survey is None else np.linalg.norm(survey.offset_mm, axis=1).max())
     return {

@@ -83,7 +83,7 @@ def calibrate_laser(
 
 @dataclass(frozen=True)
 class StatedProbe:
-    """The probe that is to be written again with the plane found; None for none."""
+    """The probe to be written with the new plane; None without one."""
 
     probe: Probe | None
 
@@ -120,7 +120,7 @@ def with_plane(stated: Probe, camera: Camera, plane: LaserPlane, wavelength_nm: 
 
 
 def description(result: LaserCalibration) -> dict[str, object]:
-    """Return the calibration as it stands in laser.json: mm and px, the plane n · x = d in C."""
+    """Return the content of laser.json: mm and px, the plane n · x = d in C."""
     plane = result.plane
     pictures = [
         {

@@ -1,4 +1,4 @@
-"""``boresight diagnose``: what physics was left out, where it shows, and what bears it out."""
+"""``boresight diagnose``: finds left-out physics, where it shows, and the evidence for it."""
 
 from __future__ import annotations
 
@@ -30,15 +30,15 @@ def diagnose(
     ] = False,
     run: Annotated[
         Path | None,
-        typer.Option("--run", metavar="RUN", help="run of FIELD whose results and parameters are taken over"),
+        typer.Option("--run", metavar="RUN", help="run of FIELD whose results and parameters are used"),
     ] = None,
     config: ConfigFile = None,
     assignments: Assignments = None,
 ) -> None:
-    """Find what physics was left out, from an inspection and a gauge run of one probe; either may be missing.
+    """Find left-out physics from an inspection and a gauge run of one probe; either may be missing.
 
-    Writes diagnosis.json, diagnosis.html, arrays.npz, and probe.yaml with what was found put in; with --apply
-    also the inspection reconstructed with that probe, in run.
+    Writes diagnosis.json, diagnosis.html, arrays.npz, and probe.yaml corrected for the effects found; with
+    --apply also the inspection reconstructed with that probe, in run.
     """
     console = Console(stderr=True)
     with ProgressDisplay(console) as display:
@@ -54,7 +54,7 @@ def diagnose(
 
 def _show(answer: Answer, output: Path, console: Console) -> None:
     chance = "not known" if answer.global_p is None else f"{answer.global_p:.2g}"
-    console.print(f"Verdict: {answer.verdict} (chance alone would show as much with probability: {chance})")
+    console.print(f"Verdict: {answer.verdict} (probability of such a result by chance alone: {chance})")
     for e in answer.effects:
         console.print(f"  {e.name} ({e.probability:.1%}): {e.statement}")
     console.print(f"Report: {output / 'diagnosis.html'}")

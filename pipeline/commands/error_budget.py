@@ -1,4 +1,4 @@
-"""``boresight error-budget``: every source of error, its share in the radius, and what dominates."""
+"""``boresight error-budget``: every source of error, its share in the radius, and the dominant ones."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ from pipeline.instrument.budget.sources import NOT_IN_RADIUS, Kind, typical_prob
 from pipeline.instrument.probe_file import read_probe
 from pipeline.pages import page_template, rendered
 
-# Required accuracies where none are given: the seed paper's 0.1 mm, and what a calibrated probe may reach.
+# Default of the required accuracies: the seed paper's 0.1 mm, and that of a calibrated probe.
 ACCURACIES_MM = (0.1, 0.02)
 _COLOURS = ("#0a5ea8", "#b04a00", "#1d6f42", "#7a3e9d", "#8a6d00")
 _LINES = ("-", "--", "-.", ":", (0, (5, 1, 1, 1, 1, 1)))
@@ -50,7 +50,7 @@ def budget_document(
     tolerances: Mapping[float, Sequence[Tolerance]],
     probe_name: str,
 ) -> dict[str, Any]:
-    """Return everything as plain data; lengths mm, rows by falling share."""
+    """Return everything as plain data; lengths in mm, rows by decreasing share."""
     rows = [
         _row(row, share, None if drawn is None else drawn.rows[row.source.name])
         for row, share in dominant_rows(budget)
@@ -107,7 +107,7 @@ def write_budget(document: dict[str, Any], budget: Budget, study: BaselineStudy,
 
 
 def budget_page(document: dict[str, Any], chart_svg: bytes) -> str:
-    """Return the page as one file that needs nothing else."""
+    """Return the page as one self-contained file."""
     return page_template("error_budget").render(d=document, chart=chart_svg)
 
 
@@ -185,8 +185,12 @@ def error_budget(
         typer.Argument(help="probe.yaml, stated or calibrated (default: a typical uncalibrated probe)"),
     ] = None,
     diameter_mm: Annotated[float, typer.Option(help="inner diameter of the pipe, mm")] = 101.6,
-    offset_x_mm: Annotated[float, typer.Option(help="probe off the pipe's axis, right, mm")] = 0.0,
-    offset_y_mm: Annotated[float, typer.Option(help="probe off the pipe's axis, down, mm")] = 0.0,
+    offset_x_mm: Annotated[
+        float, typer.Option(help="offset of the probe from the pipe's axis, right, mm")
+    ] = 0.0,
+    offset_y_mm: Annotated[
+        float, typer.Option(help="offset of the probe from the pipe's axis, down, mm")
+    ] = 0.0,
     sigma: Annotated[
         list[str] | None,
         typer.Option(metavar="NAME=VALUE", help="1 σ of a source in its unit; may be repeated"),
@@ -239,7 +243,7 @@ def _given(assignments: list[str]) -> dict[str, float]:
         try:
             given[name] = float(value)
         except ValueError:
-            raise InputError("--sigma", f"{text!r} is not understood", expected="NAME=NUMBER") from None
+            raise InputError("--sigma", f"{text!r} is not an assignment", expected="NAME=NUMBER") from None
     return given
 
 

@@ -1,4 +1,4 @@
-"""``boresight error-model``: what a tilted laser sheet does to the radius, as figures, page and numbers."""
+"""``boresight error-model``: the effect of a tilted laser sheet on the radius, as figures and page."""
 
 from __future__ import annotations
 
@@ -33,12 +33,12 @@ from pipeline.instrument.misalignment import (
 from pipeline.instrument.probe_file import read_probe
 from pipeline.pages import rendered, tidy
 
-# Baseline of the physics notes; see `implied_baselines_mm` for what the paper's figures imply.
+# Baseline of the physics notes; see `implied_baselines_mm` for the one that the paper's figures imply.
 PAPER_BASELINE_MM = 22.0
-# What the paper states without its baseline: bore of 4 inch, mm; tilt, deg; error of the radius, mm.
+# Figures that the paper states without its baseline: bore of 4 inch, mm; tilt, deg; error of the radius, mm.
 _PAPER_CASE = (101.6, 0.05, 0.1)
-# Table of a camera that the page does not know: every degree up to 110°, every 7.5° around; the page is
-# linear between.
+# Table of a camera model that the page does not have: every degree up to 110°, every 7.5° around; the page
+# interpolates linearly.
 _THETA_STEP_RAD, _THETA_COUNT, _PSI_COUNT = math.radians(1), 111, 48
 INCH_MM = 25.4
 _TRUE, _READ, _DISTANCE, _MUTED = "#0a5ea8", "#b04a00", "#1d6f42", "#5b6875"
@@ -147,8 +147,12 @@ def error_model(
         float, typer.Option(help="azimuth in C toward which the sheet leans forward, deg")
     ] = 0.0,
     opening_angle_deg: Annotated[float, typer.Option(help="opening angle of the sheet, deg")] = 180.0,
-    offset_x_mm: Annotated[float, typer.Option(help="probe off the pipe's axis, right, mm")] = 0.0,
-    offset_y_mm: Annotated[float, typer.Option(help="probe off the pipe's axis, down, mm")] = 0.0,
+    offset_x_mm: Annotated[
+        float, typer.Option(help="offset of the probe from the pipe's axis, right, mm")
+    ] = 0.0,
+    offset_y_mm: Annotated[
+        float, typer.Option(help="offset of the probe from the pipe's axis, down, mm")
+    ] = 0.0,
     output: Annotated[
         Path | None, typer.Option("--output", "-o", help="folder for figures and page (default: error-model)")
     ] = None,
@@ -201,7 +205,7 @@ def write_error_model(
 def error_model_page(
     scan: MisalignedScan, camera: Camera | None, camera_name: str, accuracy_mm: float
 ) -> str:
-    """Return the interactive page as one file that needs nothing else."""
+    """Return the interactive page as one self-contained file."""
     radial, euclidean = implied_baselines_mm(*_PAPER_CASE)
     start = {
         **asdict(scan),
@@ -223,7 +227,7 @@ def error_model_page(
 
 
 def page_camera(camera: Camera) -> dict[str, object]:
-    """Return a camera as the page knows it: Kannala-Brandt by its numbers, any other as a table."""
+    """Return a camera for the page: Kannala-Brandt as its parameters, any other as a table."""
     common = {"image_size": list(camera.image_size), "centre_px": camera.centre_px.tolist()}
     if camera.model == "kannala_brandt":
         names = dict(zip(camera.parameter_names, camera.parameters.tolist(), strict=True))
@@ -238,7 +242,7 @@ def page_camera(camera: Camera) -> dict[str, object]:
 
 
 def _table(camera: Camera) -> list[list[list[float] | None]]:
-    """Tabulate (radial, tangential) px about the centre over polar angle and azimuth; both vary slowly."""
+    """Return a table of (radial, tangential) px from the centre over polar angle and azimuth."""
     theta = np.arange(_THETA_COUNT)[:, None] * _THETA_STEP_RAD
     psi = 2 * np.pi * np.arange(_PSI_COUNT)[None] / _PSI_COUNT
     c, s = np.cos(psi) + 0 * theta, np.sin(psi) + 0 * theta
@@ -259,6 +263,6 @@ def _show(scan: MisalignedScan, numbers: dict[str, float | None], folder: Path) 
     console.print(
         "The larger error is on the side the sheet leans away from. The paper's 0.1 mm at 0.05° in "
         f"a 4 inch pipe implies a baseline of {radial:.1f} mm (radial) or {euclidean:.1f} mm (Euclidean). "
-        "A small tilt is a shift of the ring: one ring cannot tell it from an off-centre probe."
+        "A small tilt shifts the ring: one ring cannot distinguish it from an off-centre probe."
     )
     console.print(f"Figures and interactive page: {folder}", soft_wrap=True)

@@ -1,4 +1,4 @@
-"""``boresight run --follow``: a recording shown on a live page while it is still written."""
+"""``boresight run --follow``: shows a recording on a live page while it is still written."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class Snapshot:
     recording : Recording or None
         None where it cannot be opened yet.
     problem : str
-        Why it cannot.
+        Why it cannot be opened.
     complete : bool
         Whether it has not grown for ``quiet_s``: this is the last state.
     """
@@ -54,7 +54,7 @@ def snapshots(place: Path, quiet_s: float, poll_s: float, wish: threading.Event)
     place : Path
         Folder or file of the recording.
     quiet_s : float
-        A recording that has not grown for so long is at its end.
+        A recording that has not grown for this time is complete.
     poll_s : float
         Time between two looks.
 
@@ -94,7 +94,7 @@ def _size(place: Path) -> int:
 def _bytes(file: Path) -> int:
     try:
         return file.stat().st_size
-    except OSError:  # gone since it was listed, or on a drive that is away for a while
+    except OSError:  # removed since it was listed, or on a drive that is temporarily missing
         return 0
 
 
@@ -103,7 +103,7 @@ _WIDTH, _HEIGHT, _SHOWN = 1000, 260, 2000
 
 
 def write_live_page(name: str, sections: Sequence[PreliminarySection], state: str, folder: Path) -> None:
-    """Replace ``live.html`` at one stroke; while the recording grows, the page reloads every two seconds.
+    """Replace ``live.html`` atomically; while the recording grows, the page reloads every two seconds.
 
     Raises
     ------
@@ -122,7 +122,7 @@ def write_live_page(name: str, sections: Sequence[PreliminarySection], state: st
 
 
 def _chart(sections: Sequence[PreliminarySection]) -> dict[str, object] | None:
-    """Return the diameter over time as points of a polyline, thinned to what a screen shows."""
+    """Return the diameter over time as points of a polyline, thinned to the screen's resolution."""
     thinned = sections[:: max(1, len(sections) // _SHOWN)]
     if len(thinned) < 2:
         return None
@@ -142,7 +142,7 @@ def _chart(sections: Sequence[PreliminarySection]) -> dict[str, object] | None:
 
 # Time between two looks at a growing recording, s.
 _POLL_S = 0.5
-# Enough for a circle, and quick.
+# Enough for a circle, and fast.
 _RINGS = RingParameters.model_validate({"azimuths": 360})
 # Video codecs reorder frames: some that precede the last ones in the file may not be written yet.
 _UNWRITTEN_FRAMES = 8
@@ -192,7 +192,7 @@ def _context(logger: logging.Logger, wish: threading.Event) -> Context:
 def new_sections(
     snapshot: Snapshot, probe: Path | None, after: int, context: Context
 ) -> tuple[PreliminarySection, ...]:
-    """Return the sections after a frame; what a growing recording holds in part only is left for later."""
+    """Return the sections after a frame; incomplete ones of a growing recording are left for later."""
     try:
         return _sections(snapshot, probe, after, context)
     except InputError:

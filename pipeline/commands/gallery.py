@@ -1,4 +1,4 @@
-"""``boresight gallery``: every known effect rendered, measured and put beside its law, on one page."""
+"""``boresight gallery``: renders and measures every known effect, and shows it with its law on one page."""
 
 from __future__ import annotations
 
@@ -29,15 +29,15 @@ from pipeline.simulator.laws.table import all_checks, verdict
 _INCH_MM = 25.4
 # Typical 1 σ of a line's position in one frame, px, named for comparison.
 _NOISE_PX = 0.1
-# Cosine from which two patterns are listed as alike: 26° between them.
+# Cosine from which two patterns are listed as similar: 26° between them.
 _LIKE = 0.9
 # Size of a plot's field; the page adds the margins.
 WIDTH, HEIGHT = 360.0, 130.0
 # Side of the small picture, px.
 _PICTURE_PX = 300
-# Of the unrolled line: px on each side, step, columns around, and how often a column is repeated.
+# Unrolled line: px on each side, step, columns around, and repetitions of a column.
 _STRIP_PX, _STRIP_STEP_PX, _STRIP_COLUMNS, _STRIP_SCALE = 10.0, 0.25, 360, 2
-# The eye's response, so that a faint ghost or tail is seen beside the line.
+# Gamma of the eye, so that a faint ghost or tail is visible beside the line.
 _DISPLAY_GAMMA = 0.45
 # Smallest difference of light that is shown in full colour: below it there is rounding only.
 _LEAST_FULL_SCALE = 1e-4
@@ -59,7 +59,7 @@ class Plot:
 
 
 def picture_png(exhibit: Exhibit) -> bytes:
-    """Return the camera's picture with the effect, made small."""
+    """Return the camera's picture with the effect, reduced in size."""
     shape = (_PICTURE_PX, _PICTURE_PX)
     small = cv2.resize(exhibit.changed, shape, interpolation=cv2.INTER_AREA)
     return _png(_displayed(np.asarray(small, float), 0.5))
@@ -71,7 +71,7 @@ def line_png(exhibit: Exhibit) -> bytes:
 
 
 def difference_png(exhibit: Exhibit) -> tuple[bytes, float]:
-    """Return what the effect changes, red more and blue less light, and the change shown in full colour."""
+    """Return the change by the effect, red more and blue less light, and the change at full colour."""
     change = _around(exhibit, changed=True) - _around(exhibit, changed=False)
     full = max(float(np.quantile(np.abs(change), 0.999)), _LEAST_FULL_SCALE)
     share = np.clip(change / full, -1, 1)
@@ -98,7 +98,7 @@ def ring_plots(exhibit: Exhibit) -> list[Plot]:
 
 
 def course_plot(course: Course) -> Plot:
-    """Return how an effect goes with time."""
+    """Return the course of an effect in time."""
     ticks = _nice(float(course.time_s[0]), float(course.time_s[-1]))
     return _plot(course.of, "mm", course.time_s, [course.value_mm], ("4 inch",), "time, s", ticks, 0.01)
 
@@ -161,7 +161,7 @@ def _png(picture: Byte) -> bytes:
 
 @dataclass(frozen=True)
 class Bore:
-    """How large an effect is in one bore."""
+    """Size of an effect in one bore."""
 
     inch: str
     rms_um: float
@@ -195,7 +195,7 @@ def gallery_page(exhibits: Sequence[Exhibit], checks: Sequence[Check]) -> str:
 
 
 def _shown(exhibit: Exhibit, alike: Sequence[Likeness], checks: Sequence[Check]) -> dict[str, Any]:
-    """Return what the page tells of an effect."""
+    """Return the page's content on an effect."""
     difference, full_scale = difference_png(exhibit)
     course: Plot | None = None if exhibit.course is None else course_plot(exhibit.course)
     return {

@@ -1,4 +1,4 @@
-"""``boresight open-seal``: whether a truth belongs to a recording, as it was sealed."""
+"""``boresight open-seal``: checks that a truth belongs to a recording and is unchanged since the sealing."""
 
 from __future__ import annotations
 

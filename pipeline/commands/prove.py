@@ -63,7 +63,7 @@ def rows_of(done: Sequence[Worked]) -> tuple[Figure, ...]:
         for case in done
         if case.wall is not None and case.trials[0].concealed
     ]
-    words = "Median wall error after correction, relative to that by the true instrument"
+    words = "Median wall error after correction, relative to that with the true instrument"
     value = median(ratios) if ratios else None
     wall = Figure("wall_error", words, "≤ 1.1", value, len(ratios), None)
     return (*figures([trial for case in done for trial in case.trials]), wall)
@@ -112,13 +112,14 @@ def prove(
             "--shuffle", help="score every case by another case's answer: scores must drop to chance"
         ),
     ] = False,
-    workers: Annotated[int, typer.Option(min=1, help="number of cases worked on at a time")] = 1,
+    workers: Annotated[int, typer.Option(min=1, help="number of cases processed at a time")] = 1,
 ) -> None:
     """Prove the diagnosis on recordings in which an effect is concealed.
 
     Without --sealed, probes are drawn, effects concealed, and recordings rendered and sealed. Each is
-    diagnosed by a process that is given the recordings only; then the seal is checked, the truth opened and
-    scored. What is there already is kept: an interrupted proof goes on where it stopped, also within a case.
+    diagnosed by a process that gets only the recordings; then the seal is checked, the truth opened and the
+    answer scored. Existing results are kept: an interrupted proof continues where it stopped, also within a
+    case.
     """
     console = Console(stderr=True)
     require_writable(output)
@@ -145,7 +146,7 @@ def _drawn_and_worked(
         try:
             case = draw_case(drawing, index)
         except NotRenderedError as error:
-            # An effect too small for its scene to show is refused: the others go on.
+            # An effect that is too small to show in its scene is refused: the others continue.
             return _told(Worked((), None, (str(error),), None), console)
         return _told(worked(case, output, drawing.truth, leave_out), console)
 
@@ -157,7 +158,7 @@ def _sealed_and_worked(
     sealed: Path, truth: Path | None, output: Path, leave_out: bool, workers: int, console: Console
 ) -> list[Worked]:
     if truth is None:
-        raise InputError(sealed, "its truth is not given", hint="give the folder of opened truth, --truth")
+        raise InputError(sealed, "its truth is not stated", hint="state the folder of its truth with --truth")
     cases = find_cases(sealed)
     for case in cases:
         require_seal(case, truth)
@@ -166,7 +167,7 @@ def _sealed_and_worked(
 
 
 def _shuffled(done: Sequence[Worked]) -> list[Worked]:
-    """Return all trials, each with the answer to a case that conceals something else, without wall errors."""
+    """Return all trials, each with the answer to a case with another effect, without wall errors."""
     trials = shuffled([trial for case in done for trial in case.trials])
     return [Worked(trials, seconds=None, failures=(), wall=None)]
 
@@ -181,7 +182,7 @@ def _told(done: Worked, console: Console) -> Worked:
 
 def _show(done: Sequence[Worked], console: Console) -> None:
     trials = [trial for case in done for trial in case.trials]
-    table = Table(title=f"{len(trials)} diagnoses against what was concealed")
+    table = Table(title=f"{len(trials)} diagnoses compared with the concealed effects")
     for heading in ("", "value", "of", "95 % interval", "goal"):
         table.add_column(heading)
     for row in rows_of(done):

@@ -1,6 +1,6 @@
-"""Cases of a proof: drawn, rendered, sealed, diagnosed apart; the seal checked before the truth is read.
+"""Cases of a proof: draws, renders, seals and diagnoses them, and checks the seal before reading the truth.
 
-Wall errors are those of an inspection by the stated, the corrected and the true instrument.
+Wall errors are those of an inspection with the stated, the corrected and the true instrument.
 """
 
 from __future__ import annotations
@@ -53,16 +53,16 @@ from stages.rings import RINGS
 ANSWERS, ANSWERS_WITHOUT = "answers", "answers-without"
 # Exit status of `boresight simulate` for a scene that cannot show what it is meant to show.
 _REFUSED_SCENE = 3
-_GO_ON = "mend what it names, then give the same command again: what is there is kept"
+_GO_ON = "correct what it names, then repeat the command: existing results are kept"
 
 
 class NotRenderedError(BoresightError):
-    """A drawn scene cannot show what it is meant to show."""
+    """A drawn scene cannot show its effect."""
 
 
 @dataclass(frozen=True)
 class Drawing:
-    """Where pairs are drawn from and where recordings and truth go."""
+    """The prior of pairs, and the folders of recordings and truth."""
 
     prior: Path
     seed: int
@@ -72,18 +72,18 @@ class Drawing:
 
 @dataclass(frozen=True)
 class Worked:
-    """A case diagnosed, its truth opened.
+    """A diagnosed case with its opened truth.
 
     Attributes
     ----------
     trials : tuple of Trial
-        With the whole library and, where asked for, without the concealed effect.
+        Diagnoses with the whole library and, if requested, without the concealed effect.
     seconds : float or None
-        That the diagnosis with the whole library took; None where it was stopped on the way.
+        Duration of the diagnosis with the whole library; None if it was interrupted.
     failures : tuple of str
         Diagnoses that ended without an answer; they are scored as having identified nothing.
     wall : WallErrors or None
-        Of the inspection, where its truth tells the scene.
+        Wall errors of the inspection, if its truth contains the scene.
     """
 
     trials: tuple[Trial, ...]
@@ -127,12 +127,12 @@ def _render(drawing: Drawing, index: int) -> None:
 
 
 def require_seal(case: Case, truth: Path) -> None:
-    """Refuse a recording that is sealed and not as it was sealed, or whose truth is not.
+    """Refuse a sealed recording that was changed after the sealing, or whose truth was.
 
     Raises
     ------
     InputError
-        Naming the files that were changed.
+        With the names of the changed files.
     """
     for path in (case.gauge, case.field):
         if path is None or not (path / SEAL_FILE).is_file():
@@ -146,7 +146,7 @@ def require_seal(case: Case, truth: Path) -> None:
 
 
 def worked(case: Case, output: Path, truth: Path, leave_out: bool) -> Worked:
-    """Diagnose a case, check its seal, open its truth; where asked, diagnose it without what it conceals."""
+    """Diagnose a case, check its seal, open its truth; if requested, diagnose it without its effect."""
     answer, failures = output / ANSWERS / case.name, []
     failures += _answered(case, answer, ())
     require_seal(case, truth)
@@ -182,7 +182,7 @@ def _seconds(answer: Path) -> float | None:
 
 _SCENE = "truth_scene.yaml"
 _CACHE = "wall_errors.json"
-# Samples off by more than so many spreads lie on edges of the wall: the instrument is not the cause.
+# Samples with errors above so many spreads lie on edges of the wall: the instrument is not the cause.
 _OUTLYING = 5.0
 # Of the samples of a ring only every so many-th is compared, to save time.
 _EVERY = 4
@@ -196,9 +196,9 @@ class WallErrors:
     Attributes
     ----------
     stated_mm, corrected_mm : float
-        By the stated probe and by the one that the diagnosis wrote.
+        Errors with the stated probe and with the one that the diagnosis wrote.
     oracle_mm : float
-        By the true instrument with all that is concealed in it: what the extraction of the line leaves.
+        Error with the true instrument and all concealed effects: that of the line's extraction alone.
     """
 
     stated_mm: float
@@ -226,7 +226,7 @@ def wall_errors(case: Case, answer: Path, truth: Path) -> WallErrors | None:
 
 
 def _kept(file: Path) -> WallErrors | None:
-    """Return what was kept, None where it is not there or not whole: it is worked out again."""
+    """Return the stored errors; None if they are missing or incomplete, so that they are computed again."""
     try:
         return WallErrors(**read_json(file))
     except (OSError, ValueError, TypeError):
@@ -255,14 +255,14 @@ def measured_rings(field: Path, stated: Probe, folder: Path) -> RingSamples:
 
 
 def _uv(rings: RingSamples) -> Float:
-    """Return (F, A, 2) the ring samples in the image."""
+    """Return the ring samples (F, A, 2) in the image, px."""
     azimuth = rings.azimuth_rad[::_EVERY]
     outward = np.stack([np.cos(azimuth), np.sin(azimuth)], -1)
     return np.asarray(rings.centre_px + rings.radius_px[:, ::_EVERY, None].astype(float) * outward)
 
 
 def _by_probe(truth: SceneTruth, frames: Int, uv: Float, probe: Probe) -> Float:
-    """Return (F, A) by how much the samples lie outside the true wall when ``probe`` triangulates them."""
+    """Return the distance (F, A), mm, of samples triangulated with ``probe`` outside the true wall."""
     out = []
     for frame, at in zip(frames, uv, strict=True):
         T_pc = truth.motion.pose(truth.frames.time_s[frame], truth.wall.axis)

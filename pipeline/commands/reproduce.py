@@ -1,4 +1,4 @@
-"""``boresight reproduce``: compute a run again from what its record names, and compare every file."""
+"""``boresight reproduce``: computes a run again from its record, and compares every file."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ from pipeline.machine.plan import Selection
 from pipeline.machine.run_folder import Exporter, RunFolder, published_files
 from stages.catalogue import PIPELINE
 
-# Files that hold the time at which they were made; what they show stands in the other files.
+# Files that contain the time at which they were made; their content is in the other files, too.
 _DATED = frozenset({"report.html"})
 
 
 class Agreement(StrEnum):
-    """How a file of the run stands to the one computed again."""
+    """Comparison of a file of the run with the one computed again."""
 
     SAME = "same"
     DIFFERENT = "different"
@@ -43,14 +43,14 @@ class Agreement(StrEnum):
 
 @dataclass(frozen=True)
 class Compared:
-    """A file of the run folder and what the comparison says of it."""
+    """A file of the run folder and the result of its comparison."""
 
     file: str
     agreement: Agreement
 
 
 class NotReproducedError(BoresightError):
-    """A run whose results did not come out the same again."""
+    """A run whose results were not reproduced."""
 
 
 def reproduce(

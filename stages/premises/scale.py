@@ -99,10 +99,10 @@ def warn_of_oval(rings_mm: Float, context: Context) -> None:
     rays = np.linspace(-np.pi, np.pi, away.shape[1], endpoint=False)
     # Blocks of a codec, taken for the line on one ray in seven, had made a ring 4.6 % longer than wide.
     twice = ring_harmonics(away, basis_of(rays))[:, 3:]
-    known = np.isfinite(twice).all(1)
-    if known.sum() < _LEAST_STEPS:
+    measured = np.isfinite(twice).all(1)
+    if measured.sum() < _LEAST_STEPS:
         return
-    oval = complex(*np.median(twice[known], axis=0))
+    oval = complex(*np.median(twice[measured], axis=0))
     context.report("ring longer than wide by", 200 * abs(oval), "%")
     if abs(oval) > _OVAL:
         towards = notation.clock(float(clock_of_azimuth(np.angle(oval) / 2)))

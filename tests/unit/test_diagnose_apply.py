@@ -58,7 +58,7 @@ def test_without_defects_the_radius_is_told_and_nothing_is_told_of_nothing():
     even, most = np.full(12, 0.1), np.where(np.arange(12) == 0, 0.3, 0.1)
     told = consequence(GeometryChange(even, most, 0.1, ()))
     assert "understated by 0.10 mm all round, and by up to 0.30 mm at 12 o'clock" in told
-    assert "of no consequence" in consequence(GeometryChange(np.zeros(12), np.zeros(12), 0.001, ()))
+    assert "does not matter for depths" in consequence(GeometryChange(np.zeros(12), np.zeros(12), 0.001, ()))
     unseen = np.full(12, np.nan)
     assert consequence(GeometryChange(unseen, unseen, float("nan"), ())) == ""
 

@@ -9,7 +9,8 @@
     found = boresight.diagnose("recording", gauge="gauge", output="diagnosis", run="run")
     print(found.answer.verdict, found.answer.effects)   # boresight.open_diagnosis("diagnosis") reads it again
 
-What is wrong with an input is told by an `InputError`, what a recording cannot show by an `UnusableError`.
+An `InputError` reports a wrong input, an `UnusableError` a recording that does not contain enough
+information.
 """
 
 try:

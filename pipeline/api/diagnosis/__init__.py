@@ -1,1 +1,1 @@
-"""The diagnosis of left-out physics: its report, and the inspection corrected by what was found."""
+"""The diagnosis of left-out physics: its report, and the inspection corrected for the effects found."""

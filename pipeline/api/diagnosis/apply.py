@@ -1,4 +1,4 @@
-"""``boresight diagnose --apply``: the run reconstructed with the corrected probe, and what that changes."""
+"""``boresight diagnose --apply``: reconstructs the run with the corrected probe, and compares both."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ from stages.diagnose.result import EffectFound
 # Defects of two runs that lie closer than this, mm along the pipe and hours on the clock, are the same one
 # (chosen).
 _NEAR_MM, _NEAR_HOURS = 8.0, 1.5
-# Radius changes that scatter by less than this share of their size are told as one "all round" (chosen).
+# Radius changes that scatter by less than this share of their size are reported as one "all round" (chosen).
 _EVEN = 0.2
-# Depth changes and radius changes below these, mm, are not told: no inspection decides on less (chosen).
+# Depth and radius changes below these, mm, are not reported: no inspection decides on less (chosen).
 _LEAST_DEPTH_CHANGE_MM, _LEAST_RADIUS_CHANGE_MM = 0.01, 0.005
-# Stages and files that show the geometry: of the stated run no more is made.
+# Stages and files that show the geometry: for the stated probe, only these are computed.
 _GEOMETRY = frozenset({"rings", "triangulate", "motion", "accumulate", "texture", "defects"})
 _FILES = frozenset({"trajectory.csv", "radius_map.npz", "defects.json"})
 
@@ -51,13 +51,13 @@ class DefectChange:
 
 @dataclass(frozen=True)
 class GeometryChange:
-    """What the correction changes of the pipe.
+    """Changes of the pipe's geometry by the correction.
 
     Attributes
     ----------
     mean_mm, max_mm : (12,)
-        Change of radius (corrected less stated) about clock positions 12, 1 … 11: mean, and the largest in
-        size with its sign; NaN where nothing was seen.
+        Change of radius (corrected minus stated) around clock positions 12, 1 … 11: mean, and the largest
+        with its sign; NaN where nothing was seen.
     rms_mm : float
     defects : tuple of DefectChange
     """
@@ -76,10 +76,10 @@ class Uncorrected:
     ----------
     recording : Recording
     probe_file : Path
-        Of the stated probe.
+        File of the stated probe.
     configuration : Configuration
     run : Path or None
-        A run of it with that very probe and configuration; without one it is reconstructed.
+        A run with the same probe and configuration; without one the inspection is reconstructed.
     """
 
     recording: Recording
@@ -93,12 +93,12 @@ def apply_correction(
 ) -> GeometryChange:
     """Reconstruct the field with the corrected instrument into run, and with the stated one into run-stated.
 
-    What the diagnosis or an earlier run of the field holds is not computed again.
+    Results that the diagnosis or an earlier run of the field holds are used again.
 
     Raises
     ------
     BoresightError
-        As a run raises it.
+        In the same cases as a run.
     """
     stated = _job(field.recording, field.probe_file, field.configuration, folder / "run-stated")
     stated = replace(
@@ -129,7 +129,7 @@ def _true_field(effects: Sequence[EffectFound], field: Recording) -> Recording:
 
 
 def geometry_change(before: Path, after: Path) -> GeometryChange:
-    """Return what changes from one run folder to another of the same recording."""
+    """Return the changes from one run folder to another of the same recording."""
     change, azimuth = _radius_change(before, after)
     hour = np.round(clock_of_azimuth(azimuth)).astype(int) % 12
     mean, largest = np.full(12, np.nan), np.full(12, np.nan)
@@ -144,7 +144,7 @@ def geometry_change(before: Path, after: Path) -> GeometryChange:
 
 
 def consequence(change: GeometryChange) -> str:
-    """Return what the correction means for the inspection, in a sentence."""
+    """Return the consequence of the correction for the inspection, in a sentence."""
     least_mm = _LEAST_DEPTH_CHANGE_MM
     told = [d for d in change.defects if abs(d.after_mm - d.before_mm) > max(2 * d.sigma_mm, least_mm)]
     if told:
@@ -155,7 +155,7 @@ def consequence(change: GeometryChange) -> str:
     k = int(np.nanargmax(np.abs(change.mean_mm)))
     size = float(change.mean_mm[k])
     if abs(size) < _LEAST_RADIUS_CHANGE_MM:
-        return f"The geometry changes by {change.rms_mm:.3f} mm (r.m.s.): of no consequence for depths."
+        return f"The geometry changes by {change.rms_mm:.3f} mm (r.m.s.), which does not matter for depths."
     seemed = "understated" if size > 0 else "overstated"
     most = int(np.nanargmax(np.abs(change.max_mm)))
     everywhere = float(np.nanstd(change.mean_mm)) < _EVEN * abs(size)
@@ -201,7 +201,7 @@ def _defect_changes(before: Path, after: Path) -> tuple[DefectChange, ...]:
 
 
 def _defects(folder: Path) -> list[DefectChange]:
-    """Return a run's defects, their depths as those after."""
+    """Return a run's defects, with their depths as ``after_mm``."""
     entries = json.loads((folder / "defects.json").read_text("utf-8"))
     return [_defect(entry) for entry in entries]
 

@@ -1,4 +1,4 @@
-"""Left-out physics found from a script, as `boresight diagnose` finds it."""
+"""Finds left-out physics from a script, in the same way as `boresight diagnose`."""
 
 from __future__ import annotations
 
@@ -43,10 +43,10 @@ class DiagnosisFolder:
     path : Path
         Folder with diagnosis.json, diagnosis.html, arrays.npz and probe.yaml.
     answer : Answer
-        What diagnosis.json says: verdict, effects with probability and size (value and 1 σ), the class of
-        effects that cannot be told apart, and what to record next.
+        Content of diagnosis.json: verdict, effects with probability and size (value and 1 σ), the class of
+        effects that cannot be distinguished, and what to record next.
     consequence : str
-        What the correction means for the inspection; empty where it was not applied.
+        Consequence of the correction for the inspection; empty if it was not applied.
     """
 
     path: Path
@@ -55,7 +55,7 @@ class DiagnosisFolder:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What the readers of the recordings noticed and what the stages warn of; from run.json."""
+        """Warnings of the readers of the recordings and of the stages, from run.json."""
         record = RunFiles(self.path).record()
         return (*record["reader_warnings"], *record["warnings"])
 
@@ -85,23 +85,24 @@ def diagnose(
     settings: Sequence[str] = (),
     display: Display | None = None,
 ) -> DiagnosisFolder:
-    """Find what physics was left out, from an inspection and a gauge run of one probe; either may be missing.
+    """Find left-out physics from an inspection and a gauge run of one probe; either may be missing.
 
-    What the folder or ``run`` already holds of the same inputs, parameters and program is not computed again.
+    Results that the folder or ``run`` already holds for the same inputs, parameters and program are used
+    again.
 
     Parameters
     ----------
     field : path, optional
         The recording of the inspection: a folder, or a bag; with ``run`` it may be left out.
     output : path
-        Folder for diagnosis.json, diagnosis.html, arrays.npz, probe.yaml (with what was found put in) and
-        run.json, which holds the warnings.
+        Folder for diagnosis.json, diagnosis.html, arrays.npz, probe.yaml (corrected for the effects found)
+        and run.json, which holds the warnings.
     gauge : path, optional
         The recording of the same probe's run through a gauge.
     probe : path, optional
-        The stated probe's file; the one of ``run``, or the one that a recording names, when it is left out.
+        File of the stated probe; by default the one of ``run``, or the one that a recording names.
     run : path, optional
-        A run of ``field``, whose results and parameters are taken over.
+        A run of ``field``, whose results and parameters are used.
     without : sequence of str
         Effects to leave out of the library.
     apply : bool
@@ -111,20 +112,20 @@ def diagnose(
     settings : sequence of str
         Single parameters, each ``stage.name=value``; they override those of ``config``.
     display : Display, optional
-        Is told how the stages stand; nothing is shown when it is left out.
+        Receives the progress of the stages; by default nothing is shown.
 
     Returns
     -------
     DiagnosisFolder
-        Which `open_diagnosis` opens again.
+        The folder, which `open_diagnosis` opens again.
 
     Raises
     ------
     InputError
-        When a recording, the probe, a parameter or the folder cannot be used, ``run`` is of other inputs, or
+        When a recording, the probe, a parameter or the folder cannot be used, ``run`` has other inputs, or
         ``apply`` lacks one of the recordings.
     UnusableError
-        When a recording is well formed, but a stage cannot measure what it must.
+        When a recording is well formed, but a stage cannot measure what it needs.
     Cancelled
         When the user stopped it with Ctrl-C; the same call continues from there.
     """
@@ -132,7 +133,7 @@ def diagnose(
     record = None if lent is None else read_run_record(lent)
     inputs = _inputs(field, gauge, probe, record)
     if apply and (inputs.field is None or gauge is None):
-        raise InputError("diagnose", "--apply needs an inspection and a gauge run", hint="give both")
+        raise InputError("diagnose", "--apply needs an inspection and a gauge run", hint="state both")
     stages = diagnosis_stages(inputs.field is not None, inputs.gauge is not None)
     assigned = [*settings, *([f"diagnosis.without={json.dumps(list(without))}"] if without else [])]
     configuration = _configuration(stages, config, assigned, record, lent)
@@ -154,7 +155,7 @@ def diagnose(
 def _inputs(
     field: Path | str | None, gauge: Path | str | None, probe: Path | str | None, record: RunRecord | None
 ) -> DiagnosisInputs:
-    """Open what is given; inspection and probe that are not given are those of the run's record."""
+    """Open the inputs; a missing inspection or probe is taken from the run's record."""
     if record is not None:
         field, probe = field or record.recording, probe or record.probe
     given = [None if path is None else Path(path) for path in (field, gauge, probe)]
@@ -179,7 +180,7 @@ def _configuration(
     stages: Sequence[Stage], config: Path | str | None, assigned: Sequence[str],
     record: RunRecord | None, run: Path | None,
 ) -> Configuration:  # fmt: skip
-    """Return the parameters of all stages; those of a run of the field stand for defaults."""
+    """Return the parameters of all stages; those of a run of the field replace the defaults."""
     every = (*PIPELINE, *stages)
     file = None if config is None else file_or_shipped(Path(config), PARAMETERS)
     if record is None or run is None:
@@ -188,7 +189,7 @@ def _configuration(
 
 
 def _same_run(record: RunRecord | None, configuration: Configuration) -> bool:
-    """Return whether a run of the field was made with the very parameters of this call."""
+    """Return whether a run of the field was made with the same parameters as this call."""
     now = configuration.tree()
     return record is not None and all(now[s.name] == record.configuration.get(s.name) for s in PIPELINE)
 
@@ -202,7 +203,7 @@ def write_diagnosis(done: Diagnosed, made_by: MadeBy, folder: Path) -> None:
     write_page(done.found, Shown(None, done.image), folder)
     arrays = _arrays(done.found)
     if arrays:
-        # Named as a stream: savez would else append .npz to a name of its own.
+        # Passed as a stream: savez would append .npz to a file name.
         with (folder / "arrays.npz").open("wb") as stream:
             np.savez_compressed(stream, **arrays)  # type: ignore[arg-type]
     document = to_json(done.found) | {"made_by": made_by.document()}

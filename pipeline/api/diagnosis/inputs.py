@@ -19,13 +19,13 @@ from pipeline.recording.base import Recording
 from pipeline.recording.checks import check_probe_fits
 from stages.diagnose.diagnose import Noticed
 
-# Stated parameters farther apart than so many σ are not one probe's.
+# Stated parameters farther apart than so many σ do not belong to one probe.
 _ANOTHER = 8.0
 
 
 @dataclass(frozen=True)
 class DiagnosisInputs:
-    """The recordings and the stated probe, and what was noticed of them (empty for nothing)."""
+    """The recordings and the stated probe, and a notice about them (empty without one)."""
 
     field: Recording | None
     gauge: Recording | None
@@ -43,7 +43,7 @@ class DiagnosisInputs:
         return (*recordings, probe_source(self.probe), noticed)
 
     def record(self) -> Mapping[str, Json]:
-        """Return what run.json says of the recordings and the probe."""
+        """Return the entries of run.json on the recordings and the probe."""
         given = [(role, r) for role, r in (("field", self.field), ("gauge", self.gauge)) if r is not None]
         about: dict[str, Json] = {role: recording_record(r) for role, r in given}
         warnings: list[Json] = [w for _, r in given for w in r.warnings]
@@ -60,7 +60,7 @@ def open_inputs(field: Path | None, gauge: Path | None, probe: Path | None) -> D
         When there is no recording, or a recording or the probe cannot be used.
     """
     if field is None and gauge is None:
-        raise InputError("diagnose", "is given no recording", hint="give FIELD, or --gauge GAUGE, or both")
+        raise InputError("diagnose", "has no recording", hint="state FIELD, or --gauge GAUGE, or both")
     recordings = [open_recording(path) if path is not None else None for path in (field, gauge)]
     stated, file = read_with_source(_probe_file(recordings, probe))
     foreign = _of_another_probe(recordings[1], stated) if field is not None and probe is None else ""
@@ -75,12 +75,12 @@ def _probe_file(recordings: Sequence[Recording | None], probe: Path | None) -> P
     given = [r for r in recordings if r is not None]
     file = probe or next((r.probe_file for r in given if r.probe_file is not None), None)
     if file is None:
-        raise InputError(given[0].path, "names no probe", hint="give one with --probe FILE")
+        raise InputError(given[0].path, "names no probe", hint="state one with --probe FILE")
     return file
 
 
 def _of_another_probe(gauge: Recording | None, stated: Probe) -> str:
-    """Return why a gauge run is not one of the stated probe; empty when it may be."""
+    """Return why a gauge run does not belong to the stated probe; empty when it may."""
     if gauge is None or gauge.probe_file is None:
         return ""
     own = read_probe(gauge.probe_file)
@@ -97,6 +97,4 @@ def _of_another_probe(gauge: Recording | None, stated: Probe) -> str:
         )
         if far
     )
-    return (
-        f"The gauge run {gauge.name} is of another probe ({names}): it was left out and names nothing here."
-    )
+    return f"The gauge run {gauge.name} is of another probe ({names}): it was left out and not used here."

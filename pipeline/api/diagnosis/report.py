@@ -29,22 +29,22 @@ from stages.diagnose.result import (
     WallPicture,
 )
 
-# What the diagnosis measures of events beyond the numbers of their laws: meaning and unit.
+# Measured quantities of events that are not parameters of their laws: meaning and unit.
 _OF_EVENTS = {
-    "duration_s": ("how long it lasts", "s"),
-    "late_s": ("time by which pictures are late against the encoder", "s"),
+    "duration_s": ("duration", "s"),
+    "late_s": ("delay of the pictures relative to the encoder", "s"),
 }  # fmt: skip
 _HEADLINES = {
     Verdict.CONSISTENT: "The recording agrees with the stated instrument",
     Verdict.CLASS: "Something was left out; its kind is known, its name is not",
     Verdict.UNEXPLAINED: "Something was left out that no known effect explains",
-    Verdict.NOT_IDENTIFIABLE: "This recording cannot tell whether anything was left out",
+    Verdict.NOT_IDENTIFIABLE: "This recording cannot show whether anything was left out",
 }
 
 
 @dataclass(frozen=True)
 class Shown:
-    """What a page shows beside the answer; None where there is nothing to show."""
+    """Further content of the page; None where there is nothing to show."""
 
     change: GeometryChange | None = None
     image: OnImage | None = None
@@ -92,22 +92,22 @@ def sizes(found: EffectFound) -> tuple[str, ...]:
 
 
 def size_of_mismatch(found: Diagnosis) -> str:
-    """Return by how much measured and expected differ before and after, in a sentence; else empty."""
+    """Return the difference of measured and expected before and after, in a sentence; else empty."""
     if found.reading_picture is not None:
         seen = found.reading_picture
         before, after = (float(np.nanmax(np.abs(mm))) for mm in (seen.before_mm, seen.after_mm))
         return (
-            f"The encoder's reading is off by up to {before:.2f} mm; with what was found taken out, up to "
-            f"{after:.2f} mm are left."
+            f"The encoder's reading is wrong by up to {before:.2f} mm; after correction for the effects "
+            f"found, up to {after:.2f} mm remain."
         )
     if found.ring_picture is None or found.verdict is Verdict.CONSISTENT:
         return ""
     rings = found.ring_picture
     before, after = (float(np.nanmax(np.abs(_quantiles(mm)[0]))) for mm in (rings.before_mm, rings.after_mm))
     return (
-        f"With the stated instrument the ring places the wall up to {before:.3f} mm from where texture and "
-        f"motion place it (median of frames, worst azimuth); with what was found put right, {after:.3f} mm "
-        "are left. The same command with the option “apply” measures the pipe again and says what changes."
+        f"With the stated instrument, ring and texture differ by up to {before:.3f} mm in the wall's place "
+        f"(median of frames, worst azimuth); after correction for the effects found, {after:.3f} mm "
+        "remain. The same command with the option --apply measures the pipe again and says what changes."
     )
 
 
@@ -120,7 +120,7 @@ def _by_hour(change: GeometryChange) -> list[tuple[int, float | None, float | No
 
 
 def _pictures(found: Diagnosis, shown: Shown) -> dict[str, bytes]:
-    """Return the pictures (PNG) that there is something for."""
+    """Return the available pictures (PNG)."""
     made: dict[str, bytes] = {}
     if found.ring_picture is not None:
         made["frames"] = frames_figure(found.ring_picture)
@@ -157,7 +157,7 @@ def wall_figure(picture: WallPicture) -> bytes:
 
 
 def azimuth_figure(picture: Picture) -> bytes:
-    """Return the residual's mean over all frames against azimuth, with its scatter, before and after."""
+    """Return the residual's mean over all frames by azimuth, with its scatter, before and after."""
     figure = Figure(figsize=(9.6, 3.2), layout="constrained")
     axes = figure.subplots()
     degrees = np.degrees(picture.azimuth_rad)
@@ -177,7 +177,7 @@ def azimuth_figure(picture: Picture) -> bytes:
 
 
 def reading_figure(picture: ReadingPicture) -> bytes:
-    """Return by how much the encoder's reading is off over time, before and after."""
+    """Return the error of the encoder's reading over time, before and after."""
     figure = Figure(figsize=(9.6, 3.2), layout="constrained")
     axes = figure.subplots()
     axes.plot(picture.time_s, picture.before_mm, color=_BEFORE, label="before")
@@ -214,12 +214,12 @@ def image_figure(shown: OnImage) -> bytes:
         ylim=(centre[1] + reach, centre[1] - reach),
         ylabel="v, px",
     )
-    figure.colorbar(lines, ax=both, label="ring farther out than texture has it, px")
+    figure.colorbar(lines, ax=both, label="ring farther out than by texture, px")
     return rendered(figure)
 
 
 def candidates_figure(candidates: tuple[Candidate, ...]) -> bytes:
-    """Return what each explanation gains on held-out regimes, the best first."""
+    """Return the gain of each explanation on held-out regimes, the best first."""
     best = sorted(candidates, key=lambda c: c.heldout_gain, reverse=True)[:_SHOWN]
     figure = Figure(figsize=(9.6, 0.7 + 0.34 * len(best)), layout="constrained")
     axes = figure.subplots()
@@ -228,7 +228,7 @@ def candidates_figure(candidates: tuple[Candidate, ...]) -> bytes:
     axes.barh(place + 0.18, [c.heldout_gain for c in best], 0.34, color=_ACCENT, label="on held-out regimes")
     axes.set_yticks(place, [" + ".join(c.names) or "nothing left out" for c in best])
     axes.invert_yaxis()
-    axes.set(xlabel="drop of χ² against the stated instrument (square-root scale)")
+    axes.set(xlabel="drop of χ² relative to the stated instrument (square-root scale)")
     axes.set_xscale("function", functions=(_signed_root, _signed_square))
     tidy(axes)
     return rendered(figure)

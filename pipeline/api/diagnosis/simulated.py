@@ -1,4 +1,4 @@
-"""The effects that a diagnosis found are simulated and compared with pictures of its gauge run.
+"""Simulates the effects that a diagnosis found, and compares them with pictures of its gauge run.
 
 A name is kept only if the line, rendered again with it, fits the pictures of the gauge run better.
 """
@@ -30,7 +30,7 @@ from stages.rings import RINGS
 from stages.twin.gauge_line import GAUGE_LINE
 
 _SURE = 0.5
-"""Probability from which an effect counts as found: it is more probably there than not."""
+"""Probability from which an effect counts as found: more likely than not."""
 _OF_LINE = ("laser", "camera", "window")
 
 
@@ -41,13 +41,13 @@ class Switches:
     Attributes
     ----------
     found : tuple of Switch
-        Those that the simulator can switch on.
+        Switches of the effects that the simulator can render.
     effects : tuple of NamedEffect
-        The same as diagnosis.json has them.
+        The same effects as in diagnosis.json.
     inexpressible : tuple of str
         Sentences about the others.
     by_chance : float
-        Probability that chance alone shows as much when nothing was left out; nan where it is not told.
+        Probability of such a result by chance when nothing was left out; NaN if it is not stated.
     """
 
     found: tuple[Switch, ...]
@@ -57,18 +57,18 @@ class Switches:
 
     @property
     def of_line(self) -> tuple[Switch, ...]:
-        """Those that change where the laser line lies in a picture."""
+        """Return those that displace the laser line in a picture."""
         return tuple(s for s in self.found if moves_line(s.name))
 
 
 def moves_line(name: str) -> bool:
-    """Return whether an effect changes where the line of a known bore lies in the picture."""
+    """Return whether an effect displaces the line of a known bore in the picture."""
     known = ALL_EFFECTS.get(name)
     return known is not None and known.family in _OF_LINE and known.channel is Channel.RING
 
 
 def switches_of(file: Path) -> Switches:
-    """Return what a diagnosis.json says, with the sizes found; those it does not tell are the usual ones.
+    """Return the effects of a diagnosis.json with their sizes; sizes that it lacks are the typical ones.
 
     Raises
     ------
@@ -111,7 +111,7 @@ def _course(said: NamedEffect) -> Course:
         return CONSTANTLY
     kind = CourseKind(str(said.course["kind"]))
     if {q.name for q in COURSES[kind]} & {q.name for q in ALL_EFFECTS[said.name].quantities}:
-        return CONSTANTLY  # its own law says how it changes, as that of a baseline that drifts
+        return CONSTANTLY  # its own law contains the course in time, as that of a drifting baseline
     numbers = {k: Value.model_validate(v) for k, v in said.course.items() if isinstance(v, dict)}
     return Course(kind, tuple(_size(numbers, q.name, q.typical) for q in COURSES[kind]))
 
@@ -126,12 +126,12 @@ _STAGES = (*(s.for_role("gauge") for s in (PREMISES, RINGS, FIDUCIALS)), GAUGE_L
 
 @dataclass(frozen=True)
 class DiagnosisTried:
-    """What pictures of the gauge run say of a diagnosis; empty without one.
+    """Comparison of a diagnosis with pictures of its gauge run; empty without one.
 
     Attributes
     ----------
     gauge : GaugeTwin or None
-        None without a gauge run, or where nothing was named that moves the line.
+        None without a gauge run, or if no named effect moves the line.
     found, withdrawn : tuple of Mismatch
         Effects with which the pictures fit better, and those with which they do not.
     cannot_tell : tuple of str
@@ -144,30 +144,30 @@ class DiagnosisTried:
 
 
 def try_diagnosis(diagnosis: Path, folder: Path, display: Display) -> DiagnosisTried:
-    """Re-render the line of a diagnosis' gauge run with the stated probe and with what was found.
+    """Re-render the line of a diagnosis' gauge run with the stated probe and with the effects found.
 
     Parameters
     ----------
     diagnosis : Path
-        Folder of `boresight diagnose`; what it measured of the gauge run is not measured again.
+        Folder of `boresight diagnose`; its measurements of the gauge run are used again.
     folder : Path
-        Gets the results of the stages.
+        Folder for the results of the stages.
 
     Raises
     ------
     InputError
-        When the folder is not one of a diagnosis, or its gauge run or probe cannot be used.
+        When the folder is not that of a diagnosis, or its gauge run or probe cannot be used.
     """
     said, gauge, probe = switches_of(diagnosis / ANSWER), *_inputs(diagnosis / "run.json")
     still = tuple(
-        f"The gauge's pictures cannot tell {s.name.replace('_', ' ')}: it does not move the line in them."
+        f"The gauge's pictures cannot show {s.name.replace('_', ' ')}: it does not move the line in them."
         for s in said.found
         if not moves_line(s.name)
     )
     if gauge is None:
         sentence = (
-            "The diagnosis had no gauge run. An inspection measures wall and poses with the very instrument "
-            "that is in doubt, whose error then looks like the wall's own shape: record a gauge run."
+            "The diagnosis had no gauge run. An inspection measures wall and poses with the instrument that "
+            "is in doubt, so that its error looks like the wall's own shape. What to do: record a gauge run."
         )
         return DiagnosisTried(cannot_tell=(*said.inexpressible, *still, sentence))
     if not said.of_line:
@@ -185,7 +185,7 @@ def _judged(said: Switches, found: GaugeTwin, still: tuple[str, ...]) -> Diagnos
     each = [_mismatch(e, kept, found, said.by_chance) for e, kept in zip(named, found.kept, strict=True)]
     power = (
         f"A line displaced by less than about {found.told_px:.2f} px raises χ² in the gauge's pictures by "
-        "less than a tenth: instruments that differ by less cannot be told apart."
+        "less than a tenth: instruments that differ by less cannot be distinguished."
     )
     kept, withdrawn = (
         tuple(m for m, k in zip(each, found.kept, strict=True) if k == want) for want in (True, False)
