@@ -1,4 +1,4 @@
-"""The typed, strict configuration of a run: the parameters of every stage, and where they come from."""
+"""The typed, strict configuration of a run: the parameters of every stage, and their origin."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from pipeline.files.codec import Json
 from pipeline.files.json_yaml import read_yaml
 from pipeline.machine.stage import Parameters, Stage
 
-# The section that says on which machines a batch runs; it belongs to no stage and is read by
+# The section with the machines of a batch; it belongs to no stage and is read by
 # `pipeline.batch.cluster`.
 CLUSTER = "cluster"
 _COMMAND_LINE = "--set"
@@ -54,7 +54,7 @@ class Configuration:
 
 @dataclass(frozen=True)
 class _Setting:
-    """One value that someone asked for, and where."""
+    """One value that a user set, and its place."""
 
     origin: Path
     place: str
@@ -73,13 +73,13 @@ def resolve(
     Parameters
     ----------
     stages
-        Whose parameters are asked for.
+        Stages of the run.
     file
         YAML: a mapping of stage names to mappings of parameter names to values, and perhaps `CLUSTER`.
     assignments
         ``stage.parameter=value`` each, the value in YAML.
     earlier, earlier_file
-        Parameters of an earlier run by stage, which take the place of the defaults, and where they stand.
+        Parameters of an earlier run by stage, which replace the defaults, and their file.
 
     Raises
     ------
@@ -119,7 +119,7 @@ def _settings_of_file(file: Path) -> Iterator[_Setting]:
         if not isinstance(content, Mapping):
             raise InputError(
                 file,
-                f"{content!r} where parameters of a stage belong",
+                f"{content!r} instead of the parameters of a stage",
                 place=str(stage),
                 expected="stage: {parameter: value}",
                 hint="see boresight config --default",
@@ -130,11 +130,13 @@ def _settings_of_file(file: Path) -> Iterator[_Setting]:
 def _setting_of(assignment: str) -> _Setting:
     place, equals, text = assignment.partition("=")
     if not equals or "." not in place:
-        raise InputError(_COMMAND_LINE, f"{assignment!r} is no assignment", expected="stage.parameter=value")
+        raise InputError(
+            _COMMAND_LINE, f"{assignment!r} is not an assignment", expected="stage.parameter=value"
+        )
     try:
         return _Setting(Path(_COMMAND_LINE), place.strip(), yaml.safe_load(text))
     except yaml.YAMLError as error:
-        raise InputError(_COMMAND_LINE, f"{text!r} is no value", place=place) from error
+        raise InputError(_COMMAND_LINE, f"{text!r} is not a value", place=place) from error
 
 
 def _check_known(setting: _Setting, known: Sequence[str]) -> None:
@@ -154,7 +156,7 @@ def _parameters_of(stage: Stage, settings: Sequence[_Setting]) -> Parameters:
         s.place.partition(".")[2]: s for s in settings if s.place.partition(".")[0] == stage.configured_as
     }
     try:
-        # By way of JSON: strict, yet a YAML list may become a tuple and a word an enumeration member.
+        # Through JSON: strict, but a YAML list may become a tuple and a word an enumeration member.
         return stage.parameters.model_validate_json(
             json.dumps({name: _number(s.value) for name, s in mine.items()}, default=str)
         )
@@ -163,7 +165,7 @@ def _parameters_of(stage: Stage, settings: Sequence[_Setting]) -> Parameters:
 
 
 def _number(value: Any) -> Any:
-    """Return the numbers that YAML 1.1 takes for words, such as 1e-3; anything else unchanged."""
+    """Convert numbers that YAML 1.1 reads as words, such as 1e-3; return anything else unchanged."""
     if isinstance(value, list):
         return [_number(v) for v in value]
     return float(value) if isinstance(value, str) and _EXPONENT.fullmatch(value) else value

@@ -1,4 +1,4 @@
-"""What a user sees while stages run."""
+"""The progress display while stages run."""
 
 from __future__ import annotations
 
@@ -12,24 +12,24 @@ from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedCo
 
 from pipeline.machine.outcome import StageOutcome, State, state_word, warnings_of
 
-# Times a second that the bars are drawn anew: drawing takes some milliseconds in which no stage runs Python.
+# Refresh rate of the bars, 1/s: drawing takes some milliseconds in which no stage runs Python.
 _DRAWN_PER_SECOND = 4
 
 
 class Display(Protocol):
-    """Is told how the stages stand."""
+    """Receives the progress of the stages."""
 
     def planned(self, stages: int) -> None:
-        """Hear how many stages there are."""
+        """Receive the number of stages."""
 
     def started(self, stage: str) -> None:
-        """Hear that a stage started."""
+        """Receive the start of a stage."""
 
     def progressed(self, stage: str, done: int, total: int) -> None:
-        """Hear how far a running stage is; several may run at a time, each on a thread of its own."""
+        """Receive the progress of a running stage; several may run at a time, each on its own thread."""
 
     def ended(self, outcome: StageOutcome) -> None:
-        """Hear how a stage ended."""
+        """Receive the outcome of a stage."""
 
 
 class SilentDisplay:
@@ -54,7 +54,7 @@ class ProgressDisplay:
     Attributes
     ----------
     warnings : list of str
-        What the stages that ended warn of.
+        Warnings of the finished stages.
     """
 
     def __init__(self, console: Console, *, warn_at_once: bool = True) -> None:
@@ -85,7 +85,7 @@ class ProgressDisplay:
         self._progress.stop()
 
     def planned(self, stages: int) -> None:
-        """Give the bar of the whole its length."""
+        """Set the length of the overall bar."""
         self._stages = stages
         self._move_whole()
 
@@ -114,7 +114,7 @@ class ProgressDisplay:
             self._console.print(f"  [bold yellow]warning[/]: {escape(warning)}", highlight=False)
 
     def _move_whole(self) -> None:
-        """Set the bar of the whole to the stages that ended, and the shares of those that run."""
+        """Set the overall bar to the finished stages and the shares of the running ones."""
         if not self._stages:
             return
         running = [t for t in self._progress.tasks if t.id in self._tasks.values()]

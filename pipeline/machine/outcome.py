@@ -1,4 +1,4 @@
-"""How stages and runs end, with the numbers they leave for people."""
+"""Outcomes of stages and runs, with the numbers that they report."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ WARNING = "warning"
 
 
 class State(StrEnum):
-    """How a stage, or a whole run, stands."""
+    """State of a stage, or of a whole run."""
 
     WAITING = "waiting"
     RUNNING = "running"
@@ -27,14 +27,14 @@ class State(StrEnum):
 
     @classmethod
     def after(cls, error: BoresightError) -> State:
-        """Return how a stage stands that ended with an error."""
+        """Return the state of a stage that ended with an error."""
         if isinstance(error, Cancelled):
             return cls.CANCELLED
         return cls.UNUSABLE if isinstance(error, UnusableError | InputError) else cls.FAILED
 
 
 def state_word(state: str) -> str:
-    """Return the word for a state that people are shown: what ends early is stopped, for whatever reason."""
+    """Return the displayed word for a state: any run that ends early is "stopped", for whatever reason."""
     return "stopped" if state in (State.UNUSABLE, State.CANCELLED) else str(state)
 
 
@@ -49,18 +49,18 @@ class Number:
 
 @dataclass(frozen=True)
 class StageOutcome:
-    """How one stage stands.
+    """State of one stage.
 
     Attributes
     ----------
     name, version, key
-        Which result it is.
+        Identification of the result.
     state
-        `State.REUSED` when the result was there from an earlier call.
+        `State.REUSED` when the result existed from an earlier call.
     seconds
         Time of the computation, also when that was in an earlier call.
     numbers
-        What the stage reported: rejections by reason, residuals, and so on.
+        Reported numbers: rejections by reason, residuals, and so on.
     problem
         Why it did not complete; empty when it did.
     """
@@ -76,7 +76,7 @@ class StageOutcome:
 
 @dataclass(frozen=True)
 class RunOutcome:
-    """How a run stands: its state, its stages in order, headline metrics, and why it did not complete."""
+    """State of a run: its state, its stages in order, headline metrics, and why it did not complete."""
 
     state: State
     stages: tuple[StageOutcome, ...]
@@ -85,7 +85,7 @@ class RunOutcome:
 
 
 def warnings_of(stages: Iterable[StageOutcome]) -> tuple[str, ...]:
-    """Return what stages warn of, each with the stage's name."""
+    """Return the warnings of stages, each with the stage's name."""
     return tuple(f"{s.name}: {n.value}" for s in stages for n in s.numbers if n.name == WARNING)
 
 

@@ -18,21 +18,21 @@ from pipeline.machine.stage import Parameters, Stage, of_role, plain, role_of
 
 
 class PipelineError(BoresightError):
-    """Stages that do not fit together; found before anything runs."""
+    """Stages do not fit together; raised before anything runs."""
 
 
 @dataclass(frozen=True)
 class Source:
-    """Something the run starts from.
+    """An input of the run.
 
     Attributes
     ----------
     kind
-        The class by which stages ask for it.
+        The class by which stages request it.
     value
-        The thing itself.
+        The object itself.
     key
-        Hash of its content; empty for what is not there, such as a gauge run that was not made.
+        Hash of its content; empty for a missing input, such as a gauge run that was not made.
     refuse_changed
         Raises `pipeline.errors.InputError` when the content is no longer that of the key.
     """
@@ -53,11 +53,11 @@ class Step:
     inputs
         Argument names with their classes.
     output
-        Class of what it makes.
+        Class of its result.
     key
-        Hash of all that the result depends on.
+        Hash of everything on which the result depends.
     seed
-        For its random numbers: the same for equal parameters and sources, whatever the program text.
+        Seed of its random numbers: the same for equal parameters and sources, whatever the program text.
     """
 
     stage: Stage
@@ -70,7 +70,7 @@ class Step:
 
 @dataclass(frozen=True)
 class Plan:
-    """What a run starts from and its steps, in an order that works."""
+    """The sources of a run and its steps, in a valid order."""
 
     sources: tuple[Source, ...]
     steps: tuple[Step, ...]
@@ -97,7 +97,7 @@ class Plan:
         return {role_of(s.kind) or plain(s.kind).__name__.lower(): s.key for s in self.sources if s.key}
 
     def key(self) -> str:
-        """Return the key of all results together."""
+        """Return a common key of all results."""
         return hashlib.sha256("".join(s.key for s in self.steps).encode()).hexdigest()
 
     def keys(self) -> dict[type, str]:
@@ -112,7 +112,7 @@ class Selection:
     Attributes
     ----------
     recompute_from
-        Compute this stage and all after it again; empty to reuse all that is there.
+        Compute this stage and all after it again; empty to reuse all existing results.
     only
         Run this stage alone; empty for all.
     resume
@@ -129,11 +129,11 @@ class Selection:
             plan.step(name)
 
     def skips(self, step: Step) -> bool:
-        """Return whether a step is not to be computed even when its result is missing."""
+        """Return whether a step must not be computed even if its result is missing."""
         return bool(self.only) and step.stage.label != self.only
 
     def recomputes(self, step: Step, plan: Plan) -> bool:
-        """Return whether a step is to be computed even when its result is there."""
+        """Return whether a step must be computed even if its result exists."""
         if self.skips(step):
             return False
         names = [s.stage.label for s in plan.steps]
@@ -149,7 +149,7 @@ def make_plan(stages: Sequence[Stage], configuration: Configuration, sources: Se
     Raises
     ------
     PipelineError
-        When a stage asks for what no earlier stage makes, or two make the same.
+        When a stage needs an artefact that no earlier stage makes, or two make the same.
     """
     keys = {s.kind: s.key for s in sources}
     made_from = {s.kind: {s.kind} for s in sources}
@@ -184,7 +184,7 @@ def _check_wiring(stage: Stage, made: Mapping[type, str], stages: Sequence[Stage
         raise PipelineError(f"two stages are named {stage.label}")
     if stage.output() in made:
         name = plain(stage.output()).__name__
-        raise PipelineError(f"stage {stage.label} makes {name}, which is there already")
+        raise PipelineError(f"stage {stage.label} makes {name}, which exists already")
     for kind in _wired(stage, made, stages).values():
         if kind not in made:
             makers = [s.label for s in stages if s.output() == kind]
@@ -216,7 +216,7 @@ _IMPORT = re.compile(
 def source_digest(function: Callable[..., Any]) -> str:
     """Return a SHA-256 of a function's module and of all modules of this program that it imports.
 
-    Only what lies in the packages ``pipeline``, ``stages`` and the function's own counts: libraries are
+    Only modules of the packages ``pipeline``, ``stages`` and the function's own are included: libraries are
     pinned by the lock file. Imports are followed as written, also those inside functions.
     """
     packages = {*OWN_PACKAGES, function.__module__.partition(".")[0]}
@@ -266,13 +266,13 @@ class _Text:
 
 @cache
 def _read(file: Path, changed_ns: int, size: int) -> _Text:
-    """Return digest and imports of a file, read once for each time of change and size that it has."""
+    """Return digest and imports of a file, read once per modification time and size."""
     text = file.read_text(encoding="utf-8")
     return _Text(hashlib.sha256(text.encode()).digest(), tuple(_imported(text)))
 
 
 def _imported(text: str) -> Iterator[str]:
-    """Yield the modules, and what may be modules, that a text imports."""
+    """Yield the modules, and names that may be modules, that a text imports."""
     for package, names, modules in _IMPORT.findall(text):
         yield from re.findall(r"[\w.]+", modules)
         if package:

@@ -35,13 +35,13 @@ _INTERNAL = ".boresight"
 
 @dataclass(frozen=True)
 class RunFolder:
-    """A folder that holds a run, or is to hold one."""
+    """A folder with a run, or for one."""
 
     path: Path
 
     @property
     def internal(self) -> Path:
-        """Folder of everything that is not for users."""
+        """Folder of all internal files."""
         return self.path / _INTERNAL
 
     @property
@@ -62,7 +62,7 @@ def claimed(path: Path) -> Iterator[RunFolder]:
     Raises
     ------
     InputError
-        When the folder holds something else, cannot be written, or another process is at work in it.
+        When the folder holds something else, cannot be written, or another process is using it.
     """
     folder = RunFolder(path)
     _refuse_foreign(folder)
@@ -91,7 +91,7 @@ def logged(folder: RunFolder) -> Iterator[logging.Logger]:
 
 
 class _LogFile(logging.FileHandler):
-    """A log that goes quiet on a full disk, so as not to hide the error that tells of it."""
+    """A log that ignores a full disk, in order not to hide the error that reports it."""
 
     def handleError(self, record: logging.LogRecord) -> None:  # noqa: N802  the name is logging's
         """Ignore."""
@@ -103,9 +103,9 @@ def _refuse_foreign(folder: RunFolder) -> None:
     if folder.path.is_dir() and not folder.internal.is_dir() and any(folder.path.iterdir()):
         raise InputError(
             folder.path,
-            "holds files that are not those of a boresight run",
+            "holds files that do not belong to a boresight run",
             expected="a new or empty folder, or an earlier run",
-            hint="give another folder with -o; results of an older boresight may also be moved away",
+            hint="state another folder with -o, or move the results of an older boresight away",
         )
 
 
@@ -123,8 +123,8 @@ def _locked(folder: RunFolder) -> Iterator[None]:
             holder = stream.read().decode("ascii", "replace").strip() or "unknown"
             raise InputError(
                 folder.path,
-                f"process {holder} is at work in this run folder",
-                hint="wait until it has ended, or give another folder with -o",
+                f"process {holder} is using this run folder",
+                hint="wait until it has ended, or state another folder with -o",
             ) from error
         with disk_errors_named(folder.path):
             stream.truncate(0)
@@ -154,18 +154,18 @@ class Exporter:
         return {k: v for k, v in hints.items() if k not in ("folder", "return")}
 
     def key(self, keys: Mapping[type, str]) -> str:
-        """Return the hash of what its files are made from, and of the program text that writes them."""
+        """Return the hash of its inputs, and of the program text that writes its files."""
         inputs = {name: keys[kind] for name, kind in self.inputs().items()}
         return hashlib.sha256(canonical([self.name, source_digest(self.write), dict(inputs)])).hexdigest()
 
 
 def publish(exporter: Exporter, artefacts: Mapping[type, object], key: str, run: RunFolder) -> None:
-    """Write an exporter's files and put each in place whole.
+    """Write an exporter's files and put each in place atomically.
 
     Raises
     ------
     InputError
-        When the disk is full or cannot be written; files already in place stay as they were.
+        When the disk is full or cannot be written; existing files are not changed.
     """
     arguments = {name: artefacts[kind] for name, kind in exporter.inputs().items()}
     temporary = run.internal / f".new-{exporter.name}"
@@ -180,18 +180,18 @@ def publish(exporter: Exporter, artefacts: Mapping[type, object], key: str, run:
 
 
 def is_published(exporter: Exporter, key: str, run: RunFolder) -> bool:
-    """Return whether the files in place are those made from ``key``, whole."""
+    """Return whether the existing files were made from ``key`` and are complete."""
     stated, files = _read_receipt(exporter, run)
     return stated == key and all(r.matches(run.path / name) for name, r in files.items())
 
 
 def published_key(exporter: Exporter, run: RunFolder) -> str:
-    """Return the key that the files in place were made from, empty when there are none."""
+    """Return the key from which the existing files were made, empty when there are none."""
     return _read_receipt(exporter, run)[0]
 
 
 def published_files(exporter: Exporter, run: RunFolder) -> dict[str, FileRecord]:
-    """Return size and hash of an exporter's files as they were put in place, by name."""
+    """Return size and hash of an exporter's published files, by name."""
     return _read_receipt(exporter, run)[1]
 
 
@@ -230,9 +230,9 @@ def _receipt(exporter: Exporter, run: RunFolder) -> Path:
 
 
 class Writer:
-    """Writes what it is offered, once each, in the order of the offers.
+    """Writes exporters' files once each, in the order of the calls of `offer`.
 
-    Leaving it as a context waits until all is written, and raises what a write raised.
+    Leaving it as a context waits until all is written, and raises the error of a failed write.
     """
 
     def __init__(self, folder: RunFolder, logger: logging.Logger) -> None:
@@ -252,7 +252,7 @@ class Writer:
             self.check()
 
     def offer(self, exporter: Exporter, key: str, artefacts: Mapping[type, object]) -> None:
-        """Have an exporter's files written from ``artefacts`` unless those in place are made from ``key``."""
+        """Write an exporter's files from ``artefacts`` unless existing ones were made from ``key``."""
         if exporter.name not in self._writing:
             arguments = {kind: artefacts[kind] for kind in exporter.inputs().values()}
             self._writing[exporter.name] = self._pool.submit(self._write, exporter, key, arguments)

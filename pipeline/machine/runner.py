@@ -1,4 +1,4 @@
-"""Runs a plan: reuses what is whole, computes what is missing, and leaves a clear account of every ending."""
+"""Runs a plan: reuses complete results, computes missing ones, and records the outcome in any case."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ from pipeline.system.native import give_back_memory
 from pipeline.system.parallel import one_library_thread
 
 _LONGEST_PROBLEM = 300  # characters of an unexpected error that run.json quotes; the log has all of it
-_LOOK_S = 0.2  # longest wait, after which the main thread looks whether the user wishes to stop
+_LOOK_S = 0.2  # longest wait, after which the main thread checks whether the user wishes to stop
 
 
 class FailedError(BoresightError):
-    """A bug: something broke that no input should break. The log holds the traceback."""
+    """A bug: an error that no input should cause. The log holds the traceback."""
 
 
 class Runner:
@@ -39,21 +39,21 @@ class Runner:
     plan
         The stages, wired and keyed.
     exporters
-        Writers of files for people; each runs as soon as its inputs are there.
+        Writers of files for users; each runs as soon as its inputs exist.
     folder
         A claimed run folder.
     record
         Called with the outcome at every change; writes run.json.
     headline
-        Returns the headline numbers of the artefacts that it is given by class.
+        Returns the headline numbers of artefacts by class.
     display, logger, wish, workers
-        Where progress goes, where messages go, the user's wish to stop, and how many threads to use.
+        Receiver of progress, receiver of messages, the user's wish to stop, and the number of threads.
     made_by
-        What exporters write into their files about how they came about.
+        Provenance that exporters write into their files.
     lent
-        Stores of other runs: a result found there is used as if it were our own.
+        Stores of other runs, whose results are used like own ones.
     at_once
-        How many stages may run side by side.
+        Largest number of stages that run at the same time.
     """
 
     def __init__(
@@ -92,7 +92,7 @@ class Runner:
         Raises
         ------
         UnusableError, InputError, Cancelled
-            As a stage raised it; what was completed before is kept.
+            As a stage raised it; completed results are kept.
         FailedError
             For anything else that a stage or exporter raised; the traceback is in the log.
         """
@@ -115,11 +115,11 @@ class Runner:
             self._end(State.FAILED, problem)
             raise FailedError(
                 f"{self._at} failed: {problem}\n"
-                f"This is a fault of the program. The log with the details: {self._folder.log}"
+                f"This is an error in the program. The log with the details: {self._folder.log}"
             ) from error
 
     def _complete_all(self, selection: Selection) -> None:
-        """Complete every step as soon as what it needs is there; some run side by side."""
+        """Complete every step as soon as its inputs exist; some run at the same time."""
         waiting = list(self._plan.steps)
         running: dict[Future[Stored], Step] = {}
         with ThreadPoolExecutor(self._at_once, "stage") as pool:
@@ -134,7 +134,7 @@ class Runner:
                 self._over.set()
 
     def _is_due(self, step: Step, selection: Selection) -> bool:
-        """Return whether a step has to be computed, and say that it starts; settle it if it is there."""
+        """Return whether a step has to be computed, and announce it; settle it if its result exists."""
         name = step.stage.label
         self._at = f"stage {name}"
         self._stop_if_wished()
@@ -152,7 +152,7 @@ class Runner:
         return True
 
     def _stored(self, step: Step) -> Stored | None:
-        """Return the result of a step from our store, or from one that is lent to us."""
+        """Return the result of a step from the own store, or from a lent one."""
         name, kind = step.stage.name, plain(step.output)
         own = self._folder.store.read(name, step.key, kind)
         lent = (store.borrow(name, step.key, kind) for store in self._lent)
@@ -167,7 +167,7 @@ class Runner:
             self._settle(step, future.result(), State.COMPLETED)
 
     def _compute(self, step: Step) -> Stored:
-        """Compute a step and return it as the store gives it back; on a thread of its own."""
+        """Compute a step and return the result as read back from the store; called on its own thread."""
         name = step.stage.name
         numbers: list[Number] = []
         start = time.monotonic()
@@ -181,11 +181,11 @@ class Runner:
         give_back_memory()
         stored = self._folder.store.read(name, step.key, plain(step.output))
         if stored is None:
-            raise TypeError(f"stage {name} made a {kind} that does not read back")
+            raise TypeError(f"stage {name} made a {kind} that cannot be read back")
         return stored
 
     def _artefact(self, step: Step, numbers: list[Number]) -> object:
-        """Call a stage. Where an input changed meanwhile, that is raised in place of any other error."""
+        """Call a stage. If an input changed meanwhile, that is raised instead of any other error."""
         inputs: dict[str, object] = dict.fromkeys(step.stage.may_lack())
         inputs |= {argument: self._artefacts[kind] for argument, kind in step.inputs}
         context = self._context(step, numbers)
@@ -262,7 +262,7 @@ class Runner:
             self._publish_ready()
 
     def _end(self, state: State, problem: str) -> None:
-        """Record how a run ended that did not complete; a full disk that caused it may refuse the record."""
+        """Record the outcome of an incomplete run; on a full disk this may fail, too."""
         self._logger.info("ended: %s: %s", state.value, problem)
         for name, outcome in self._outcomes.items():
             if outcome.state == State.RUNNING:
@@ -285,7 +285,7 @@ class Runner:
 
 
 def _next(waiting: list[Step], running: Collection[Step], at_once: int) -> Step | None:
-    """Take the first step off the list whose inputs are all made; None while too many steps are running."""
+    """Remove the first step with complete inputs from the list; None while too many steps are running."""
     missing = {s.output for s in (*waiting, *running)}
     ready = (s for s in waiting if not any(kind in missing for _, kind in s.inputs))
     step = next(ready, None) if len(running) < at_once else None

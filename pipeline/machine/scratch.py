@@ -1,4 +1,4 @@
-"""Room for arrays that are larger than memory should hold: unnamed files, gone when no array needs them."""
+"""Storage for arrays too large for memory: unnamed files, which vanish when no array needs them."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ _MAP_FROM_BYTES = 1 << 25
 
 @dataclass(frozen=True)
 class Scratch:
-    """Where large intermediate arrays go.
+    """Storage for large intermediate arrays.
 
     The files have no name, so that nothing is left behind however the program ends.
 
     Attributes
     ----------
     folder : Path or None
-        A folder on a disk with room; None for the system's temporary folder.
+        A folder on a disk with free space; None for the system's temporary folder.
     """
 
     folder: Path | None = None
@@ -39,13 +39,13 @@ class Scratch:
         return self.folder if self.folder is not None else Path(tempfile.gettempdir())
 
     def zeros(self, shape: Sequence[int], dtype: DTypeLike) -> NDArray[Any]:
-        """Return an array of zeros: in memory where it is small, else mapped from a file."""
+        """Return an array of zeros: in memory if it is small, else mapped from a file."""
         kind = np.dtype(dtype)
         size = int(np.prod(shape, dtype=np.int64)) * kind.itemsize
         if size < _MAP_FROM_BYTES:
             return np.zeros(shape, kind)
         with self.file() as stream:
-            # Room taken now: where the disk fills under a mapped file, the system ends the program.
+            # Space is reserved now: if the disk fills under a mapped file, the system kills the program.
             with disk_errors_named(self.place):
                 os.posix_fallocate(stream.fileno(), 0, size)
             return _mapped(stream, kind, tuple(shape))

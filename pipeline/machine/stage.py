@@ -1,4 +1,4 @@
-"""What a stage is: a named, versioned, pure function from typed inputs and parameters to one typed output."""
+"""A stage: a named, versioned, pure function from typed inputs and parameters to one typed output."""
 
 from __future__ import annotations
 
@@ -16,33 +16,33 @@ from pipeline.machine.scratch import Scratch
 class Parameters(BaseModel):
     """Base of every stage's parameters: strict, immutable, unknown keys refused.
 
-    Each field carries ``description`` (meaning and unit) and its range, so that the documentation and
-    ``configs/default.yaml`` are made from it.
+    Each field has a ``description`` (meaning and unit) and its range, from which the documentation and
+    ``configs/default.yaml`` are made.
     """
 
     model_config = ConfigDict(strict=True, frozen=True, extra="forbid", allow_inf_nan=False)
 
 
 class Progress(Protocol):
-    """Told how far a stage is."""
+    """Receives the progress of a stage."""
 
     def __call__(self, done: int, total: int) -> None:
         """Report ``done`` of ``total`` units of work."""
 
 
 def unheard(done: int, total: int) -> None:
-    """Ignore progress, where nobody asked for it."""
+    """Ignore progress."""
 
 
 class Warn(Protocol):
-    """Write-only sink of warnings for people: terminal, run.json, report and review show them."""
+    """Write-only sink of warnings for users: terminal, run.json, report and review show them."""
 
     def __call__(self, text: str) -> None:
-        """Warn: ``text`` says what was found, in which frames, what it means and what to do."""
+        """Warn: ``text`` says what is wrong, in which frames, what it means and what to do."""
 
 
 class Report(Protocol):
-    """Write-only sink of numbers for people; nothing computed may depend on it."""
+    """Write-only sink of numbers for users; no result may depend on it."""
 
     def __call__(self, name: str, value: float | int | str, unit: str = "") -> None:
         """Record one headline number, e.g. ``report("rejected: saturated", 12, "samples")``."""
@@ -50,23 +50,23 @@ class Report(Protocol):
 
 @dataclass(frozen=True)
 class Context:
-    """What the runner lends a stage while it runs.
+    """Services of the runner for a running stage.
 
     Attributes
     ----------
     progress
-        To be called now and then; raises `pipeline.errors.Cancelled` when the user stopped the run.
+        To be called regularly; raises `pipeline.errors.Cancelled` when the user stopped the run.
     report
-        Numbers for people.
+        Receives numbers for users.
     warn
-        Warnings for people.
+        Receives warnings for users.
     random
         Generator seeded from the stage's parameters and the sources, so that a repeated run draws the same
         numbers.
     workers
-        How many threads or processes the stage may use.
+        Number of threads or processes that the stage may use.
     scratch
-        Room for arrays larger than memory should hold.
+        Storage for arrays too large for memory.
     """
 
     progress: Progress
@@ -79,23 +79,23 @@ class Context:
 
 @dataclass(frozen=True)
 class Of:
-    """Which of several recordings an artefact is of: ``Annotated[RingSamples, Of("gauge")]``."""
+    """The recording to which an artefact belongs, of several: ``Annotated[RingSamples, Of("gauge")]``."""
 
     role: str
 
 
 def of_role(kind: type, role: str) -> type:
-    """Return the class as that of one of several recordings; the class itself for the role ""."""
+    """Return the class for one of several recordings; the class itself for the role ""."""
     return cast(type, Annotated[kind, Of(role)]) if role else kind
 
 
 def plain(kind: type) -> type:
-    """Return the class without the recording it is of."""
+    """Return the class without its recording."""
     return kind.__origin__ if get_origin(kind) is Annotated else kind  # type: ignore[attr-defined]
 
 
 def role_of(kind: type) -> str:
-    """Return which recording the class is of; empty where there is one recording only."""
+    """Return the recording of the class; empty if there is one recording only."""
     marks = get_args(kind)[1:] if get_origin(kind) is Annotated else ()
     return next((m.role for m in marks if isinstance(m, Of)), "")
 
@@ -112,14 +112,14 @@ class Stage:
 
     The runner wires stages by type: every argument of ``function`` other than ``parameters`` and
     ``context`` is an artefact class made by an earlier stage, or one of the sources `Recording`, `Probe`.
-    One that may be None is None where neither is there.
+    An optional argument is None if neither exists.
 
     Attributes
     ----------
     name
         Unique name, used on the command line and in the configuration.
     version
-        To be raised whenever the result for the same inputs changes.
+        Must be raised whenever the result for the same inputs changes.
     parameters
         Class of its parameters.
     function
@@ -127,10 +127,10 @@ class Stage:
     summary
         One line for ``boresight stages``.
     section
-        Section of the configuration that holds its parameters, where that is not ``name``: several stages may
-        share a section.
+        Section of the configuration with its parameters, if it is not ``name``: several stages may share a
+        section.
     role
-        Which of several recordings it works on: see `for_role`.
+        The recording that it processes, of several: see `for_role`.
     """
 
     name: str
@@ -148,15 +148,15 @@ class Stage:
 
     @property
     def label(self) -> str:
-        """Name for people, with the recording it works on."""
+        """Name for users, with the recording that it processes."""
         return f"{self.role} {self.name}".strip()
 
     def for_role(self, role: str) -> Stage:
-        """Return the stage as the one that works on one of several recordings.
+        """Return the stage for one of several recordings.
 
-        The stage takes the artefacts made of that recording; where there is no such artefact, it takes the
-        one that all recordings share. Its results have the same keys as without a role, so that they can be
-        reused from a run of that recording alone.
+        The stage takes the artefacts of that recording; if there is no such artefact, it takes the one that
+        all recordings share. Its results have the same keys as without a role, so that they can be reused
+        from a run of that recording alone.
         """
         return replace(self, role=role)
 
@@ -173,5 +173,5 @@ class Stage:
         return {k: v for k, v in hints.items() if k not in ("parameters", "context", "return")}
 
     def output(self) -> type:
-        """Return the artefact class that the stage makes, with the recording it is of."""
+        """Return the artefact class that the stage makes, with its recording."""
         return of_role(get_type_hints(self.function)["return"], self.role)

@@ -1,4 +1,4 @@
-"""Results on disk, one folder each. The manifest is written last: where it is whole, the result is."""
+"""Results on disk, one folder each. The manifest is written last: if it is complete, so is the result."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _MAP_FROM_BYTES = 1 << 22
 
 @dataclass(frozen=True)
 class Provenance:
-    """How a result came about: the stage, its time in s and the numbers it reported."""
+    """Origin of a result: the stage, its time in s and its reported numbers."""
 
     stage: str
     version: str
@@ -75,14 +75,14 @@ class Store:
                 raise
 
     def read(self, stage: str, key: str, kind: type) -> Stored | None:
-        """Return a whole result of class ``kind``; discard what is not whole and return None."""
+        """Return a complete result of class ``kind``; discard an incomplete one and return None."""
         stored = self.borrow(stage, key, kind)
         if stored is None:
             self.discard(stage, key)
         return stored
 
     def borrow(self, stage: str, key: str, kind: type) -> Stored | None:
-        """Return a whole result of class ``kind`` of a run that is not ours: nothing is discarded."""
+        """Return a complete result of class ``kind`` of another run; nothing is discarded."""
         folder = self._place(stage, key)
         try:
             manifest = _read_manifest(folder)
@@ -96,9 +96,9 @@ class Store:
         return Stored(artefact, provenance)
 
     def look(self, stage: str, key: str, kind: type) -> Any | None:
-        """Return a result for showing it, None when it is not there as a whole.
+        """Return a result for display, None when it is not complete.
 
-        Sizes are checked, not contents, and nothing is discarded: a run may be at work in the folder.
+        Sizes are checked, not contents, and nothing is discarded: a run may be using the folder.
         """
         folder = self._place(stage, key)
         try:
@@ -110,7 +110,7 @@ class Store:
             return None
 
     def has(self, stage: str, key: str) -> bool:
-        """Return whether a result is there, by manifest and sizes; `read` also checks the content."""
+        """Return whether a result exists, by manifest and sizes; `read` also checks the content."""
         folder = self._place(stage, key)
         try:
             files: Mapping[str, Any] = _read_manifest(folder)["files"]
@@ -119,12 +119,12 @@ class Store:
             return False
 
     def discard(self, stage: str, key: str) -> None:
-        """Remove a result, if it is there."""
+        """Remove a result, if it exists."""
         with disk_errors_named(self.folder):
             remove(self._place(stage, key))
 
     def sweep(self) -> None:
-        """Remove what interrupted writes left behind."""
+        """Remove remains of interrupted writes."""
         with disk_errors_named(self.folder):
             for path in self.folder.glob(".new-*"):
                 remove(path)
@@ -134,7 +134,7 @@ class Store:
 
 
 def _alike(arrays: Mapping[str, NDArray[Any]]) -> dict[str, str]:
-    """Return for each array that stands under an earlier name too, that name."""
+    """Return the earlier name of each array that is stored under two names."""
     first: dict[int, str] = {}
     names = {name: first.setdefault(id(array), name) for name, array in arrays.items()}
     return {name: earlier for name, earlier in names.items() if name != earlier}

@@ -11,7 +11,7 @@ from pipeline.recording.folder import recognise as recognise_folder
 
 
 def _open_ros(path: Path) -> Recording:
-    """Open a bag of ROS; what reads bags is slow to import and needed for them alone."""
+    """Open a ROS bag; its reader is slow to import and needed for bags only."""
     from pipeline.recording.bag import open_ros
 
     return open_ros(path)

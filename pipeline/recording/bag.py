@@ -1,4 +1,4 @@
-"""Recordings kept as ROS 1 bags, ROS 2 bags (sqlite3 or MCAP storage) or MCAP files.
+"""Recordings stored as ROS 1 bags, ROS 2 bags (sqlite3 or MCAP storage) or MCAP files.
 
 Topics, by default:
 
@@ -10,9 +10,9 @@ Topics, by default:
 ``/encoder/distance_mm``
     ``std_msgs/Float64``, timed by when it was recorded.
 ``/imu/data``
-    ``sensor_msgs/Imu``; the covariances in it are not used, probe.yaml says how an IMU errs.
+    ``sensor_msgs/Imu``; its covariances are not used, since probe.yaml states the errors of an IMU.
 
-What a bag cannot say stands in a YAML file beside it: ``run.recording.yaml`` for ``run.bag``, ``run.mcap``
+Further facts are in a YAML file beside the bag: ``run.recording.yaml`` for ``run.bag``, ``run.mcap``
 or the folder ``run``, else ``recording.yaml`` in the same folder (for a ROS 2 bag: inside it). Its keys are
 those of a recording folder without ``video``, ``frames`` and ``encoder``; ``frame_rate`` may be left out;
 ``topics`` may name ``image``, ``illumination``, ``encoder`` and ``imu``; without an illumination topic, the
@@ -108,7 +108,7 @@ def open_ros(path: Path) -> Recording:
     Raises
     ------
     InputError
-        When it is damaged, or topics or the YAML file beside it do not say what is needed.
+        When it is damaged, or topics or the YAML file beside it lack required facts.
     """
     return _open(path, RosBag)
 
@@ -131,7 +131,7 @@ def _open(path: Path, opener: Callable[[Path], Bag]) -> Recording:
         encoder, imu = encoder_of(bag, topics, start_ns), imu_of(bag, topics, start_ns)
         source = _source(bag, topics, recorded_ns)
     except BAG_ERRORS as error:
-        hint = "repair it with the tools of its format, or copy again"
+        hint = "repair it with the tools of its format, or copy it again"
         raise InputError(path, f"cannot be read as a bag: {error}", hint=hint) from error
     encoder, noticed = checked_encoder(encoder, frames)
     warnings = (*described.warnings, *noticed)
@@ -150,7 +150,7 @@ def _sidecar(path: Path) -> Path:
         if file.is_file():
             return file
     raise InputError(
-        path, "nothing says what was recorded", expected=f"{own.name} or {shared.name} beside it",
+        path, "has no description beside it", expected=f"{own.name} or {shared.name}",
         hint="write its kind, probe and pipe there, as in a recording folder",
     )  # fmt: skip
 
@@ -167,5 +167,5 @@ def _source(bag: Bag, topics: Topics, recorded_ns: Int) -> BagSource:
 
 
 def _rate(frames: FrameTable) -> float:
-    """Return the usual frame rate, 1/s; 30 where a single frame says nothing of it."""
+    """Return the usual frame rate, 1/s; 30 if there is only one frame."""
     return 1 / float(np.median(np.diff(frames.time_s))) if frames.time_s.size > 1 else 30.0

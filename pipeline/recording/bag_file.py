@@ -26,7 +26,7 @@ from rosbags.serde import SerdeError
 from rosbags.typesys import Stores, get_typestore
 from rosbags.typesys.store import Typestore
 
-# What the libraries raise on damaged files.
+# Exceptions of the libraries on damaged files.
 BAG_ERRORS = (
     AnyReaderError, Reader1Error, Reader2Error, SerdeError, McapError, sqlite3.Error, struct.error,
     OSError, EOFError, ValueError, TypeError, AttributeError, KeyError, IndexError, AssertionError,
@@ -94,7 +94,7 @@ class McapFile:
         return bag_files(self.path)
 
     def topics(self) -> dict[str, str]:
-        """See `Bag.topics`; topics in other encodings than ROS's are passed over."""
+        """See `Bag.topics`; topics in other encodings than ROS's are ignored."""
         summary = _mcap_summary(self.path)
         return {
             c.topic: _full_type(summary.schemas[c.schema_id])
@@ -122,7 +122,7 @@ def bag_files(path: Path) -> list[Path]:
 
 
 def open_mcap(path: Path) -> McapFile:
-    """Return an MCAP file, the encoding of its messages looked up; raises one of `BAG_ERRORS`."""
+    """Return an MCAP file with the encoding of its messages; raises one of `BAG_ERRORS`."""
     found = {c.message_encoding for c in _mcap_summary(path).channels.values()}
     ours = sorted(found & {"cdr", "ros1"})
     if not ours:
@@ -134,7 +134,7 @@ def _mcap_summary(path: Path) -> Summary:
     with path.open("rb") as opened:
         summary = make_reader(opened).get_summary()
     if summary is None:
-        raise ValueError("there is no summary at its end")
+        raise ValueError("it has no summary at its end; it may be cut off")
     return summary
 
 
@@ -152,5 +152,5 @@ def _decode(coded: bytes, message_type: str, *, ros1: bool) -> Any:
 
 @cache
 def _typestore(distribution: Stores) -> Typestore:
-    """Return a distribution's message types; kept, since each store compiles its decoders anew."""
+    """Return a distribution's message types; cached, since each store compiles its decoders again."""
     return get_typestore(distribution)

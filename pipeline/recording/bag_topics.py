@@ -1,4 +1,4 @@
-"""Which topics of a bag hold frames, light, encoder and IMU, what these say, and their images."""
+"""Chooses a bag's topics of frames, light, encoder and IMU, and reads their messages."""
 
 from __future__ import annotations
 
@@ -98,7 +98,7 @@ def choose_topics(types: Mapping[str, str], section: Section, path: Path) -> Top
     Raises
     ------
     InputError
-        When a named topic is not there or of another type, or several could be the images.
+        When a named topic is missing or has another type, or several could be the images.
     """
     named = section.section("topics") if section.has("topics") else Section(section.file, {}, "topics")
     named.refuse_unknown(("image", "illumination", "encoder", "imu"))
@@ -121,7 +121,7 @@ def frames_of(bag: Bag, topics: Topics, section: Section) -> tuple[Int, FrameTab
     Raises
     ------
     InputError
-        When there are no images, their times run backwards, or nothing says what lit them.
+        When there are no images, their times run backwards, or their illumination is unknown.
     """
     recorded, stamped = [], []
     for time_ns, coded in bag.messages(topics.image):
@@ -140,7 +140,7 @@ def frames_of(bag: Bag, topics: Topics, section: Section) -> tuple[Int, FrameTab
 
 
 def encoder_of(bag: Bag, topics: Topics, start_ns: int) -> Encoder | None:
-    """Return the encoder's readings, time counted from ``start_ns``; None where there is no such topic."""
+    """Return the encoder's readings, with time from ``start_ns``; None if there is no such topic."""
     if not topics.encoder:
         return None
     rows = [(t - start_ns, bag.decode(c, ENCODER_TYPE).data) for t, c in bag.messages(topics.encoder)]
@@ -157,9 +157,9 @@ def encoder_of(bag: Bag, topics: Topics, start_ns: int) -> Encoder | None:
 
 
 def imu_of(bag: Bag, topics: Topics, start_ns: int) -> Imu | None:
-    """Return the IMU's readings, time counted from ``start_ns``; None where there is no such topic.
+    """Return the IMU's readings, with time from ``start_ns``; None if there is no such topic.
 
-    Times are the stamps of its driver where these run with the recorder's clock, as those of the images.
+    Times are the stamps of its driver if these agree with the recorder's clock, as for the images.
 
     Raises
     ------
@@ -197,7 +197,7 @@ def _imu_messages(bag: Bag, topic: str) -> tuple[Int, Int, Float]:
 
 
 def _lights(bag: Bag, topics: Topics, section: Section, recorded_ns: Int) -> NDArray[np.str_]:
-    """Return what lit each image: by its own message, by the latest message, or by a stated pattern."""
+    """Return the illumination of each image: from its own message, the latest one, or a stated pattern."""
     if not topics.illumination:
         pattern = _pattern(section)
         return np.array([pattern[i % len(pattern)] for i in range(recorded_ns.size)], np.str_)

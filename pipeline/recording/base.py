@@ -1,4 +1,4 @@
-"""What every reader makes of its files: a `Recording`, its frames selected by number."""
+"""The result of every reader: a `Recording`, whose frames are selected by number."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def ascending(frames: Sequence[int] | Int) -> Int:
 
 
 def complete(wanted: Int, found: Iterator[tuple[int, Item]]) -> Iterator[tuple[int, Item | None]]:
-    """Yield every wanted frame in order, None for those that ``found``, ascending too, passes over."""
+    """Yield every wanted frame in order, None for those that are missing in ``found`` (ascending, too)."""
     pending = iter(wanted.tolist())
     due = next(pending, None)
     for number, item in found:
@@ -61,9 +61,9 @@ Coming = Future[tuple[int, Item] | None]
 
 
 def in_background(items: Pairs[Item], ahead: int) -> Pairs[Item]:
-    """Return ``items`` in order; one thread makes up to ``ahead`` of them before they are asked for.
+    """Return ``items`` in order; one thread makes up to ``ahead`` of them in advance.
 
-    It starts at once. What making an item raises is raised in the item's place.
+    It starts at once. An exception while making an item is raised in the item's place.
     """
     pool = ThreadPoolExecutor(1)
     return _as_made(items, pool, deque(pool.submit(next, items, None) for _ in range(ahead)))
@@ -79,7 +79,7 @@ def _as_made(items: Pairs[Item], pool: ThreadPoolExecutor, coming: deque[Coming[
 
 
 class Illumination(StrEnum):
-    """What lit the wall in a frame."""
+    """Illumination of the wall in a frame."""
 
     LASER = "laser"
     LED = "led"
@@ -155,7 +155,7 @@ class Fiducials:
 
 @dataclass(frozen=True)
 class PlannedPiece:
-    """A straight length, ``bend_deg`` 0, or a bend of a pipe as planned; NaN marks what is not stated."""
+    """A planned straight length (``bend_deg`` 0) or bend of a pipe; NaN where not stated."""
 
     length_mm: float
     bend_deg: float = 0.0
@@ -164,7 +164,7 @@ class PlannedPiece:
 
 @dataclass(frozen=True)
 class PipeFacts:
-    """What is known of the pipe beforehand; gauge runs also know bores and fiducials."""
+    """Stated facts of the pipe; for gauge runs also bores and fiducials."""
 
     nominal_diameter_mm: float
     wall_thickness_mm: float | None = None
@@ -176,18 +176,18 @@ class PipeFacts:
 
 @dataclass(frozen=True)
 class InspectionFacts:
-    """What a report must say of an inspection and cannot be measured; empty where nobody has stated it.
+    """Facts of an inspection that a report must state and that cannot be measured; empty if not stated.
 
     Attributes
     ----------
     client, site, asset, line : str
-        For whom, where, and which pipe.
+        Client, place, and pipe.
     operator, date : str
-        Who drove the probe, and when (ISO 8601).
+        Operator of the probe, and date (ISO 8601).
     procedure : str
         The written procedure that was followed.
     equipment, calibration : str
-        The probe by its serial number, and its calibration certificate.
+        Serial number of the probe, and its calibration certificate.
     """
 
     client: str = ""
@@ -224,30 +224,29 @@ class Recording:
     name, kind
         ``kind`` is ``inspection`` or ``gauge``.
     path
-        The folder or file it was opened from.
+        The opened folder or file.
     frames, encoder, pipe
     frame_rate : float
         Nominal, 1/s.
     source
         Delivers the images.
     probe_file
-        Where the stated probe lies, if the recording names one.
+        File of the stated probe, if the recording names one.
     content_key
         Hash of everything that determines the content (files' bytes, not their times).
     warnings
-        What the reader noticed and mended, for the report.
+        Problems that the reader noticed and corrected, for the report.
     files
-        What it is read from, as it was when it was opened: see `pipeline.recording.checks.refuse_changed`.
+        Its files in their state at opening: see `pipeline.recording.checks.refuse_changed`.
     listed
-        All rows of the table of frames, also those for which there are no pictures; None where there is no
-        such table.
+        All rows of the table of frames, also those without pictures; None without such a table.
     inspection
-        For whom, where and how it was recorded, for the report.
+        Facts of the inspection, for the report.
     imu
-        None where there is none.
+        None without an IMU.
     stays : (h, w) bool or None
         Pixels of the lit pictures, reduced by a whole factor, at which something stays while the wall moves;
-        None where there are none, or nobody looked.
+        None if there are none, or if they were not examined.
     """
 
     name: str

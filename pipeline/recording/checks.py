@@ -1,6 +1,6 @@
-"""Contradictions within a recording: each is mended and named in a warning, or refused.
+"""Contradictions within a recording: each is corrected and named in a warning, or refused.
 
-`CheckedFrames` is the table of frames as the pictures show it: in which light each was taken, and when.
+`CheckedFrames` is the table of frames, corrected by the pictures: light and time of each.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from pipeline.recording.one_field import OneField
 
 
 def common_frames(table: FrameTable, count: int) -> tuple[FrameTable, tuple[str, ...]]:
-    """Return the part of a table that ``count`` images cover, and what was noticed."""
+    """Return the part of a table that ``count`` images cover, and a warning."""
     listed = int(table.frame[-1]) + 1
     if listed == count:
         return table, ()
@@ -43,17 +43,17 @@ def refuse_backward(file: Path, values: Sequence[float] | Float, name: str, *, s
         raise InputError(
             file, f"{name} goes from {values[i]:g} to {values[i + 1]:g}", place=f"reading {i + 2}",
             expected=f"{name} that only rises",
-            hint="find out what the recorder's clock did there, or cut the recording at that place",
+            hint="check the recorder's clock, or cut the recording at that place",
         )  # fmt: skip
 
 
 def check_probe_fits(recording: Recording, probe: Probe) -> None:
-    """Raise `InputError` when the images are not of the size that the probe's camera has."""
+    """Raise `InputError` when the images have another size than the probe's camera."""
     found, wanted = recording.source.image_size, probe.camera.image_size
     if tuple(found) != tuple(wanted):
         raise InputError(
             recording.path, f"its images are {found[0]} x {found[1]} pixels",
-            expected=f"{wanted[0]} x {wanted[1]}, as the probe's camera says",
+            expected=f"{wanted[0]} x {wanted[1]}, as the probe's camera states",
             hint=_size_hint(tuple(found), tuple(wanted)),
         )  # fmt: skip
 
@@ -61,23 +61,23 @@ def check_probe_fits(recording: Recording, probe: Probe) -> None:
 def _size_hint(found: tuple[int, ...], wanted: tuple[int, ...]) -> str:
     """Return what to do about images (width, height) of another size than the camera's."""
     if found == wanted[::-1]:
-        return "turn the pictures back by 90° in the recorder, or give a probe file of this camera so turned"
+        return "rotate the pictures back by 90° in the recorder, or use a probe file of the rotated camera"
     cut = [name for name, f, w in zip(("columns", "rows"), found, wanted, strict=True) if f < w]
     if len(cut) == 1 and any(f == w for f, w in zip(found, wanted, strict=True)):
         return (
-            f"if the recorder cut {cut[0]} off, switch that off; or give a probe file with this image_size, "
-            "and with centre_px less what was cut off at the left and above"
+            f"if the recorder cut {cut[0]} off, switch that off; or use a probe file with this image_size, "
+            "and with centre_px reduced by the parts cut off at the left and above"
         )
-    return "give the probe file of this camera at this resolution with --probe"
+    return "state the probe file of this camera at this resolution with --probe"
 
 
 def refuse_changed(recording: Recording) -> None:
-    """Raise `InputError` when a file of a recording is no longer as it was when it was opened."""
+    """Raise `InputError` when a file of a recording has changed since it was opened."""
     for file in recording.files:
         file.refuse_changed()
 
 
-# Stands in the table of frames in place of a light: the frame has a pose, but no stage looks at its picture.
+# Replaces the light in the table of frames: the frame has a pose, but no stage uses its picture.
 WITHHELD = "withheld"
 
 
@@ -88,18 +88,18 @@ class CheckedFrames:
     Attributes
     ----------
     frame : (N,) int
-        Numbers of the pictures that are used: all of the recording's but repeated ones.
+        Numbers of the used pictures: all of the recording's except repeated ones.
     time_s : (N,)
-        When each was taken: the recording's own times, or those of the rows that belong to the pictures.
+        Times of the pictures: the recording's own, or those of the rows that belong to the pictures.
     illumination : (N,) str
         `Illumination` values as the pictures show them.
     encoder_factor : float
-        By which the encoder's readings are to be multiplied: 1 unless its unit or sign was wrong.
+        Factor on the encoder's readings: 1 unless its unit or sign was wrong.
     relabelled, retimed : int
-        In how many frames light and time differ from the recording's table.
+        Numbers of frames whose light and time differ from the recording's table.
     withheld : (N,) bool or None
-        Frames whose pictures no stage of the run may measure, so that `boresight twin` can compare with them
-        what the run predicts; None where there are none.
+        Frames whose pictures no stage of the run may use, so that `boresight twin` can compare them with the
+        run's predictions; None without any.
     stays : (h, w) bool or None
         As in `Recording`.
     interlaced : bool
@@ -122,7 +122,7 @@ class CheckedFrames:
     def applied_to(self, recording: Recording) -> Recording:
         """Return the recording with these frames, and its encoder in mm and with the motion's sign.
 
-        The light of a withheld frame is `WITHHELD`, so that asking for frames of a light passes over it.
+        The light of a withheld frame is `WITHHELD`, so that it is never selected by its light.
         """
         hidden = np.zeros(len(self.frame), bool) if self.withheld is None else self.withheld
         table = FrameTable(self.frame, self.time_s, np.where(hidden, WITHHELD, self.illumination))
@@ -136,7 +136,7 @@ class CheckedFrames:
 def withheld_frames(label: NDArray[np.str_], every: int) -> Bool:
     """Return which frames (N,) are withheld: one in ``every`` of each light, none for 0.
 
-    The lights take turns, so that the frames beside a withheld one are measured where lights alternate.
+    The lights are withheld in turn, so that the frames beside a withheld one are used if lights alternate.
     """
     withheld = np.zeros(len(label), bool)
     kinds = np.unique(label)

@@ -1,4 +1,4 @@
-"""Decoded frames kept on the disk while a run lasts, so that its stages decode a video once between them."""
+"""Stores decoded frames on the disk during a run, so that its stages decode a video only once."""
 
 from __future__ import annotations
 
@@ -33,31 +33,31 @@ from pipeline.recording.video import AHEAD, FEW, VideoSource
 Made = TypeVar("Made")
 Form = Literal["grey", "split", "bgr"]
 _FORMS: tuple[Form, ...] = ("grey", "split", "bgr")
-"""What is kept of a frame: luma; luma with chroma of half its size; all. Each can be made from a later
+"""Stored part of a frame: luma; luma with chroma of half its size; all. Each can be made from a later
 one."""
-# Frames are kept as they are decoded, 2 to 6 MB each at 1600 x 1200: 4 GiB hold half a minute of such video.
-# Frames beyond it are decoded again. A disk that is nearly full is left to the results.
+# Frames are stored as decoded, 2 to 6 MB each at 1600 x 1200: 4 GiB hold half a minute of such video. Frames
+# beyond this are decoded again. A nearly full disk is reserved for the results.
 _MOST_BYTES, _SHARE_OF_FREE = 4 << 30, 0.25
-# Bytes reserved on the disk at a time: room found block by block while writing costs twice the system time.
+# Bytes reserved on the disk at a time: allocating block by block while writing costs twice the system time.
 _GROWTH = 1 << 27
 
 
 @dataclass(frozen=True)
 class Kept:
-    """Where a frame's planes lie in the file, and what they are.
+    """Place and properties of a frame's planes in the file.
 
     Attributes
     ----------
     offset : int
-        Of the first plane in the file, bytes.
+        Offset of the first plane in the file, bytes.
     planes : tuple of (int, int)
-        Height and width of the planes that are kept, one after the other.
+        Height and width of the stored planes, one after the other.
     form : Form
-        What is kept.
+        Stored part of the frame.
     size : (int, int)
         Width and height of the frame, px.
     pixel_format, color_range, colorspace
-        As the decoder gave them.
+        Values of the decoder.
     """
 
     offset: int
@@ -82,7 +82,7 @@ class FrameStore:
     ----------
     stream : file
     room : int
-        Bytes that the file may still take; 0 once the disk has refused one.
+        Number of bytes that may still be written; 0 after the disk has refused one.
     """
 
     stream: IO[bytes]
@@ -96,12 +96,12 @@ class FrameStore:
         weakref.finalize(self, self.stream.close)
 
     def holds(self, number: int, form: Form) -> bool:
-        """Return whether a frame is there in that form or a richer one, or known to be unreadable."""
+        """Return whether a frame is stored in that form or a richer one, or known to be unreadable."""
         kept = self._kept.get(number)
         return number in self._kept if kept is None else _FORMS.index(kept.form) >= _FORMS.index(form)
 
     def put(self, number: int, frame: av.VideoFrame | None, form: Form) -> None:
-        """Keep a frame in one form where its format, the limit and the disk allow it."""
+        """Store a frame in one form if its format, the limit and the disk allow it."""
         if frame is None:
             self._kept[number] = None
         elif _is_planar(frame) and not (form != "bgr" and self._kept.get(number)):
@@ -110,7 +110,7 @@ class FrameStore:
             self._write(number, frame, form)
 
     def take(self, number: int, planes: Planes) -> Image | None:
-        """Return the pixels of a frame that is there, as `pipeline.recording.images.pixels` gives them."""
+        """Return the pixels of a stored frame, as `pipeline.recording.images.pixels` gives them."""
         kept = self._kept[number]
         if kept is None:
             return None
@@ -122,7 +122,7 @@ class FrameStore:
         return shown(_rebuilt(kept, content), planes)
 
     def take_split(self, number: int) -> SplitImage | None:
-        """Return a frame that is there as `pipeline.recording.images.split` gives it."""
+        """Return a stored frame as `pipeline.recording.images.split` gives it."""
         kept = self._kept[number]
         if kept is None:
             return None
@@ -152,7 +152,7 @@ class FrameStore:
         try:
             self._take_room(offset + size)
             written = os.pwritev(self.stream.fileno(), [p.data for p in planes], offset)
-        except OSError:  # the disk is full or takes no file of this size: go on without
+        except OSError:  # the disk is full or refuses a file of this size: continue without it
             written = 0
         if written < size:
             self.room = 0
@@ -180,15 +180,15 @@ class FrameStore:
 
 @dataclass(frozen=True)
 class DecodedOnce:
-    """Frames of a video; each is decoded when it is first asked for and kept for the next stage.
+    """Frames of a video; each is decoded at its first use and stored for the next stage.
 
     Attributes
     ----------
     video : VideoSource
     store : FrameStore
     dim, lit : frozenset of int
-        Frames in the laser's light, of which the luma alone is kept, and in the lamps', whose chroma is
-        halved until it is asked for: a run does not need more, and writing more costs time.
+        Frames in the laser's light, of which only the luma is stored, and in the lamps', whose chroma is
+        stored at half size until more is requested: a run does not need more, and writing costs time.
     """
 
     video: VideoSource
@@ -252,7 +252,7 @@ def read_split(recording: Recording, frames: Sequence[int] | Int) -> Iterator[tu
 
 
 def read_luma(recording: Recording, frames: Sequence[int] | Int) -> Iterator[tuple[int, Image | None]]:
-    """Yield the luma of frames that `read_split` yields: a part of its time where colours are kept apart."""
+    """Yield the luma of frames that `read_split` yields, which is faster if colours are stored apart."""
     if isinstance(recording.source, DecodedOnce):
         return recording.source.read_luma(frames)
     return ((number, luma_of(image)) for number, image in read_split(recording, frames))
@@ -266,8 +266,8 @@ def luma_of(image: SplitImage | None) -> Image | None:
 def decoded_once(recording: Recording, scratch: Scratch) -> Recording:
     """Return the recording with frames that are decoded once, however many stages ask for them.
 
-    Their bytes are those of the video's frames; what a stage makes of them is not changed. A recording of
-    single images, or one for which the disk has no room, is returned as it is.
+    Their bytes are those of the video's frames, so that results do not change. A recording of single images,
+    or one for which the disk has no space, is returned unchanged.
     """
     if not isinstance(recording.source, VideoSource):
         return recording

@@ -1,4 +1,4 @@
-"""Encoder readings that cannot be true: a counter that restarts is continued, and jumps are warned of."""
+"""Checks implausible encoder readings: continues a counter that restarts, and warns of jumps."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _LARGEST, _JUMP_FACTOR, _BESIDE, _BESIDE_S, _JUMP_MM = 0.95, 10.0, 5, 0.2, 1.0
 
 
 def checked_encoder(encoder: Encoder | None, frames: FrameTable) -> tuple[Encoder | None, tuple[str, ...]]:
-    """Return the encoder with its counter continued, and warnings: covers a part only, pauses, jumps."""
+    """Return the encoder with its counter continued, and warnings of partial cover, pauses and jumps."""
     if encoder is None or frames.frame.size == 0:
         return encoder, ()
     encoder, began_anew = counted_on(encoder)
@@ -27,7 +27,7 @@ def checked_encoder(encoder: Encoder | None, frames: FrameTable) -> tuple[Encode
     if encoder.time_s[-1] < frames.time_s[-1] - slack:
         found.append(f"the encoder ends {frames.time_s[-1] - encoder.time_s[-1]:.2f} s before the last frame")
     if np.any(step_s > 10 * slack):
-        found.append(f"the encoder is silent for up to {step_s.max():.2f} s")
+        found.append(f"the encoder has no readings for up to {step_s.max():.2f} s")
     return encoder, (*found, *_warned_of_jumps(encoder))
 
 
@@ -38,10 +38,10 @@ def _slack_s(encoder: Encoder, frames: FrameTable) -> float:
 
 
 def counted_on(encoder: Encoder) -> tuple[Encoder, tuple[str, ...]]:
-    """Return the readings of a counter that restarts as if it had counted on, and a warning of that.
+    """Return the readings of a restarting counter, continued without the jumps, and a warning.
 
-    Such a counter always jumps back by its whole range; after a slip of the wheel the reading goes on from
-    where it is.
+    Such a counter always jumps back by its whole range; after a slip of the wheel the reading continues from
+    its current value.
     """
     jumps = _jumps(encoder)
     if not jumps.size:
@@ -58,16 +58,16 @@ def counted_on(encoder: Encoder) -> tuple[Encoder, tuple[str, ...]]:
     begun[jumps + 1] = -whole_mm
     times = f"{jumps.size} time{'s' * (jumps.size > 1)}"
     return replace(encoder, distance_mm=encoder.distance_mm + np.cumsum(begun)), (
-        f"the encoder's counter begins anew {times}, after {abs(whole_mm):.4g} mm each: taken as if it had "
-        "counted on",
+        f"the encoder's counter restarts {times}, after {abs(whole_mm):.4g} mm each: its readings are "
+        "continued without these jumps",
     )
 
 
 def _jumps(encoder: Encoder) -> Int:
     """Return the readings (K,) after which the encoder jumps.
 
-    A coarse encoder repeats most readings, and so does that of a probe that waits: only steps that are not 0
-    tell what is usual. Setting out is no jump, since the encoder then goes on as fast.
+    A coarse encoder repeats most readings, and so does that of a waiting probe: only steps that are not 0
+    define the usual step. A start is not a jump, since the encoder then continues as fast.
     """
     step_mm = np.abs(np.diff(encoder.distance_mm))
     if not step_mm.any():

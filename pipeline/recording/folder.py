@@ -1,4 +1,4 @@
-"""A recording kept as a folder: recording.yaml, which every kind has, tables, and a video or images."""
+"""A recording stored as a folder: recording.yaml, which every kind has, tables, and a video or images."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ _FIDUCIAL_KEYS = ("dictionary", "size_mm", "columns_along", "rows_along", "marke
 
 
 def pipe_facts(section: Section) -> PipeFacts:
-    """Return what a recording's ``pipe`` section says; raises `InputError` at the key at fault."""
+    """Return the facts of a recording's ``pipe`` section; raises `InputError` with the wrong key."""
     section.refuse_unknown(_PIPE_KEYS)
     has = section.has
     return PipeFacts(
@@ -83,14 +83,14 @@ def _marker(section: Section) -> Marker:
 
 
 def inspection_facts(section: Section) -> InspectionFacts:
-    """Return what the ``inspection`` section says; raises `InputError` at the key at fault."""
+    """Return the facts of the ``inspection`` section; raises `InputError` with the wrong key."""
     section.refuse_unknown(_INSPECTION_KEYS)
     stated = {key: section.text(key) for key in _INSPECTION_KEYS if section.has(key) and key != "date"}
     return InspectionFacts(**stated, date=_date(section) if section.has("date") else "")
 
 
 def _date(section: Section) -> str:
-    """Return a date as ISO 8601 has it; YAML reads an unquoted one as a date already."""
+    """Return a date in ISO 8601 format; YAML converts an unquoted one to a date."""
     value = section.require("date", "a date such as 2026-05-31")
     if isinstance(value, datetime.date):
         return value.isoformat()
@@ -102,7 +102,7 @@ def _date(section: Section) -> str:
 
 @dataclass(frozen=True)
 class Description:
-    """What recording.yaml says whatever holds the frames; ``frame_rate`` is None where it says none."""
+    """The entries of recording.yaml that all storages of frames share; ``frame_rate`` may be None."""
 
     name: str
     kind: str
@@ -114,7 +114,7 @@ class Description:
 
 
 def describe(section: Section) -> Description:
-    """Return the keys that all recordings share; raises `InputError` at the key at fault."""
+    """Return the keys that all recordings share; raises `InputError` with the wrong key."""
     probe_file, warnings = optional_file(section, "probe")
     return Description(
         name=section.text("name"),
@@ -138,23 +138,23 @@ def inside(section: Section, key: str) -> Path:
 
 
 def required_file(section: Section, key: str) -> Path:
-    """Return the file that a key names; raises `InputError` when it is not there."""
+    """Return the file that a key names; raises `InputError` when it does not exist."""
     file = inside(section, key)
     if not file.is_file():
         raise InputError(
-            file, f"is missing, yet {section.file.name} names it as {key}",
+            file, f"is missing, but {section.file.name} names it as {key}",
             hint="copy the whole folder of the recording",
         )  # fmt: skip
     return file
 
 
 def optional_file(section: Section, key: str) -> tuple[Path | None, tuple[str, ...]]:
-    """Return a file that a recording can do without, or None and a warning when it is named but absent."""
+    """Return an optional file of a recording, or None and a warning when it is named but missing."""
     if not section.has(key):
         return None, ()
     file = inside(section, key)
     if not file.is_file():
-        return None, (f"{section.text(key)} is named as {key} but is not there",)
+        return None, (f"{section.text(key)} is named as {key} but does not exist",)
     return file, ()
 
 
@@ -177,7 +177,7 @@ def open_folder(path: Path) -> Recording:
     Raises
     ------
     InputError
-        When a file is missing or wrong; what can be mended is named in `Recording.warnings` instead.
+        When a file is missing or wrong; correctable errors are named in `Recording.warnings` instead.
     """
     description = input_file(path / DESCRIPTION)
     section = described_in(description.path)
@@ -193,7 +193,7 @@ def open_folder(path: Path) -> Recording:
 
 
 def described_in(file: Path) -> Section:
-    """Return what recording.yaml says; raises `InputError`."""
+    """Return the content of recording.yaml; raises `InputError`."""
     section = read_yaml(file)
     section.refuse_unknown(_KEYS)
     return section
@@ -201,7 +201,7 @@ def described_in(file: Path) -> Section:
 
 @dataclass(frozen=True)
 class TableFiles:
-    """The files of a recording's tables, and warnings where one that is named is not there."""
+    """The files of a recording's tables, and warnings of named files that do not exist."""
 
     frames: Path
     encoder: Path | None
@@ -217,7 +217,7 @@ def table_files(section: Section) -> TableFiles:
 
 @dataclass(frozen=True)
 class FolderParts:
-    """What was read from a recording folder; ``files`` are its files as they were before it was read."""
+    """The content of a recording folder; ``files`` are its files in their state before reading."""
 
     table: FrameTable
     encoder: Encoder | None
@@ -228,7 +228,7 @@ class FolderParts:
 
 
 def assembled(section: Section, frames_file: Path, parts: FolderParts) -> Recording:
-    """Return the recording that a description and what was read make; raises `InputError`."""
+    """Return the recording from a description and the content of its files; raises `InputError`."""
     described = describe(section)
     rate = section.number("frame_rate", above=0)
     table, rounded = without_rounding(frames_file, parts.table, rate)
@@ -256,7 +256,7 @@ def assembled(section: Section, frames_file: Path, parts: FolderParts) -> Record
 def _match(
     file: Path, table: FrameTable, source: VideoSource | ImageSequence
 ) -> tuple[FrameTable, tuple[str, ...]]:
-    """Return the frames that table and images share, and what was mended."""
+    """Return the frames that table and images share, and the warnings."""
     gaps = _check_numbers(source, table)
     frames, cut = common_frames(table, source.count)
     if frames.frame.size == 0:
@@ -268,7 +268,7 @@ def _match(
 
 
 def _open_source(section: Section, table: FrameTable) -> tuple[VideoSource | ImageSequence, list[InputFile]]:
-    """Return the source of images and the files it reads, as they were before."""
+    """Return the source of images and its files in their state before reading."""
     if is_pattern(section.text("video")):
         inside(section, "video")
         images = open_images(section.file.parent, section.text("video"))
@@ -283,7 +283,7 @@ def _check_numbers(source: VideoSource | ImageSequence, table: FrameTable) -> tu
     if isinstance(source, ImageSequence) and first != listed:
         raise InputError(
             source.file(first), f"is the first image, but the table of frames starts at {listed}",
-            hint="number both alike: a shift would give every frame the light of its neighbour",
+            hint="number both in the same way: a shift would give every frame the light of its neighbour",
         )  # fmt: skip
     missing = int(source.numbers[-1]) - first + 1 - source.numbers.size
     return (f"{missing} images are missing between the first and the last",) if missing else ()

@@ -1,7 +1,7 @@
-"""A recording that is still being written: every look at its folder reads what is new in it.
+"""A recording that is still being written: every call of `look` reads the new part of its folder.
 
-Of a Matroska video only the last cluster, which may be incomplete, is read again. Other kinds of video, and
-bags, are read again as a whole. Files are not hashed: what is shown of a growing recording is not a result.
+Only the last cluster of a Matroska video, which may be incomplete, is read again. Other kinds of video, and
+bags, are read again as a whole. Files are not hashed: the display of a growing recording is not a result.
 """
 
 from __future__ import annotations
@@ -38,14 +38,14 @@ from pipeline.recording.video_index import Packet, index_of, list_packets
 
 
 class GrowingRecording:
-    """A recording that is looked at again and again."""
+    """A recording that is read repeatedly while it grows."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
         self._begin()
 
     def look(self) -> Recording:
-        """Return the recording as it stands.
+        """Return the current state of the recording.
 
         Raises
         ------
@@ -70,7 +70,7 @@ class GrowingRecording:
         named = table_files(section)
         table = self._frames.table(named.frames)
         encoder = self._encoder.readings(named.encoder) if named.encoder is not None else None
-        # A growing recording is shown, not measured: its poses do without the IMU.
+        # A growing recording is shown, not measured: its poses do not use the IMU.
         parts = FolderParts(table, encoder, None, self._source(section, table), named.warnings, ())
         return assembled(section, named.frames, parts)
 
@@ -82,19 +82,19 @@ class GrowingRecording:
 
 
 class _StartedAnewError(Exception):
-    """A file is shorter than what was read of it, or another one: the recorder started again."""
+    """A file is shorter than its part that was read, or was replaced: the recorder started again."""
 
 
 @dataclass(frozen=True)
 class _Lines:
-    """How far a CSV file was read whose lines are taken as they become whole."""
+    """Reading position in a growing CSV file, of which only complete lines are used."""
 
     read_bytes: int = 0
     inode: int = -1
     head: bytes = b""
 
     def new(self, file: Path, least: int) -> tuple[str, _Lines]:
-        """Return the first line and the new ones, none where fewer than ``least``, and where they end."""
+        """Return the first line and the new ones, none if fewer than ``least``, and the new position."""
         inode = _same(file, self.inode, self.read_bytes)
         with file.open("rb") as stream:
             stream.seek(self.read_bytes)
@@ -115,7 +115,7 @@ class _GrowingFrames:
         self._lines, self._table = _Lines(), FrameTable(np.empty(0, int), np.empty(0), np.empty(0, str))
 
     def table(self, file: Path) -> FrameTable:
-        """Return all that is there."""
+        """Return all rows so far."""
         text, lines = self._lines.new(file, 1)
         if text:
             old, new = self._table, frame_table(file, text)
@@ -136,7 +136,7 @@ class _GrowingEncoder:
         self._lines, self._readings = _Lines(), Encoder(np.empty(0), np.empty(0))
 
     def readings(self, file: Path) -> Encoder | None:
-        """Return all that is there, None where there is nothing yet."""
+        """Return all readings so far, None without any."""
         text, lines = self._lines.new(file, 2)
         if text:
             old, new = self._readings, encoder_readings(file, text)
@@ -157,7 +157,7 @@ class _GrowingVideo:
     inode: int = -1
 
     def source(self, path: Path) -> VideoSource:
-        """Return the frames that are there."""
+        """Return the frames written so far."""
         self.inode = _same(path, self.inode, self.clusters[-1] if self.clusters else 0)
         self.tail = self.tail or matroska_tail(path)
         if self.tail is None:
@@ -186,9 +186,9 @@ class _TailSource(VideoSource):
     Attributes
     ----------
     tail, clusters
-        Where clusters are known to begin, ascending.
+        Known beginnings of clusters, ascending.
     places : (N,) int
-        Where the frames lie in the file.
+        Places of the frames in the file.
     """
 
     tail: MatroskaTail
@@ -204,7 +204,7 @@ class _TailSource(VideoSource):
 
 
 def _same(file: Path, inode: int, read_bytes: int) -> int:
-    """Return a file's inode; raises where it is another file than it was, or shorter."""
+    """Return a file's inode; raises if the file was replaced or is shorter than before."""
     now = file.stat()
     if now.st_size < read_bytes or inode not in (-1, now.st_ino):
         raise _StartedAnewError

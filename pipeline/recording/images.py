@@ -1,4 +1,4 @@
-"""Pictures: grey and colour planes of decoded frames, compressed images, and frames kept as numbered files.
+"""Pictures: grey and colour planes of decoded frames, compressed images, and frames in numbered files.
 
 Numbered image files are named by a pattern such as ``frames/%06d.png``.
 """
@@ -25,7 +25,7 @@ from pipeline.recording.base import Planes, ascending, decoded_ahead
 _BT709, _BT601 = (0.2126, 0.0722), (0.299, 0.114)
 # Luma of black and of white in limited range (ITU-R BT.601 and BT.709), and of white in full range.
 _LIMITED_BLACK, _LIMITED_WHITE, _WHITE = 16, 235, 255
-# Planar formats of 8 bits whose chroma is as fine as their luma.
+# Planar formats of 8 bits whose chroma has the resolution of their luma.
 FULL_CHROMA = ("yuv444p", "yuvj444p")
 
 
@@ -94,7 +94,7 @@ class SplitImage:
     def of_planes(
         planes: Sequence[Image], pixel_format: str, color_range: int, colorspace: int
     ) -> SplitImage:
-        """Split planes of full-resolution chroma, or of chroma halved: whole colours are not worked out."""
+        """Split planes of full-resolution chroma, or of halved chroma, without computing full colours."""
         parts = [halved(p) if p.shape == planes[0].shape else p for p in planes]
         small = bgr_444(parts, pixel_format, color_range, colorspace)
         return SplitImage(in_full_range(planes[0], pixel_format, color_range), small)
@@ -208,7 +208,7 @@ class ImageSequence:
 
 
 def is_pattern(name: str) -> bool:
-    """Tell whether the name of a video is a pattern of image files."""
+    """Return whether the name of a video is a pattern of image files."""
     return "%" in name
 
 
@@ -222,7 +222,7 @@ def open_images(folder: Path, pattern: str) -> ImageSequence:
     """
     numbers = _numbers(folder, pattern)
     if not numbers:
-        raise InputError(folder / pattern, "there is no such image", expected=EXPECTED)
+        raise InputError(folder / pattern, "fits no image", expected=EXPECTED)
     first = folder / (pattern % numbers[0])
     image = decode_still(first.read_bytes(), "grey")
     if image is None:

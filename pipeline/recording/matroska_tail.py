@@ -1,7 +1,7 @@
-"""The end of a Matroska file that is still being written, as a file of its own.
+"""The end of a Matroska file that is still being written, read as a separate file.
 
 Clusters do not depend on each other. So the head of the file (what comes before its first cluster), followed
-by everything from any later cluster on, is again a Matroska file (RFC 9559, § 5.1.3), and what is new can be
+by everything from any later cluster on, is again a Matroska file (RFC 9559, § 5.1.3), and the new part can be
 read alone.
 """
 
@@ -15,7 +15,7 @@ _CLUSTER = b"\x1f\x43\xb6\x75"
 _TIMESTAMP, _CRC32 = 0xE7, 0xBF
 _CRC32_BYTES = 6
 _LONGEST_START = 4 + 8 + _CRC32_BYTES + 1
-# The first cluster is looked for in so many bytes from the start (heads have some kB), and the last one in
+# The first cluster is searched in so many bytes from the start (heads have some kB), and the last one in
 # pieces of so many bytes from the end.
 _HEAD_BYTES = 1 << 20
 _AT_ONCE = 1 << 20
@@ -33,11 +33,11 @@ class MatroskaTail:
         return HeadAndTail(self, cluster)
 
     def place_of(self, place: int, cluster: int) -> int:
-        """Return the place in the file of a byte that `since` gives at ``place``."""
+        """Return the place in the file of a byte that `since` returns at ``place``."""
         return place - self.head_bytes + cluster
 
     def last_cluster(self, after: int) -> int:
-        """Return where the last cluster begins; ``after``, where an earlier one begins, if there is none."""
+        """Return the beginning of the last cluster, or ``after``, that of an earlier one."""
         with self.path.open("rb") as file:
             end = file.seek(0, 2)
             while end > after:
@@ -51,7 +51,7 @@ class MatroskaTail:
 
 
 def matroska_tail(path: Path) -> MatroskaTail | None:
-    """Return a file's head and tail; None where it is no Matroska file with a cluster."""
+    """Return a file's head and tail; None if it is not a Matroska file with a cluster."""
     with path.open("rb") as file:
         start = file.read(_HEAD_BYTES)
     place = start.find(_CLUSTER)
@@ -62,7 +62,7 @@ def matroska_tail(path: Path) -> MatroskaTail | None:
 
 
 def _last_cluster_in(content: bytes) -> int:
-    """Return where the last cluster in ``content`` begins, −1 where none does."""
+    """Return the beginning of the last cluster in ``content``, −1 without one."""
     place = content.rfind(_CLUSTER)
     while place >= 0 and not _is_cluster(content, place):
         place = content.rfind(_CLUSTER, 0, place)
@@ -70,7 +70,7 @@ def _last_cluster_in(content: bytes) -> int:
 
 
 def _is_cluster(content: bytes, place: int) -> bool:
-    """Tell whether an identifier is a cluster's: its size and its timestamp follow, maybe its checksum."""
+    """Return whether an identifier is a cluster's: its size and timestamp follow, maybe its checksum."""
     place += len(_CLUSTER)
     if place >= len(content) or content[place] == 0:
         return False
@@ -81,7 +81,7 @@ def _is_cluster(content: bytes, place: int) -> bool:
 
 
 class HeadAndTail:
-    """Bytes of the head, then those from a cluster on; it can be read once, not sought in."""
+    """Bytes of the head, then those from a cluster on; a stream that can be read once, without seeking."""
 
     def __init__(self, tail: MatroskaTail, cluster: int) -> None:
         self._file = tail.path.open("rb")

@@ -13,7 +13,7 @@ from pipeline.recording.base import FrameSource, Planes
 
 @dataclass(frozen=True)
 class OneField:
-    """Pictures of a ``source`` as their even rows show them: one time and one light in each."""
+    """Pictures of a ``source`` reconstructed from their even rows: one time and one light in each."""
 
     source: FrameSource
 

@@ -1,4 +1,4 @@
-"""Stamps of frames that were rounded until some are equal: 0.1, 0.1, 0.1, 0.2, ..."""
+"""Corrects stamps of frames that were rounded until some are equal: 0.1, 0.1, 0.1, 0.2, ..."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ from pipeline.errors import InputError
 from pipeline.recording.base import FrameTable
 
 # Rounding moves a stamp by half a unit; a line laid through many rounded stamps is off by less than a tenth.
-# Their errors repeat like a saw's teeth: the line's slope may be off by some σ of independent errors.
+# Their errors are a sawtooth: the line's slope may be off by some σ of independent errors.
 _WITHIN_UNITS, _SIGMAS = 0.6, 3.0
 # The unit of time is at least 1.1 frames long, else rounding makes no two stamps equal. It holds at most 1.5
 # times the frames of the stated rate, and one more: a unit in which the clock stood still holds more.
 _SHORTEST, _LONGEST = 1.1, 1.5
-# Stamps are multiples of their unit but for the digits of a float.
+# Stamps are multiples of their unit except for rounding of floats.
 _EXACT = 1e-6
 
 
 def without_rounding(file: Path, table: FrameTable, rate: float) -> tuple[FrameTable, tuple[str, ...]]:
-    """Return a table whose times rise strictly, and what was noticed: equal stamps, if rounded, are parted.
+    """Return a table with strictly rising times, and warnings: equal stamps are separated if rounded.
 
-    Times are those of an even rhythm where it lies within the rounding of all stamps; else frames with equal
+    Times are those of an even rhythm if it lies within the rounding of all stamps; else frames with equal
     stamps are spread evenly over the time that rounds to their stamp. ``rate`` is the stated frame rate, 1/s.
 
     Raises
@@ -43,7 +43,7 @@ def without_rounding(file: Path, table: FrameTable, rate: float) -> tuple[FrameT
     if not (np.isfinite(held) and whole and held > _SHORTEST and count.max() <= _LONGEST * held + 1):
         _refuse(file, table, int(count.max()))
     even = _even_rhythm(table, unit_s, 1 / rate)
-    time_s, how = even, "an even rhythm, which rounds to all of them, takes their place"
+    time_s, how = even, "an even rhythm, which rounds to all of them, replaces them"
     if time_s is None:
         time_s, how = (
             _shared(table.time_s, unit_s),
@@ -56,7 +56,7 @@ def without_rounding(file: Path, table: FrameTable, rate: float) -> tuple[FrameT
 
 
 def _even_rhythm(table: FrameTable, unit_s: float, stated_s: float) -> Float | None:
-    """Return the even times (N,) of which all stamps are rounded, None where there are none.
+    """Return the even times (N,) that round to all stamps, None if there are none.
 
     Their period is the stated one unless the stamps clearly show another: a few seconds show little.
     """
@@ -69,7 +69,7 @@ def _even_rhythm(table: FrameTable, unit_s: float, stated_s: float) -> Float | N
 
 
 def _shared(time_s: Float, unit_s: float) -> Float:
-    """Return times (N,) at which those with one stamp share the unit about it."""
+    """Return times (N,) at which frames with one stamp are spread over the unit around it."""
     _, first, index, count = np.unique(time_s, return_index=True, return_inverse=True, return_counts=True)
     place = (np.arange(len(time_s)) - first[index] + 0.5) / count[index]
     return np.asarray(time_s + (place - 0.5) * unit_s)

@@ -102,7 +102,7 @@ def _readings(file: Path, text: str, columns: Sequence[str], key: str) -> Float:
     if len(rows) < 2:
         raise InputError(
             file, f"has {len(rows)} readings", expected="at least 2",
-            hint=f"take the key {key} out of recording.yaml to run without one",
+            hint=f"remove the key {key} from recording.yaml to run without one",
         )  # fmt: skip
     return np.array(rows)
 
@@ -114,12 +114,12 @@ def refuse_other_units(file: Path, imu: Imu) -> None:
     if rate > _LARGEST_RATE_RAD_S:
         raise InputError(
             file, f"a rate is {rate:.4g} rad/s", expected=f"rates up to {_LARGEST_RATE_RAD_S:g} rad/s",
-            hint="give rates in rad/s: 1 °/s is 0.01745 rad/s",
+            hint="state rates in rad/s: 1 °/s is 0.01745 rad/s",
         )  # fmt: skip
     if not _LEAST_FORCE_M_S2 <= force <= _LARGEST_FORCE_M_S2:
         raise InputError(
             file, f"the accelerometer usually shows {force:.4g} m/s²", expected="about 9.8 m/s²",
-            hint="give the specific force in m/s², gravity included: 1 g is 9.80665 m/s²",
+            hint="state the specific force in m/s², gravity included: 1 g is 9.80665 m/s²",
         )  # fmt: skip
 
 

@@ -18,13 +18,13 @@ from pipeline.recording.base import FrameTable, Planes, ascending, complete, in_
 from pipeline.recording.images import shown
 from pipeline.recording.video_index import VideoIndex, list_frames
 
-# Fixed, so that which frames of a damaged file are given up does not depend on the machine.
+# Fixed, so that the rejected frames of a damaged file do not depend on the machine.
 _THREADS = 4
 # Restarting the decoder costs about as much as decoding this many frames.
 _RESTART_FRAMES = 8
 # A decoder holds back at most this many frames: 16 for reordering and one a thread.
 _HELD_BACK = 16 + _THREADS
-# Frames decoded ahead of the one worked on, and the number from which a thread of its own is worth it.
+# Frames decoded ahead of the processed one, and the number from which a separate thread is worth it.
 AHEAD, FEW = 12, 3
 # Times of a frame in video and table are the same when they differ by less than this part of a period.
 _SAME_TIME = 0.25
@@ -40,7 +40,7 @@ class VideoSource:
     image_size : (int, int)
         Width and height, px.
     numbers : (N,) int
-        Under which number each frame of the file is asked for, ascending; see `numbered_by`.
+        Number of each frame of the file, ascending; see `numbered_by`.
     """
 
     path: Path
@@ -57,8 +57,8 @@ class VideoSource:
         """Return the source with numbers taken from a table of frames by their times.
 
         A file that lost frames while it was written has fewer than the table lists. If frames were numbered
-        by counting, those after the gap would get the light of others. Where the times do not agree, frames
-        are numbered by counting all the same.
+        by counting, those after the gap would get the light of others. If the times do not agree, frames
+        are numbered by counting nevertheless.
         """
         if not self.index.timed or self.numbers.size >= table.frame.size or table.frame.size < 2:
             return self
@@ -131,7 +131,7 @@ class VideoSource:
 
     @contextmanager
     def opened_at(self, keyframe: int) -> Iterator[tuple[av.container.InputContainer, av.VideoStream]]:
-        """Lend the file opened where the packets from a keyframe on can be read."""
+        """Yield the opened file at a place from which the packets from a keyframe on can be read."""
         with opened(self.path, str(self.path)) as (container, stream):
             if keyframe > 0:
                 container.seek(int(self.index.pts[keyframe]), stream=stream)
@@ -178,7 +178,7 @@ def refuse_empty(path: Path, index: VideoIndex, size_px: tuple[int, int]) -> Non
 def opened(
     path: Path, content: str | Readable
 ) -> Iterator[tuple[av.container.InputContainer, av.VideoStream]]:
-    """Lend container and stream of a video's ``content``; raises `InputError` naming ``path``."""
+    """Yield container and stream of a video's ``content``; raises `InputError` naming ``path``."""
     try:
         with av.open(content, "r") as container:
             yield container, _prepare(container)
@@ -240,7 +240,7 @@ def _decode_packet(
 
 
 def _stretches(wanted: Int, index: VideoIndex) -> list[Int]:
-    """Split ascending frame numbers where seeking to a keyframe is quicker than decoding on."""
+    """Split ascending frame numbers where seeking to a keyframe is faster than decoding further."""
     if wanted.size == 0:
         return []
     return np.split(wanted, np.flatnonzero(index.key_of[wanted[1:]] - wanted[:-1] > _RESTART_FRAMES) + 1)

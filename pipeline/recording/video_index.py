@@ -1,7 +1,7 @@
-"""What a video file lists without being decoded, and which frames damage reaches.
+"""Lists the frames of a video without decoding it, and finds the frames affected by damage.
 
-Coded pictures tell by themselves whether others are predicted from them (H.264), and by checksums whether
-they are whole (FFV1).
+Coded pictures state whether others are predicted from them (H.264), and by checksums whether they are
+complete (FFV1).
 """
 
 from __future__ import annotations
@@ -42,8 +42,7 @@ class VideoIndex:
     timed : bool
         Whether packets carry times of presentation; if not, frames are numbered as they come.
     broken : (B,) int
-        Numbers of frames that cannot be trusted: by their checksum, or since what they are predicted from
-        is not in the file.
+        Numbers of unreliable frames: with a wrong checksum, or predicted from frames that the file lacks.
     expendable : (N,) bool
         Frames that no other frame is predicted from: they need not be decoded unless they are wanted.
     """
@@ -76,7 +75,7 @@ class VideoIndex:
         return np.union1d(wanted, np.flatnonzero(~self.expendable))
 
     def reached(self, number: int, damaged: Collection[int]) -> bool:
-        """Tell whether one of the damaged frames may be part of the prediction of a frame.
+        """Return whether one of the damaged frames may be part of the prediction of a frame.
 
         Prediction refers to frames coded before, and to none shown before the frame's keyframe.
         """
@@ -101,12 +100,12 @@ class VideoIndex:
 
 
 def list_frames(container: av.container.InputContainer, stream: av.VideoStream) -> VideoIndex:
-    """List a stream's packets; what lies behind damage of the container is left out."""
+    """List a stream's packets; those after damage of the container are left out."""
     return index_of(list_packets(container, stream), container, stream)
 
 
 def list_packets(container: av.container.InputContainer, stream: av.VideoStream) -> list[Packet]:
-    """Return what is to be known of a stream's packets, in the order of the file."""
+    """Return the properties of a stream's packets, in the order of the file."""
     packets: list[Packet] = []
     codec = stream.codec_context
     checked = codec.name == "ffv1"
@@ -119,7 +118,7 @@ def list_packets(container: av.container.InputContainer, stream: av.VideoStream)
                 place = -1 if packet.pos is None else packet.pos
                 packets.append(Packet(packet.pts, packet.is_keyframe, sound, needed, place))
     except av.FFmpegError:
-        pass  # the table of frames tells what is missing behind this place
+        pass  # the table of frames shows what is missing after this place
     return packets
 
 
@@ -127,7 +126,7 @@ def index_of(
     packets: Sequence[Packet], container: av.container.InputContainer, stream: av.VideoStream
 ) -> VideoIndex:
     """Return the index of a stream's packets."""
-    # AVI keeps no times of presentation: with frames out of order, what it gives are times of decoding.
+    # AVI stores no times of presentation: with frames out of order, its times are those of decoding.
     told = not (container.format.name == "avi" and stream.codec_context.has_b_frames)
     timed = told and all(p.pts is not None for p in packets)
     pts = np.array([p.pts for p in packets] if timed else range(len(packets)), np.int64)
@@ -160,7 +159,7 @@ class Packet(NamedTuple):
     reference
         Whether others may be predicted from it.
     place
-        Its first byte in what was read; −1 where that is not known.
+        Offset of its first byte; −1 if unknown.
     """
 
     pts: int | None
@@ -171,9 +170,9 @@ class Packet(NamedTuple):
 
 
 def checksums_hold(packet: bytes) -> bool:
-    """Tell whether a coded frame is a row of slices whose checksums are right.
+    """Return whether a coded frame is a sequence of slices with right checksums.
 
-    Each slice ends with its length (3 bytes), a status (1) and what makes the CRC of the whole slice 0 (4).
+    Each slice ends with its length (3 bytes), a status (1) and bytes that make the CRC of the slice 0 (4).
     Frames coded without checksums do not pass either.
     """
     end = len(packet)
@@ -186,19 +185,19 @@ def checksums_hold(packet: bytes) -> bool:
 
 
 def _remainder(data: bytes) -> int:
-    """Return the CRC-32 of RFC 9043, which takes bits the other way round than zlib and starts from 0."""
+    """Return the CRC-32 of RFC 9043, which has the opposite bit order of zlib and starts from 0."""
     return zlib.crc32(data.translate(_MIRRORED), 0xFFFFFFFF) ^ 0xFFFFFFFF
 
 
 def length_bytes(extradata: bytes | None) -> int:
-    """Return how many bytes the length before each unit takes (ISO/IEC 14496-15); 0 where there is none."""
+    """Return the number of bytes of the length before each unit (ISO/IEC 14496-15); 0 without one."""
     if not extradata or len(extradata) < 5 or extradata[0] != _LENGTH_PREFIXED:
         return 0
     return (extradata[4] & 3) + 1
 
 
 def is_reference(packet: bytes, length_size: int) -> bool:
-    """Tell whether others may be predicted from a coded picture, by its first slice; True where unknown."""
+    """Return whether others may be predicted from a coded picture, by its first slice; True if unknown."""
     at = 0
     while length_size and at + length_size < len(packet):
         length = int.from_bytes(packet[at : at + length_size], "big")

@@ -184,7 +184,7 @@ def test_texture_lost_in_most_frames_contradicts_nothing() -> None:
 
 
 @pytest.mark.parametrize(
-    ("wider", "words"), [(0.026, "suggests that the probe is wrong"), (0.0, "cannot tell")]
+    ("wider", "words"), [(0.026, "suggests that the probe is wrong"), (0.0, "cannot show")]
 )
 def test_a_diameter_that_errs_as_the_way_does_speaks_against_the_probe(wider: float, words: str) -> None:
     """Pictures zoomed by 1 %: the radius was 1.3 mm too large, and only the encoder was blamed."""
