@@ -53,7 +53,7 @@ from stages.rings import RINGS
 ANSWERS, ANSWERS_WITHOUT = "answers", "answers-without"
 # Exit status of `boresight simulate` for a scene that cannot show what it is meant to show.
 _REFUSED_SCENE = 3
-_GO_ON = "correct what it names, then repeat the command: existing results are kept"
+_GO_ON = "correct what it names, then give the same command again: existing results are kept"
 
 
 class NotRenderedError(BoresightError):

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from pipeline.arrays import Byte
 from pipeline.artefacts.measured import PointCloud, RingSamples, RingValidity, Wall, WallTexture
 
-# Points written at a time (50 bytes each), for memory's sake.
+# Points written at a time (50 bytes each), to limit memory.
 _AT_ONCE = 1 << 20
 # Colour of points without a photo: middle grey.
 _GREY = 128
@@ -78,7 +78,7 @@ def write_radius_map(wall: Wall, folder: Path) -> None:
     """Write ``radius_map.npz``; NaN where nothing was seen."""
     radius = wall.radius_map
     places, measured = ("distance_mm", "azimuth_rad"), ("radius_mm", "sigma_mm", "count")
-    # By level 1: the 6 that NumPy takes needs 2.5 times as long for 1 % less.
+    # Compression level 1: NumPy's default of 6 needs 2.5 times as long for 1 % less.
     with ZipFile(folder / "radius_map.npz", "w", ZIP_DEFLATED, compresslevel=1) as archive:
         for name in (*places, *measured, "sigma_random_mm", "misalignment_mm"):
             with archive.open(f"{name}.npy", "w", force_zip64=True) as stream:

@@ -1,4 +1,4 @@
-"""Every file of a run folder and who writes it, in one place."""
+"""The list of all files of a run folder, with the functions that write them."""
 
 from __future__ import annotations
 

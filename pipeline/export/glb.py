@@ -27,7 +27,7 @@ from pipeline.machine.scratch import Scratch
 _GLTF, _JSON, _BINARY = 0x46546C67, 0x4E4F534A, 0x004E4942
 _VERSION = 2
 _LARGEST = (1 << 32) - 1
-# EXT_structural_metadata asks for eight where glTF asks for four.
+# EXT_structural_metadata requires eight where glTF requires four.
 _ALIGNED = 8
 # Bytes copied at a time.
 _AT_ONCE = 1 << 24
@@ -177,7 +177,7 @@ def tile_primitive(
 def _materials(builder: GlbBuilder, tile: MeshTile, number: int) -> Sequence[int]:
     """Return the tile's materials in the order of the variants, unlit: no viewer changes their colours."""
     errors = {e.variant: e for e in tile.errors}
-    # The photo holds the light of the camera's own lamps; a viewer's would come on top of it.
+    # The photo contains the light of the camera's own lamps; a viewer's light would be added to it.
     photo = builder.material(f"photo {number}", _jpeg(tile.photo_bgr), "image/jpeg", _UNLIT)
     return [
         photo,

@@ -19,20 +19,20 @@ if TYPE_CHECKING:
 
 # Common viewers and graphics cards refuse pictures with a side of more than 16384 px.
 _MOST_ROWS = 16384
-# PNG level of figures: with a higher one of the 9 they hardly shrink any more.
+# PNG level of figures: a higher one hardly reduces their size.
 _COMPRESSION = 3
 # PNG strategy of photos, which are noisy: run lengths alone take 0.6 of level 3's time and 5 % less room.
 _PHOTO = (cv2.IMWRITE_PNG_STRATEGY, cv2.IMWRITE_PNG_STRATEGY_RLE)
-# Of an overlay's figure: dots per inch, mm of pipe per inch, the longest figure (12000 px at 120 dpi, which
+# Figure of an overlay: dots per inch, mm of pipe per inch, the longest figure (12000 px at 120 dpi, which
 # viewers still open).
 _DPI, _MM_PER_INCH, _LONGEST_INCH = 120, 30.0, 100.0
 
 
 def write_unrolled(texture: WallTexture, folder: Path) -> None:
-    """Write ``unrolled.png`` (BGRA, as recorded) and ``unrolled.json`` (where its pixels lie).
+    """Write ``unrolled.png`` (BGRA, as recorded) and ``unrolled.json`` (scale and place of its pixels).
 
-    A picture too long for other programs is written shrunk along the pipe, and in full in sheets, listed in
-    ``unrolled.json``: ``unrolled-001.png`` and so on.
+    A picture too long for other programs is written reduced along the pipe, and at full resolution in sheets,
+    listed in ``unrolled.json``: ``unrolled-001.png`` and so on.
 
     Raises
     ------
@@ -112,7 +112,7 @@ def overlay_figure(overlays: Overlays, overlay: Overlay) -> Figure:
     width = float(np.clip(np.ptp(distance) / _MM_PER_INCH, 6, _LONGEST_INCH))
     figure = Figure(figsize=(width + 2, 5))
     FigureCanvasAgg(figure)
-    # Places are fixed: a layout engine draws every figure three times to find them.
+    # Positions are fixed: a layout engine draws every figure three times to find them.
     axes = figure.add_axes((0.75 / (width + 2), 0.6 / 5, width / (width + 2), 4.0 / 5))
     half = (distance[-1] - distance[0]) / max(len(distance) - 1, 1) / 2
     # No finer than the picture's own dots.

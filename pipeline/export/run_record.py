@@ -39,7 +39,7 @@ def write_run_record(
     folder: Path,
     outcome: RunOutcome,
 ) -> None:
-    """Replace ``run.json`` at one stroke; ``about`` is what it says of the sources beyond their hashes.
+    """Replace ``run.json`` atomically; ``about`` are its entries on the sources in addition to their hashes.
 
     Raises
     ------
@@ -91,12 +91,12 @@ def _numbers(numbers: Iterable[Number]) -> list[Json]:
 
 
 def _finite(value: float | int | str) -> Json:
-    """Return the value, None for what JSON cannot write."""
+    """Return the value, or None if JSON cannot represent it."""
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def headline(artefacts: Mapping[type, object]) -> tuple[Number, ...]:
-    """Return headline numbers, with units, of whatever artefacts are there."""
+    """Return headline numbers, with units, of the existing artefacts."""
     return tuple(number for artefact in artefacts.values() for number in _of(artefact))
 
 
@@ -130,8 +130,7 @@ def _of_trajectory(trajectory: Trajectory) -> Iterator[Number]:
 def _scale_sigma(trajectory: Trajectory, distance_mm: Float) -> float:
     """Return the relative 1 σ of the distance to the farthest frame, at least that of the calibration.
 
-    After driving there and back the end is better known than the scale: the calibration's part does not
-    cancel.
+    After a run to and fro the end is better known than the scale: the calibration's part does not cancel.
     """
     farthest_mm = float(np.abs(distance_mm - distance_mm[0]).max())
     if not np.isfinite(trajectory.distance_sigma_mm) or farthest_mm == 0:
@@ -158,7 +157,7 @@ def _of_wall(wall: Wall) -> Iterator[Number]:
 
 
 def mean_diameter(radius: WallMap) -> tuple[float, float]:
-    """Return the mean diameter of what was seen, mm, and its 1 σ.
+    """Return the mean diameter of the seen wall, mm, and its 1 σ.
 
     The calibration's error is common to all cells and stays in the mean; noise averages out.
     """
@@ -176,13 +175,13 @@ def _of_defects(defects: Defects) -> Iterator[Number]:
 
 @dataclass(frozen=True)
 class RunRecord:
-    """What a run's record says of how it came about.
+    """The provenance of a run in its record.
 
     Attributes
     ----------
     recording, probe : Path
     input_sha256 : mapping of str to str
-        Of ``recording`` and ``probe``.
+        Hashes of ``recording`` and ``probe``.
     configuration : mapping of str to mapping
         Parameters by stage.
     libraries : mapping of str to str
@@ -216,7 +215,7 @@ def read_run_record(run: Path) -> RunRecord:
         missing = isinstance(error, FileNotFoundError)
         problem = "does not exist" if missing else "is not the record of a run"
         raise InputError(
-            file, problem, expected="run.json of boresight run", hint="name a run folder"
+            file, problem, expected="run.json of boresight run", hint="state a run folder"
         ) from error
     if state != "completed":
         raise InputError(file, f"the run is {state}", expected="a completed run", hint="complete it first")
@@ -229,7 +228,7 @@ def check_inputs_unchanged(record: RunRecord, now: Mapping[str, str]) -> None:
     Raises
     ------
     InputError
-        When the recording or the probe is not what the run was made from.
+        When the recording or the probe differs from the one of the run.
     """
     places = {"recording": record.recording, "probe": record.probe}
     for name, place in places.items():
@@ -237,7 +236,7 @@ def check_inputs_unchanged(record: RunRecord, now: Mapping[str, str]) -> None:
         if now[name] != stated:
             raise InputError(
                 place,
-                f"the {name} is not what the run was made from",
+                f"the {name} differs from the one of the run",
                 expected=stated,
                 hint="restore it: a run of other inputs gives other results",
             )

@@ -1,4 +1,4 @@
-"""Tables for people: sections, defects, trajectory as CSV and JSON; the centreline as GeoJSON and DXF too."""
+"""Tables for users: sections, defects, trajectory as CSV and JSON; the centreline as GeoJSON and DXF too."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def _number(value: float) -> str:
 
 
 def _record(defect: Defect) -> dict[str, object]:
-    """Return the defect as JSON holds it; a number that is not known is null."""
+    """Return the defect for JSON; an unknown number is null."""
     record: dict[str, object] = {}
     for f in fields(Defect):
         value = getattr(defect, f.name)
@@ -96,7 +96,7 @@ def write_trajectory(trajectory: Trajectory, folder: Path) -> None:
 
 _STEP_MM = 10.0
 _MOST_POINTS = 5000
-"""Points lie 10 mm apart, on long pipes farther: 5000 are as many as a drawing handles with ease."""
+"""Points are 10 mm apart, in long pipes more: a drawing handles 5000 easily."""
 _POINT = ("distance_mm", "x_mm", "y_mm", "z_mm", "sigma_x_mm", "sigma_y_mm", "sigma_z_mm", "piece")
 _PIECE = (
     "kind", "from_mm", "to_mm", "length_mm", "sigma_mm", "angle_deg", "angle_sigma_deg", "toward_clock",
@@ -123,7 +123,7 @@ def write_centreline(trajectory: Trajectory, folder: Path) -> None:
 
 
 def _points(trajectory: Trajectory) -> tuple[Float, Float, Float]:
-    """Return distances (n,), points (n, 3) in P and their 1 σ (n, 3) over the way of the camera, mm."""
+    """Return distances (n,), points (n, 3) in P and their 1 σ (n, 3) over the camera's path, mm."""
     s = distance_along(trajectory.axis, trajectory.T_pc)
     first, last = float(s.min()), float(s.max())
     step = max(_STEP_MM, (last - first) / _MOST_POINTS)
@@ -161,7 +161,7 @@ def _parts(
 
 
 def _geojson(pieces: tuple[PipePiece, ...], distance: Float, xyz: Float) -> dict[str, object]:
-    """Return a feature for each piece: as in RFC 7946, but in metres of P, which has no place on a map."""
+    """Return a feature for each piece: as in RFC 7946, but in metres of P, without a place on a map."""
     features = []
     for piece, line in _parts(pieces, distance, xyz):
         properties = {name: text for name, text in zip(_PIECE, _row(piece), strict=True) if text}

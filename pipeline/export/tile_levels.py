@@ -1,4 +1,4 @@
-"""Coarse levels of the model: a grid over the radius map, photo and error colours shrunk level by level.
+"""Coarse levels of the model: a grid over the radius map, photo and error colours reduced level by level.
 
 A grid is as good as decimation here, because a coarse level is a nearly regular tube.
 """
@@ -43,7 +43,7 @@ class Flat:
 
 @dataclass(frozen=True)
 class CoarseTile:
-    """A tile, which stretch each of its vertices belongs to (V,), and by how much its wall is off, mm."""
+    """A tile, the stretch of each of its vertices (V,), and the error of its wall, mm."""
 
     tile: MeshTile
     stretch: Int
@@ -51,7 +51,7 @@ class CoarseTile:
 
 
 def flat_of(texture: WallTexture, overlays: Overlays, from_mm: float, to_mm: float) -> Flat:
-    """Return a stretch's pictures as fine as they are; transparent where the photo does not reach."""
+    """Return a stretch's pictures at full resolution; transparent where there is no photo."""
     ends = (np.array([from_mm, to_mm]) - texture.distance_from_mm) / texture.mm_per_px
     first = round(float(ends[0]))
     last = max(round(float(ends[1])), first + 1)
@@ -150,7 +150,7 @@ def _column_step(columns: int, stride: int) -> int:
 
 
 def _means(radius_mm: Float32, row: Int, half: int, step: int) -> Float:
-    """Return the means (n, m) about some cells of what was measured; NaN where nothing was."""
+    """Return the means (n, m) of measured values around some cells; NaN where nothing was measured."""
     out = np.full((len(row), radius_mm.shape[1] // step), np.nan)
     for k, i in enumerate(row):
         block = np.roll(radius_mm[max(i - half, 0) : i + half + 1], step // 2, 1).astype(float)

@@ -42,7 +42,7 @@ class StretchFacts:
 
 @dataclass(frozen=True)
 class DefectFacts:
-    """What is known of a defect."""
+    """Facts of a defect."""
 
     number: int = field(metadata={"kind": "U", "says": "number in the list of defects"})
     defect_kind: str = field(metadata={"kind": "S", "says": "what it is"})
@@ -68,7 +68,7 @@ def schema() -> Json:
 
 
 def stretch_facts(number: int, radius_map: RadiusMap, rows: slice, defects: Sequence[Defect]) -> StretchFacts:
-    """Return what the radius map says of some of its rows."""
+    """Return the facts of some rows of the radius map."""
     s = radius_map.distance_mm[rows]
     radius, sigma = radius_map.radius_mm[rows], radius_map.sigma_mm[rows]
     seen = np.isfinite(radius)
@@ -95,7 +95,7 @@ def near(defects: Sequence[Defect], from_mm: float, to_mm: float) -> list[Defect
 
 
 def defect_at(defects: Sequence[Defect], distance_mm: Float, azimuth_rad: Float) -> Int:
-    """Return (N,) which of the defects holds each place in its outline, their number where none does."""
+    """Return the index (N,) of the defect whose outline contains each place; their number if none does."""
     # matplotlib is slow to import, so it is imported only when it is needed.
     from matplotlib.path import Path as Outline
 
@@ -124,7 +124,7 @@ def add_tables(
 
 
 def feature_ids(stretches: int, defects: int) -> Json:
-    """Return how a primitive names its features: attribute 0 is the stretch, attribute 1 the defect."""
+    """Return the feature identifiers of a primitive: attribute 0 is the stretch, attribute 1 the defect."""
     ids: list[Json] = [{"featureCount": stretches, "attribute": 0, "propertyTable": 0, "label": "stretch"}]
     if defects:
         ids.append(

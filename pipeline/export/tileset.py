@@ -28,7 +28,7 @@ from pipeline.geometry.axis import PipeAxis, to_pipe
 from pipeline.recording.base import Recording
 
 Json = dict[str, Any]
-# Stretches that a coarse tile tells apart, so that its metadata stay small.
+# Number of stretches that a coarse tile distinguishes, so that its metadata stay small.
 _MOST_STRETCHES = 16
 # Viewers refine where an error shows as some 16 px or more; a texel counts as an error eight times as large.
 _TEXELS = 8.0
@@ -79,7 +79,7 @@ class _Node:
 
 @dataclass(frozen=True)
 class _Writer:
-    """Writes contents from the leaves up, so that pictures are shrunk from those just made."""
+    """Writes contents from the leaves up, so that pictures are reduced from those just made."""
 
     folder: Path
     mesh: TexturedMesh
@@ -97,7 +97,7 @@ class _Writer:
         return self._parent(first, last, (self.node(first, middle), self.node(middle, last)))
 
     def facts(self, number: int, rows: slice) -> metadata.StretchFacts:
-        """Return what is known of some rows of the wall."""
+        """Return the facts of some rows of the wall."""
         return metadata.stretch_facts(number, self.radius_map, rows, self.defects)
 
     def _leaf(self, number: int) -> _Node:
@@ -127,7 +127,7 @@ class _Writer:
         return _Node(tile, error, box, level, whole, flat)
 
     def _rows(self, first: int, last: int) -> slice:
-        """Return the rows of the map from where a tile begins to where the next one does, both included."""
+        """Return the rows of the map from the beginning of a tile to that of the next, both included."""
         s, place = self.radius_map.distance_mm, self.mesh.packed.distance_mm
         end = place[last, 0] if last < len(place) else place[-1, 1]
         step = (s[-1] - s[0]) / max(len(s) - 1, 1)
@@ -136,7 +136,7 @@ class _Writer:
         return slice(a, int(np.clip(b, a + 1, len(s) - 1)) + 1)
 
     def _shrunk(self, node: _Node, level: int, texel_mm: float) -> Flat:
-        """Return what a node looks like as a part of one at a higher level."""
+        """Return a node's pictures for a node at a higher level."""
         around_mm = self.texture.bgra.shape[1] * self.texture.mm_per_px
         length_mm = node.facts.distance_to_mm - node.facts.distance_from_mm
         size = round(around_mm / texel_mm), round(length_mm / texel_mm)

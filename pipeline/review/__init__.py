@@ -1,1 +1,1 @@
-"""What people look at: the report and the review server."""
+"""The review server and its reports."""

@@ -1,4 +1,4 @@
-"""A review's run compared with an earlier one: the comparison's inputs, and what the page shows of it."""
+"""A review's run compared with an earlier one: inputs of the comparison, and its content for the page."""
 
 from __future__ import annotations
 
@@ -45,20 +45,20 @@ _HALF_VIEW_MM = 12.0
 
 @dataclass(frozen=True)
 class RunPair:
-    """A review's run and an earlier run of the same pipe, as a comparison takes them."""
+    """A review's run and an earlier run of the same pipe, as inputs of a comparison."""
 
     now: Review
     earlier: Review
 
     @property
     def state(self) -> tuple[str, str, int, int]:
-        """Changes whenever a run was computed again or a decision on it was taken."""
+        """Return a value that changes whenever a run was computed again or a decision was taken."""
         both = (self.now, self.earlier)
         versions, revisions = [r.files.version for r in both], [r.ledger.revision() for r in both]
         return versions[0], versions[1], revisions[0], revisions[1]
 
     def walls(self) -> WallPair:
-        """Return both walls, and the welds that the earlier run's review kept."""
+        """Return both walls, and the welds that were not rejected in the earlier run's review."""
         welds = [f for f in _standing(self.earlier.state()) if f.kind == DefectKind.WELD]
         middles = [(f.size.distance_from_mm + f.size.distance_to_mm) / 2 for f in welds]
         return WallPair(
@@ -66,7 +66,7 @@ class RunPair:
         )
 
     def walls_key(self) -> str:
-        """Return a hash of all that `walls` returns, by the keys of the results that it is made of."""
+        """Return a hash of the result of `walls`, from the keys of its parts."""
         found = self.walls()
         facts = (found.welds_mm, found.is_one_calibration)
         walls = [(w.smoothing_mm, w.ring_spacing_mm) for w in (found.earlier, found.now)]
@@ -74,13 +74,13 @@ class RunPair:
         return digest((facts, tuple(walls), tuple(keys)))
 
     def findings(self) -> FindingPair:
-        """Return the findings of both as their reviews left them, without the rejected ones."""
+        """Return the findings of both after their reviews, without the rejected ones."""
         before, after = (tuple(_outlined(f) for f in _standing(r.state())) for r in (self.earlier, self.now))
         return FindingPair(before, after)
 
     @property
     def is_one_calibration(self) -> bool:
-        """Whether both runs used one calibration; a run that corrected its probe has one of its own."""
+        """Whether both runs used one calibration; a run that corrected its probe has its own."""
         both = (self.now, self.earlier)
         probes = {r.files.record()["input_sha256"]["probe"] for r in both}
         return len(probes) == 1 and all(r.files.artefact(Trajectory).instrument is None for r in both)
@@ -94,9 +94,9 @@ class Compared:
     ----------
     pair : RunPair
     compute : callable
-        Gives the comparison of the pair as it stands; keeps what was computed before.
+        Returns the current comparison of the pair; stores computed results.
     years : float or None
-        Time between the runs, where it is known.
+        Time between the runs, if known.
     """
 
     pair: RunPair
@@ -110,7 +110,7 @@ class Compared:
 
     @property
     def changes(self) -> tuple[Change, ...]:
-        """How every finding of either run changed, as the reviews left it."""
+        """The change of every finding of either run after the reviews."""
         return _result(self, self.pair.state)[1].changes
 
     @property
@@ -150,7 +150,7 @@ class Compared:
     def picture(self, layer: str, limits: Limits | None = None) -> FlatPicture:
         """Return a layer: one of the difference, of the earlier run, or of the later one.
 
-        Limits are those of both runs alike; the difference has its own.
+        Limits apply to both runs; the difference has its own.
 
         Raises
         ------
@@ -178,7 +178,7 @@ class Compared:
         return _TABLES[name], json.dumps(self._told(), indent=1, ensure_ascii=False).encode()
 
     def _told(self) -> dict[str, Any]:
-        """Return the table of changes, and the registration they rest on."""
+        """Return the table of changes, and the registration on which they are based."""
         document = self.document()
         told = {k: document[k] for k in ("earlier", "years", "family_error", "registration", "diameter")}
         runs = {"run": self.pair.now.files.version, "earlier": self.pair.earlier.files.version}
@@ -202,7 +202,7 @@ class Compared:
 
     @property
     def _wall_thickness_mm(self) -> float | None:
-        """As assumed in the review, else as the recording says; None where unknown."""
+        """Wall thickness assumed in the review, else that of the recording, mm; None if unknown."""
         assumed = self.pair.now.state().assumed.wall_thickness_mm
         pipe = self.pair.now.files.pipe()
         return assumed or (pipe.wall_thickness_mm if pipe is not None else None)
@@ -250,7 +250,7 @@ def _overlay(
 
 
 def _shown(change: Change) -> dict[str, Any]:
-    """Return what the page needs to show a place: its middle, outlines of both runs, how much about it."""
+    """Return the data for showing a place: its middle, outlines of both runs, size of the view."""
     return {
         "azimuth_rad": change.place.middle[1],
         "half_mm": max(float(np.ptp(change.place.corners[:, 0])), _HALF_VIEW_MM),
@@ -273,6 +273,6 @@ def _statement(found: tuple[Change, ...]) -> str:
     tested = sum(c.growth is not None for c in found)
     words = ", ".join(f"{n} {fate}" for fate, n in count.items())
     return (
-        f"{tested} findings compared on both walls: {words}. Where nothing has changed, the chance that any "
+        f"{tested} findings compared on both walls: {words}. If nothing has changed, the chance that any "
         f"of these is declared a change is {FAMILY_ERROR:.0%}."
     )

@@ -1,4 +1,4 @@
-"""The review and the assessment of its findings as plain data for the page; what is not known is None."""
+"""The review and the assessment of its findings as plain data for the page; unknown values are None."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ from pipeline.review.model_stretches import StretchedModel
 from pipeline.review.review import Seal, State
 from pipeline.review.run_files import RunFiles
 
-# Colours in which a legend's gradient is given.
+# Number of colours of a legend's gradient.
 _LEGEND_STEPS = 64
-# What the page needs of a finding as the run measured it; the rest comes with the state.
+# Entries of a measured finding that the page needs; the rest comes with the state.
 _TOLD = ("id", "statement", "pof_class", "pacp_suggestion", "en13508_suggestion")
 _FLOW_ABOVE_YIELD_MPA = 69.0  # 10 ksi: flow stress of the modified method of ASME B31G
 # Beyond this share of the wall neither criterion applies.
@@ -38,7 +38,7 @@ ASSUMPTIONS = (
 
 @dataclass(frozen=True)
 class Strength:
-    """Estimated failure pressure, MPa, by both criteria, and what it rests on.
+    """Estimated failure pressure, MPa, by both criteria, and its assumptions.
 
     It is stated without ±: the σ of the depth would give a few kPa, while burst tests scatter about both
     criteria by far more (W. Zhou, G. Huang, S. Zhang, Model error assessment of burst capacity models for
@@ -82,7 +82,7 @@ def modified_b31g(loss: float, z: float) -> float:
 
 
 def run_document(files: RunFiles) -> dict[str, Any]:
-    """Return what does not change while the run stays as it is."""
+    """Return the data that does not change as long as the run does not."""
     record = files.record()
     overlays = files.artefact(Overlays)
     pipe = files.pipe()
@@ -115,7 +115,7 @@ def _named(numbers: list[dict[str, Any]]) -> list[dict[str, Any]]:
 
 
 def seal_document(seal: Seal, files: RunFiles) -> dict[str, Any]:
-    """Return what tells the page that something has changed, and whether the review is signed."""
+    """Return the version of the review, by which the page detects changes, and whether it is signed."""
     return asdict(seal) | {"signed": seal.signed, "run_version": files.version}
 
 
@@ -150,7 +150,7 @@ def layer_document(picture: FlatPicture) -> dict[str, Any]:
 
 
 def model_document(model: StretchedModel) -> list[dict[str, Any]]:
-    """Return where each stretch of the model lies, and how large it is."""
+    """Return place and size of each stretch of the model."""
     return [asdict(stretch) for stretch in model.stretches()]
 
 
@@ -168,7 +168,7 @@ def section_document(wall: WallMap, overlays: Overlays, distance_mm: float) -> d
 
 
 def profile_document(wall: WallMap, distance_mm: float, azimuth_rad: float, half_mm: float) -> dict[str, Any]:
-    """Return the radius along the pipe and around it through a point, less the median of each."""
+    """Return the radius along the pipe and around it through a point, minus the median of each."""
     rows = wall.rows(distance_mm - half_mm, distance_mm + half_mm)
     column, row = wall.column(azimuth_rad), wall.row(distance_mm)
     radius = float(np.nanmedian(wall.radius_mm[row]))
@@ -190,7 +190,7 @@ def profile_document(wall: WallMap, distance_mm: float, azimuth_rad: float, half
 
 
 def cleaned(tree: dict[str, Any]) -> dict[str, Any]:
-    """Return plain data fit for JSON: arrays as lists, None for what is no finite number."""
+    """Return plain data fit for JSON: arrays as lists, None for numbers that are not finite."""
     return {k: _plain(v) for k, v in tree.items()}
 
 
@@ -231,7 +231,7 @@ def _entry(entry: Entry) -> dict[str, Any]:
 
 
 def overlay_document(overlay: Overlay) -> dict[str, Any]:
-    """Return what a legend needs of an overlay."""
+    """Return the data of an overlay for its legend."""
     at = np.linspace(1, 255, _LEGEND_STEPS).round().astype(int)
     return {
         "name": overlay.name,
@@ -252,7 +252,7 @@ def _value_layers(files: RunFiles, overlays: Overlays) -> Iterator[dict[str, Any
 
 
 def _diagnosis(files: RunFiles) -> dict[str, Any] | None:
-    """Return what a diagnosis in the run folder says, None without one."""
+    """Return the content of a diagnosis in the run folder, None without one."""
     file = files.file("diagnosis.json")
     if not file.is_file():
         return None

@@ -40,7 +40,7 @@ def export_review(
         When the folder holds something else, or the model is too large for one page.
     """
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
-        raise InputError(folder, "is not empty", hint="give a new folder")
+        raise InputError(folder, "is not empty", hint="state a new folder")
     temporary = folder.with_name(f".new-{folder.name}")
     shutil.rmtree(temporary, ignore_errors=True)
     temporary.mkdir(parents=True)
@@ -88,7 +88,7 @@ def _data(review: Review, state: State, folder: Path) -> dict[str, Any]:
 
 
 def _add_comparison(data: dict[str, Any], compared: Compared, folder: Path) -> None:
-    """Add what the comparison says, and write its tables and the tiles of its layers."""
+    """Add the content of the comparison, and write its tables and the tiles of its layers."""
     data["comparison"] = compared.document()
     data["layers"] |= {name: _tiles(name, compared.picture(name), folder) for name in compared.layers()}
     for name in compared.tables:
@@ -135,7 +135,7 @@ def _spots(review: Review, state: State, folder: Path) -> Iterator[dict[str, Any
 
 
 def _sights(review: Review, distance_mm: float, azimuth_rad: float, folder: Path) -> list[dict[str, Any]]:
-    """Return the frames that show a spot; none when the recording is not where it was."""
+    """Return the frames that show a spot; none when the recording was moved."""
     try:
         finder = finder_of(review.files)
         sights = finder.sights(distance_mm, azimuth_rad)

@@ -27,13 +27,13 @@ _STORED = {
     "uncertainty": "sigma_mm", "misalignment": "misalignment_mm",
 }  # fmt: skip
 _LEVELS = 254
-# Rows looked through at a time, for memory's sake.
+# Rows processed at a time, to limit memory.
 _ROWS = 4096
 
 
 @dataclass(frozen=True)
 class Values:
-    """A quantity of every cell of the wall, mm, worked out where it is asked for.
+    """A quantity of every cell of the wall, mm, computed on demand.
 
     Attributes
     ----------
@@ -77,7 +77,7 @@ class Limits:
 
 
 def values_of(files: RunFiles, layer: str) -> Values:
-    """Return what a layer shows.
+    """Return the values of a layer.
 
     Raises
     ------
@@ -125,9 +125,9 @@ class FlatPicture:
     Attributes
     ----------
     stored : (S, A) or (S, A, 4)
-        Rows along distance, possibly still on disk, or values that are worked out when asked for.
+        Rows along distance, possibly still on disk, or values that are computed on demand.
     colours : callable
-        Gives BGRA of a part of it.
+        Returns BGRA of a part of it.
     distance_from_mm, distance_to_mm, azimuth_from_rad : float
         Edges of the picture, not centres of its pixels; it covers the whole turn.
     """
@@ -192,7 +192,7 @@ def picture_of(files: RunFiles, layer: str, limits: Limits | None = None) -> Fla
     Raises
     ------
     InputError
-        When there is none of that name, or the run does not hold it any more.
+        When there is none of that name, or the run no longer holds it.
     """
     if layer == PHOTO:
         return photo_picture(files.artefact(WallTexture))

@@ -21,11 +21,11 @@ from pipeline.recording.checks import refuse_changed
 from pipeline.review.run_files import RunFiles
 
 _QUALITY = 88
-# A wall spot is seen best well off the axis, where texture is largest, yet away from the picture's rim.
+# A wall spot is seen best far off the axis, where texture is largest, but away from the picture's rim.
 _BEST_POLAR_RAD = 1.05
-# How far a pixel's ray is followed to the wall, in radii and steps of 0.5 %.
+# Length over which a pixel's ray is followed to the wall, in radii and steps of 0.5 %.
 _NEAREST_RADII, _FARTHEST_RADII, _REACHES = 0.3, 30.0, 900
-# Frames from within so many radii of a spot are looked at; runs whose finders are kept in memory.
+# Frames within so many radii of a spot are examined; number of runs whose finders are kept in memory.
 _NEAR_RADII = 8.0
 _KEPT = 2
 
@@ -35,7 +35,7 @@ class UnseenError(BoresightError):
 
 
 @dataclass(frozen=True)
-class Sight:
+class SpotView:
     """A frame that shows a spot.
 
     Attributes
@@ -45,7 +45,7 @@ class Sight:
     illumination : str
     spot_px : (2,)
     ring_px : (M, 2)
-        The line as measured in this frame; empty without laser.
+        The line measured in this frame; empty without laser.
     """
 
     frame: int
@@ -57,7 +57,7 @@ class Sight:
 
 @dataclass(frozen=True)
 class FrameFinder:
-    """Finds frames by what they show."""
+    """Finds the frames that show a spot of the wall, and the spot that a pixel shows."""
 
     recording: Recording
     probe: Probe
@@ -65,7 +65,7 @@ class FrameFinder:
     rings: RingSamples
     radius_mm: float
 
-    def sights(self, distance_mm: float, azimuth_rad: float) -> tuple[Sight, ...]:
+    def sights(self, distance_mm: float, azimuth_rad: float) -> tuple[SpotView, ...]:
         """Return the frame whose ring passes the spot, and the lit frame that shows it best.
 
         Raises
@@ -135,14 +135,14 @@ class FrameFinder:
         return jpeg.tobytes()
 
     def off_sheet(self, spot_c: Float) -> Float:
-        """Return how far (N,) the spot lies off the laser's sheet along the optical axis, mm."""
+        """Return the distance (N,), mm, of the spot from the laser's sheet along the optical axis."""
         rho = np.hypot(spot_c[:, 0], spot_c[:, 1])
         azimuth = np.arctan2(spot_c[:, 1], spot_c[:, 0])
         laser = self.probe.laser
         return np.asarray(spot_c[:, 2] - laser.height(azimuth) - rho * laser.slope(azimuth))
 
     def _near(self, spot_p: Float) -> Int:
-        """Return the frames taken from near a spot, or all: long runs have hundreds of thousands."""
+        """Return the frames taken near a spot, or all if there are none; long runs have very many."""
         away = np.linalg.norm(self.trajectory.T_pc[:, :3, 3] - spot_p, axis=1)
         near = np.flatnonzero(away < _NEAR_RADII * self.radius_mm)
         return near if len(near) else np.arange(len(away))
@@ -151,32 +151,34 @@ class FrameFinder:
         frames = self.recording.frames
         return np.asarray(frames.illumination[np.searchsorted(frames.frame, self.trajectory.frame[near])])
 
-    def _sight(self, index: int, spot_c: Float, illumination: str) -> Sight | None:
+    def _sight(self, index: int, spot_c: Float, illumination: str) -> SpotView | None:
         uv, valid = self.probe.camera.project(spot_c[None])
         width, height = self.probe.camera.image_size
         inside = valid[0] and 0 <= uv[0, 0] < width and 0 <= uv[0, 1] < height
         if not inside:
             return None
         frame = int(self.trajectory.frame[index])
-        return Sight(frame, float(self.trajectory.time_s[index]), str(illumination), uv[0], self._ring(frame))
+        return SpotView(
+            frame, float(self.trajectory.time_s[index]), str(illumination), uv[0], self._ring(frame)
+        )
 
     def _ring(self, frame: int) -> Float:
         row = np.flatnonzero(self.rings.frame == frame)
         if not len(row):
             return np.zeros((0, 2))
         rings, k = self.rings, row[0]
-        used = rings.validity[k] == RingValidity.VALID  # of this frame alone: all of a long run are gigabytes
+        used = rings.validity[k] == RingValidity.VALID  # this frame only: a long run has gigabytes
         outward = np.stack([np.cos(rings.azimuth_rad), np.sin(rings.azimuth_rad)], -1)
         return np.asarray(rings.centre_px + rings.radius_px[k, used, None] * outward[used], float)
 
 
 def finder_of(files: RunFiles) -> FrameFinder:
-    """Return the finder of a run, made again when the run was.
+    """Return the finder of a run, made again when the run was computed again.
 
     Raises
     ------
     UnseenError
-        When the recording or its probe is not where it was.
+        When the recording or its probe was moved.
     """
     return _finder(files, files.version)
 

@@ -1,4 +1,4 @@
-"""Who may talk to the server: this machine's browser, with the token, on the page that the server gave."""
+"""Access control of the server: only this machine's browser, with the token, on the server's own page."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class Guard:
     ----------
     app
     token : str
-        Known to whoever started the server; the page's address carries it once, then a cookie does.
+        Secret of the server's start; the page's first address contains it, later a cookie does.
     port : int
     """
 
@@ -51,7 +51,7 @@ class Guard:
 
     @property
     def cookie(self) -> str:
-        """Name of the cookie; a browser sends it to every port of a host, so that each needs its own."""
+        """Name of the cookie; a browser sends it to every port of a host, so each port needs its own."""
         return f"boresight-{self.port}"
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
@@ -81,13 +81,13 @@ class Guard:
         if scope["method"] in _CHANGING and headers.get("origin", "") not in origins:
             return PlainTextResponse("this page is not the server's own", 403)
         if "transfer-encoding" in headers:
-            return PlainTextResponse("say how long the body is", 411)
+            return PlainTextResponse("the header Content-Length is missing", 411)
         if int(headers.get("content-length", "0") or 0) > _LARGEST_BODY:
             return PlainTextResponse("too large", 413)
         return None
 
     def _first_visit(self, scope: Scope) -> Response:
-        """Put the token of the address into a cookie that scripts cannot read, and out of the address."""
+        """Move the token from the address into a cookie that scripts cannot read."""
         if not self._same(_token_in(scope) or ""):
             return PlainTextResponse("the token is not that of this server; it changes at every start", 403)
         response = RedirectResponse("/", 303)

@@ -19,8 +19,8 @@ from pipeline.pages import notation
 from pipeline.review.decisions.replay import Finding, Measured, Outline
 from pipeline.review.run_files import RunFiles, measured_findings
 
-# Width of the wall around an outline that its depth refers to; σ from which a direction is sure; fewest cells
-# of that wall which give its median.
+# Width of the wall around an outline to which its depth refers; σ from which a direction is sure; fewest
+# cells of that wall for its median.
 _AROUND_MM = 6.0
 _SURE_SIGMA = 2.0
 _LEAST_AROUND = 20
@@ -35,7 +35,7 @@ class OutlineGauge:
     wall: WallMap
 
     def measure(self, outline: Outline) -> Measured:
-        """Return the outline's extent and its extreme depth against the wall within 6 mm around it."""
+        """Return the outline's extent and its extreme depth relative to the wall within 6 mm around it."""
         point = np.asarray(outline, float)
         rows, columns, inside, around = self._cells(point)
         radius = np.where(inside | around, self.wall.radius_mm[np.ix_(rows, columns)], np.nan)
@@ -55,7 +55,7 @@ class OutlineGauge:
         return float(self.wall.distance_mm[row]), float(clock_of_azimuth(self.wall.azimuth_rad[column]))
 
     def _cells(self, point: Float) -> tuple[Int, Int, Bool, Bool]:
-        """Return rows and columns about the outline, and which of their cells are in it or around it."""
+        """Return rows and columns around the outline, and which of their cells are in it or around it."""
         wall = self.wall
         rows = wall.rows(point[:, 0].min() - _AROUND_MM, point[:, 0].max() + _AROUND_MM)
         radius = float(np.nanmedian(wall.radius_mm[rows]))
@@ -75,7 +75,7 @@ class OutlineGauge:
     def _depth(
         self, radius: Float, sigma: Float32, inside: Bool, around: Bool
     ) -> tuple[float, float, tuple[int, int] | None]:
-        """Return the extreme of the smoothed radius within, less the median around, its 1 σ and its cell."""
+        """Return the extreme of the smoothed radius within, minus the median around, its 1 σ and its cell."""
         known = around & np.isfinite(radius)
         seen = inside & np.isfinite(radius)
         if known.sum() < _LEAST_AROUND or not seen.any():
@@ -113,7 +113,7 @@ class Reading:
 
 
 def readings(wall: WallMap, tool: Tool, points: Outline) -> tuple[Reading, ...]:
-    """Return what a tool reads at points (distance mm, azimuth rad).
+    """Return the readings of a tool at points (distance mm, azimuth rad).
 
     Raises
     ------
@@ -142,7 +142,7 @@ def _point(wall: WallMap, points: Outline) -> tuple[Reading, ...]:
 
 
 def _distance(wall: WallMap, points: Outline) -> tuple[Reading, ...]:
-    """Along the wall between the points, over its relief, and straight through the bore."""
+    """Return the distance along the wall between the points, over its relief, and through the bore."""
     (s0, a0), (s1, a1) = points[0], points[1]
     xyz, sigma = _line(wall, (s0, a0), (s1, a1))
     along = np.linalg.norm(np.diff(xyz, axis=0), axis=1).sum()
@@ -168,7 +168,7 @@ def _line(wall: WallMap, start: tuple[float, float], end: tuple[float, float]) -
 
 
 def _area(wall: WallMap, points: Outline) -> tuple[Reading, ...]:
-    """Area of the polygon on the wall as if it were smooth: cells times the local radius."""
+    """Return the area of the polygon on the wall, as if it were smooth: cells times the local radius."""
     point = np.asarray(points, float)
     rows = wall.rows(point[:, 0].min(), point[:, 0].max())
     radius = float(np.nanmedian(wall.radius_mm[rows]))
@@ -186,21 +186,21 @@ def _depth(wall: WallMap, points: Outline) -> tuple[Reading, ...]:
 
 
 def _diameter(wall: WallMap, points: Outline) -> tuple[Reading, ...]:
-    """Through the axis at the point's azimuth, and the mean of the section."""
+    """Return the diameter through the axis at the point's azimuth, and the mean of the section."""
     s, a = points[0]
     (r0, sigma0, _), (r1, sigma1, _) = wall.radius_at(s, a), wall.radius_at(s, a + np.pi)
     row = wall.row(s)
     section, sigma = wall.radius_mm[row], wall.sigma_mm[row]
     common = float(np.nanmedian(sigma))
     return (
-        # What both ends share, the calibration, adds up; it does not average away.
+        # The calibration's error, which both ends share, adds up and does not average out.
         Reading("diameter", r0 + r1, sigma0 + sigma1, "mm"),
         Reading("mean diameter", 2 * float(np.nanmean(section)), 2 * common, "mm"),
     )
 
 
 def cautions(files: RunFiles, finding: Finding) -> tuple[str, ...]:
-    """Return in sentences what an inspector should know before relying on a finding as it stands."""
+    """Return warnings for an inspector about relying on a finding in its current state."""
     return tuple(c for c in (contradiction(finding), _read_again(files, finding)) if c)
 
 
@@ -224,11 +224,11 @@ def _read_again(files: RunFiles, finding: Finding) -> str:
         return ""
     same = OutlineGauge(files.artefact(Wall).radius_map).measure(run.outline)
     return (
-        "The depth was read again because the outline was drawn again. "
-        f"The run found {_told_depth(run.size)}, from single points of the rings against the fitted pipe. "
-        "The review reads the map of the wall: the extreme of its means over 1 mm, against the wall within "
-        f"6 mm around the outline. Read so, the run's own outline gives {_told_depth(same)}, the new one "
-        f"{_told_depth(finding.size)}."
+        "The depth was measured again because the outline was drawn again. "
+        f"The run found {_told_depth(run.size)}, from single ring points relative to the fitted pipe. "
+        "The review measures the map of the wall: the extreme of its means over 1 mm, relative to the wall "
+        f"within 6 mm around the outline. In this way, the run's outline gives {_told_depth(same)}, the new "
+        f"one {_told_depth(finding.size)}."
     )
 
 

@@ -1,4 +1,4 @@
-"""The model by stretches: each of model.glb's primitives as a file, so that long pipes load near the eye.
+"""The model in stretches: each of model.glb's primitives as a file, so that only the visible part is loaded.
 
 The container is glTF 2.0's binary form (Khronos, 2021, § 4): a header, a JSON chunk, a binary chunk.
 """
@@ -34,7 +34,7 @@ _MOST_STATIONS = 2000  # of an axis: at 100 m one every 5 cm
 
 @dataclass(frozen=True)
 class Stretch:
-    """A part of the model between two distances; ``triangles`` say how much it costs to draw."""
+    """A part of the model between two distances; ``triangles`` is its number of triangles."""
 
     from_mm: float
     to_mm: float
@@ -61,12 +61,12 @@ class StretchedModel:
     axis: PipeAxis
 
     def stretches(self) -> tuple[Stretch, ...]:
-        """Return where each primitive lies along the pipe.
+        """Return the place of each primitive along the pipe.
 
         Raises
         ------
         InputError
-            When the file is not as boresight writes it.
+            When the file was not written by boresight.
         """
         with _as_written(self.file):
             accessors, primitives = self.document["accessors"], self._primitives
@@ -86,7 +86,7 @@ class StretchedModel:
         Raises
         ------
         InputError
-            When there is no such stretch, or the file is not as boresight writes it.
+            When there is no such stretch, or the file was not written by boresight.
         """
         if not 0 <= number < len(self._primitives):
             raise InputError("model", f"there is no stretch {number}")
@@ -101,14 +101,14 @@ class StretchedModel:
 
 
 def _distances(axis: PipeAxis, point_p: Float) -> Float:
-    """Return distances (N, M) of points (N, M, 3) along the axis, near enough to say where a stretch lies.
+    """Return distances (N, M) of points (N, M, 3) along the axis, accurate enough to locate a stretch.
 
-    `to_pipe` would be exact, but loads SciPy and Numba, for which the first view need not wait.
+    `to_pipe` would be exact, but loads SciPy and Numba, which would delay the first view.
     """
     step = max(len(axis.distance_mm) // _MOST_STATIONS, 1)
     at, origin, tangent = axis.distance_mm[::step], axis.origin_p[::step], axis.R_pa[::step, :, 2]
     found = np.empty(point_p.shape[:2])
-    for k, corners in enumerate(point_p):  # one stretch at a time, for memory's sake
+    for k, corners in enumerate(point_p):  # one stretch at a time, to limit memory
         nearest = np.sum((corners[:, None] - origin) ** 2, axis=2).argmin(1)
         found[k] = at[nearest] + np.sum((corners - origin[nearest]) * tangent[nearest], axis=1)
     return found
@@ -134,20 +134,20 @@ def _model(file: Path, _as_it_is: FileStamp, files: RunFiles) -> StretchedModel:
 
 
 def read_model(file: Path, axis: PipeAxis) -> StretchedModel:
-    """Read the head of a model; of its buffer only what is asked for is read, later.
+    """Read the head of a model; parts of its buffer are read on demand.
 
     Raises
     ------
     InputError
-        When it is not one that boresight wrote.
+        When it was not written by boresight.
     """
     with file.open("rb") as stream:
         head = stream.read(20)
         if len(head) < 20:
-            raise InputError(file, "is no binary glTF")
+            raise InputError(file, "is not a binary glTF")
         magic, version, _, length, kind = struct.unpack("<5I", head)
         if (magic, version, kind) != (_GLTF, 2, _JSON) or length > _LARGEST_DOCUMENT:
-            raise InputError(file, "is no binary glTF 2.0")
+            raise InputError(file, "is not a binary glTF 2.0")
         text = stream.read(length)
     with _as_written(file):
         document: Json = parse_json(text)
@@ -159,7 +159,7 @@ def read_model(file: Path, axis: PipeAxis) -> StretchedModel:
 
 @contextmanager
 def _as_written(file: Path) -> Iterator[None]:
-    """Turn what is missing, misplaced or of another kind in a document into an `InputError`."""
+    """Convert errors of missing or wrong entries in a document to an `InputError`."""
     try:
         yield
     except (ValueError, KeyError, IndexError, TypeError, AttributeError, OverflowError) as error:

@@ -1,4 +1,4 @@
-"""The content of the quality page: how good a run is along the pipe, and reasons for unused samples."""
+"""The content of the quality page: the quality of a run along the pipe, and reasons for unused samples."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from pipeline.export.report.tables import REASONS
 from pipeline.review.documents import cleaned
 from pipeline.review.run_files import RunFiles
 
-# Points of a curve, about one for each pixel of its width; bytes of a diagnosis page that is still read.
+# Points of a curve, about one for each pixel of its width; largest diagnosis page that is read, bytes.
 _MOST_POINTS = 600
 _LARGEST_PAGE = 64 << 20
 _PICTURE = re.compile(r"data:image/(png|jpeg);base64,[A-Za-z0-9+/=]+")
@@ -37,7 +37,7 @@ def quality_document(files: RunFiles, wall: WallMap) -> dict[str, Any]:
 
 
 def _plot(title: str, unit: str, x_label: str, x: Float, **curves: Float) -> dict[str, Any]:
-    """Return curves thinned to what a screen can show."""
+    """Return curves thinned to the resolution of a screen."""
     step = max(-(-len(x) // _MOST_POINTS), 1)
     named = [{"name": n.replace("_", " "), "y": np.asarray(y, float)[::step]} for n, y in curves.items()]
     return {"title": title, "unit": unit, "x_label": x_label, "x": x[::step], "curves": named}
@@ -69,10 +69,10 @@ def _diameters(sections: Sections) -> dict[str, Any]:
 
 
 def _drift(trajectory: Trajectory) -> dict[str, Any]:
-    """Return how the camera's place becomes less certain with the way travelled since the first frame."""
+    """Return the uncertainty of the camera's position over the distance since the first frame."""
     sigma = np.sqrt(np.clip(np.diagonal(trajectory.covariance, axis1=1, axis2=2)[:, :3], 0, None))
     across = np.hypot(sigma[:, 0], sigma[:, 1])
-    title = "Drift: 1 σ of the camera's place against the first frame"
+    title = "Drift: 1 σ of the camera's position relative to the first frame"
     return _plot(title, "mm", "frame", trajectory.frame.astype(float), along=sigma[:, 2], across=across)
 
 
@@ -94,7 +94,7 @@ def _samples(rings: RingSamples) -> list[dict[str, Any]]:
 
 
 def _instrument(files: RunFiles) -> list[dict[str, Any]]:
-    """Return where the probe's numbers come from, and how old its file is."""
+    """Return the origin of the probe's parameters, and the age of its file."""
     file = Path(files.record()["probe"]["path"])
     try:
         probe = files.probe()
@@ -112,14 +112,14 @@ def _instrument(files: RunFiles) -> list[dict[str, Any]]:
 
 
 class _Pictures(HTMLParser):
-    """Collects the pictures that a page carries in itself."""
+    """Collects the pictures embedded in a page."""
 
     def __init__(self) -> None:
         super().__init__()
         self.found: list[dict[str, str]] = []
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        """Take a picture's data and its text; anything that is not plainly a picture is left."""
+        """Store a picture's data and its text; anything else is ignored."""
         told = dict(attrs)
         source = (told.get("src") or "").strip()
         if tag == "img" and _PICTURE.fullmatch(source):

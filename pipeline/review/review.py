@@ -1,4 +1,4 @@
-"""The review of a run: its current findings and signature; decisions are carried to new findings."""
+"""The review of a run: its current findings and signature; decisions are transferred to new findings."""
 
 from __future__ import annotations
 
@@ -21,7 +21,8 @@ from pipeline.review.measuring import OutlineGauge
 from pipeline.review.run_files import RunFiles, measured_findings
 
 FOLDER = "review"
-# A new finding is an old one when their middles are no farther apart than this, or than half its length.
+# A new finding is the same as an old one when their middles are no farther apart than this, or than half its
+# length.
 _APART_MM = 5.0
 
 
@@ -36,13 +37,13 @@ class State:
     findings : tuple of Finding
     may_undo, may_redo : bool
     lost : tuple of Entry
-        Decisions whose finding a later computation of the run no longer has.
+        Decisions whose finding no longer exists after a later computation of the run.
     assumed : Assume
         Wall thickness and yield strength, for wall loss and failure pressure.
     described : Describe
-        For whom, where and how it was inspected, as the recording says and the inspector completed it.
+        Facts of the inspection from the recording, completed by the inspector.
     entries : tuple of Entry
-        Those that count, in order.
+        Entries that count, in order.
     """
 
     revision: int

@@ -130,12 +130,12 @@ def test_the_default_configuration_is_printed(boresight: Callable[..., Told]) ->
     ("arguments", "message"),
     [
         (["run", "nowhere", "-o", "out"], "nowhere: does not exist"),
-        (["run", SAMPLE, "-o", SAMPLE], "not those of a boresight run"),
+        (["run", SAMPLE, "-o", SAMPLE], "do not belong to a boresight run"),
         (["run", SAMPLE, "-o", "out", "--set", "rings.nonsense=1"], "unknown key"),
         (["run", SAMPLE, "-o", "out", "--only", "nonsense"], "no stage nonsense"),
         (["run", SAMPLE, "-o", "out", "--probe", "no.yaml"], r"no.yaml"),
         (["run", SAMPLE, "-o", "/proc/out"], "cannot be written"),
-        (["config", "--set", "nonsense"], "is no assignment"),
+        (["config", "--set", "nonsense"], "is not an assignment"),
     ],
 )
 def test_refusals_are_text_and_exit_code_2(

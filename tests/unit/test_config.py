@@ -28,8 +28,8 @@ def test_defaults_then_file_then_assignments(tmp_path: Path) -> None:
     [
         ("draw.cuont=3", r"draw\.cuont: unknown key\n.*did you mean draw\.count\?"),
         ("drew.count=3", r"did you mean draw\.count\?"),
-        ("width=3", "is no assignment"),
-        ("draw.count", "is no assignment"),
+        ("width=3", "is not an assignment"),
+        ("draw.count", "is not an assignment"),
         (
             "draw.count=many",
             r"draw\.count: .*integer.*not 'many'\nExpected: numbers drawn; from 1 to 5000000",
@@ -43,7 +43,7 @@ def test_defaults_then_file_then_assignments(tmp_path: Path) -> None:
         ("smooth.unusable_above=.nan", r"smooth\.unusable_above"),
         ("smooth.unusable_above=.inf", r"smooth\.unusable_above"),
         ("total.weights=[1, x]", r"total\.weights: .*number"),
-        ("total.weights=[1", "is no value"),
+        ("total.weights=[1", "is not a value"),
     ],
 )
 def test_wrong_assignments_are_refused_by_name(assignment: str, message: str) -> None:

@@ -200,7 +200,7 @@ def test_text_burnt_in_is_not_followed() -> None:
     told: list[str] = []
     context = replace(quiet_context(), warn=told.append)
     stays = find_static_places(run.recording, run.probe, run.recording.frames.of(Illumination.LED), context)
-    assert "burnt in" in told[0]
+    assert "burnt-in" in told[0]
     z, _, sigma = errors(estimated(replace(run, recording=replace(run.recording, stays=stays))), run)
     assert abs(z[-1]) < 3 * sigma[-1, 0] + 0.02
     assert abs(followed) > 0.2 * STEP * k[-1], "the control: text is followed as if it were the wall"

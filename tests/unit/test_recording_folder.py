@@ -108,7 +108,7 @@ def test_images_numbered_otherwise_than_the_table_are_refused(tmp_path: Path) ->
 def test_wrong_patterns(copy: Path, pattern: str) -> None:
     described = copy / "recording.yaml"
     described.write_text(described.read_text().replace("video: 'frames.mkv'", f"video: '{pattern}'"))
-    with pytest.raises(InputError, match=r"pattern|no such image"):
+    with pytest.raises(InputError, match=r"pattern|fits no image"):
         open_recording(copy)
 
 
@@ -184,7 +184,7 @@ def test_images_of_another_size_than_the_cameras(folder: Path) -> None:
 
 @pytest.mark.parametrize(
     ("size", "hint"),
-    [((48, 64), "turn the pictures back by 90°"), ((64, 60), "cut rows off"), ((80, 48), "cut columns off"),
+    [((48, 64), "rotate the pictures back by 90°"), ((64, 60), "cut rows off"), ((80, 48), "cut columns off"),
      ((32, 24), "at this resolution"), ((128, 96), "at this resolution")],
 )  # fmt: skip
 def test_images_that_were_turned_or_cut_are_told_so(folder: Path, size: tuple[int, int], hint: str) -> None:

@@ -66,7 +66,7 @@ def test_a_record_comes_back(tmp_path: Path) -> None:
 def test_other_inputs_are_refused(tmp_path: Path, changed: str) -> None:
     (tmp_path / "run.json").write_text(json.dumps(RECORD))
     record = read_run_record(tmp_path)
-    with pytest.raises(InputError, match=f"the {changed} is not what the run was made from"):
+    with pytest.raises(InputError, match=f"the {changed} differs from the one of the run"):
         check_inputs_unchanged(record, {"recording": "a", "probe": "b"} | {changed: "c"})
 
 

@@ -64,7 +64,7 @@ def test_an_author_who_has_not_seen_the_last_action_is_refused(ledger):
     ledger.append(do.Accept(finding="1"), "ann", "b", 0)
     with pytest.raises(StaleError, match="1 changes"):
         ledger.append(do.Reject(finding="1"), "bo", "b", 0)
-    with pytest.raises(StaleError, match="older than what is shown"):
+    with pytest.raises(StaleError, match="older than the shown state"):
         ledger.append(do.Reject(finding="1"), "bo", "b", 7)
     assert after(ledger)["1"].decided_by == "ann"
 
@@ -72,7 +72,7 @@ def test_an_author_who_has_not_seen_the_last_action_is_refused(ledger):
 def test_what_is_gone_cannot_be_decided(ledger):
     ledger.append(do.Merge(findings=("1", "2")), "ann", "b", 0)
     ledger.append(do.Accept(finding="1"), "ann", "b", 1)
-    with pytest.raises(ImpossibleError, match="not there any more"):
+    with pytest.raises(ImpossibleError, match="no longer exists"):
         after(ledger)
 
 

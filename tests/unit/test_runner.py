@@ -227,7 +227,7 @@ def test_a_stage_that_breaks_its_word_fails(tmp_path: Path) -> None:
 
 def test_a_foreign_folder_is_refused_untouched(tmp_path: Path) -> None:
     (tmp_path / "thesis.txt").write_text("mine")
-    with pytest.raises(InputError, match="not those of a boresight run"):
+    with pytest.raises(InputError, match="do not belong to a boresight run"):
         run_toys(tmp_path)
     assert [p.name for p in tmp_path.iterdir()] == ["thesis.txt"]
     with pytest.raises(InputError, match="is a file"):
@@ -255,7 +255,7 @@ def test_two_processes_do_not_share_a_folder(tmp_path: Path) -> None:
         lock = tmp_path / "run" / ".boresight" / "lock"
         while not lock.is_file() or not lock.read_text():
             assert other.poll() is None
-        with pytest.raises(InputError, match=f"process {other.pid} is at work"):
+        with pytest.raises(InputError, match=f"process {other.pid} is using"):
             run_toys(tmp_path / "run")
     finally:
         other.kill()

@@ -24,12 +24,12 @@ from pipeline.pages import notation
 from pipeline.recording.base import Recording
 from pipeline.recording.checks import CheckedFrames
 
-# Libraries that the results stand on, named with their versions.
+# Libraries on which the results depend, named with their versions.
 _STANDS_ON = ("numpy", "scipy", "opencv-contrib-python-headless", "av")
-# Findings with pictures: about 5 MB of a page that is to open anywhere.
+# Number of findings with pictures: about 5 MB of a page that should open anywhere.
 _PICTURED = 60
-# Beyond this a stated probability is not borne out: of findings in drawn recordings that were stated at 0.95
-# or more (0.98 on average), 0.90 were real (`python -m tests.benchmarks.bench_findings`).
+# Higher probabilities are not confirmed: of findings in drawn recordings that were stated at 0.95 or more
+# (0.98 on average), 0.90 were real (`python -m tests.benchmarks.bench_findings`).
 _TOLD_APART = 0.9
 
 
@@ -77,7 +77,7 @@ def write_report(summary: RunSummary, folder: Path) -> None:
 
 
 def page_of(summary: RunSummary) -> Page:
-    """Return what the page shows of a run."""
+    """Return the content of the page on a run."""
     pictures = gallery(summary)
     found = summary.defects
     findings = _findings(found.items if found else (), pictures)
@@ -142,7 +142,7 @@ def _probability(probability: float) -> str:
 
 
 def _ranges(frames: list[int]) -> tuple[str, ...]:
-    """Return frames as ranges, where a few frames in between may be of the other light."""
+    """Return frames as ranges, in which a few frames may be of the other light."""
     parts: list[list[int]] = []
     for frame in frames:
         if parts and frame - parts[-1][1] <= 4:

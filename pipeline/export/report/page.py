@@ -1,4 +1,4 @@
-"""What the report page shows, as its template takes it: texts, tables, pictures and line plots."""
+"""The content of the report page for its template: texts, tables, pictures and line plots."""
 
 from __future__ import annotations
 
@@ -100,7 +100,7 @@ def round_ticks(low: float, high: float, about: int) -> Float:
     """Return round values within [low, high], roughly ``about`` of them."""
     raw = (high - low) / about
     power = 10.0 ** np.floor(np.log10(raw))
-    # 0.999: a step that is round already stays so in spite of rounding errors.
+    # 0.999: a step that is round already is kept in spite of rounding errors.
     step = power * next(f for f in (1, 2, 2.5, 5, 10) if f * power >= raw * 0.999)
     return np.asarray(np.round(np.arange(np.ceil(low / step), np.floor(high / step) + 1) * step, 10) + 0.0)
 
@@ -111,7 +111,7 @@ _MOST_NUMBERED = 40
 
 @dataclass(frozen=True)
 class Card:
-    """One answer on the first screen: the question's name, the number, and what it rests on."""
+    """One answer on the first screen: the name of the question, the number, and its basis."""
 
     name: str
     value: str

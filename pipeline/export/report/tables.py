@@ -22,7 +22,7 @@ from pipeline.recording.base import Recording
 
 @dataclass(frozen=True)
 class RunSummary:
-    """A run as the report shows it; an artefact that was not made is None.
+    """The data of a run for the report; an artefact that was not made is None.
 
     Attributes
     ----------
@@ -31,12 +31,11 @@ class RunSummary:
         When the run was made, ISO 8601, or empty.
     rings, trajectory, wall, texture, overlays, sections, defects
     stages : tuple of StageOutcome
-        How each ended, and the numbers it reported. Names of numbers that begin with ``rejected`` account for
-        what was not used.
+        Outcome and reported numbers of each. Numbers whose name begins with ``rejected`` count unused data.
     versions : tuple of (str, str)
-        Name and version of the program and of what it stands on.
+        Name and version of the program and of its libraries.
     inputs : tuple of (str, str)
-        File and hash of what went in.
+        File and hash of each input.
     """
 
     recording: Recording
@@ -60,7 +59,7 @@ class RunSummary:
 
 
 NOT_CALIBRATED = (
-    "The instrument's numbers are only stated, not calibrated on a gauge: diameters rest on them, "
+    "The instrument's parameters are only stated, not calibrated on a gauge: diameters depend on them, "
     "and a misaligned laser would go unnoticed."
 )
 _ONE = {"corrosion": "area of corrosion"}
@@ -87,7 +86,7 @@ def verdict(summary: RunSummary) -> str:
 
 
 def cards(summary: RunSummary) -> tuple[Card, ...]:
-    """Return the answers that the first screen gives."""
+    """Return the answers of the first screen."""
     return (_inspected(summary), _instrument(summary), _measured(summary), _found(summary))
 
 
@@ -177,7 +176,7 @@ _SHOWN = 24
 
 
 def tables(summary: RunSummary) -> tuple[Table, ...]:
-    """Return all tables below the pictures; those that have nothing to tell are left out."""
+    """Return all tables below the pictures; empty ones are left out."""
     made = (_frames(summary), _samples(summary.rings), _rejections(summary), _events(summary),
             _numbers(summary), _stages(summary), _versions(summary))  # fmt: skip
     return tuple(t for t in made if t is not None)

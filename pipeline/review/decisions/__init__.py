@@ -1,4 +1,4 @@
-"""What an inspector can do to a finding."""
+"""The actions of an inspector on findings."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from pipeline.errors import InputError
 
 FindingId = Annotated[str, Field(pattern=r"^(m|a)?[0-9]{1,9}(\.[0-9]{1,3})*$")]
 Text = Annotated[str, Field(max_length=4000)]
-# (distance mm, azimuth rad); the azimuth runs on beyond ±π rather than jumping.
+# (distance mm, azimuth rad); the azimuth continues beyond ±π without a jump.
 Point = tuple[
     Annotated[float, Field(ge=-1e7, le=1e7, allow_inf_nan=False)],
     Annotated[float, Field(ge=-13, le=13, allow_inf_nan=False)],
@@ -39,7 +39,7 @@ class Reject(_Action):
 
 
 class Reopen(_Action):
-    """The finding is to be decided again."""
+    """The finding must be decided again."""
 
     do: Literal["reopen"] = "reopen"
     finding: FindingId
@@ -54,7 +54,7 @@ class Reclassify(_Action):
 
 
 class Redraw(_Action):
-    """The finding reaches over another outline."""
+    """The finding has another outline."""
 
     do: Literal["redraw"] = "redraw"
     finding: FindingId
@@ -100,7 +100,7 @@ class Comment(_Action):
 
 
 class Assume(_Action):
-    """What is taken for known of the pipe, for wall loss and strength."""
+    """Assumed data of the pipe, for wall loss and strength."""
 
     do: Literal["assume"] = "assume"
     wall_thickness_mm: Annotated[float, Field(gt=0, le=1000)] | None = None
@@ -111,7 +111,7 @@ ShortText = Annotated[str, Field(max_length=200)]
 
 
 class Describe(_Action):
-    """For whom, where and how the pipe was inspected; what is left empty is as the recording says."""
+    """Client, place and method of the inspection; empty entries are taken from the recording."""
 
     do: Literal["describe"] = "describe"
     client: ShortText = ""
@@ -126,7 +126,7 @@ class Describe(_Action):
 
 
 class Undo(_Action):
-    """Take back the last action that still counts."""
+    """Undo the last action that still counts."""
 
     do: Literal["undo"] = "undo"
 

@@ -17,8 +17,8 @@ from pipeline.review.decisions import Action, action_of
 
 # Time that an action waits for another process that is writing, before it is refused. Chosen.
 _BUSY_S = 10.0
-_KEPT = "free space or mend its permissions, then do the last step again; what was decided before is kept"
-# What the disk refuses, in whatever variant; anything else is the fault of the file's content.
+_KEPT = "free space or correct its permissions, then repeat the last step; earlier decisions are kept"
+# Errors of the disk, in any variant; any other error is one of the file's content.
 _PRIMARY = 0xFF
 _DISK_REFUSALS = (
     sqlite3.SQLITE_FULL, sqlite3.SQLITE_READONLY, sqlite3.SQLITE_IOERR, sqlite3.SQLITE_CANTOPEN,
@@ -33,7 +33,7 @@ class StaleError(BoresightError):
 
 @dataclass(frozen=True)
 class Entry:
-    """One action: its number, the findings it was taken on, who, when (ISO 8601, UTC), and what."""
+    """One action: its number, the findings on which it was taken, author, time (ISO 8601, UTC), content."""
 
     id: int
     basis: str
@@ -57,17 +57,17 @@ class Signature:
 
 @dataclass(frozen=True)
 class Ledger:
-    """Decisions in the SQLite file ``file``; every call opens it anew, so that threads need not share."""
+    """Decisions in the SQLite file ``file``; every call opens it, so that threads need not share it."""
 
     file: Path
 
     def prepare(self) -> None:
-        """Create the file or bring it up to the newest form.
+        """Create the file or convert it to the newest format.
 
         Raises
         ------
         InputError
-            When it is no ledger, or one of a newer program.
+            When it is not a ledger, or one of a newer program.
         """
         with disk_errors_named(self.file.parent, _KEPT):
             self.file.parent.mkdir(exist_ok=True)
@@ -75,12 +75,12 @@ class Ledger:
             _migrate(connection, self.file)
 
     def keep_basis(self, sha256: str, defects: str) -> None:
-        """Keep the findings on which decisions will be taken."""
+        """Store the findings on which decisions will be taken."""
         with self._open() as connection:
             connection.execute("INSERT OR IGNORE INTO basis VALUES (?, ?, ?)", (sha256, defects, _now()))
 
     def basis(self, sha256: str) -> str:
-        """Return kept findings, the text of a defects.json."""
+        """Return stored findings, the text of a defects.json."""
         with self._open() as connection:
             found = connection.execute("SELECT defects FROM basis WHERE sha256 = ?", (sha256,)).fetchone()
         if found is None:
@@ -101,7 +101,7 @@ class Ledger:
             if last > revision:
                 raise StaleError(f"{last - revision} changes have been made elsewhere since; look again")
             if last < revision:
-                raise StaleError("the record of decisions is older than what is shown; look again")
+                raise StaleError("the record of decisions is older than the shown state; look again")
             at = _now()
             row = (basis, who, at, action.model_dump_json())
             written = connection.execute(
@@ -159,14 +159,14 @@ class Ledger:
                     self.file, f"cannot be written: {error}",
                     expected="a folder that can be written, on a disk with room", hint=_KEPT,
                 ) from error  # fmt: skip
-            hint = "move it away to start anew, or restore it from a copy"
+            hint = "move it away to start again, or restore it from a copy"
             raise InputError(self.file, f"cannot be used as a ledger: {error}", hint=hint) from error
         finally:
             connection.close()
 
 
 def _migrate(connection: sqlite3.Connection, file: Path) -> None:
-    """Apply the numbered scripts that the file has not seen, each as a whole or not at all."""
+    """Apply the numbered scripts that are new for the file, each atomically."""
     scripts = sorted(p.name for p in _scripts().iterdir() if p.name.endswith(".sql"))
     connection.execute("BEGIN EXCLUSIVE")
     version = int(connection.execute("PRAGMA user_version").fetchone()[0])

@@ -1,4 +1,4 @@
-"""The findings after all actions were applied, each with what the run measured of it."""
+"""The findings after all actions were applied, each with its measurement by the run."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class ImpossibleError(BoresightError):
 class Measured:
     """Size of an outline on the wall; ``depth_mm`` positive into the wall, NaN where nothing was seen.
 
-    The peak is the place where the depth was read; NaN of a run that was made before its findings told it.
+    The peak is the place where the depth was measured; NaN for an older run whose findings do not state it.
     """
 
     distance_from_mm: float
@@ -52,7 +52,7 @@ class Gauge(Protocol):
 
 @dataclass(frozen=True)
 class Remark:
-    """A comment: by whom, when, what."""
+    """A comment with its author and time."""
 
     who: str
     at: str
@@ -73,13 +73,13 @@ class Finding:
     status : str
         ``open``, ``accepted``, ``rejected``, or ``gone``: merged or split into others.
     original : int or None
-        Number of the measured defect that it is, None when it was made by hand.
+        Number of its measured defect, None when it was added by hand.
     edited : bool
-        Whether kind or outline differ from what was measured.
+        Whether kind or outline differ from the measured ones.
     decided_by, decided_at, reason : str
     remarks : tuple of Remark
     made_of : tuple of str
-        Findings it was merged or split from.
+        Findings from which it was merged or split.
     """
 
     id: str
@@ -97,7 +97,7 @@ class Finding:
 
 
 def counting(entries: Sequence[Entry]) -> tuple[tuple[Entry, ...], tuple[Entry, ...]]:
-    """Return the entries that count, and those undone that may be done again, the next one last."""
+    """Return the entries that count, and the undone ones that may be redone, the next one last."""
     done: list[Entry] = []
     undone: list[Entry] = []
     for entry in entries:
@@ -119,7 +119,7 @@ def replay(measured: Iterable[Finding], entries: Sequence[Entry], gauge: Gauge) 
     Raises
     ------
     ImpossibleError
-        When an action names a finding that is not there, or not any more.
+        When an action names a finding that does not exist, or no longer exists.
     """
     findings = {f.id: f for f in measured}
     for entry in counting(entries)[0]:
@@ -148,7 +148,7 @@ def _after(findings: Mapping[str, Finding], entry: Entry, gauge: Gauge) -> dict[
 
 def _there(findings: Mapping[str, Finding], name: str) -> Finding:
     if name not in findings or findings[name].status == GONE:
-        raise ImpossibleError(f"finding {name} is not there any more")
+        raise ImpossibleError(f"finding {name} no longer exists; look again")
     return findings[name]
 
 
@@ -234,7 +234,7 @@ def _meet(one: Finding, other: Finding) -> bool:
 
 
 def _any_inside(points: Outline, outline: Outline) -> bool:
-    scale = np.array([1.0, 100.0])  # about mm both ways; what is inside does not depend on it
+    scale = np.array([1.0, 100.0])  # about mm in both directions; the result does not depend on it
     polygon = (np.asarray(outline) * scale).astype(np.float32)
     return any(
         cv2.pointPolygonTest(polygon, tuple(map(float, p * scale)), False) > 0 for p in np.asarray(points)
@@ -242,10 +242,10 @@ def _any_inside(points: Outline, outline: Outline) -> bool:
 
 
 def labels(findings: Iterable[Finding]) -> dict[str, str]:
-    """Return what each finding is called, by its id: ``3``, ``4 (merged)``, ``5 (added)``, ``3.1 (split)``.
+    """Return the name of each finding, by its id: ``3``, ``4 (merged)``, ``5 (added)``, ``3.1 (split)``.
 
-    Those made by hand are numbered on from the measured ones, in the order in which they were made;
-    ``findings`` are all of a review, those that are gone too.
+    Findings made by hand are numbered after the measured ones, in the order in which they were made;
+    ``findings`` are all of a review, including merged and split ones.
     """
     parts = {f.id: _parts(f.id) for f in findings}
     measured = max((number for made, number, _ in parts.values() if not made), default=0)

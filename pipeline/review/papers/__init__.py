@@ -1,4 +1,4 @@
-"""The files of a review to save: the report as PDF and HTML, tables and pictures, all from one content."""
+"""The downloads of a review: the report as PDF and HTML, tables and pictures, all from one content."""
 
 from __future__ import annotations
 
@@ -26,9 +26,10 @@ from pipeline.review.review import Review, State
 from pipeline.review.tables import csv_text, findings_table
 
 OVERVIEW = "overview.svg"
-# Findings with pictures, the deepest first: about 100 kB each, of a report that is to open anywhere.
+# Number of findings with pictures, the deepest first: about 100 kB each, for a report that should open
+# anywhere.
 _MOST_PICTURED = 60
-# PDF/A-2u: for keeping, every font inside, every character with its meaning (ISO 19005-2).
+# PDF/A-2u: for archiving, with all fonts embedded and every character mapped to Unicode (ISO 19005-2).
 _STANDARD: Literal["a-2u"] = "a-2u"
 
 
@@ -41,7 +42,7 @@ def pictures(review: Review, state: State) -> dict[str, bytes]:
 
 
 def pictured(state: State) -> tuple[Finding, ...]:
-    """Return the findings that the papers show with a picture: the deepest of those not rejected."""
+    """Return the findings with a picture in the reports: the deepest of those not rejected."""
     standing = [f for f in state.findings if f.status not in (REJECTED, GONE)]
     deepest = sorted(standing, key=lambda f: -abs(np.nan_to_num(f.size.depth_mm)))[:_MOST_PICTURED]
     return tuple(f for f in standing if f in deepest)
@@ -101,7 +102,7 @@ def _with_pictures(review: Review, state: State) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class Paper:
-    """A file of a review; ``shown`` when a browser is to display rather than to save it."""
+    """A file of a review; ``shown`` if a browser displays it instead of saving it."""
 
     name: str
     media_type: str

@@ -1,4 +1,4 @@
-"""The content of all reports, made once from the run and the decisions, so that all print the same words."""
+"""The content of all reports, made once from the run and the decisions, so that all have the same text."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def report_content(review: Review, state: State) -> dict[str, Any]:
 
 
 def _run_rows(review: Review, state: State, run: dict[str, Any]) -> list[list[str]]:
-    """Return name and value of what is known of the pipe and how it was measured; nothing that is not."""
+    """Return names and values of the known facts of the pipe and of the measurement."""
     metrics = {m["name"]: f"{m['value']} {m['unit']}".strip() for m in run["metrics"]}
     first, last = run["distance_mm"]
     rows = [
@@ -63,8 +63,8 @@ def _run_rows(review: Review, state: State, run: dict[str, Any]) -> list[list[st
         ("Inspected", f"{first:.1f}–{last:.1f} mm"),
         ("Wall seen", metrics.get("wall seen", "")),
         ("1 σ of the radius, median", metrics.get("median 1 σ of the radius", "")),
-        ("Wall thickness, given", _given(state.assumed.wall_thickness_mm, "mm")),
-        ("Yield strength, given", _given(state.assumed.yield_mpa, "MPa")),
+        ("Wall thickness, stated", _given(state.assumed.wall_thickness_mm, "mm")),
+        ("Yield strength, stated", _given(state.assumed.yield_mpa, "MPa")),
     ]
     return [[name, text] for name, text in rows if text]
 
@@ -74,7 +74,7 @@ def _given(value: float | None, unit: str) -> str:
 
 
 def _summary(rows: list[dict[str, Any]]) -> list[list[str]]:
-    """Return how many findings were decided how, and the deepest and highest of those not rejected."""
+    """Return the numbers of findings by decision, and the deepest and highest of those not rejected."""
     count = Counter(row["status"] for row in rows)
     out = [[f"Findings {word}", str(count[status])] for status, word in _STATUS.items()]
     left = [r for r in rows if r["status"] != REJECTED and r["depth_mm"] is not None]
@@ -88,7 +88,7 @@ def _summary(rows: list[dict[str, Any]]) -> list[list[str]]:
 
 
 def _told(row: dict[str, Any]) -> dict[str, str]:
-    """Return the words that every report uses of a finding."""
+    """Return the texts on a finding that every report uses."""
     size = f"{row['length_mm']} mm along × {row['width_mm']} mm around"
     pressure = ""
     if row["b31g_mpa"] is not None:
@@ -118,7 +118,7 @@ def _clock(row: dict[str, Any]) -> str:
 
 
 def _as_measured(row: dict[str, Any]) -> str:
-    """Return what the run had measured of a finding that was edited since."""
+    """Return the run's measurement of a finding that was edited since."""
     if not row["edited"]:
         return ""
     if row["measured_kind"] is None:
@@ -152,12 +152,12 @@ _WORDS_OF_ACTIONS = {
     "redraw": "drew the outline of finding {name} again", "split": "split finding {name}",
     "comment": "remarked on finding {name}: {text}", "merge": "merged findings {names}",
     "add": "added a {kind} as finding {made}",
-    "assume": "gave pipe data: {pipe}", "describe": "gave the facts of the inspection",
+    "assume": "stated pipe data: {pipe}", "describe": "stated the facts of the inspection",
 }  # fmt: skip
 
 
 def _in_words(entry: Entry, labels: dict[str, str]) -> str:
-    """Return a sentence about what an action did."""
+    """Return a sentence that describes an action."""
     said = entry.action.model_dump(mode="json")
     told = {k: v for k, v in said.items() if isinstance(v, str)}
     told["name"] = labels.get(str(said.get("finding")), str(said.get("finding")))
@@ -169,7 +169,7 @@ def _in_words(entry: Entry, labels: dict[str, str]) -> str:
 
 
 def _revision(seal: Seal) -> str:
-    """Return the issue of the report: each signature is one, what is not signed is a draft."""
+    """Return the revision of the report: each signature makes one; an unsigned state is a draft."""
     if seal.signature is None:
         return "Draft"
     return f"Revision {seal.signature.id}" if seal.signed else f"Draft after revision {seal.signature.id}"

@@ -1,4 +1,4 @@
-"""Accepted findings in the forms that other programs and standards read: POF, PACP and EN 13508-2.
+"""Accepted findings in the formats of other programs and standards: POF, PACP and EN 13508-2.
 
 Codes are suggestions from the shape: they do not replace a coded inspection by a certified inspector.
 """
@@ -59,7 +59,7 @@ _CONTINUOUS_MM = 1000.0
 
 
 def pof_text(review: Review, state: State) -> bytes:
-    """Return the accepted findings as a pipe tally of POF; what one run of a probe cannot know is empty."""
+    """Return the accepted findings as a pipe tally of POF; data that a run cannot provide is empty."""
     wall, bore = state.assumed.wall_thickness_mm, 2 * review.files.artefact(Overlays).nominal_radius_mm
     return csv_text([_pof(row, wall, bore) for row in _accepted(review, state)], POF_COLUMNS).encode(
         "utf-8-sig"
@@ -93,7 +93,7 @@ def _pof_deformation(row: dict[str, Any]) -> dict[str, Any]:
 
 
 def _pof_loss(row: dict[str, Any], wall_mm: float | None) -> dict[str, Any]:
-    """Return depth in % of the wall where that is given; none where no loss was measured: see the comment."""
+    """Return depth in % of the wall if that is stated; none if no loss was measured: see the comment."""
     depth, deep = row["depth_mm"], ""
     if depth is not None and depth > 0:
         deep = f"{100 * depth / wall_mm:.1f}%" if wall_mm else f"{depth} mm"
@@ -169,7 +169,7 @@ def _en(row: dict[str, Any], bore_mm: float) -> list[dict[str, Any]]:
 
 
 def _characterised(kind: DefectKind, row: dict[str, Any]) -> tuple[str, str]:
-    """Return characterisations 1 and 2; Z, other, where the shape alone does not tell, with a remark."""
+    """Return characterisations 1 and 2; Z (other) with a remark where the shape alone does not decide."""
     if kind is DefectKind.CRACK:
         direction = {"CL": "A", "CC": "B", "CS": "D"}[row["pacp"].split(" ")[0]]
         return "B", direction
@@ -179,7 +179,7 @@ def _characterised(kind: DefectKind, row: dict[str, Any]) -> tuple[str, str]:
 
 
 def _percent(row: dict[str, Any], bore_mm: float) -> int | None:
-    """Return by how much a dent narrows the bore, or a deposit its area at most, in whole per cent from 1."""
+    """Return the narrowing of the bore by a dent, or of its area by a deposit at most, in whole per cent."""
     kind, depth = DefectKind(row["kind"]), row["depth_mm"]
     if depth is None or kind not in (DefectKind.DENT, DefectKind.DEPOSIT):
         return None
@@ -190,7 +190,7 @@ def _percent(row: dict[str, Any], bore_mm: float) -> int | None:
 
 
 def _whole_hours(row: dict[str, Any]) -> tuple[int, int | None]:
-    """Return where a finding starts and ends on the clock in whole hours, 12 and 12 all round."""
+    """Return the start and end of a finding on the clock in whole hours; 12 and 12 all round."""
     first, last = (_hour(row[name]) for name in ("clock_from", "clock_to"))
     if row["clock_from"] == row["clock_to"]:
         return 12, 12
@@ -203,7 +203,7 @@ def _hour(clock: str) -> int:
 
 
 def _ends(row: dict[str, Any], start: str, end: str) -> list[tuple[float, str | None]]:
-    """Return where a finding is, m: its peak, or start and end with their marks where it is long."""
+    """Return the place of a finding, m: its peak, or start and end with their marks if it is long."""
     if row["length_mm"] < _CONTINUOUS_MM:
         return [(_metres(row), None)]
     return [(round(row["distance_from_mm"] / 1000, 3), start), (round(row["distance_to_mm"] / 1000, 3), end)]

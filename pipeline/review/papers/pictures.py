@@ -1,4 +1,4 @@
-"""Pictures of the papers: the whole wall with numbered findings, and four views of each finding.
+"""Pictures of the reports: the whole wall with numbered findings, and four views of each finding.
 
 Distance runs to the right and the clock downward, as in every flat picture of boresight. All are SVG.
 """
@@ -23,11 +23,11 @@ from pipeline.review.decisions.replay import Finding, Outline
 from pipeline.review.flat_tiles import Limits, full_range_mm, values_of
 from pipeline.review.run_files import RunFiles
 
-# Pixels of the whole wall, and of one side of a picture about a finding: sharp in print at their size.
+# Pixels of the whole wall, and of one side of a picture around a finding: sharp in print at their size.
 _MAP_PX, _CROP_PX = 600_000, 300
 _LEAST_HALF_MM = 8.0
 _EXAGGERATION = 20.0
-# The end colours mean at least this, or noise would be alarming; the page has the same.
+# Smallest value of the end colours, so that noise does not look alarming; the page has the same.
 _LEAST_RANGE_MM = 0.25
 _INK, _SOFT, _BLUE, _ORANGE = "#16202b", "#6b7682", "#0a5ea8", "#b34700"
 _MOST_NUMBERED = 40
@@ -35,7 +35,7 @@ _MOST_NUMBERED = 40
 
 @dataclass(frozen=True)
 class Canvas:
-    """What pictures of a run are drawn from."""
+    """The data from which pictures of a run are drawn."""
 
     photo: FlatImage
     deviation: FlatImage
@@ -135,12 +135,12 @@ class Canvas:
 
 
 def canvas_of(files: RunFiles) -> Canvas:
-    """Return what pictures of a run are drawn from.
+    """Return the data from which pictures of a run are drawn.
 
     Raises
     ------
     InputError
-        When a result of the run is not there any more.
+        When a result of the run no longer exists.
     """
     overlays = files.artefact(Overlays)
     shown = overlays.pictures[0]
@@ -154,7 +154,7 @@ def canvas_of(files: RunFiles) -> Canvas:
 
 
 def peak(finding: Finding) -> tuple[float, float]:
-    """Return distance (mm) and azimuth (rad) of a finding's peak; of its outline's middle where not known."""
+    """Return distance (mm) and azimuth (rad) of a finding's peak, or of its outline's middle if unknown."""
     size = finding.size
     if np.isfinite(size.peak_distance_mm):
         return size.peak_distance_mm, float(np.radians(30 * size.peak_clock - 90))
@@ -163,7 +163,7 @@ def peak(finding: Finding) -> tuple[float, float]:
 
 
 def _about(outline: Outline, radius_mm: float) -> Window:
-    """Return a square window about an outline, with a margin, no wider than the circumference."""
+    """Return a square window around an outline, with a margin, no wider than the circumference."""
     point = np.asarray(outline, float)
     low, high = point.min(0), point.max(0)
     span = float(max(high[0] - low[0], (high[1] - low[1]) * radius_mm))
@@ -195,7 +195,7 @@ def _outline(axes: Axes, outline: Outline, name: str) -> None:
 
 
 def _scale_bar(axes: Axes, window: Window, radius_mm: float) -> None:
-    """Draw a bar of a round length; the picture has the same scale both ways."""
+    """Draw a bar of a round length; the picture has the same scale in both directions."""
     axes.axis("off")
     width = window.distance_to_mm - window.distance_from_mm
     length = float(round_ticks(0, width, 4)[1])

@@ -143,7 +143,7 @@ def test_an_outline_is_changed_by_dragging_its_points_and_says_why_the_depth_cha
     assert after[1:] == before[1:]
     with page.one_change():
         page.page.click("text=Done")
-    assert "Read so, the run's own outline gives" in page.page.locator(".detail .caution").inner_text()
+    assert "In this way, the run's outline gives" in page.page.locator(".detail .caution").inner_text()
 
 
 def test_caps_lock_and_focus_do_not_change_what_a_key_does(page: Tab) -> None:
