@@ -107,15 +107,15 @@ class Factor:
     Attributes
     ----------
     band : BandedCholesky
-        Of the frames.
+        Cholesky factor of the frames' band.
     border : (7 N, B)
-        Multiplied by the inverse of the band's factor.
+        The border, multiplied by the inverse of the band's factor.
     corner
-        Cholesky factor of the border's information, the frames eliminated.
+        Cholesky factor of the border's information after elimination of the frames.
     right : (7 N,)
-        Multiplied like the border.
+        The frames' right side, multiplied in the same way as the border.
     border_right : (B,)
-        The border's right side, the frames eliminated.
+        The border's right side after elimination of the frames.
     """
 
     band: BandedCholesky
@@ -126,7 +126,7 @@ class Factor:
 
     @cached_property
     def solved_border(self) -> Float:
-        """Return by how much the frames' unknowns (7 N, B) decrease for each unit of a border unknown."""
+        """Return the decrease (7 N, B) of the frames' unknowns per unit of each border unknown."""
         return self.band.back(self.border)
 
     def step(self) -> tuple[Float, Float]:
@@ -163,18 +163,18 @@ class Factor:
         return out
 
     def frames_after(self, border: Float) -> Float:
-        """Return the step (N, 7) of the frames to their best place when the border steps by (B,)."""
+        """Return the step (N, 7) of the frames to their optimum when the border steps by (B,)."""
         rest = self.right - self.border @ border
         return self.band.back(rest[:, None]).reshape(-1, BLOCK)
 
     def frames_follow(self, border: Float) -> Float:
-        """Return how frames (N, 7, S) follow S directions (B, S) of the border."""
+        """Return the response (N, 7, S) of the frames to S directions (B, S) of the border."""
         return np.asarray((-self.solved_border @ border).reshape(-1, BLOCK, border.shape[1]))
 
     def response(self, which: Int) -> tuple[Float, Float]:
-        """Return how frames (N, 7, S) and border (B, S) follow when S numbers of the border are moved.
+        """Return the response of frames (N, 7, S) and border (B, S) to changes of S border unknowns.
 
-        All other unknowns take their best values for them.
+        All other unknowns take their optimum.
         """
         information = self.border_information()
         other = np.setdiff1d(np.arange(len(information)), which)

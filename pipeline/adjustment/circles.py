@@ -1,4 +1,4 @@
-"""Circles through rings of points that lie on a round wall for the most part."""
+"""Fits circles to rings of points that mostly lie on a round wall."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ LEAST_COVERED = 0.3
 """Share of the circle that a ring must show to have a centre. Not measured."""
 _AT_ONCE = 256
 _ROUNDS = 5
-"""Fits of a circle, each weighted by the residuals of the one before. Chosen: not measured on any set of
-rings."""
+"""Number of fits of a circle, each weighted by the residuals of the one before. Chosen: not measured on any
+set of rings."""
 _OUTLYING = 3.0
-"""Spreads at which a sample weighs half in the fit of a circle. Not measured."""
+"""Spreads at which a sample has half its weight in the fit of a circle. Not measured."""
 _FARTHEST_SAMPLE = 2.0
 """Median distances from the camera's axis up to which a sample may lie on a ring's circle: of a camera 0.6
 radii off the pipe's axis the farthest lies at 1.65. Lines mirrored far away lie a hundred times as far."""
@@ -22,15 +22,16 @@ _ARCS, _ARC = 8, 3
 """Arcs, each a third of the circle, whose circles are tried: standing water mirrors up to half of a ring, and
 two of the eight lie in the other half."""
 _ENOUGH = 180
-"""Samples of a ring that are enough to choose the arc by."""
+"""Number of samples of a ring that are enough to choose the arc."""
 _FEWEST = 9
-"""Samples of an arc from which its spread tells more than its three terms take away."""
+"""Fewest samples of an arc for an estimate of its spread, well above the three fitted terms."""
 _AMONG = 10.0
 """Spreads of the arc within which samples all around are on its circle. A choice: it leaves room for an oval
 pipe, and a mirrored line passes it within some degrees of the water."""
 _CLEARLY = 0.5
-"""Part of the median error of the circle through all samples that the arc's must have. A choice: with a fifth
-of the samples elsewhere Cauchy's weights find the circle by themselves."""
+"""Largest median error of the arc's circle, as a part of that of the circle through all samples. A choice:
+with
+a fifth of the samples elsewhere, Cauchy's weights find the circle by themselves."""
 
 
 def circles_through(xy: Float32) -> tuple[Float, Float]:
@@ -70,9 +71,9 @@ def _robust_circles(xy: Float, near: Bool) -> Float:
 
 
 def _start(xy: Float, near: Bool) -> tuple[Float, Float]:
-    """Return circles through all samples, or through those of the arc whose circle clearly more lie on.
+    """Return circles through all samples, or through an arc if its circle clearly fits more samples.
 
-    With them comes the largest deviation, mm², of samples that count: the many mirrored ones share another
+    Also return the largest deviation, mm², of samples that are used: the many mirrored ones share another
     circle.
     """
     found, azimuths = _fitted(xy, near), near.shape[1]

@@ -14,13 +14,13 @@ import numpy as np
 
 from pipeline.arrays import Float
 
-_HOLD = 1e-4  # 1/mm²: a landmark that nothing holds any more keeps its place
+_HOLD = 1e-4  # 1/mm²: a landmark without observations keeps its place
 BLOCK = 7
 
 
 @dataclass(frozen=True)
 class Sums:
-    """Normal equations of N frames and B numbers that all share.
+    """Normal equations of N frames and B global unknowns.
 
     Attributes
     ----------
@@ -40,18 +40,18 @@ class Sums:
 
     @staticmethod
     def empty(frames: int, border: int, lags: int, block: int = BLOCK) -> Sums:
-        """Return sums of nothing, of frames with ``block`` unknowns each."""
+        """Return empty sums, for frames with ``block`` unknowns each."""
         size = block * frames
         shapes = (frames, lags, block, block), (size, border), (border, border), (size,), (border,)
         return Sums(*(np.zeros(shape) for shape in shapes))
 
     def like(self) -> Sums:
-        """Return sums of nothing, of the same sizes."""
+        """Return empty sums of the same sizes."""
         return Sums(*(np.zeros(a.shape) for a in self.arrays))
 
     @property
     def arrays(self) -> tuple[Float, ...]:
-        """All of them, in the order of the fields."""
+        """All arrays, in the order of the fields."""
         return self.band, self.border, self.corner, self.right, self.right_border
 
     def add(self, other: Sums) -> None:
@@ -141,7 +141,7 @@ def add_landmarks(  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
 def _invert(h, out):  # type: ignore[no-untyped-def]
-    """Write the inverse of a landmark's information, raised where nothing holds the landmark."""
+    """Write the inverse of a landmark's information, regularised where nothing determines the landmark."""
     determinant = _cofactors(h, out)
     if determinant < _HOLD**3:
         for a in range(3):
@@ -187,7 +187,7 @@ def _add_observation(  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
 def _eliminate_from_corner(hi, g, side, corner, right_border):  # type: ignore[no-untyped-def]
-    """Subtract what one landmark takes from the border numbers; ``side`` is (3, B)."""
+    """Subtract one landmark's Schur complement from the border; ``side`` is (3, B)."""
     for a in range(side.shape[1]):
         if side[0, a] == 0.0 and side[1, a] == 0.0 and side[2, a] == 0.0:
             continue
@@ -201,7 +201,7 @@ def _eliminate_from_corner(hi, g, side, corner, right_border):  # type: ignore[n
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
 def _eliminate_from_frames(frame, cross, hi, g, side, band, border, right):  # type: ignore[no-untyped-def]
-    """Subtract what one landmark, seen in ``frame``, takes from its frames; ``cross`` is (3, 6 n)."""
+    """Subtract one landmark's Schur complement, seen in ``frame``, from its frames; ``cross``: (3, 6 n)."""
     size = band.shape[2]
     taken = np.empty(6 * len(frame))
     for i in range(len(frame)):

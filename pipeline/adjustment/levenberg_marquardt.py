@@ -13,16 +13,16 @@ from typing import Any, Generic, Protocol, TypeVar
 import numpy as np
 
 _LEAST_DAMPING, _FIRST_DAMPING, _MOST_DAMPING = 1e-12, 1e-7, 1e6
-"""Relative damping: the smallest, which only guards against rounding; that of the first step that is damped
-at all; the largest, with which steps are too short to help."""
+"""Relative damping: the smallest, which only guards against rounding; that of the first damped step; the
+largest, with which steps are too short to help."""
 _GROWTH = 8.0
 """Factor of the damping after the first failure; Nielsen has 2, but starts at far larger damping. Not
 measured."""
 _STRONGEST_FALL = 0.01
-"""Factor of the damping after a step that gained all it promised; Nielsen has 1/3. Not measured."""
+"""Factor of the damping after a step with the full predicted gain; Nielsen has 1/3. Not measured."""
 
 Watch = Callable[[], object]
-"""Called before every step of a solver: tells how far it is, and raises when the user wishes it to stop."""
+"""Called before every step of a solver: reports progress, and raises when the user wishes to stop."""
 
 State = TypeVar("State")
 Step = TypeVar("Step")
@@ -44,7 +44,7 @@ class Linear(Protocol[Step]):
         """Return the step to the minimum, the diagonal raised by a relative ``damping``."""
 
     def decrease(self, step: Step) -> float:
-        """Return the decrease of the cost that the linear equations promise of a step."""
+        """Return the decrease of the cost that the linear equations predict for a step."""
 
 
 Equations = TypeVar("Equations", bound=Linear[Any])
@@ -52,17 +52,18 @@ Equations = TypeVar("Equations", bound=Linear[Any])
 
 @dataclass(frozen=True)
 class Minimum(Generic[State, Equations]):
-    """Where the search ended.
+    """Result of the search.
 
     Attributes
     ----------
     state
     equations
-        Linearised at that state.
+        Equations linearised at that state.
     trials : int
-        Steps tried.
+        Number of steps tried.
     settled : bool
-        Whether no further step promised a decrease; False when ``Stop.trials`` ended the search.
+        Whether no further step was predicted to decrease the cost; False when ``Stop.trials`` ended the
+        search.
     """
 
     state: State
@@ -89,7 +90,7 @@ class Damping:
         return self.value > _MOST_DAMPING
 
     def after(self, gain: float) -> Damping:
-        """Return the damping after a step that gained this share of what it promised."""
+        """Return the damping after a step with this ratio of actual to predicted gain."""
         if gain <= 0:
             return Damping(max(self.value, _FIRST_DAMPING) * self.growth, 2 * self.growth)
         factor = max(_STRONGEST_FALL, 1 - (2 * min(gain, 1) - 1) ** 3)
@@ -98,17 +99,17 @@ class Damping:
 
 @dataclass(frozen=True)
 class Stop:
-    """When the search ends.
+    """Criteria for the end of the search.
 
     Attributes
     ----------
     trials : int
-        After so many steps tried at the latest.
+        Largest number of steps tried.
     enough : float
-        When a step of slight damping promises less than this share of the cost.
+        The search ends when a step of slight damping is predicted to gain less than this share of the cost.
     doubtful : float
-        When a step that failed had promised a smaller decrease than this, which approximate derivatives can
-        feign.
+        The search ends when a failed step had a predicted decrease below this, which may be an artefact of
+        approximate derivatives.
     """
 
     trials: int
@@ -116,7 +117,7 @@ class Stop:
     doubtful: float = 0.0
 
     def reached(self, damping: Damping, gain: float, promised: float, cost: float) -> bool:
-        """Return whether a step that gained this share of what it ``promised`` is the last."""
+        """Return whether a step with this ratio of actual to ``promised`` gain is the last."""
         if damping.is_exhausted:
             return True
         least = self.doubtful if gain <= 0 else self.enough * cost * damping.is_slight
@@ -133,21 +134,21 @@ def minimise(
 ) -> Minimum[State, Equations]:
     """Minimise a robust cost.
 
-    A step is judged by the scales it was computed with and counts only if it lowers the cost; then the
-    residuals' scales are measured anew.
+    A step is evaluated with the scales with which it was computed, and is accepted only if it lowers the
+    cost; then the residuals' scales are estimated again.
 
     Parameters
     ----------
     start
     linearised
-        Gives the equations at a state, judged by given scales; by None at the start.
+        Returns the equations at a state, weighted by given scales; by None at the start.
     moved
-        Gives the state after a step.
+        Returns the state after a step.
     judged_anew
-        Gives equations judged by the scales that their own residuals show, and these scales.
+        Returns equations weighted by the scales of their own residuals, and these scales.
     stop
     watch
-        Is called before every step.
+        Called before every step.
 
     Raises
     ------
@@ -164,7 +165,7 @@ def minimise(
             continue
         cost, promised = equations.cost, equations.decrease(step)
         candidate = moved(state, step)
-        del equations  # two sets of them would be the most that a stage holds
+        del equations  # two sets of them would be the peak of a stage's memory
         equations = linearised(candidate, scales)
         gain = (cost - equations.cost) / promised if promised > 0 else 0.0
         if gain > 0:
@@ -179,7 +180,7 @@ def minimise(
 
 
 def _step(equations: Linear[Any], damping: Damping) -> Any:
-    """Return the damped step, or None where rounding spoils the equations and damping may yet help."""
+    """Return the damped step, or None if rounding spoils the equations and damping may still help."""
     try:
         return equations.step(damping.value)
     except np.linalg.LinAlgError:

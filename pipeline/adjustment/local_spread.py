@@ -1,4 +1,4 @@
-"""Medians and robust spreads of each place of a wall: behind some parts of the window there is more noise."""
+"""Local medians and robust spreads of a wall: behind some parts of the window there is more noise."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from pipeline.arrays import Float, Float32
 from pipeline.system.parallel import side_by_side
 
 # Length of a place along the pipe, and sectors around it: each is 13 mm wide in a pipe of 100 mm. A place
-# holds some 300 independent cells, which tell its spread to 6 %; 10 mm of defect fill less than half of it.
+# holds some 300 independent cells, which give its spread to 6 %; 10 mm of defect fill less than half of it.
 _PLACE_MM, _SECTORS = 32.0, 24
-# Fewer cells do not tell a place's own spread: the median spread of all places stands in.
+# With fewer cells, the median spread of all places is used instead of a place's own.
 _FEWEST_CELLS = 100
 
 
@@ -56,15 +56,15 @@ def _sectors(columns: int) -> list[Float]:
 
 
 def _spread_of(values: Float | Float32) -> float:
-    """Return the robust spread of what is known of some values, NaN where it is too little."""
+    """Return the robust spread of the known values, NaN if there are too few."""
     known = values[np.isfinite(values)]
     return robust_spread(known) if known.size >= _FEWEST_CELLS else float("nan")
 
 
 def running_median(value: Float32, size: tuple[int, int]) -> Float32:
-    """Return the median (S, A) of so many rows and columns, both odd, about each of finite values (S, A).
+    """Return the median (S, A) over ``size`` rows and columns, both odd, around each of finite values (S, A).
 
-    Both halves are worked on at once, each with the rows that its windows reach of the other.
+    Both halves are processed at once, each with the rows of the other that its windows reach.
     """
     half, reach = len(value) // 2, size[0] // 2
     before = min(half, reach)

@@ -1,9 +1,9 @@
 """Priors of a motion: it is smooth, and the encoder's slip hardly changes from frame to frame.
 
-The prior of smooth motion is a random process: the third differences of position and turn from frame to frame
-are independent and normal, 1 σ ``sigma``. Acceleration is then a random walk, and jerk is white.
+The prior of smooth motion is a random process: the third differences of position and rotation from frame to
+frame are independent and normal, 1 σ ``sigma``. Acceleration is then a random walk, and jerk is white.
 
-A run shows how large ``sigma`` is by the frames whose poses are well known, say every h-th. The third
+``sigma`` is estimated from the frames of a run whose poses are well known, say every h-th. The third
 difference over h frames is that of every frame, summed three times over h frames in a row,
 
     (1 − L^h)³ = (1 + L + … + L^(h−1))³ (1 − L)³    (L takes the value of the frame before),
@@ -29,12 +29,12 @@ from pipeline.arrays import Float, Int
 from pipeline.geometry.rigid import vector_from_rotation
 
 LOOSE = np.array([0.3, 0.3, 0.3, 0.01, 0.01, 0.01])
-"""1 σ (6,) of a third difference, mm and rad, while nothing is known of the motion yet."""
+"""1 σ (6,) of a third difference, mm and rad, before anything is known of the motion."""
 
 _SMOOTHEST = np.array([1e-4] * 3 + [1e-6] * 3)
-"""Smallest 1 σ, mm and rad, of third differences that is believed: far below that of any pose."""
+"""Smallest 1 σ, mm and rad, of third differences: far below that of any pose."""
 _JERK_SIGMAS = 5.0
-"""Third differences of so many σ weigh half: probes also jerk. Not measured."""
+"""Third differences of so many σ have half their weight: probes also jerk. Not measured."""
 _FEWEST_FRAMES = 8
 """Known frames below which the smoothness of the motion is not estimated. Not measured."""
 TREMBLING_GROWTH = np.sqrt(20.0)
@@ -73,9 +73,9 @@ def third_difference_sigma(T_pc: Float, time_s: Float, known: Int) -> Float:
 def trembling(T_pc: Float, time_s: Float, known: Int) -> Float:
     """Return the 1 σ (6,) of position, mm, and turn, rad, that changes independently from frame to frame.
 
-    Third differences over one and over two gaps tell it from motion: those of white jerk grow with the gap as
-    `third_difference_growth`, those of trembling have a variance of 1 + 9 + 9 + 1 at any gap. Errors of the
-    poses that change from frame to frame count as trembling. With fewer than sixteen frames it is 0.
+    Third differences over one and over two gaps distinguish it from motion: those of white jerk grow with the
+    gap as `third_difference_growth`, those of trembling have a variance of 1 + 9 + 9 + 1 at any gap. Errors
+    of the poses that change from frame to frame count as trembling. With fewer than sixteen frames it is 0.
 
     Parameters
     ----------
@@ -91,7 +91,7 @@ def trembling(T_pc: Float, time_s: Float, known: Int) -> Float:
 
 
 def trembling_of_places(place: Float, known: Int) -> Float:
-    """Return the 1 σ (D,) of what places (K, D) in frames ``known`` (K,) tremble by; see `trembling`."""
+    """Return the 1 σ (D,) of the trembling of places (K, D) in frames ``known`` (K,); see `trembling`."""
     near, far = (
         place[3 * n :] - 3 * place[2 * n : -n] + 3 * place[n : -2 * n] - place[: -3 * n] for n in (1, 2)
     )
@@ -126,15 +126,15 @@ def _third_difference_of_poses(T_pc: Float, time_s: Float, known: Int, gaps: int
 
 
 def jerking_sigma(T_pc: Float, time_s: Float, sigma: Float) -> Float:
-    """Return the 1 σ (N − 3, 6) of each third difference: ``sigma`` (6,), or its own size where that is more.
+    """Return the 1 σ (N − 3, 6) of each third difference: ``sigma`` (6,), or its own size if larger.
 
-    A probe that stops or turns back jerks a hundred times as much as on its way. A prior that does not expect
-    this pulls the poses to one side, and an effect that fits the pull seems to be there.
+    A probe that stops or turns back jerks a hundred times as much as in steady motion. A prior that does not
+    allow for this pulls the poses to one side, and an effect that fits the pull may seem to exist.
 
     Parameters
     ----------
     T_pc : (N, 4, 4)
-        Poses as they are measured.
+        Measured poses.
     time_s : (N,)
     sigma : (6,)
     """
@@ -142,7 +142,7 @@ def jerking_sigma(T_pc: Float, time_s: Float, sigma: Float) -> Float:
 
 
 def smooth_motion_rows(T_pc: Float, time_s: Float, sigma: Float, border: int) -> Rows:
-    """Hold third differences of position and turn of neighbouring frames to 0 ± ``sigma``.
+    """Return the equations: third differences of position and rotation from frame to frame are 0 ± ``sigma``.
 
     Parameters
     ----------
@@ -173,7 +173,7 @@ def _third_differences(T_pc: Float, time_s: Float) -> tuple[Int, Float, Float]:
 
 
 def slip_drift_rows(slip: Float, sigma_mm: float, border: int) -> Rows:
-    """Hold the change of the slip (N,), mm, from frame to frame to 0 ± ``sigma_mm``; jumps weigh little."""
+    """Return the equations: slip (N,), mm, changes by 0 ± ``sigma_mm`` per frame; jumps weigh little."""
     count = len(slip) - 1
     pair = np.stack([np.arange(count), np.arange(1, count + 1)], -1)
     by_pair = np.zeros((count, 2, BLOCK))

@@ -1,10 +1,10 @@
-"""Normal equations solved: dense ones, with covariance and the Schur complement, and banded ones.
+"""Solves normal equations: dense ones, with covariance and the Schur complement, and banded ones.
 
 Unknowns of one system may differ by ten powers of ten (focal lengths in px, distortions of the fourth order),
-so all matrices are brought to a unit diagonal first. B. Triggs et al., "Bundle adjustment: a modern
+so all matrices are scaled to a unit diagonal first. B. Triggs et al., "Bundle adjustment: a modern
 synthesis", 2000, § 6.
 
-Banded ones have Cholesky factors, worked on in dense columns of blocks as wide as the band: that is twice the
+Banded ones have Cholesky factors, computed in dense columns of blocks as wide as the band: that is twice the
 arithmetic, but LAPACK's banded routines, which go column by column, were measured ten times slower. G. Golub,
 C. Van Loan, "Matrix computations", § 4.2.6 and 4.3.5.
 """
@@ -35,7 +35,8 @@ def solved(matrix: Float, right: Float, rcond: float = 1e-15) -> Float:
 def spectrum(information: Float, least: float) -> tuple[Float, Float, Float]:
     """Return scale (N,), eigenvalues (N,) and eigenvectors (N, N) of the matrix with a unit diagonal.
 
-    Eigenvalues below ``least`` are rounding: they are raised to it, so that what is not seen stays uncertain.
+    Eigenvalues below ``least`` are rounding: they are raised to it, so that undetermined directions stay
+    uncertain.
     """
     scale = unit_scale(information)
     value, vector = np.linalg.eigh(information * scale * scale[:, None])
@@ -66,13 +67,13 @@ class Marginal:
     Attributes
     ----------
     information, right : (K, K), (K,)
-        The Schur complement, and what is left of the right side.
+        The Schur complement, and the remaining right side.
     follow : (N, K)
-        How all unknowns follow those kept.
+        Response of all unknowns to the kept ones.
     step : (N,)
-        Step of the eliminated unknowns while the kept ones stay.
+        Step of the eliminated unknowns with the kept ones fixed.
     gain : float
-        By how much that step lowers the sum of squares.
+        Decrease of the sum of squares by that step.
     """
 
     information: Float
@@ -88,8 +89,8 @@ def marginalised(information: Float, right: Float, out: Int, rcond: float | None
     Parameters
     ----------
     rcond
-        Where given, unknowns are eliminated by least squares, and directions weaker than this part of the
-        strongest do not move. Where None, all must be determined.
+        If stated, unknowns are eliminated by least squares, and directions weaker than this part of the
+        strongest do not move. If None, all must be determined.
 
     Raises
     ------
@@ -120,7 +121,7 @@ class ArrowEquations:
     coupling : (V, F, P)
     block : (V, P, P)
     shared_gradients : (V, F)
-        Of each block's equations.
+        Gradients of each block's equations.
     block_gradient : (V, P)
     """
 
@@ -142,7 +143,7 @@ class ArrowEquations:
         return step, -best - np.einsum("vpf,f->vp", response, step)
 
     def decrease(self, step: tuple[Float, Float]) -> float:
-        """Return by how much a step would lower the sum of squares, if the equations were linear."""
+        """Return the decrease of the sum of squares by a step if the equations were linear."""
         shared, block = step
         slope = self.shared_gradients.sum(0) @ shared + np.sum(self.block_gradient * block)
         curve = shared @ self.shared @ shared + np.einsum("vp,vpq,vq->", block, self.block, block)
@@ -175,7 +176,7 @@ class BandedCholesky:
     def of_band(band: Float) -> BandedCholesky:
         """Factorise the matrix whose rows f and columns f - l, in blocks, are ``band[f, l]`` (N, R, b, b).
 
-        Of the blocks on the diagonal, l = 0, the lower triangle is looked at.
+        Of the blocks on the diagonal, l = 0, the lower triangle is used.
 
         Raises
         ------
@@ -224,7 +225,7 @@ class BandedCholesky:
         return out
 
     def _columns(self) -> list[tuple[slice, Float, Float, Int]]:
-        """Return place, diagonal block, what lies below it, and where, of every column."""
+        """Return place, diagonal block, rows below it and their numbers of every column."""
         start = np.cumsum([0] + [len(d) for d in self.diagonal])
         own = [slice(int(a), int(b)) for a, b in pairwise(start)]
         return list(zip(own, self.diagonal, self.below, self.rows, strict=True))

@@ -1,7 +1,7 @@
-"""Spreads, robust losses, harmonics of rings, and scores of equations that err alike in clusters.
+"""Spreads, robust losses, harmonics of rings, and scores of equations with correlated errors in clusters.
 
 A robust loss gives the weight of an equation and the cost that goes with it.
-The cost of a loss ρ is what its weight minimises when the equations are solved anew: w = ρ′(r) / r.
+The weight w = ρ′(r) / r of a loss ρ minimises its cost by repeated solution of the equations.
 P. Huber, "Robust statistics", 1981, § 7.8; S. Geman, D. McClure, "Statistical methods for tomographic image
 reconstruction", 1987.
 

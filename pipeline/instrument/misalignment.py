@@ -83,7 +83,7 @@ class MisalignedScan:
 
     @property
     def sheet(self) -> LaserSheet:
-        """The sheet as it is."""
+        """The true sheet."""
         slope, direction = math.tan(math.radians(self.tilt_deg)), math.radians(self.tilt_direction_deg)
         cone = math.radians(180 - self.opening_angle_deg) / 2
         return LaserSheet(
@@ -95,13 +95,13 @@ class MisalignedScan:
         return math.radians(self.tilt_direction_deg) + 2 * np.pi * np.arange(AZIMUTHS) / AZIMUTHS
 
     def wall_points(self, azimuth_rad: Float) -> Float:
-        """Return (A, 3) points in C where the sheet as it is meets the wall."""
+        """Return the points (A, 3), mm in C, at which the true sheet meets the wall."""
         return sheet_on_wall(self.sheet, self.radius_mm, self.offset_mm, azimuth_rad)
 
 
 @dataclass(frozen=True)
 class MisreadRing:
-    """A ring as it is and as triangulated with the assumed plane.
+    """A true ring, and the same ring triangulated with the assumed plane.
 
     Attributes
     ----------

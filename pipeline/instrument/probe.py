@@ -1,4 +1,4 @@
-"""The probe: camera, laser sheet, shutter, lighting, and the covariance of what is believed of them."""
+"""The probe: camera, laser sheet, shutter, lighting, and the covariance of their parameters."""
 
 from __future__ import annotations
 

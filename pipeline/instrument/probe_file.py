@@ -1,4 +1,4 @@
-"""probe.yaml: what is stated or was measured of the instrument, and its covariance.
+"""probe.yaml: stated or measured parameters of the instrument, and their covariance.
 
 In the section ``standard_uncertainty``, ``focal_px`` is common to fx and fy; ``centre_px``, ``tilt_deg`` and
 ``decentre_mm`` hold for each axis on its own; ``distortion`` lists the camera's other parameters in their
@@ -142,7 +142,7 @@ def probe_from(document: Section) -> Probe:
 
 
 def read_with_source(file: Path) -> tuple[Probe, ProbeSource]:
-    """Read a probe file with what it says of its own making; see `read_probe`."""
+    """Read a probe file with its provenance; see `read_probe`."""
     document = read_yaml(file)
     probe = probe_from(document)
     made_by = document.section("made_by").values if document.has("made_by") else None

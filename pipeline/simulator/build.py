@@ -93,7 +93,7 @@ def true_instrument(scene: Scene, stated: Probe, wall: Wall) -> TrueInstrument:
 
 
 def drawn(stated: Probe, seed: int) -> Probe:
-    """Return a probe drawn from what is stated: normal, with the stated covariance."""
+    """Return a probe drawn from the stated normal distribution."""
     random = np.random.default_rng([seed, _INSTRUMENT_STREAM])
     directions = stated.principal_uncertainties()
     moved = directions @ random.standard_normal(directions.shape[1])

@@ -65,7 +65,7 @@ def clear_mm(surface: Surface, T_wc: Float, distance_mm: float, aside_mm: float)
 
 
 def _sagitta_mm(surface: Surface, along_mm: Float) -> Float:
-    """Return how far a chord of the axis strays from it at most."""
+    """Return the largest distance of a chord of the axis from it, mm."""
     if len(surface.axis_s) == 2:
         return np.zeros(len(along_mm))
     turned = np.linalg.norm(np.diff(surface.axis_turn[:, :, 2], axis=0), axis=1).max()
@@ -75,7 +75,7 @@ def _sagitta_mm(surface: Surface, along_mm: Float) -> Float:
 
 @kernel
 def _write_clear(all_round: Float, beside: Float, along: Float, e: Float, near: Float, clear: Float) -> None:
-    """Write what is clear (N, SECTORS) at blocks (N,) in order of their way from the camera."""
+    """Write the clearance (N, SECTORS) at blocks (N,) in order of their distance from the camera."""
     for k in range(along.shape[0]):
         least_round = np.inf
         for j in range(k - NEAR_BLOCKS):

@@ -135,7 +135,7 @@ class Sector:
 
 @dataclass(frozen=True)
 class TrueLaser:
-    """The laser sheet as it is.
+    """The true laser sheet.
 
     Attributes
     ----------
@@ -260,7 +260,7 @@ class TrueSensor:
     drops : tuple of Dust
         Drops: ``attenuation`` is their power, ``sigma_px`` their radius.
     bloom_relative, bloom_px : float
-        Share of the light above full scale that leaks along columns, and how far (1/e).
+        Share of the light above full scale that leaks along columns, and its 1/e length, px.
     dark_pattern : float
         1 σ of the pixels' dark signal, full scales.
     defective_share, hot_level : float

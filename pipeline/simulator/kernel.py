@@ -34,7 +34,7 @@ def summing_kernel(function: Function) -> Function:
 
 # Threads: as many as the smallest machine that the program is made for has cores.
 _THREADS = 2
-# Rows a thread takes at a time: about 19 bands of a 2 MP picture even out how long rows take.
+# Rows that a thread takes at a time: about 19 bands of a 2 MP picture balance the times of the rows.
 _BAND_ROWS = 64
 
 

@@ -117,7 +117,7 @@ class Odometer:
     backlash_mm : float
         Play b: the reading is s − (b/2) sgn v, turning over within the play at a reversal.
     delay_s : float
-        τ by which readings come late: the one at camera time t tells of t − τ, so visual − encoder = v τ.
+        Delay τ of the readings: the one at camera time t belongs to t − τ, so visual − encoder = v τ.
     slips : tuple of Slip
     """
 

@@ -41,7 +41,7 @@ class Variation(Parameters):
 
 
 class Concealable(Parameters):
-    """An effect that may be concealed, and how large."""
+    """An effect that may be concealed, and its range of sizes."""
 
     name: str = Field(description="of the catalogue")
     weight: float = Field(1.0, gt=0, description="how often, relative to the others")
@@ -148,7 +148,7 @@ def _draw_variations(
 
 
 def _draw_effects(prior: Prior, random: np.random.Generator) -> dict[str, dict[str, float]]:
-    """Return the concealed effects; none is drawn twice, nor together with one that looks alike."""
+    """Return the concealed effects; none is drawn twice, nor together with one that looks the same."""
     left = list(prior.effects)
     drawn: dict[str, dict[str, float]] = {}
     for _ in range(_weighted(random, prior.concealed)):

@@ -112,7 +112,7 @@ def _encoder_text(encoder: Encoder) -> str:
 
 
 def _facts(facts: PipeFacts) -> dict[str, object]:
-    """Return the section ``pipe``, without what is not known."""
+    """Return the section ``pipe`` without unknown entries."""
     section: dict[str, object] = {"nominal_diameter_mm": facts.nominal_diameter_mm}
     if facts.wall_thickness_mm is not None:
         section["wall_thickness_mm"] = facts.wall_thickness_mm
@@ -169,7 +169,7 @@ def produce(orders: Sequence[Order], progress: Callable[[Order, int], None]) -> 
     InputError
         When a scene or a place cannot be used.
     UnusableError
-        When a scene cannot show what it is meant to show.
+        When a scene cannot show its effects.
     """
     for order in orders:
         _require_apart(order.places)

@@ -17,7 +17,7 @@ _LEAST_STEP_MM = 2e-5
 # How far from a section's plane a point of a bent pipe may lie: off by this times radius over bend, below
 # the precision of a hit.
 _SECTION_MM = 1e-5
-# Way along a ray, mm, after which it counts as lost: farther than any light reaches in such a pipe.
+# Length of a ray, mm, after which it counts as lost: farther than any light reaches in such a pipe.
 _FAR_MM = 2000.0
 
 

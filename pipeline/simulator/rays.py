@@ -30,7 +30,7 @@ class RayTable(NamedTuple):
         All rays come from the origin of C.
     step : float
     first : float
-        Pixel coordinate of the first node, u and v alike.
+        Pixel coordinate of the first node, the same for u and v.
     centre_u, centre_v, locking : float
         Centre and amplitude of a pixel locking, px: see `TrueCamera.locking_px`.
     """

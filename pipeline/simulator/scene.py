@@ -127,7 +127,7 @@ class Scene(Parameters):
     """Everything that a rendered recording depends on."""
 
     name: str = Field(min_length=1, description="name of the recording")
-    summary: str = Field("", description="what it is for, one sentence")
+    summary: str = Field("", description="purpose in one sentence")
     kind: Literal["inspection", "gauge"] = Field("inspection", description="kind of run")
     seed: int = Field(0, ge=0, description="of everything random")
     probe_seed: int | None = Field(
@@ -136,7 +136,7 @@ class Scene(Parameters):
     frames: int = Field(gt=0, le=1_000_000, description="number of frames")
     frame_rate: float = Field(30.0, gt=0, le=10_000, description="1/s")
     pattern: tuple[Pattern, ...] = Field(("laser", "led"), min_length=1, description="illumination, repeated")
-    probe: dict[str, Any] = Field(description="what is stated of the instrument, as in probe.yaml")
+    probe: dict[str, Any] = Field(description="stated parameters of the instrument, as in probe.yaml")
     truth: Literal["stated", "drawn"] = Field(
         "drawn", description="true instrument: as stated, or drawn from its stated uncertainty"
     )
@@ -168,7 +168,7 @@ def scene_from(values: dict[str, Any], file: Path) -> Scene:
     try:
         return Scene.model_validate_json(json.dumps(values))
     except TypeError as error:
-        raise InputError(file, f"holds what a scene cannot: {error}") from error
+        raise InputError(file, f"is not a valid scene: {error}") from error
     except ValidationError as error:
         first = error.errors()[0]
         place = ".".join(map(str, first["loc"]))

@@ -74,7 +74,7 @@ def _gaussian(light: Float32, sigma_px: float) -> Float32:
 
 
 def _bloomed(light: Float32, sensor: TrueSensor) -> Float32:
-    """Return light with a share of what is above full scale spread along the columns; the sum is kept."""
+    """Return light with a share of the part above full scale spread along the columns; the sum is kept."""
     leaked = sensor.bloom_relative * np.maximum(light - 1, 0)
     reach = int(np.ceil(8 * sensor.bloom_px))
     spread = np.exp(-np.abs(np.arange(-reach, reach + 1)) / sensor.bloom_px)

@@ -1,6 +1,6 @@
 """The laser's light as tables over azimuth: the sheet outside all windows, and its reflection by the wall.
 
-`room_mm` says without tables or kernels how far a pixel's ray meets the sheet off the wall.
+`room_mm` gives, without tables or kernels, the distance from the wall at which a pixel's ray meets the sheet.
 """
 
 from __future__ import annotations

@@ -86,7 +86,7 @@ def surface_of(wall: Wall) -> Surface:
 
 
 def _fine(axis: PipeAxis) -> PipeAxis:
-    """Return a bent axis with evenly spaced points that lie close enough; a straight one as it is."""
+    """Return a bent axis with evenly spaced points that are close enough; a straight one unchanged."""
     if len(axis.distance_mm) == 2:
         return axis
     first, last = float(axis.distance_mm[0]), float(axis.distance_mm[-1])
@@ -231,7 +231,7 @@ def _level_at(texture: Texture, k: int, s: float, psi: float, weight: float, fre
 
 @kernel
 def sheen_at(texture: Texture, squared: float) -> float:
-    """Return what the wall sends to the camera over what a dull one would.
+    """Return the ratio of the light that the wall sends to the camera to that of a matt wall.
 
     ``squared`` is the square of the cosine between the wall's normal and the direction halfway between light
     and camera (Blinn-Phong, normalised: (m + 8)/8 cos^m for an exponent m).

@@ -22,12 +22,12 @@ class Change(Protocol):
     """What happens to the instrument with time: a drift, a rocking."""
 
     def __call__(self, instrument: TrueInstrument, time_s: float) -> TrueInstrument:
-        """Return the instrument as it is at ``time_s`` given what it would be without this change."""
+        """Return the instrument at ``time_s``, given the one without this change."""
 
 
 @dataclass(frozen=True)
 class SceneTruth:
-    """A scene worked out; an effect is a pure function from one to another.
+    """A scene with all values drawn; an effect is a pure function from one to another.
 
     Attributes
     ----------
@@ -65,14 +65,14 @@ class SceneTruth:
     changes: tuple[Change, ...] = ()
 
     def instrument_at(self, time_s: float) -> TrueInstrument:
-        """Return the instrument as it is at a time."""
+        """Return the true instrument at a time."""
         instrument = self.instrument
         for change in self.changes:
             instrument = change(instrument, time_s)
         return instrument
 
     def late_s(self, instrument: TrueInstrument) -> float:
-        """Return by how many s frames are late: a longer exposure from one start has its middle later."""
+        """Return the delay of frames, s: a longer exposure with the same start has its middle later."""
         return 0.5 * (instrument.shutter.exposure_s - self.stated.shutter.exposure_s)
 
     def poses(self) -> Float:
@@ -87,7 +87,7 @@ class SceneTruth:
 
 
 def row_late_s(instrument: TrueInstrument, row: Float) -> Float:
-    """Return how much later than the frame's middle row rows (...) are exposed, s; 0 for a global shutter."""
+    """Return the delay, s, of rows (...) relative to the frame's middle row; 0 for a global shutter."""
     rows = instrument.camera.model.image_size[1]
     readout_s = instrument.shutter.readout_s if instrument.shutter.kind == "rolling" else 0.0
     return np.asarray(((row + 0.5) / rows - 0.5) * readout_s)

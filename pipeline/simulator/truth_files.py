@@ -30,7 +30,7 @@ from pipeline.simulator.wall.grid import Wall
 _JPEG_QUALITY = 95
 # A JPEG has at most 65535 px a side.
 _JPEG_LARGEST = 65000
-# Rows written at a time, for memory's sake.
+# Rows written at a time, to limit memory.
 _PIXELS_AT_A_TIME = 1024
 Json = dict[str, object]
 
@@ -75,7 +75,7 @@ def effects_of(scene: Scene) -> list[list[object]]:
 
 
 def defects_of(pipe: Pipe) -> list[Json]:
-    """Return defects and welds; depths are positive, their kind tells whether inward or into the wall."""
+    """Return defects and welds; depths are positive, their kind says whether inward or into the wall."""
     return [_defect(d) for d in pipe.defects] + [_weld(w) for w in pipe.welds]
 
 
@@ -176,7 +176,7 @@ class Comparison:
 def seal_truth(truth: Path, recording: Path) -> None:
     """Seal the files of a truth folder: hashes into the recording, the nonce into the truth.
 
-    The recording's own files are hashed too, into the same seal, for the truth tells of them only.
+    The recording's own files are hashed too, into the same seal, because the truth belongs to them only.
     """
     nonce = secrets.token_hex(32)
     (truth / NONCE_FILE).write_text(nonce + "\n", "utf-8")
@@ -190,7 +190,7 @@ def seal_truth(truth: Path, recording: Path) -> None:
 
 
 def open_seal(recording: Path, truth: Path) -> tuple[Comparison, ...]:
-    """Return for every sealed file, and every file that was not sealed, whether it is as it was sealed.
+    """Return for every sealed file, and every file that was not sealed, whether it is unchanged.
 
     Raises
     ------
@@ -203,7 +203,7 @@ def open_seal(recording: Path, truth: Path) -> tuple[Comparison, ...]:
         file = error.filename if isinstance(error, OSError) else truth / NONCE_FILE
         raise InputError(
             Path(file or recording), f"cannot be read: {error}", expected="a sealed file that may be read",
-            hint="mend its permissions, or copy recording and truth again, whole",
+            hint="correct its permissions, or copy recording and truth again completely",
         ) from error  # fmt: skip
 
 

@@ -20,7 +20,7 @@ TILE_PX = 8
 _TILE_CLOSE_MM = 1e-3
 # Distance at which light is stated (see `TrueLaser.power_mm`): about the radius of a 4 inch pipe.
 REFERENCE_MM = 50.0
-# How near to the wall a hit must lie, mm: a thousandth of what a pixel spans along a line.
+# Largest distance of a hit from the wall, mm: a thousandth of a pixel's extent along a line.
 _LINE_CLOSE_MM = 2e-5
 
 Speckle = tuple[float, float, int]
@@ -78,7 +78,7 @@ def new_work() -> Work:
 
 
 class Line(NamedTuple):
-    """A sheet of light, the profile across it, and how far the sheet moves during a frame, mm."""
+    """A sheet of light, the profile across it, and the sheet's motion during a frame, mm."""
 
     sheet: SheetTable
     profile: ProfileTable
@@ -86,7 +86,7 @@ class Line(NamedTuple):
 
 
 def line_of(sheet: SheetTable, profile: ProfileTable, surface: Surface) -> Line:
-    """Return a sheet with its profile, and how far it moves at the widest wall."""
+    """Return a sheet with its profile, and its motion at the widest wall, mm."""
     moved = np.ptp(sheet.height, axis=0) + surface.most_mm * np.ptp(sheet.slope, axis=0)
     return Line(sheet, profile, float(moved.max()))
 

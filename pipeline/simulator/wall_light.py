@@ -21,7 +21,7 @@ _CLOSE_MM = 5e-4
 # by more than 10 mm to hide an LED. And by how much it must stand in, mm: ten times the error of the map's
 # cells.
 _SHADOW_MM, _STANDS_IN_MM = 40.0, 0.01
-# Spacing of the table of what the wall throws on itself: far below a bore's radius, its scale.
+# Spacing of the table of light from wall to wall: far below a bore's radius, its scale.
 GLOW_STEP_MM = 0.5
 
 
@@ -81,7 +81,7 @@ def least_ahead(lamps: Lamps) -> float:
 
 @kernel
 def glow_at(lamps: Lamps, s: float, c: int) -> float:
-    """Return what the wall throws on itself at a distance, in one colour; 0 beyond the table."""
+    """Return the light from wall to wall at a distance, in one colour; 0 beyond the table."""
     x = (s - lamps.glow_from_mm) * (1.0 / GLOW_STEP_MM)
     if not (x >= 0.0 and x < lamps.glow.shape[0] - 1):
         return 0.0

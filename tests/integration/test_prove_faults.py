@@ -99,7 +99,7 @@ def test_a_truth_that_may_not_be_read_is_named(drill: Path) -> None:
     )  # fmt: skip
     assert done.returncode == 2
     assert "a-gauge/truth.json: cannot be read" in done.stderr
-    assert "mend its permissions" in done.stderr
+    assert "correct its permissions" in done.stderr
 
 
 def test_a_diagnosis_that_was_killed_is_no_failure_of_the_diagnosis(

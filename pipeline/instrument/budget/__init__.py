@@ -113,7 +113,7 @@ def error_budget(scan: RingScan, given: Mapping[str, float] | None = None) -> Bu
     scan
         Its probe's covariance gives the stated sources' σ.
     given
-        1 σ by source name in the source's unit, in place of what is stated or typical; 0 switches it off.
+        1 σ by source name in the source's unit, instead of the stated or typical one; 0 switches it off.
 
     Raises
     ------

@@ -32,7 +32,7 @@ class RingScan:
     Attributes
     ----------
     probe : Probe
-        The instrument as believed; at zero disturbance also as it is.
+        The stated instrument; at zero disturbance also the true one.
     diameter_mm : float
     offset_mm : (float, float)
         Probe minus pipe axis in the section, along x and y of C.
@@ -216,7 +216,7 @@ def line_sigma_px(scan: RingScan, photometry: LinePhotometry) -> dict[str, Float
 
 
 def _px_per_axial_mm(scan: RingScan) -> Float:
-    """Return how far (A,) in px the line moves when the sheet moves by 1 mm along the wall."""
+    """Return the displacement (A,), px, of the line when the sheet moves by 1 mm along the wall."""
     by_point = scan.probe.camera.project_jacobian(scan.wall_points).by_point
     return np.asarray(np.linalg.norm(by_point[..., 2], axis=-1))
 

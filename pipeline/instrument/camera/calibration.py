@@ -122,7 +122,7 @@ class UncertaintyMap:
 
 @dataclass(frozen=True)
 class DisplacementMap:
-    """By how many px another camera sees the same directions elsewhere, at pixels ``uv`` (R, C, 2).
+    """Displacement, px, of the same directions in another camera, at pixels ``uv`` (R, C, 2).
 
     Attributes
     ----------
@@ -163,7 +163,7 @@ class CalibrationReport:
     displacement
         From the calibration to that camera.
     board_shape : str
-        What the board was taken for: flat, bent or surveyed.
+        Assumed shape of the board: flat, bent or surveyed.
     survey
         The board's corners, when they were measured.
     """

@@ -145,7 +145,7 @@ def centre_drift(truth: SceneTruth, shift_px: float, direction_deg: float, time_
 
 
 def pixel_locking(truth: SceneTruth, amplitude_px: float) -> SceneTruth:
-    """Draw a line at image radius ρ at ρ + a sin 2πρ: what a sensor that undersamples does to a line."""
+    """Draw a line at image radius ρ at ρ + a sin 2πρ: the effect of an undersampling sensor on a line."""
     return with_camera(truth, locking_px=truth.instrument.camera.locking_px + amplitude_px)
 
 

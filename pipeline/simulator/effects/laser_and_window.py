@@ -140,7 +140,7 @@ def dome_axial(truth: SceneTruth, offset_mm: float) -> SceneTruth:
 
 
 def dome_lateral(truth: SceneTruth, offset_mm: float, direction_deg: float) -> SceneTruth:
-    """Set the dome aside towards ``direction_deg``."""
+    """Displace the dome towards ``direction_deg``."""
     return _with_dome_moved(truth, *cartesian(offset_mm, direction_deg), 0.0)
 
 
@@ -150,7 +150,7 @@ def outside_index(truth: SceneTruth, index_excess: float) -> SceneTruth:
 
 
 def _with_windows(truth: SceneTruth, windows: tuple[Window, ...]) -> SceneTruth:
-    """Return the truth with windows outside the others, before camera and laser alike."""
+    """Return the truth with windows outside the others, in front of both camera and laser."""
     instrument = truth.instrument
     laser = replace(instrument.laser, windows=(*instrument.laser.windows, *windows))
     camera = replace(instrument.camera, windows=(*instrument.camera.windows, *windows))

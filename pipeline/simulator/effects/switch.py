@@ -5,7 +5,7 @@ The text is ``NAME`` alone for the typical size, or ``NAME=VALUE`` followed by a
 ==========  ===========================================  ============================
 ``@40``     a direction or azimuth, deg                  ``laser_tilt=0.6@40``
 ``x3``      an order                                     ``sheet_waviness=0.3x3@30``
-``/40s``    any other quantity, told by its unit         ``baseline_drift=0.05/40s``
+``/40s``    any other quantity, recognised by its unit   ``baseline_drift=0.05/40s``
 ==========  ===========================================  ============================
 
 in any order, as in ``laser_rocking=1@40/5.3Hz``. What is left out is the catalogue's typical size. A course
@@ -33,7 +33,7 @@ _PART = re.compile(rf"(?P<mark>[@x/])(?P<value>{_NUMBER})(?P<unit>[a-zA-Z]*?)(?=
 
 @dataclass(frozen=True)
 class Switch:
-    """An effect and how large it is.
+    """An effect and its size.
 
     Attributes
     ----------
@@ -63,7 +63,7 @@ class Switch:
 
     @property
     def key(self) -> str:
-        """Name and kind of course, as in ``laser_tilt~step``; the name alone of what is constant."""
+        """Name and kind of course, as in ``laser_tilt~step``; the name alone if it is constant."""
         constant = self.course.kind is CourseKind.CONSTANT
         return self.name if constant else f"{self.name}{_COURSE}{self.course.kind}"
 

@@ -1,4 +1,4 @@
-"""What each effect of the catalogue does to picture, ring and encoder, and how alike two effects are.
+"""The influence of each catalogue effect on picture, ring and encoder, and the similarity of two effects.
 
 Likeness is |cosine| of the angle between two patterns: of the radius error around the ring or, for effects
 without one, of the line's profile or the odometer's reading. Nothing is typed in: all is computed from
@@ -22,9 +22,9 @@ from pipeline.simulator.laws import RADII_MM, exponent, harmonic, strongest
 from pipeline.simulator.render import renderer_of
 from pipeline.simulator.truth import SceneTruth
 
-# A centroid's window, the steps along a radius in which it is taken, and how far about the line it is sought.
+# Window of a centroid, its steps along a radius, and the range around the line in which it is searched.
 WINDOW_PX, _STEP_PX, _REACH_PX = 6.0, 0.25, 30.0
-# Times the window is centred anew on the centroid of the light in it.
+# Number of times that the window is centred on the centroid of its light.
 _CENTRINGS = 3
 
 
@@ -222,7 +222,7 @@ def _residual(before: SeenLine, after: SeenLine, scene: SceneTruth, azimuth_rad:
 
 @dataclass(frozen=True)
 class Likeness:
-    """Another effect or state whose pattern is alike: |cosine| in 4 inch alone and over all three bores."""
+    """Another effect or state with a similar pattern: |cosine| in 4 inch alone and over all three bores."""
 
     name: str
     one_bore: float
@@ -234,7 +234,7 @@ def likenesses(exhibits: Sequence[Exhibit], least: float = 0.9) -> dict[str, lis
 
     Radius errors over azimuth are compared. For effects that do not change the radius, the motion less the
     encoder's reading is compared or, where there is none, light, width and skewness of the line. An effect
-    with a direction is turned to the direction in which the two are most alike.
+    with a direction is turned to the direction in which the two are most similar.
     """
     return {e.name: _alike(e, exhibits, least)[:_MOST_ALIKE] for e in exhibits}
 
@@ -268,7 +268,7 @@ def _effect_likeness(one: Exhibit, other: Exhibit) -> Likeness:
 
 
 def _state_likeness(one: Exhibit, name: str, order: int) -> Likeness:
-    """Return how much of the radius error one of `STATES` explains when it is fitted in each bore apart."""
+    """Return the share of the radius error that one of `STATES` explains, fitted in each bore separately."""
     wave = np.exp(1j * order * one.azimuth_rad)
     basis = np.stack([wave.real, wave.imag] if order else [wave.real], -1)
     taken, whole = {}, {}

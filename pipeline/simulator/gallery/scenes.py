@@ -37,7 +37,7 @@ _COMPANIONS = {
 
 
 def surroundings(name: str) -> str:
-    """Return in words what is added to the bench to show an effect; empty for the plain bench."""
+    """Return in words the additions to the bench that show an effect; empty for the plain bench."""
     if name in _SHAKEN:
         return f"the camera moves at {_RATE_MM_S:.1f} mm/s to the lower right"
     if name in _ROUGH:

@@ -171,7 +171,7 @@ _SEARCH_PX = (60.0, 560.0)
 
 
 class TracedRing(NamedTuple):
-    """A ring as it is and as it is read.
+    """A true ring and its measurement.
 
     Attributes
     ----------
@@ -210,7 +210,7 @@ def trace_ring(truth: SceneTruth, time_s: float = 0.0, azimuths: int = _TRACED_A
 
 
 def _height(truth: SceneTruth, instrument: TrueInstrument, time_s: float, uv: Float) -> tuple[Float, Float]:
-    """Return how far ahead of the sheet pixels (N, 2) see the wall, and the points (N, 3) in C."""
+    """Return the distance ahead of the sheet of wall seen by pixels (N, 2), and its points (N, 3) in C."""
     origin, ray = viewing_rays(instrument.camera, uv)
     T_pc = truth.motion.pose(time_s + row_late_s(instrument, uv[:, 1]), truth.wall.axis)
     R_pc = T_pc[:, :3, :3]

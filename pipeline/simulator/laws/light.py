@@ -82,7 +82,7 @@ def _subsurface() -> Check:
 
 
 def _tube_ghost() -> Check:
-    """Check where the copy lies, from what it adds to the picture."""
+    """Check the place of the copy, from its light in the picture."""
     plain, truth = profiles(strip_truth(_R)), strip_truth(_R)
     incidence = math.pi / 2 - theta_of(_R)
     apart = 2 * 2.0 * math.tan(math.asin(math.sin(incidence) / 1.5))
@@ -95,7 +95,7 @@ def _tube_ghost() -> Check:
 
 
 def _skew() -> Iterator[Check]:
-    """Check how far the centroid lies from the peak."""
+    """Check the distance of the centroid from the peak."""
     for skewness in (0.3, 0.03):
         profile = replace(strip_truth(_R).instrument.laser.profile, skewness=skewness)
         height = np.linspace(-0.5 * LINE_SIGMA_MM, 0.5 * LINE_SIGMA_MM, 100001)
@@ -232,7 +232,7 @@ def _pixels() -> Iterator[Check]:
 
 
 def _locking() -> Check:
-    """Check how far a line moves that is rendered through pixels which draw everything to a sin 2πρ."""
+    """Check the displacement of a line rendered through pixels that shift everything by a sin 2πρ."""
     truth, size = strip_truth(_R), 0.02
     moved = profiles(truth, Switch("pixel_locking", (size,))).centroid() - profiles(truth).centroid()
     predicted = size * math.sin(2 * math.pi * FOCAL_PX * theta_of(_R))

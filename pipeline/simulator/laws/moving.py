@@ -31,7 +31,7 @@ from pipeline.simulator.truth import SceneTruth
 _RADIUS_MM = 50.8
 # Offset and yaw of the examples: large enough for second-order terms to show, small enough for the laws.
 _OFF_CENTRE_MM, _YAW_DEG = 2.0, 5.0
-# Speed of a slow crawler; a vibration above half of 30 frames/s, so that its alias is what is seen.
+# Speed of a slow crawler; a vibration above half of 30 frames/s, so that only its alias is seen.
 _SPEED_MM_S, _ALIASED_HZ = 15.0, 26.0
 
 
@@ -129,7 +129,7 @@ def _off_centre() -> Iterator[Check]:
 
 
 def _yaw() -> Iterator[Check]:
-    """Check (rβ²/4)(1 + c₂) about a centre that lies βl aside."""
+    """Check (rβ²/4)(1 + c₂) around a centre that is displaced by βl."""
     beta = math.radians(_YAW_DEG)
     truth = _moving(yaw_rad=constant(beta))
     read = truth.stated.triangulate(trace_ring(truth).uv)[:, :2]

@@ -176,7 +176,7 @@ def _camera() -> Check:
 
 
 def separation_mm(switch: Switch, radius_mm: float) -> tuple[Float, Float]:
-    """Return azimuths and by how much farther ahead the ghost meets the wall than the line does there.
+    """Return azimuths and the distance by which the ghost meets the wall ahead of the line there.
 
     Sheet rays meet the round wall, are mirrored, and meet it again on the other side.
     """

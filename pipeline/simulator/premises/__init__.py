@@ -1,4 +1,4 @@
-"""Premises: what must hold for a scene to show what it is meant to show, before and after rendering."""
+"""Premises: conditions under which a scene shows its effects, before and after rendering."""
 
 from __future__ import annotations
 
@@ -130,7 +130,7 @@ class SeenRing:
 
 
 def effect_premises(plain: SceneTruth, switches: Sequence[Switch]) -> list[Premise]:
-    """Return how many times the noise floor each effect changes the recording by, the others switched on.
+    """Return the change of the recording by each effect over the noise floor, with the others switched on.
 
     Effects of the family ``picture`` are left out.
 

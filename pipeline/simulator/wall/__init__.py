@@ -1,4 +1,4 @@
-"""The wall of a scene from its description, and what a recording states of the pipe."""
+"""The wall of a scene from its description, and the facts of the pipe that a recording states."""
 
 from __future__ import annotations
 

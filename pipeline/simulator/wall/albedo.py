@@ -124,7 +124,7 @@ def bare_wall(grid: Grid, surface: Surface, seeds: Seeds) -> Float32:
 
 
 def grain(grid: Grid, surface: Surface, seeds: Seeds) -> Float32:
-    """Return the finest texture (S, A), relative: what a frame just resolves, and twice as coarse."""
+    """Return the finest texture (S, A), relative: at the resolution of a frame, and twice as coarse."""
     if surface.grain == 0:
         return np.zeros(grid.shape, np.float32)
     wave = surface.grain_mm or 4 * FINEST_OVER_RADIUS * grid.radius_mm

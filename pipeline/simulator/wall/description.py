@@ -81,7 +81,7 @@ class Branch(Parameters):
     distance_mm: float = Field(description="middle, mm")
     azimuth_deg: float = Field(description="middle, deg")
     diameter_mm: float = Field(gt=1, le=500, description="of the side pipe, mm")
-    depth_mm: float = Field(15.0, gt=0, le=200, description="how far into it the wall reaches, mm")
+    depth_mm: float = Field(15.0, gt=0, le=200, description="depth of the wall visible in it, mm")
 
 
 class Relief(Parameters):
@@ -142,7 +142,7 @@ class Pipe(Parameters):
     """The pipe of a scene."""
 
     diameter_mm: float = Field(gt=4, le=3000, description="inner diameter (of the first bore), mm")
-    nominal_diameter_mm: float | None = Field(None, gt=4, description="what the operator believes, mm")
+    nominal_diameter_mm: float | None = Field(None, gt=4, description="diameter stated by the operator, mm")
     from_mm: float = Field(-40.0, description="distance at which the laid out wall begins, mm")
     to_mm: float = Field(300.0, description="distance at which it ends, mm")
     cell_mm: float = Field(0.25, ge=0.02, le=5, description="cell of the relief, mm")
@@ -168,7 +168,7 @@ class Pipe(Parameters):
     fiducials: Fiducials | None = None
 
 
-# Reflectances in red, green, blue of what a defect leaves: chosen by eye for a plausible picture.
+# Reflectances of defects in red, green, blue: chosen by eye for a plausible picture.
 _RUST: Tint = (0.34, 0.13, 0.05)
 _DARK: Tint = (0.06, 0.06, 0.06)
 _BRIGHT: Tint = (0.62, 0.62, 0.60)
@@ -198,7 +198,7 @@ _Shape = Callable[[Defect, np.random.Generator, Float, Float], Imprint]
 
 
 def imprint(defect: Defect, random: np.random.Generator, along_mm: Float, around_mm: Float) -> Imprint:
-    """Return what a defect does at offsets (n, 1) and (1, m) from its middle."""
+    """Return the change of the wall by a defect at offsets (n, 1) and (1, m) from its middle."""
     return _SHAPES[defect.kind](defect, random, along_mm, around_mm)
 
 
@@ -272,7 +272,7 @@ def _turned(d: Defect, along: Float, around: Float) -> tuple[Float, Float]:
 
 
 def _distance(d: Defect, random: np.random.Generator, along: Float, around: Float, irregular: float) -> Float:
-    """Return (n, m) how far out an offset lies: 1 at an outline that wavers by a share."""
+    """Return the relative distance (n, m) of an offset from the middle: 1 at an irregular outline."""
     u, v = _turned(d, along, around)
     q = np.hypot(2 * u / d.length_mm, 2 * v / d.width_mm)
     if irregular == 0:

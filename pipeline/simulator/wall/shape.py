@@ -52,7 +52,7 @@ def axis_curvature(distance_mm: Float, bends: Sequence[Bend]) -> Float:
 
 
 def _joint(s: Float, psi: Float, joint: Joint) -> Float:
-    """Return what a joint adds to the radius: a groove, and the second pipe out of line."""
+    """Return the change of the radius by a joint: a groove, and an offset of the second pipe."""
     inside = np.abs(s - joint.distance_mm) - joint.gap_mm / 2
     groove = joint.depth_mm * np.clip(0.5 - inside / joint.chamfer_mm, 0, 1) if joint.gap_mm > 0 else 0.0
     beyond = np.clip((s - joint.distance_mm) / joint.chamfer_mm + 0.5, 0, 1)
@@ -119,7 +119,7 @@ def weld_rows(grid: Grid, weld: Weld, reach_mm: float) -> Int:
 
 
 def weld_relief(grid: Grid, weld: Weld, random: np.random.Generator, rows: Int) -> Float:
-    """Return what a bead adds to the radius (rows, A): inward, wavering, with ripples along it."""
+    """Return the change of the radius (rows, A) by a bead: inward, irregular, with ripples along it."""
     across, height = weld_across(grid, weld, random, rows)
     profile = np.clip(1 - across**2, 0, None)
     pitch = max(weld.width_mm / 3, 4 * grid.arc_step_mm)

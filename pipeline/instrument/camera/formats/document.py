@@ -1,4 +1,4 @@
-"""A calibration file opened once for all formats, what a format is, and the program's own format.
+"""A calibration file opened once for all formats, the interface of a format, and the program's own format.
 
 The program's own camera file is the ``camera:`` section of probe.yaml, alone or with the rest.
 """
