@@ -95,7 +95,7 @@ REFUSALS: dict[str, tuple[Spoil, tuple[str, ...]]] = {
     "another camera": (replaced(PROBE, "kannala_brandt", "pinhole"), ("camera.distortion", "5 numbers")),
     "unknown uncertainty": (replaced(PROBE, "baseline_mm: 0.008", "baselin_mm: 1.0"), ("baseline_mm?",)),
     "empty probe": (emptied(PROBE), ("probe.yaml: holds nothing",)),
-    "no probe": (without(PROBE), ("probe.yaml is named as probe but is not there", "--probe FILE")),
+    "no probe": (without(PROBE), ("probe.yaml is named as probe but does not exist", "--probe FILE")),
     "one encoder reading": (rewritten("encoder.csv", lambda lines: lines[:1]), ("has 1 readings",)),
 }
 
@@ -189,7 +189,7 @@ def test_frames_that_cannot_be_used_are_counted(
         (rewritten("frames.csv", lambda lines: [*lines, "24,0.8,laser\n"]), "the 24 in common"),
         (rewritten("encoder.csv", lambda lines: lines[: len(lines) // 2]), "encoder ends 0.38 s before"),
         (replaced("encoder.csv", "^0.4000,[^\n]*", "0.4000,99.0"), "the encoder jumps by up to"),
-        (without("encoder.csv"), "encoder.csv is named as encoder but is not there"),
+        (without("encoder.csv"), "encoder.csv is named as encoder but does not exist"),
     ],
     ids=["truncated", "short table", "long table", "encoder ends early", "encoder jumps", "encoder removed"],
 )

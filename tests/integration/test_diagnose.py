@@ -194,7 +194,7 @@ def test_a_run_of_another_recording_is_refused_by_name(pair, tmp_path):
     words = ["diagnose", str(pair[0]), "--run", str(tmp_path), "-o", str(tmp_path / "out")]
     done = CliRunner().invoke(app, words)
     assert isinstance(done.exception, InputError)
-    assert "the recording is not what the run was made from" in str(done.exception)
+    assert "the recording differs from the one of the run" in str(done.exception)
     (tmp_path / "run.json").write_text(json.dumps(record | {"configuration": {"rings": {"gone": 1}}}))
     open_field = open_recording(pair[0])
     same = {

@@ -55,7 +55,7 @@ def test_wrong_assignments_are_refused_by_name(assignment: str, message: str) ->
     ("text", "message"),
     [
         ("draw: {cuont: 3}", r"draw\.cuont: unknown key\n.*draw\.count"),
-        ("draw: 3", "draw: 3 where parameters of a stage belong"),
+        ("draw: 3", "draw: 3 instead of the parameters of a stage"),
         ("draw: {count: 3, count: 4}", "twice"),
         ("- 3", "a list at its top level"),
         ("draw: {count: [}", "not valid YAML"),

@@ -66,8 +66,8 @@ def test_the_first_lines_give_the_size_with_its_sigma_and_what_it_means_for_the_
     write_page(WHOLE, Shown(), tmp_path)
     page = (tmp_path / "diagnosis.html").read_text()
     assert "angle by which the sheet leans forward: 0.600 ± 0.010 deg" in page
-    assert "places the wall up to 0.100 mm from where texture and motion place it" in page
-    assert "with what was found put right, 0.001 mm are left" in page
+    assert "ring and texture differ by up to 0.100 mm" in page
+    assert "after correction for the effects found, 0.001 mm remain" in page
 
 
 def test_causes_of_a_class_that_say_the_same_are_said_once(tmp_path):
@@ -103,5 +103,5 @@ def test_every_other_verdict_has_its_page(tmp_path, verdict):
 def test_every_size_of_a_slip_is_told_in_words() -> None:
     numbers = {"slip_mm": Value(-3.3, 0.06), "time_s": Value(4.2, 0.02), "duration_s": Value(0.29, 0.02)}
     told = sizes(EffectFound("encoder_slip", 0.98, numbers, "", ""))
-    assert told[-1] == "how long it lasts: 0.290 ± 0.020 s"
+    assert told[-1] == "duration: 0.290 ± 0.020 s"
     assert not any("_" in words for words in told)

@@ -110,7 +110,7 @@ def test_a_plan_of_another_pipe_is_refused() -> None:
     assert told == []
     laid(run, plan=right[:2], warn=told.append)
     laid(run, plan=(right[3], right[1]), warn=told.append)
-    assert "it has 1 bends, the pipe as measured 2" in told[0]
+    assert "it has 1 bends, the measured pipe 2" in told[0]
     assert "bend 1 turns by 45.0°" in told[1]
 
 

@@ -29,7 +29,7 @@ def keys(plan: Plan) -> list[str]:
     [
         ((SMOOTH, DRAW, TOTAL), "stage smooth needs Drawn: stage draw, which must come before"),
         ((DRAW, TOTAL), "stage total needs Smoothed: no stage makes it"),
-        ((DRAW, replace(DRAW, name="again")), "stage again makes Drawn, which is there already"),
+        ((DRAW, replace(DRAW, name="again")), "stage again makes Drawn, which exists already"),
         ((DRAW, DRAW), "two stages are named draw"),
     ],
 )

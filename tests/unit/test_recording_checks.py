@@ -65,7 +65,7 @@ def test_a_counter_that_begins_anew_counts_on(count_mm: float, stands: int) -> N
     way = count_mm * np.floor(way / count_mm)
     encoder, found = noticed(way % 100, (len(way) - 1) / 9.95)
     assert len(found) == 1
-    assert "begins anew 2 times" in found[0] or "begins anew 3 times" in found[0]
+    assert "restarts 2 times" in found[0] or "restarts 3 times" in found[0]
     np.testing.assert_allclose(encoder.distance_mm, way, atol=2 * max(count_mm, 0.3))
 
 

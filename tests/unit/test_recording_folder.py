@@ -138,7 +138,7 @@ def test_shorter_table_of_frames_uses_the_common_part(copy: Path) -> None:
         (lambda rows: rows[:20], "the encoder ends 0.32 s before the last frame"),
         (lambda rows: rows[:1] + rows[30:], "the encoder begins 0.29 s after the first frame"),
         (lambda rows: [*rows[:30], "0.29,25.8", *rows[31:]], "the encoder jumps by up to 20.2 mm at 0.28 s"),
-        (lambda rows: [*rows[:40], "9.0,8.0"], "the encoder is silent for up to 8.62 s"),
+        (lambda rows: [*rows[:40], "9.0,8.0"], "the encoder has no readings for up to 8.62 s"),
     ],
 )
 def test_suspicious_encoders_are_named(copy: Path, edit, warning: str) -> None:
@@ -220,7 +220,7 @@ SPOILED = {
         "video: ../x.mkv",
         r"inside the recording's",
     ),
-    "video missing": ("recording.yaml", "video: 'frames.mkv'", "video: x.mkv", r"x.mkv: is missing, yet"),
+    "video missing": ("recording.yaml", "video: 'frames.mkv'", "video: x.mkv", r"x.mkv: is missing, but"),
     "no columns": ("frames.csv", "frame,time_s,illumination\n", "", r"line 1: has no column frame"),
     "semicolons": ("encoder.csv", "time_s,distance_mm", "time_s;distance_mm", "separated by semicolons"),
     "mistyped column": ("frames.csv", "illumination", "ilumination", r"is ilumination meant"),
