@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import binned_statistic_2d
 
 from pipeline.arrays import Bool, Float, Int
 from pipeline.recording.base import Illumination
@@ -109,8 +108,11 @@ def wall_distances_mm(residual: RingResidual) -> Float:
 
 def _mean(row: Int, azimuth_rad: Float, values: Float, rows: int) -> Float:
     """Return the means (``rows``, `AZIMUTHS`) of values (M,); NaN where there are none."""
-    edges = [np.arange(rows + 1) - 0.5, np.linspace(-np.pi, np.pi, AZIMUTHS + 1)]
-    return np.asarray(binned_statistic_2d(row, azimuth_rad, values, "mean", edges).statistic)
+    column = np.floor((azimuth_rad + np.pi) / (2 * np.pi) * AZIMUTHS).astype(np.int64) % AZIMUTHS
+    cell = row * AZIMUTHS + column
+    count, total = (np.bincount(cell, w, rows * AZIMUTHS) for w in (None, values))
+    mean = np.divide(total, count, out=np.full(len(total), np.nan), where=count > 0)
+    return mean.reshape(rows, AZIMUTHS)
 
 
 def rings_against_fiducials(

@@ -1,6 +1,7 @@
 """What a correction changes: radius by clock position, depths of defects, and the sentence about it."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -119,3 +120,16 @@ def test_residuals_fall_into_the_cells_where_they_lie():
     assert np.delete(over[1], 5) == pytest.approx(np.delete(np.cos(azimuth), 5))
     assert np.isfinite(rings.over_wall(wall_distances_mm(rings))).sum() == AZIMUTHS - 1
     assert rings.rms_px == pytest.approx(np.sqrt(2), rel=0.02)
+
+
+def test_residuals_without_a_usable_ring_make_an_empty_picture_and_azimuths_wrap() -> None:
+    """SciPy's binning ended a diagnosis whose lit and ring frames do not overlap with an error."""
+    azimuth, ones = np.array([1.0, 1.0, 1.0 + 2 * np.pi]), np.ones(3)
+    rings = RingResidual(
+        "field", np.array([7, 7, 7]), azimuth, azimuth, 3.1 * ones, np.zeros((3, 2)), np.arange(3.0), ones,
+        np.zeros(3, bool),
+    )  # fmt: skip
+    assert np.isnan(rings.over_frames(np.array([6, 7]))).all()
+    assert np.isnan(rings.over_wall(wall_distances_mm(rings))).all()
+    over = replace(rings, usable=ones > 0).over_frames(np.array([7]))
+    assert over[np.isfinite(over)] == pytest.approx([1.0])
