@@ -225,7 +225,7 @@ def test_an_exposure_shorter_than_none_is_no_explanation(exposure_s, possible):
 def test_rings_that_jump_in_an_inspection_are_told_as_a_knock_where_they_may_be_one(told, ambiguous, words):
     warned: list[str] = []
     jump = SimpleNamespace(frame=140, jump_mm=np.array([0.2, -0.2, 0.01]))
-    knock = SimpleNamespace(told=told, ambiguous=ambiguous, jump=jump, time_s=4.67)
+    knock = SimpleNamespace(certain=told, ambiguous=ambiguous, jump=jump, time_s=4.67)
     warn_of_knock(cast(Any, knock), cast(Any, SimpleNamespace(warn=warned.append)))
     assert len(warned) == (told or ambiguous)
     assert all("at 4.67 s (frame 140)" in w and "0.28 mm" in w and words in w for w in warned)
