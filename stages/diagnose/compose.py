@@ -28,8 +28,8 @@ _SAME_FREQUENCY_HZ = 0.15
 _IN_PROFILE = Location(str(Channel.PROFILE), None, None)
 _UNKNOWN = "a cause that the library does not have, such as {}"
 _BY_LIGHT = (
-    "Rings of the gauge run deviate by less than the size of {} is uncertain: whether anything else "
-    "moves them was not decided."
+    "Rings of the gauge run deviate by less than the size of {} is uncertain: whether anything else, such as "
+    "{}, moves them was not decided."
 )
 _OF_ENCODER = "an error of the encoder that depends on distance or speed in another way"
 
@@ -49,7 +49,8 @@ def composed(
     doubtful = (SLIP,) if any(u.by_slip for u in of_travel) else ()
     own = [c for c in claims_of(None, gauge, probe.shutter.exposure_s) if c.name not in without]
     rings = verdict_of_rings(examined, own)
-    of_light = _by_light(examined, rings, known)
+    certain = {c.name for c in known if c.sure}
+    of_light = _by_light(examined, rings, [c for c in own if c.name in certain])
     rings = Verdict.CONSISTENT if of_light else rings
     said = _said(examined, rings, known, unnamed, bool(of_profile), doubtful)
     asked = said.members if said.members else [e.name for e in said.effects]
@@ -160,22 +161,25 @@ def verdict_of_rings(examined: Examined | None, own: Sequence[Claim]) -> Verdict
     if verdict is not Verdict.UNEXPLAINED:
         return verdict
     if examined.best is None:
-        of_line = (c for c in own if c.location.channel == Channel.PROFILE)
-        explained = any(
-            of_gauge.may_be_light(examined, next(iter(c.parameters.values()), None)) for c in of_line
-        )
+        explained = bool(_lights(examined, [c for c in own if c.sure]))
     else:
         explained = bool(own) and not examined.best.names
     return Verdict.CONSISTENT if explained else verdict
 
 
-def _by_light(examined: Examined | None, rings: Verdict, known: Sequence[Claim]) -> tuple[str, ...]:
-    """Return in words which certain effect on the line's light may have made the class that rings show."""
+def _by_light(examined: Examined | None, rings: Verdict, certain: Sequence[Claim]) -> tuple[str, ...]:
+    """Return in words which light of the gauge run's line may have made the class that rings show."""
     if examined is None or rings is not Verdict.CLASS:
         return ()
-    lights = (c for c in known if c.sure and effect(c.name).family == "photometric" and c.parameters)
-    each = ((c.name, next(iter(c.parameters.values()))) for c in lights)
-    return tuple(_BY_LIGHT.format(name) for name, size in each if of_gauge.may_be_light(examined, size))[:1]
+    names = ", ".join(of_gauge.members(examined))
+    return tuple(_BY_LIGHT.format(light, names) for light in _lights(examined, certain))[:1]
+
+
+def _lights(examined: Examined, claims: Sequence[Claim]) -> list[str]:
+    """Return the effects on the line's light that may have made all that rings show."""
+    lights = (c for c in claims if c.location.channel == Channel.PROFILE)
+    each = ((c.name, next(iter(c.parameters.values()), None)) for c in lights)
+    return [name for name, size in each if of_gauge.may_be_light(examined, name, size)]
 
 
 def _of_rest(examined: Examined | None, rings: Verdict) -> Location | None:

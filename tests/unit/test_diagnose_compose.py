@@ -22,6 +22,7 @@ from stages.diagnose.travel.events import with_events
 from tests.diagnosed import AGREES, DIFFERS, PLAY, SCALE, SLIP, SWING, answer, of_gauge, seen
 from tests.travel_cases import read
 from tests.travel_cases import seen as sight
+from tests.unit.wall_points import Bore, plain_probe, ring_points
 
 
 def test_what_one_recording_shows_once_is_a_class(real_probe: Probe) -> None:
@@ -264,14 +265,8 @@ def test_what_image_formation_may_show_in_the_line_is_not_told_as_improbable(rea
     assert told == [1.0, pytest.approx(3e-8)]
 
 
-@pytest.mark.parametrize(
-    ("moved_px", "sd_mm", "verdict"),
-    [(0.07, 0.03, Verdict.NAMED), (0.3, 0.03, Verdict.PARTLY), (0.07, 0.002, Verdict.PARTLY)],
-)
-def test_rings_that_move_by_less_than_the_light_of_a_named_effect_is_known_to_are_no_remainder(
-    real_probe: Probe, monkeypatch: pytest.MonkeyPatch, moved_px: float, sd_mm: float, verdict: Verdict
-) -> None:
-    """A line beside which a wall glows was "partly", with a class of 13 names for a drift of .07 px."""
+def rings_of_a_class(monkeypatch: pytest.MonkeyPatch, moved_px: float) -> Examined:
+    """Return rings that a drift, of a class of two names, moves by ``moved_px``."""
     monkeypatch.setattr(of_rings, "ring_shift_alone_px", lambda fit, term: term.shift_px)
     monkeypatch.setattr(of_rings, "verdict_of", lambda examined: Verdict.CLASS)
     drift = EffectFound("baseline_drift", 0.5, {}, "The baseline gets longer.", "", ())
@@ -280,15 +275,91 @@ def test_rings_that_move_by_less_than_the_light_of_a_named_effect_is_known_to_ar
     monkeypatch.setattr(of_rings, "candidates", lambda examined: ())
     monkeypatch.setattr(of_rings, "unknown_law_descriptions", lambda examined: ())
     best = SimpleNamespace(fit=SimpleNamespace(terms=(SimpleNamespace(shift_px=moved_px),)), names=("a",))
-    run = SimpleNamespace(width_px=np.full(9, 1.7))
     rings = SimpleNamespace(
-        best=best, searched=SimpleNamespace(run=run), location=None, quality=None, feasibility=(),
+        best=best, searched=searched_rings(), location=None, quality=None, feasibility=(),
         global_p=0.0, shortcomings=(), verdicts=None,
     )  # fmt: skip
-    glow = finding("subsurface", 20.0, 1e-12, (Size("transport_mm", "mm", 0.3, sd_mm),), "The wall glows.")
-    light = ProfileEvidence("gauge", np.arange(3), (replace(glow, agreements=(AGREES,)),))
-    found = answer(real_probe, None, replace(seen("gauge"), profile=light, geometry=cast(Any, rings)))
+    return cast(Any, rings)
+
+
+def searched_rings() -> Any:
+    """Return rings of a 4 inch bore, 6 px for each mm of the sheet, 1.7 px wide."""
+    rings = ring_points(plain_probe(), Bore(50.8), 40)
+    return SimpleNamespace(
+        run=SimpleNamespace(width_px=np.full(9, 1.7)),
+        nothing=SimpleNamespace(linearised=SimpleNamespace(rings=rings)), by_chance=0.5,
+    )  # fmt: skip
+
+
+def light(source: str, name: str, *size: Size) -> ProfileEvidence:
+    """Return a certain effect on the line's light."""
+    found = replace(finding(name, 20.0, 1e-12, size, "It is seen."), agreements=(AGREES,))
+    return ProfileEvidence(source, np.arange(3), (found,))
+
+
+@pytest.mark.parametrize(
+    ("moved_px", "sd_mm", "verdict"),
+    [(0.07, 0.03, Verdict.NAMED), (0.3, 0.03, Verdict.PARTLY), (0.07, 0.002, Verdict.PARTLY)],
+)
+def test_rings_that_move_by_less_than_the_light_of_a_named_effect_is_known_to_are_no_remainder(
+    real_probe: Probe, monkeypatch: pytest.MonkeyPatch, moved_px: float, sd_mm: float, verdict: Verdict
+) -> None:
+    """A line beside which a wall glows was "partly", with a class of 13 names for a drift of .07 px."""
+    rings = rings_of_a_class(monkeypatch, moved_px)
+    glow = light("gauge", "subsurface", Size("transport_mm", "mm", 0.3, sd_mm))
+    found = answer(real_probe, None, replace(seen("gauge"), profile=glow, geometry=rings))
     assert found.verdict is verdict
     assert [e.name for e in found.effects] == ["subsurface"]
-    told = any("less than the size of subsurface is uncertain" in s for s in found.shortcomings)
-    assert told is (verdict is Verdict.NAMED)
+    told = [s for s in found.shortcomings if "less than the size of subsurface is uncertain" in s]
+    assert bool(told) is (verdict is Verdict.NAMED)
+    assert all("such as laser_cone, baseline_drift, moves them" in s for s in told)
+
+
+@pytest.mark.parametrize(
+    ("name", "size"),
+    [
+        ("vignetting", (Size("falloff", "", 0.3, 0.06),)),
+        ("ambient_light", (Size("relative", "", 0.05, 0.02),)),
+        ("dust", (Size("attenuation", "", 0.4, 0.1),)),
+        ("speckle", (Size("contrast", "", 0.1, 0.02),)),
+        ("ghost_ring", (Size("relative", "", 0.02, 0.01),)),
+    ],
+)
+def test_light_that_cannot_move_the_line_so_far_hides_nothing(
+    real_probe: Probe, monkeypatch: pytest.MonkeyPatch, name: str, size: tuple[Size, ...]
+) -> None:
+    """Each hid .05 px or more: its size was known to 20 %, so it was let move the line by .2 widths."""
+    rings, seen_light = rings_of_a_class(monkeypatch, 0.05), light("gauge", name, *size)
+    found = answer(real_probe, None, replace(seen("gauge"), profile=seen_light, geometry=rings))
+    assert found.remainder is not None
+    assert {"laser_cone", "baseline_drift"} <= set(found.remainder.members)
+
+
+def test_light_of_the_inspection_alone_hides_nothing_in_the_gauge_run(
+    real_probe: Probe, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rings = rings_of_a_class(monkeypatch, 0.07)
+    glow = light("field", "subsurface", Size("transport_mm", "mm", 0.3, 0.03))
+    field, gauge = replace(seen("field"), profile=glow), replace(seen("gauge"), geometry=rings)
+    found = answer(real_probe, field, gauge)
+    assert found.remainder is not None
+    assert {"laser_cone", "baseline_drift"} <= set(found.remainder.members)
+    assert answer(real_probe, field, replace(gauge, profile=glow)).remainder is None
+
+
+@pytest.mark.parametrize(
+    ("name", "size", "verdict"),
+    [
+        ("subsurface", (Size("transport_mm", "mm", 0.3, 0.06),), Verdict.NAMED),
+        ("beam_decentre", (), Verdict.PARTLY),
+        ("saturation", (Size("exposure_gain", "", 3.0, 2.0),), Verdict.PARTLY),
+    ],
+)
+def test_what_repeats_is_light_only_where_the_light_moves_the_line_so_far(
+    real_probe: Probe, name: str, size: tuple[Size, ...], verdict: Verdict
+) -> None:
+    """A claim without a size excused a whole width of the line: 1.4 px, with noise of .1 px."""
+    quality = FitQuality("px", 0.31, 0.3, 0.29, 0.284, 0.126)
+    rings = Examined(searched_rings(), None, (), (), quality=quality, location=Location("ring", None, None))
+    gauge = replace(seen("gauge"), profile=light("gauge", name, *size), geometry=rings)
+    assert answer(real_probe, None, gauge).verdict is verdict

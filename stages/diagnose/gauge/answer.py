@@ -11,6 +11,7 @@ from pipeline.physics.catalogue import effect
 from pipeline.physics.effect import CourseKind
 from stages.diagnose.agreement import TELLING
 from stages.diagnose.effects.courses import Coursed, Drifting
+from stages.diagnose.effects.library import LIBRARY, ring_shift_px
 from stages.diagnose.gauge.confirm import Sized, course_of, quantities
 from stages.diagnose.gauge.examine import Examined
 from stages.diagnose.gauge.formula import ADEQUATE
@@ -30,6 +31,9 @@ _MOST_OF_FLOOR = 1.12
 # Explanations that were weighed but not fitted are listed above this probability: all others together change
 # no answer.
 _LISTED = 1e-3
+# Nothing predicts how far a second line pulls the first. Least squares with one line follow a second one of
+# height h at a distance d, both of width σ, by h d exp(−d² / 4σ²), which is largest, √(2/e) h σ, at d = √2 σ.
+_SECOND_LINES, _MOST_PULL = ("ghost_ring", "tube_ghost"), float(np.sqrt(2 / np.e))
 _REPEATS = (
     "Rings and fiducials of the gauge run lie {:.2f} px from where its other parts have them, and noise is "
     "{:.2f} px of it. The rest is the same at one place of the image on other wall, and no effect or simple "
@@ -137,17 +141,33 @@ def beyond_line(examined: Examined) -> tuple[bool, ...]:
     return tuple(shift_px(best.fit, t) > width_px for t in best.library_terms) if best is not None else ()
 
 
-def may_be_light(examined: Examined, size: Value | None) -> bool:
-    """Return whether all that rings show may be the line's own light, whose effect has this size.
+def may_be_light(examined: Examined, name: str, size: Value | None) -> bool:
+    """Return whether all that rings show may be the line's own light, whose effect ``name`` has this size.
 
-    It moves the line within its width, which is as well known as the size is, and fiducials not at all.
+    It moves no fiducials, and the line by no more than its own law says for what is unknown of the size. An
+    effect without a size, or whose influence is not predicted, explains nothing.
     """
     best, quality = examined.best, examined.quality
-    share = min(size.sd / max(abs(size.value), 1e-300), 1.0) if size is not None else 1.0
-    most_px = share * float(np.median(examined.searched.run.width_px))
+    most_px = _unknown_shift_px(examined, name, size) if size is not None else 0.0
     if best is not None:
         return all(ring_shift_alone_px(best.fit, t) < most_px for t in best.fit.terms)
-    return quality is None or quality.heldout_after**2 - quality.noise_floor**2 < most_px**2
+    return quality is not None and quality.heldout_after**2 - quality.noise_floor**2 < most_px**2
+
+
+def _unknown_shift_px(examined: Examined, name: str, size: Value) -> float:
+    """Return the RMS shift, px, of rings by what is unknown of a light: its σ, or a second line's whole pull.
+
+    A size that is worse known than 100 % moves no more than it does itself.
+    """
+    searched = examined.searched
+    if name in _SECOND_LINES:
+        return float(_MOST_PULL * abs(size.value) * np.median(searched.run.width_px))
+    if name not in LIBRARY:
+        return 0.0
+    unknown = np.array([min(size.sd, abs(size.value))])
+    model, rings = LIBRARY[name], searched.nothing.linearised.rings
+    each = (ring_shift_px(model, rings, shape, unknown) for shape in model.shapes(0.0, 1.0))
+    return max(float(np.sqrt(np.nanmean(shift**2))) for shift in each)
 
 
 def _found(
