@@ -224,5 +224,5 @@ def _defects_of_run(
 
 
 DEFECTS = Stage(
-    "defects", "53", DefectParameters, _defects_of_run, "defects as instances with depth, clock and kind"
+    "defects", "54", DefectParameters, _defects_of_run, "defects as instances with depth, clock and kind"
 )

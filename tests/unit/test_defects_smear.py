@@ -88,7 +88,7 @@ def told_sigma(
         relief=SimpleNamespace(cell_mm=(0.5, 0.5), radius_mm=RADIUS, typical=SimpleNamespace(sigma_mm=0.01)),
         near=SimpleNamespace(frame=np.arange(len(ways_mm))),
     )
-    depth = Depth(float(seen_mm.max()), 0.03, 0.0, (0, 0))
+    depth = Depth(float(np.nanmax(seen_mm)), 0.03, 0.0, (0, 0))
     return flattened(depth, region, cast("Surface", surface), held, ways_mm).sigma_mm
 
 
@@ -167,6 +167,25 @@ def test_a_wide_patch_tells_by_all_its_columns_how_fast_it_falls_off() -> None:
     rough = smooth_noise(np.random.default_rng(2), true.shape, 0.06, 1.0)
     told = found_on(true + rough, HeldOver(np.r_[1.0, 0.33 * 0.98 ** np.arange(16)]))
     assert told.depth_sigma_mm < abs(told.depth_mm)
+
+
+@pytest.mark.parametrize("unseen", ["steep flank", "every second cell", "up to the end of the wall"])
+@pytest.mark.parametrize("share", [0.6, 0.8, 0.9, 0.95])
+@pytest.mark.parametrize("bell_mm", [0.5, 1.0, 2.0])
+def test_sigma_holds_what_was_lost_where_the_steep_flank_is_unseen(
+    bell_mm: float, share: float, unseen: str
+) -> None:
+    """The slope was taken from what was seen: a loss of .78 was told as .46 of what is left."""
+    bell = np.exp(-0.5 * (np.arange(-100, 101) * 0.5 / bell_mm) ** 2)
+    seen = np.asarray(lfilter([1 - share], [1, -share], bell))
+    height, top = float(seen.max()), int(seen.argmax())
+    hidden = {
+        "steep flank": slice(top - 8, top - 1), "every second cell": slice(top % 2 - 1, None, 2),
+        "up to the end of the wall": slice(0, top - 1),
+    }  # fmt: skip
+    found = standing_out(seen)
+    seen[hidden[unseen]] = np.nan
+    assert 1 - height < 1.3 * told_sigma(seen, HeldOver(share ** np.arange(12)), finding=found)
 
 
 STANDS = np.full(400, 79.0) + 1e-6 * np.arange(400)
