@@ -64,6 +64,10 @@ class Steps:
     end: Int
     size: Float
 
+    def of(self, use: Bool) -> Steps:
+        """Return the steps in ``use`` (K,)."""
+        return Steps(self.start[use], self.end[use], self.size[use])
+
     def by_encoder(self, encoder: Encoder, time_s: Float) -> Float:
         """Return the encoder's advance over each step (K,), in its own unit."""
         read = np.interp(time_s, encoder.time_s, encoder.distance_mm)
@@ -80,7 +84,7 @@ def steps_of_wall(pictures: Pictures, shown: Int, copy: Bool) -> Steps:
     while np.any(copy[start]):
         start = np.where(copy[start], pictures.partner[start], start)
     use = (shown[end] == Light.WALL) & (shown[start] == Light.WALL) & np.isfinite(pictures.step[end])
-    return Steps(start[use], end[use], pictures.step[end[use]])
+    return Steps(start, end, pictures.step[end]).of(use)
 
 
 def row_times(table: FrameTable, row: Int) -> Float:

@@ -54,20 +54,32 @@ def rows_beside_encoder(
     behind all such pictures, or behind none, those are returned by which the encoder follows the wall better;
     or ``row`` itself, unless they follow it much better than that.
     """
-    if encoder is None or not again.any() or len(steps.end) < _LEAST_STEPS:
+    if encoder is None or not again.any():
         return row
     as_stored = row + np.cumsum(np.diff(row, prepend=-1) < 1)
     put_in = np.maximum(as_stored - np.cumsum(again), 0)
-    off = [_off_the_wall(steps, encoder, row_times(table, r)) for r in (row, as_stored, put_in)]
+    rows = (row, as_stored, put_in)
+    times = [row_times(table, r) for r in rows]
+    known = steps.of(np.all([_in_table(steps, encoder, t) for t in times], 0))
+    if len(known.end) < _LEAST_STEPS:
+        return row
+    off = [_off_the_wall(known, encoder, t) for t in times]
     best = int(np.argmin(off))
-    return (row, as_stored, put_in)[best] if off[best] < _FOLLOWS * off[0] else row
+    return rows[best] if off[best] < _FOLLOWS * off[0] else row
+
+
+def _in_table(steps: Steps, encoder: Encoder, time_s: Float) -> Bool:
+    """Return which steps (K,) the encoder's table covers: beyond its ends no reading is known."""
+    covered = (time_s >= encoder.time_s[0]) & (time_s <= encoder.time_s[-1])
+    return np.asarray(covered[steps.start] & covered[steps.end])
 
 
 def _off_the_wall(steps: Steps, encoder: Encoder, time_s: Float) -> float:
-    """Return the mean square by which the encoder's advance departs from the wall's, scaled to it."""
+    """Return the share of the encoder's mean square advance that the wall's, scaled to it, leaves."""
     read = steps.by_encoder(encoder, time_s)
     scale = float(read @ steps.size) / max(float(steps.size @ steps.size), 1e-12)
-    return float(np.mean((read - scale * steps.size) ** 2))
+    left = read - scale * steps.size
+    return float(left @ left) / max(float(read @ read), 1e-12)
 
 
 def repeated(pictures: Pictures, light: Int) -> Bool:

@@ -6,10 +6,12 @@ import cv2
 import numpy as np
 import pytest
 
-from pipeline.arrays import Bool, Float
+from pipeline.arrays import Bool, Float, Int
+from pipeline.recording.base import Encoder, FrameTable
 from stages.premises.light import Light
+from stages.premises.losses import Steps
 from stages.premises.pictures import Pictures, change_between
-from stages.premises.repeats import copies
+from stages.premises.repeats import copies, rows_beside_encoder
 
 
 def test_pictures_exposed_alike_by_chance_are_no_copies() -> None:
@@ -54,3 +56,37 @@ def test_copies_that_come_often_are_all_told(often: int) -> None:
     change = np.random.default_rng(6).uniform(0.2, 0.25, 240)
     change[often::often] = 0.02
     assert np.flatnonzero(line_copies(change)).tolist() == list(range(often, 240, often))
+
+
+def rows_told(seed: int, copied: slice, covered: slice, put_in: bool) -> tuple[Int, Int]:
+    """Return the rows told and the true ones; the encoder's table has only the rows in ``covered``."""
+    random, count = np.random.default_rng(seed), 300
+    again = np.zeros(count, bool)
+    again[copied] = True
+    true = np.arange(count) - put_in * np.cumsum(again)
+    time_s = np.arange(count) / 30
+    mm = np.cumsum(1 + 0.5 * np.sin(2 * np.pi * np.arange(count) / 120))
+    lit = np.flatnonzero((np.arange(count) % 2 == 1) & ~again)
+    size = np.diff(mm[true[lit]]) / 50 * (1 + 0.05 * random.standard_normal(len(lit) - 1))
+    table = FrameTable(np.arange(count), time_s, np.where(np.arange(count) % 2, "led", "laser"))
+    encoder = Encoder(time_s[covered], mm[covered])
+    return rows_beside_encoder(np.arange(count), again, table, Steps(lit[:-1], lit[1:], size), encoder), true
+
+
+@pytest.mark.parametrize(
+    ("copied", "covered"),
+    [(slice(20, 80), slice(200, 300)), (slice(100, 180), slice(250, 300)), (slice(20, 40), slice(0, 60))],
+)
+def test_rows_for_which_the_encoder_has_no_reading_do_not_follow_the_wall(
+    copied: slice, covered: slice
+) -> None:
+    """Beyond its table it read no advance, which departs from no wall: later rows were up to 80 too early."""
+    for seed in range(4):
+        told, true = rows_told(seed, copied, covered, put_in=False)
+        np.testing.assert_array_equal(told, true)
+
+
+@pytest.mark.parametrize("covered", [slice(0, 300), slice(60, 240)])
+def test_rows_move_up_behind_pictures_put_in_as_an_encoder_of_most_rows_shows(covered: slice) -> None:
+    told, true = rows_told(1, slice(100, 110), covered, put_in=True)
+    np.testing.assert_array_equal(told, true)
