@@ -24,7 +24,7 @@ from pipeline.recording.base import Planes, ascending, decoded_ahead
 # Luma weights (red, blue) of ITU-R BT.709 and BT.601; swscale takes 601 where a stream names none.
 _BT709, _BT601 = (0.2126, 0.0722), (0.299, 0.114)
 # Luma of black and of white in limited range (ITU-R BT.601 and BT.709), and of white in full range.
-_LIMITED_BLACK, _LIMITED_WHITE, _WHITE = 16, 235, 255
+_LIMITED_BLACK, _LIMITED_WHITE, WHITE = 16, 235, 255
 # Planar formats of 8 bits whose chroma has the resolution of their luma.
 FULL_CHROMA = ("yuv444p", "yuvj444p")
 
@@ -60,10 +60,18 @@ def _luma(frame: av.VideoFrame) -> Image:
 
 def luma_of_white(luma: Image, bgr: Image) -> int:
     """Return the luma of white from one frame read both ways: 235 in limited range, else 255."""
-    full = cv2.cvtColor(bgr, cv2.COLOR_BGR2GRAY).astype(float)
-    limited = _LIMITED_BLACK + full * (_LIMITED_WHITE - _LIMITED_BLACK) / _WHITE
-    is_limited = np.abs(luma - limited).mean() < np.abs(luma - full).mean()
-    return _LIMITED_WHITE if is_limited else _WHITE
+    return _LIMITED_WHITE if _black(luma, bgr) > _LIMITED_BLACK / 2 else WHITE
+
+
+def _black(luma: Image, bgr: Image) -> float:
+    """Return the luma of black: luma is that and a sum of colours, with the weights of the video's standard.
+
+    They are fitted, so that it does not matter which standard that is. Colours at an end of their range may
+    have been clipped and are left out.
+    """
+    inside = np.all((bgr > 0) & (bgr < WHITE), axis=-1)
+    known = np.column_stack([bgr[inside], np.ones(int(inside.sum()))])
+    return float(np.linalg.lstsq(known, luma[inside].astype(float), rcond=None)[0][-1])
 
 
 def plane_of(plane: av.video.plane.VideoPlane) -> Image:

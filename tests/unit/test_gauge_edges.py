@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import cv2
 import numpy as np
@@ -11,7 +12,7 @@ from scipy.special import erf
 
 from pipeline.arrays import Float, Image
 from pipeline.geometry.rigid import inverse, transform
-from stages.calibrate.gauge import premises
+from stages.calibrate.gauge import _brightest_grey, premises
 from stages.calibrate.gauge.edges import fit_steps, measure_edges
 from stages.calibrate.gauge.geometry import Gauge, gauge_of
 from tests.gauge_runs import USUAL, facts, stated_probe
@@ -91,3 +92,8 @@ def test_no_edge_where_there_is_none_or_where_bright_comes_before_dark() -> None
     flat = np.full((1, 21), 60.0) + np.random.default_rng(0).normal(0, 1, (1, 21))
     falling = 60 - 40 * (t[:1] > 0)
     assert np.isnan(fit_steps(t, np.concatenate([flat, falling]))[0]).all()
+
+
+def test_frames_that_cannot_be_read_leave_white_at_the_end_of_the_range() -> None:
+    unread = SimpleNamespace(read=lambda frames, planes: iter((int(n), None) for n in frames))
+    assert _brightest_grey(unread, np.arange(3)) == 255

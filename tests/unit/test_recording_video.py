@@ -61,6 +61,18 @@ def test_luma_of_white_is_that_of_the_range_of_the_video(tmp_path: Path, name: s
     assert luma_of_white(grey, bgr) == (255 if full else 235)
 
 
+@pytest.mark.parametrize("full", [False, True])
+@pytest.mark.parametrize("colour", [(30, 80, 180), (50, 70, 190), (70, 150, 60), (200, 200, 200)])
+def test_luma_of_white_does_not_depend_on_the_colour_of_the_wall(
+    colour: tuple[int, int, int], full: bool
+) -> None:
+    """By the weights of BT.601, red wall of a BT.709 video was of full range, and green wall of limited."""
+    wall = np.random.default_rng(3).uniform(0.7, 1.2, (HEIGHT, WIDTH, 1)) * colour
+    weights, black, white = np.array([0.0722, 0.7152, 0.2126]), 0 if full else 16, 255 if full else 219
+    luma = np.rint(black + white / 255 * (wall @ weights)).astype(np.uint8)
+    assert luma_of_white(luma, wall.astype(np.uint8)) == (255 if full else 235)
+
+
 @pytest.mark.parametrize("name", ENCODINGS)
 def test_colours_are_those_of_swscale(tmp_path: Path, name: str) -> None:
     source = _made(tmp_path, name)

@@ -18,7 +18,7 @@ from pipeline.instrument.probe import Probe
 from pipeline.machine.stage import Context, Stage
 from pipeline.recording.base import Illumination, Recording
 from pipeline.recording.checks import CheckedFrames
-from pipeline.recording.images import luma_of_white
+from pipeline.recording.images import WHITE, luma_of_white
 from stages.calibrate.gauge import premises
 from stages.calibrate.gauge.adjust import Measurements
 from stages.calibrate.gauge.edges import Edges, Sighting, find_fiducials, joined, measure_edges
@@ -178,11 +178,10 @@ def _edges(
 
 
 def _brightest_grey(recording: Recording, frames: Int) -> int:
-    """Return the luma of white, as the first of the ``frames`` that can be read tells it."""
+    """Return the luma of white, as the first of the ``frames`` that can be read tells it; 255 if none can."""
     both = zip(recording.read(frames, "grey"), recording.read(frames, "bgr"), strict=True)
-    return next(
-        luma_of_white(grey, bgr) for (_, grey), (_, bgr) in both if grey is not None and bgr is not None
-    )
+    read = ((grey, bgr) for (_, grey), (_, bgr) in both if grey is not None and bgr is not None)
+    return next((luma_of_white(grey, bgr) for grey, bgr in read), WHITE)
 
 
 def _require_bores(
@@ -214,5 +213,5 @@ def _calibrate_run(
 
 
 GAUGE = Stage(
-    "gauge", "6", GaugeParameters, _calibrate_run, "fiducials and rings on known bore to camera and sheet"
+    "gauge", "7", GaugeParameters, _calibrate_run, "fiducials and rings on known bore to camera and sheet"
 )
