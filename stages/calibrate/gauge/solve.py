@@ -73,7 +73,7 @@ def first_unknowns(
     unsure = prior_directions(probe, SheetModel.PLAIN, parameters)
     return Unknowns(
         T_pc, np.zeros(len(T_pc)), np.array([1.0, offset, 0.0]), np.zeros(len(gauge.radius_mm)),
-        np.zeros((len(gauge.ids), 4)), np.zeros(unsure.shape[1]), probe, unsure,
+        np.zeros((len(gauge.ids), 4)), np.zeros(unsure.shape[1]), probe, unsure, offset,
     )  # fmt: skip
 
 

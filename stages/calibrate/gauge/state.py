@@ -15,6 +15,10 @@ from pipeline.instrument.probe import Probe
 from pipeline.machine.stage import Parameters
 
 ENCODER = 3
+OFFSET_SIGMA_MM = 1.0
+"""1 σ, mm, of the encoder's offset that first poses give. They rest on corners of fiducials, found to about a
+pixel, which is less than this on any gauge's wall. Where borders across the gauge are too narrow to be
+measured, nothing else holds the distance, and poses left the gauge by metres."""
 
 
 class GaugeParameters(Parameters):
@@ -138,6 +142,8 @@ class Unknowns:
     stated : Probe
     unsure : (P, Q)
         Change of the probe's parameters with each correction.
+    first_offset_mm : float
+        The encoder's offset by the first poses, ± `OFFSET_SIGMA_MM`.
     """
 
     T_pc: Float
@@ -148,6 +154,7 @@ class Unknowns:
     instrument: Float
     stated: Probe
     unsure: Float
+    first_offset_mm: float
 
     @property
     def layout(self) -> Layout:

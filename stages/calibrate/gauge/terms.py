@@ -15,7 +15,7 @@ from pipeline.geometry.rigid import inverse, skew, transform
 from pipeline.recording.base import Encoder
 from stages.calibrate.gauge.edges import Edges
 from stages.calibrate.gauge.geometry import BoreRings
-from stages.calibrate.gauge.state import ENCODER, GaugeParameters, Unknowns
+from stages.calibrate.gauge.state import ENCODER, OFFSET_SIGMA_MM, GaugeParameters, Unknowns
 
 # Half the span over which the encoder's speed is differenced, and 1 σ with which the first frame's slip is
 # held at 0: half and twice of them move no parameter of drawn gauge runs by 1e-9 of its σ.
@@ -162,10 +162,15 @@ def prior_rows(state: Unknowns, radius_sigma_mm: float, parameters: GaugeParamet
     """Return the priors of the global unknowns."""
     at = state.layout
     value = np.concatenate(
-        [state.encoder - [1.0, 0.0, 0.0], state.bore_mm, state.edge_mm.ravel(), state.instrument]
+        [
+            state.encoder - [1.0, state.first_offset_mm, 0.0],
+            state.bore_mm,
+            state.edge_mm.ravel(),
+            state.instrument,
+        ]
     )
     sigma = np.ones(at.size)
-    sigma[:ENCODER] = state.stated.encoder_scale_sigma, 1e4, parameters.delay_prior_s
+    sigma[:ENCODER] = state.stated.encoder_scale_sigma, OFFSET_SIGMA_MM, parameters.delay_prior_s
     sigma[at.bore] = max(radius_sigma_mm, 1e-5)
     sigma[at.marker] = parameters.placement_sigma_mm
     none = np.zeros((at.size, 0), np.int64)

@@ -12,7 +12,7 @@ from scipy.linalg import block_diag
 from pipeline.adjustment.rows import Rows
 from pipeline.arrays import Float, Int
 from pipeline.geometry.rigid import from_parts, rotation_from_vector
-from stages.calibrate.gauge.state import ENCODER, Unknowns
+from stages.calibrate.gauge.state import ENCODER, OFFSET_SIGMA_MM, Unknowns
 from stages.diagnose.effects.base import EffectModel, Shape
 from stages.diagnose.effects.nameless import VOCABULARY
 from stages.diagnose.gauge.elimination import ENCODER as ENCODER_ROW
@@ -260,7 +260,7 @@ def _prior(state: Unknowns, terms: Sequence[Term], run: GaugeRun) -> tuple[Float
     size = at.size + sum(len(t.amplitude) for t in terms)
     information = np.zeros((size, size))
     sigma = np.ones(at.size)
-    sigma[:ENCODER] = state.stated.encoder_scale_sigma, 1e4, _DELAY_SIGMA_S
+    sigma[:ENCODER] = state.stated.encoder_scale_sigma, OFFSET_SIGMA_MM, _DELAY_SIGMA_S
     sigma[at.bore] = run.bore_sigma_mm
     sigma[at.marker] = _PLACEMENT_SIGMA_MM
     information[: at.size, : at.size] = np.diag(sigma**-2)
@@ -269,8 +269,8 @@ def _prior(state: Unknowns, terms: Sequence[Term], run: GaugeRun) -> tuple[Float
     wide = np.arange(at.size, size)
     information[wide, wide] = (_WIDE * np.array(plausible)) ** -2.0
     value = np.concatenate(
-        [state.encoder - [1.0, 0.0, 0.0], state.bore_mm, state.edge_mm.ravel(), state.instrument,
-         *[t.amplitude for t in terms]]
+        [state.encoder - [1.0, state.first_offset_mm, 0.0], state.bore_mm, state.edge_mm.ravel(),
+         state.instrument, *[t.amplitude for t in terms]]
     )  # fmt: skip
     return information, information @ value, value
 
