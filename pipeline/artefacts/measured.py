@@ -154,6 +154,8 @@ class Trajectory:
         Relative 1 σ of all radii if encoder and stated diameter contradict the probe, else 0.
     knock : LaserKnock or None
         A knock of the laser in the run; ``instrument`` is the probe before it.
+    cut_sigma_mm : float
+        Part of ``distance_sigma_mm`` that the probe's ways at cuts of the recording make; 0 without any.
     """
 
     frame: Int
@@ -174,6 +176,7 @@ class Trajectory:
     image_scale_sigma: Float | None = None
     radius_doubt: float = 0.0
     knock: LaserKnock | None = None
+    cut_sigma_mm: float = 0.0
 
 
 @dataclass(frozen=True)

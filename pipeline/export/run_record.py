@@ -131,11 +131,13 @@ def _scale_sigma(trajectory: Trajectory, distance_mm: Float) -> float:
     """Return the relative 1 σ of the distance to the farthest frame, at least that of the calibration.
 
     After a run to and fro the end is better known than the scale: the calibration's part does not cancel.
+    The ways at cuts of the recording are no errors of the scale.
     """
     farthest_mm = float(np.abs(distance_mm - distance_mm[0]).max())
     if not np.isfinite(trajectory.distance_sigma_mm) or farthest_mm == 0:
         return trajectory.scale_sigma
-    return max(trajectory.scale_sigma, trajectory.distance_sigma_mm / farthest_mm)
+    own_mm2 = trajectory.distance_sigma_mm**2 - trajectory.cut_sigma_mm**2
+    return max(trajectory.scale_sigma, math.sqrt(max(own_mm2, 0.0)) / farthest_mm)
 
 
 def _of_wall(wall: Wall) -> Iterator[Number]:

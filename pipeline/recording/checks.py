@@ -105,7 +105,8 @@ class CheckedFrames:
     interlaced : bool
         Whether odd rows were taken at another time than even ones; then the even ones alone are used.
     cut : tuple of int
-        Frames whose wall does not continue that of the frames before: how far the probe went is not known.
+        First frames that may lie behind a place where the recording was cut: the wall does not continue
+        there, and how far the probe went is not known.
     """
 
     frame: Int

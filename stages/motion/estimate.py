@@ -62,8 +62,11 @@ def estimate_motion(
     points: RingPoints,
     parameters: MotionParameters,
     context: Context,
+    cut: tuple[int, ...] = (),
 ) -> Trajectory:
     """Estimate the camera's pose in every frame, with the axis of the pipe and corrections of the probe.
+
+    From the first of the frames ``cut`` on, distances are not known (`beyond_cuts`).
 
     Raises
     ------
@@ -80,6 +83,8 @@ def estimate_motion(
     joined = joined.with_scale_sigma(doubt)
     trajectory = trajectory_of(joined, recording.frames, probe, has_encoder)
     trajectory = lay_route(trajectory, joined.turn_variance, recording, probe, context)
+    grid = run.texture.grid
+    trajectory = beyond_cuts(trajectory, cut, grid.far_mm - grid.near_mm)
     events = find_events(recording.frames, trajectory, run.texture.poses, joined.slip, has_encoder)
     if run.encoder is not None:
         sigmas = probe.encoder_scale_sigma, run.encoder.sigma_mm
@@ -194,13 +199,13 @@ def _motion_of_run(
     context: Context,
 ) -> Trajectory:
     """Estimate the motion from the frames and encoder as corrected by the stage premises."""
-    motion = estimate_motion(frames.applied_to(recording), probe, rings, points, parameters, context)
-    return beyond_cuts(motion, frames.cut)
+    checked = frames.applied_to(recording)
+    return estimate_motion(checked, probe, rings, points, parameters, context, frames.cut)
 
 
 MOTION = Stage(
     "motion",
-    "55",
+    "56",
     MotionParameters,
     _motion_of_run,
     "camera pose in every frame and the pipe's axis, from texture, rings and encoder together",

@@ -92,10 +92,12 @@ def check_premises(
     keep = np.concatenate([[True], np.diff(changes.row) > 0]) & ~left_out
     withheld = withheld_frames(changes.label[keep], parameters.withhold)
     context.report("frames withheld from measurement", int(withheld.sum()), "frames")
+    # The pictures of the line between the last wall before a cut and the first behind it may lie behind it.
+    behind = recording.frames.frame[pictures.partner[found.cut] + 1]
     return CheckedFrames(
         recording.frames.frame[keep], changes.time_s[keep], changes.label[keep], factor,
         int(changes.relabelled.sum()), int(changes.retimed.sum()),
-        withheld if withheld.any() else None, seen.stays, combed, found.cut,
+        withheld if withheld.any() else None, seen.stays, combed, tuple(behind.tolist()),
     )  # fmt: skip
 
 
@@ -124,7 +126,7 @@ class _Matched:
 
     changes: Changes
     left_out: LeftOut
-    cut: tuple[int, ...]
+    cut: Int
     jumps: list[ClockJump]
     steps: Steps
     rings_mm: Float
@@ -161,7 +163,7 @@ def _matched(recording: Recording, probe: Probe, seen: _Seen) -> _Matched:
     jumps = clock_jumps(stated_s, steps, encoder)
     changes = Changes(recording.frames, label, row, without_jumps(stated_s, jumps))
     left_out = LeftOut(seen.outside, seen.astray, again & (np.diff(row, prepend=-1) > 0))
-    cut = tuple(recording.frames.frame[cuts(pictures, seen.shown, left_out.any, changes.time_s)].tolist())
+    cut = cuts(pictures, seen.shown, left_out.any, changes.time_s)
     return _Matched(changes, left_out, cut, jumps, steps, rings_mm, radius_mm, forwards)
 
 

@@ -43,13 +43,14 @@ def cuts(pictures: Pictures, shown: Int, left_out: Bool, time_s: Float) -> Int:
     return np.asarray(place[(change > _CHANGES * beside) & ~continues])
 
 
-def warn_of_cuts(cut: tuple[int, ...], pictures: Pictures, frame: Int, context: Context) -> None:
-    """Warn between which of the frames (F,) the recording was ``cut``."""
-    for k in np.flatnonzero(np.isin(frame, cut)):
+def warn_of_cuts(place: Int, pictures: Pictures, frame: Int, context: Context) -> None:
+    """Warn between which of the frames (F,) the recording was cut: before ``place`` (K,) of `cuts`."""
+    for k in place:
         context.warn(
             f"frame {frame[k]} does not continue the wall of frame {frame[pictures.partner[k]]}: the picture "
             "changes much more than in any step around, and no texture is common to both. Probably the "
             "recording was cut or paused here, or two were joined. The distance travelled in between is "
-            "unknown: distances from here on are wrong by it, which their σ includes, and laser, encoder or "
-            "pipe may seem to jump. What to do: process the two parts as separate recordings"
+            "unknown: distances from here on are wrong by it, and σ, the length of the run, is a guess; "
+            "laser, encoder or pipe may seem to jump. What to do: process the two parts as separate "
+            "recordings"
         )

@@ -37,6 +37,12 @@ def test_a_way_there_and_back_is_divided_by_its_farthest_place() -> None:
     assert scale_told(trajectory(way, 6e-5, 0.1)) == pytest.approx(5e-4)
 
 
+def test_what_is_unknown_at_a_cut_is_no_error_of_the_scale() -> None:
+    """With any cut, σ of the scale was 1."""
+    cut = replace(trajectory(np.linspace(0, 200, 50), 6e-5, np.hypot(0.1, 200.0)), cut_sigma_mm=200.0)
+    assert scale_told(cut) == pytest.approx(5e-4)
+
+
 def test_a_run_that_stood_or_was_not_adjusted_states_what_calibration_leaves() -> None:
     way = np.linspace(0, 200, 50)
     assert scale_told(trajectory(0 * way, 6e-5, 0.0)) == pytest.approx(6e-5)

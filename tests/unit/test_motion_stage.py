@@ -50,6 +50,19 @@ def steady() -> DrawnRun:
     return drawn_run(STEP * k, 0.004 * k)
 
 
+def test_the_report_holds_what_is_unknown_at_a_cut(steady: DrawnRun) -> None:
+    """It was made before, with σ of a run without cuts."""
+    told: dict[str, object] = {}
+    context = replace(quiet_context(), report=lambda name, value, unit="": told.update({name: value}))
+    run = steady
+    got = estimate_motion(run.recording, run.probe, run.rings, run.points, PARAMETERS, context, (18,))
+    assert told["1 σ of distance at the end"] == got.distance_sigma_mm
+    assert got.distance_sigma_mm > STEP * 35
+    along = np.sqrt(got.covariance[:, 2, 2])
+    assert along[17] < 1.0
+    assert along[18] > STEP * 35 - 0.1
+
+
 @pytest.mark.parametrize("encoder", [True, False])
 def test_pose_lies_within_its_sigma(steady: DrawnRun, encoder: bool) -> None:
     run = steady if encoder else without_encoder(steady)

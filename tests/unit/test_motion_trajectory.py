@@ -9,6 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from pipeline.artefacts.measured import Trajectory
+from pipeline.artefacts.motion import PipePiece
 from pipeline.geometry.axis import PipeAxis, straight_axis
 from pipeline.instrument.camera.fisheye import KannalaBrandt
 from pipeline.instrument.laser import LaserSheet
@@ -127,17 +128,32 @@ def test_rings_of_a_probe_that_jerks_deny_nothing() -> None:
         assert not SeenCentres(-T_pc[::2, :2, 3], 22.0).deny_trembling(run, number[1::2])
 
 
+def run_of(z_mm: list[float]) -> Trajectory:
+    """Return a run to these places with two pieces of pipe, each known to 0.3 mm."""
+    count = len(z_mm)
+    poses = np.tile(np.eye(4), (count, 1, 1))
+    poses[:, 2, 3] = z_mm
+    pieces = (PipePiece("straight", 0.0, 15.0, 0.3), PipePiece("straight", 15.0, 30.0, 0.3))
+    return Trajectory(
+        np.arange(count), np.arange(count) / 30, poses, np.tile(0.01 * np.eye(6), (count, 1, 1)),
+        straight_axis(-50.0, 150.0), 50.0, 1.0, 0.001, 0.0005, (), distance_sigma_mm=0.1, pieces=pieces,
+    )  # fmt: skip
+
+
 @pytest.mark.parametrize("cut", [(), (2,), (2, 3)])
 def test_distances_beyond_a_cut_are_as_unsure_as_the_run_is_long(cut: tuple[int, ...]) -> None:
     """Where ten pictures were stored ten too late, distances erred by 73 of their σ."""
-    poses = np.tile(np.eye(4), (4, 1, 1))
-    poses[:, 2, 3] = 10.0 * np.arange(4)
-    plain = Trajectory(
-        np.arange(4), np.arange(4) / 30, poses, np.tile(0.01 * np.eye(6), (4, 1, 1)),
-        straight_axis(-50.0, 150.0), 50.0, 1.0, 0.001, 0.0005, (), distance_sigma_mm=0.1,
-    )  # fmt: skip
-    found = beyond_cuts(plain, cut)
+    found = beyond_cuts(run_of([0.0, 10.0, 20.0, 30.0]), cut, 20.0)
     behind = bool(cut) * (np.arange(4) >= 2)
     np.testing.assert_allclose(found.covariance[:, 2, 2], 0.01 + 900.0 * behind)
     np.testing.assert_allclose(found.covariance[:, [0, 1, 5], [0, 1, 5]], 0.01)
     assert found.distance_sigma_mm == pytest.approx(30.0 if cut else 0.1, rel=1e-4)
+    assert found.cut_sigma_mm == (30.0 if cut else 0.0)
+    assert [p.sigma_mm for p in found.pieces] == pytest.approx([0.3, 30.0 if cut else 0.3], rel=1e-4)
+
+
+def test_a_probe_that_stood_went_at_a_cut_at_least_as_far_as_a_picture_shows() -> None:
+    """Its run has no length, so that σ was 0 beyond the cut."""
+    found = beyond_cuts(run_of([5.0, 5.0, 5.0, 5.0]), (2,), 20.0)
+    np.testing.assert_allclose(np.sqrt(found.covariance[:, 2, 2]), [0.1, 0.1, 20.0, 20.0], rtol=1e-4)
+    assert found.distance_sigma_mm == pytest.approx(20.0, rel=1e-4)
