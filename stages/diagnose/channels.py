@@ -277,8 +277,8 @@ FREE_MOTION = Stage(
     "free_motion", "2", MotionParameters, adjust_freely, "an inspection's motion without encoder", "motion"
 )
 GAUGE_EVIDENCE = Stage(
-    "evidence", "48", DiagnosisParameters, examine_gauge, "what a gauge run shows of effects", "diagnosis"
+    "evidence", "49", DiagnosisParameters, examine_gauge, "what a gauge run shows of effects", "diagnosis"
 )
 FIELD_EVIDENCE = Stage(
-    "evidence", "25", DiagnosisParameters, examine_field, "what an inspection shows of effects", "diagnosis"
+    "evidence", "26", DiagnosisParameters, examine_field, "what an inspection shows of effects", "diagnosis"
 )

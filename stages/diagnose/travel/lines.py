@@ -27,10 +27,9 @@ _TRIALS = 40
 # Below this frequency the drift of a towed probe itself contains spectral lines. Debt: data/debts.md.
 SLOWEST_HZ = 1.5
 _WANDER_HZ = 1.2
+# A probe rolls more slowly (chosen): once in 3 s.
+_ROLL_HZ = 0.3
 LEAST_SAMPLES = 48
-# A difference between lit and laser pictures makes lines of its own where the rhythm of the lights has more
-# than this share of its strongest line (chosen): a probe's stated error may shift one kind against the other.
-_OF_RHYTHM = 0.1
 
 
 def shows_apart(time_s: Float, frequency: float) -> bool:
@@ -41,29 +40,41 @@ def shows_apart(time_s: Float, frequency: float) -> bool:
 
 
 def amplitudes(
-    time_s: Float, xy_mm: Float, frequency: float, start_s: float | None = None
+    time_s: Float, xy_mm: Float, lit: Bool, frequency: float, start_s: float | None = None
 ) -> tuple[Float, float]:
-    """Return amplitudes (2, 2) along x and y of sine and cosine, mm, beside slow drift, and their 1 σ.
+    """Return amplitudes (2, 2) along x and y of sine and cosine, mm, beside `_slow` changes, and their 1 σ.
 
-    Phases count from ``start_s``, or else from the first picture.
+    Phases count from ``start_s``, or else from the first picture. σ is that of the less certain phase: it is
+    huge where the slow changes can take the oscillation's place.
     """
     t = time_s - (time_s[0] if start_s is None else start_s)
-    line = [np.sin(2 * np.pi * frequency * t), np.cos(2 * np.pi * frequency * t)]
-    design = np.concatenate([np.stack(line, 1), wander(time_s)], 1)
+    line = np.stack([np.sin(2 * np.pi * frequency * t), np.cos(2 * np.pi * frequency * t)], 1)
+    slow = _slow(time_s, lit)
+    free = len(t) - slow.shape[1] - line.shape[1]
     # Chosen: with fewer pictures, too few degrees of freedom are left for a σ.
-    if len(t) < 1.3 * design.shape[1]:
+    if free < 0.3 * (len(t) - free):
         return np.full((2, 2), np.nan), float("nan")
-    solution = np.linalg.lstsq(design, xy_mm, rcond=1e-6)[0]
-    left = xy_mm - design @ solution
-    noise = float(np.sqrt(np.mean(left**2) * len(t) / (len(t) - design.shape[1])))
-    return np.asarray(solution[:2].T), noise * float(np.sqrt(2 / len(t)))
+    line, xy_mm = (x - slow @ np.linalg.lstsq(slow, x, rcond=1e-6)[0] for x in (line, xy_mm))
+    solution, _, _, strength = np.linalg.lstsq(line, xy_mm, rcond=1e-6)
+    noise = float(np.sqrt(np.sum((xy_mm - line @ solution) ** 2) / (xy_mm.shape[1] * free)))
+    return np.asarray(solution.T), noise / max(float(strength[-1]), 1e-9)
 
 
-def wander(time_s: Float) -> Float:
-    """Return columns (N, K) for whatever changes more slowly than the lines."""
+def _slow(time_s: Float, lit: Bool) -> Float:
+    """Return columns (N, K) for all that is no line: the probe's `wander`, and lit pictures that lie aside.
+
+    An error of the stated probe may shift lit and laser pictures against each other, and turns with the roll.
+    """
+    if lit.all() or not lit.any():
+        return wander(time_s)
+    return np.concatenate([wander(time_s), lit[:, None] * wander(time_s, _ROLL_HZ)], 1)
+
+
+def wander(time_s: Float, fastest_hz: float = _WANDER_HZ) -> Float:
+    """Return columns (N, K) for whatever changes more slowly than ``fastest_hz``."""
     span = float(time_s[-1] - time_s[0])
     t = time_s - time_s[0]
-    phase = np.pi / span * np.arange(1, int(2 * span * _WANDER_HZ) + 1) * t[:, None]
+    phase = np.pi / span * np.arange(1, int(2 * span * fastest_hz) + 1) * t[:, None]
     return np.concatenate([np.stack([np.ones_like(t), t / span], 1), np.cos(phase), np.sin(phase)], 1)
 
 
@@ -74,17 +85,17 @@ def swing_agreements(time_s: Float, xy_mm: Float, lit: Bool, frequency_hz: float
         (("first half of the pictures", early), ("second half of the pictures", ~early)),
         (("pictures of the lit wall", lit), ("pictures of the laser's ring alone", ~lit)),
     )
-    found = [[_part(time_s, xy_mm, frequency_hz, *p) for p in pair] for pair in pairs]
+    found = [[_part(time_s, xy_mm, lit, frequency_hz, *p) for p in pair] for pair in pairs]
     each = [agreement(a, b) for a, b in found if a is not None and b is not None]
     return tuple(a for a in each if a is not None)
 
 
-def _part(time_s: Float, xy_mm: Float, frequency_hz: float, where: str, use: Bool) -> Part | None:
+def _part(time_s: Float, xy_mm: Float, lit: Bool, frequency_hz: float, where: str, use: Bool) -> Part | None:
     """Return the oscillation in these pictures; None if they show none."""
     t = time_s[use]
     if use.sum() < LEAST_SAMPLES / 2 or not shows_apart(t, frequency_hz):
         return None
-    both, sigma = amplitudes(t, xy_mm[use], frequency_hz, float(time_s[0]))
+    both, sigma = amplitudes(t, xy_mm[use], lit[use], frequency_hz, float(time_s[0]))
     if not np.isfinite(sigma):
         return None
     size = float(np.linalg.norm(both, 2))
@@ -166,13 +177,13 @@ def find_lines(time_s: Float, xy_mm: Float, lit: Bool, shown: Bool | None = None
 
 
 def _strongest(time_s: Float, xy_mm: Float, lit: Bool) -> tuple[float, float] | None:
-    """Return frequency and p-value of the largest significant line that is none of the lights' rhythm."""
+    """Return frequency and p-value of the largest significant line."""
     rate = 1 / float(np.median(np.diff(time_s)))
     even = time_s[0] + np.arange(int(np.round((time_s[-1] - time_s[0]) * rate)) + 1) / rate
-    series = np.stack([np.interp(even, time_s, xy_mm[:, k]) for k in range(2)], 1)
-    slow = wander(even)
-    centred = series - slow @ np.linalg.lstsq(slow, series, rcond=1e-6)[0]
-    count = len(series)
+    slow = _slow(time_s, lit)
+    left = xy_mm - slow @ np.linalg.lstsq(slow, xy_mm, rcond=1e-6)[0]
+    centred = np.stack([np.interp(even, time_s, left[:, k]) for k in range(2)], 1)
+    count = len(centred)
     tapers = dpss(count, _BANDWIDTH, _TAPERS)
     size = _PADDING * count
     spectrum = np.fft.rfft(tapers[:, :, None] * centred, size, axis=1)
@@ -183,7 +194,6 @@ def _strongest(time_s: Float, xy_mm: Float, lit: Bool) -> tuple[float, float] | 
     power = np.sum(area**2) * np.sum(np.abs(mean) ** 2, 1)
     ratio = (_TAPERS - 1) * power / np.maximum(rest, 1e-30)
     band = (frequency > SLOWEST_HZ) & (frequency < rate / 2 - _BANDWIDTH / count * rate)
-    band &= ~_is_rhythm(np.interp(even, time_s, lit), tapers[0], size)
     floor = np.median(np.sqrt(power[band])) if band.any() else np.inf
     ratio = np.where(band & (np.sqrt(power) > _ABOVE_FLOOR * floor), ratio, 0.0)
     chance = np.minimum(fisher.sf(ratio, 4, 4 * (_TAPERS - 1)) * count, 1.0)
@@ -194,37 +204,35 @@ def _strongest(time_s: Float, xy_mm: Float, lit: Bool) -> tuple[float, float] | 
     return float(frequency[best]), float(chance[best])
 
 
-def _is_rhythm(lit: Float, taper: Float, size: int) -> Bool:
-    """Return at which frequencies of a spectrum of ``size`` the light (N,), lit 1 and laser 0, has lines."""
-    strength = np.abs(np.fft.rfft(taper * (lit - lit.mean()), size))
-    return np.asarray(strength > _OF_RHYTHM * max(float(strength.max()), 1e-9))
-
-
 def _measured(time_s: Float, xy_mm: Float, lit: Bool, frequency: float, p_value: float) -> Line:
     laser_only = ~lit
-    frequency = _refined(time_s, xy_mm, frequency)
-    both, sigma = amplitudes(time_s, xy_mm, frequency)
+    frequency = _refined(time_s, xy_mm, lit, frequency)
+    both, sigma = amplitudes(time_s, xy_mm, lit, frequency)
     direction = np.linalg.svd(both)[0][:, 0] if np.any(both) else np.array([1.0, 0.0])
     shares = []
     for kind in (lit, laser_only):
         clear = kind.sum() >= LEAST_SAMPLES / 2 and shows_apart(time_s[kind], frequency)
-        shares.append(amplitudes(time_s[kind], xy_mm[kind], frequency) if clear else (both * np.nan, np.nan))
+        if clear:
+            shares.append(amplitudes(time_s[kind], xy_mm[kind], lit[kind], frequency))
+        else:
+            shares.append((both * np.nan, np.nan))
     size, span = float(np.linalg.norm(direction @ both)), float(time_s[-1] - time_s[0])
     # Error of one line in white noise, and of the search grid.
     turning = np.hypot(np.sqrt(3) / np.pi * sigma / max(size, 1e-9), 1 / _TRIALS) / span
-    one, other = (float(np.linalg.norm(direction @ s[0])) for s in shares)
+    in_lit, in_laser = (float(np.linalg.norm(direction @ s[0])) for s in shares)
     return Line(
         frequency, size, sigma,
-        float(np.degrees(np.arctan2(direction[1], direction[0]))) % 180.0, p_value, one, other,
+        float(np.degrees(np.arctan2(direction[1], direction[0]))) % 180.0, p_value, in_lit, in_laser,
         float(np.hypot(shares[0][1], shares[1][1])), float(turning),
     )  # fmt: skip
 
 
-def _refined(time_s: Float, xy_mm: Float, frequency: float) -> float:
-    """Return the frequency near ``frequency`` at which a sinusoid explains most."""
+def _refined(time_s: Float, xy_mm: Float, lit: Bool, frequency: float) -> float:
+    """Return the frequency near ``frequency`` at which a sinusoid is clearest."""
     width = 1 / (time_s[-1] - time_s[0])
     trial = frequency + width * np.linspace(-0.5, 0.5, _TRIALS + 1)
-    return float(trial[np.argmax([np.linalg.norm(amplitudes(time_s, xy_mm, f)[0]) for f in trial])])
+    each = (amplitudes(time_s, xy_mm, lit, f) for f in trial)
+    return float(trial[np.argmax([np.linalg.norm(both) / sigma for both, sigma in each])])
 
 
 def _without(time_s: Float, xy_mm: Float, lit: Bool, line: Line) -> Float:
@@ -232,7 +240,7 @@ def _without(time_s: Float, xy_mm: Float, lit: Bool, line: Line) -> Float:
     out = xy_mm.copy()
     whole = np.ones(len(time_s), bool)
     for kind in (lit, ~lit) if np.isfinite(line.share_sigma_mm) else (whole,):
-        swing = amplitudes(time_s[kind], xy_mm[kind], line.frequency_hz)[0]
+        swing = amplitudes(time_s[kind], xy_mm[kind], lit[kind], line.frequency_hz)[0]
         phase = 2 * np.pi * line.frequency_hz * (time_s[kind] - time_s[kind][0])
         out[kind] -= np.stack([np.sin(phase), np.cos(phase)], 1) @ swing.T
     return out
