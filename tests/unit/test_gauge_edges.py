@@ -78,6 +78,25 @@ def test_edge_beside_overexposed_white_is_left_out_as_it_seems_to_lie_further_in
         assert np.abs(outside).mean() < 0.1
 
 
+@pytest.mark.parametrize(
+    ("clipped_at", "brightest", "level"),
+    [(235, 500.0, 235), (240, 500.0, 240), (245, 300.0, 245), (255, 500.0, 255), (255, 243.0, 255)],
+)
+def test_pictures_that_are_clipped_below_the_white_of_their_range_are_seen_to_be(
+    clipped_at: int, brightest: float, level: int
+) -> None:
+    """A camera whose white ends at 240 passed as not overexposed, and its edges moved inward."""
+    random, along = np.random.default_rng(2), np.linspace(-1.5, 1.5, 300)
+    images = [
+        np.clip(np.exp(-(along**2)) * brightest + random.normal(0, 1.5, (200, 300)), 0, clipped_at)
+        for _ in range(9)
+    ]
+    grey = [np.clip(i + random.normal(0, 1.0, i.shape), 0, 255).astype(np.uint8) for i in images]
+    shown = {"grey": grey, "bgr": [np.repeat(g[..., None], 3, -1) for g in grey]}
+    recording = SimpleNamespace(read=lambda frames, kind: [(int(k), shown[kind][k]) for k in frames])
+    assert _brightest_grey(recording, np.arange(9)) == pytest.approx(level, abs=1)
+
+
 def test_overexposed_edges_are_told() -> None:
     said: list[str] = []
     context = replace(quiet_context(), warn=said.append)

@@ -21,7 +21,7 @@ from pipeline.recording.checks import CheckedFrames
 from pipeline.recording.images import WHITE, luma_of_white
 from stages.calibrate.gauge import premises
 from stages.calibrate.gauge.adjust import Measurements
-from stages.calibrate.gauge.edges import Edges, Sighting, find_fiducials, joined, measure_edges
+from stages.calibrate.gauge.edges import Edges, Sighting, clip_level, find_fiducials, joined, measure_edges
 from stages.calibrate.gauge.geometry import BoreRings, Gauge
 from stages.calibrate.gauge.poses import (
     PosedFrames,
@@ -36,6 +36,9 @@ from stages.calibrate.gauge.solve import Finding, RingSource, first_unknowns, so
 from stages.calibrate.gauge.state import GaugeParameters, Unknowns
 
 __all__ = ["GAUGE", "GaugeCalibration", "GaugeParameters", "calibrate_gauge", "require_gauge"]
+
+# Chosen: so many pictures show at which grey level all of them are clipped.
+_LOOKED_AT = 6
 
 
 @dataclass(frozen=True)
@@ -178,10 +181,14 @@ def _edges(
 
 
 def _brightest_grey(recording: Recording, frames: Int) -> int:
-    """Return the luma of white, as the first of the ``frames`` that can be read tells it; 255 if none can."""
-    both = zip(recording.read(frames, "grey"), recording.read(frames, "bgr"), strict=True)
-    read = ((grey, bgr) for (_, grey), (_, bgr) in both if grey is not None and bgr is not None)
-    return next((luma_of_white(grey, bgr) for grey, bgr in read), WHITE)
+    """Return the grey level at which pictures are clipped, from a few of the ``frames`` that can be read.
+
+    The first of them tells the luma of white.
+    """
+    few = frames[:: max(len(frames) // _LOOKED_AT, 1)]
+    both = zip(recording.read(few, "grey"), recording.read(few, "bgr"), strict=True)
+    seen = [(grey.copy(), bgr) for (_, grey), (_, bgr) in both if grey is not None and bgr is not None]
+    return clip_level((grey for grey, _ in seen), luma_of_white(*seen[0])) if seen else WHITE
 
 
 def _require_bores(
@@ -213,5 +220,5 @@ def _calibrate_run(
 
 
 GAUGE = Stage(
-    "gauge", "7", GaugeParameters, _calibrate_run, "fiducials and rings on known bore to camera and sheet"
+    "gauge", "8", GaugeParameters, _calibrate_run, "fiducials and rings on known bore to camera and sheet"
 )

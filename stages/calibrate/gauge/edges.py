@@ -31,6 +31,10 @@ _SPAN = 0.7
 _LEAST_STEP_GREY, _INSIDE, _MOST_NOISE, _BLUR_PX = 8.0, 0.6, 0.12, (0.3, 2.5)
 # White counts as overexposed so few grey levels below the brightest, of which compression takes a few off.
 _BELOW_WHITE_GREY = 5
+# Pictures are clipped below the range's white where so many times more pixels lie within 5 levels of the
+# commonest bright one than in as many below (chosen: a ridge of light on a wall has 2.4 times), of
+# this share of all, and hardly any above. Below 230, the clip of limited range, bright wall is no clip.
+_PILED, _LEAST_SHARE, _ABOVE_PILE, _DARKEST_CLIP = 4.0, 1e-4, 0.05, 230
 # Least σ, and the part of the border over which a profile reaches. Debt: data/debts.md.
 _LEAST_SIGMA_PX, _OF_BORDER = 0.03, 0.85
 # Markers are drawn in cells; the outermost is black all round.
@@ -128,6 +132,19 @@ def joined(parts: list[Edges]) -> Edges:
     return Edges(**{k: np.concatenate([getattr(p, k) for p in parts]) for k in vars(parts[0])})
 
 
+def clip_level(images: Iterable[Image], white: int) -> int:
+    """Return the grey level at which images are clipped: ``white``, or below it where pixels pile up there.
+
+    Some cameras clip below the white that their video's range allows, or state another range.
+    """
+    count = sum((np.bincount(image.ravel(), minlength=256) for image in images), np.zeros(256, np.int64))
+    level = _DARKEST_CLIP + int(np.argmax(count[_DARKEST_CLIP:]))
+    low, high = level - _BELOW_WHITE_GREY, level + _BELOW_WHITE_GREY + 1
+    pile, above, below = count[low:high].sum(), count[high:].sum(), count[2 * low - high : low].sum()
+    piled = pile > max(_PILED * below, _LEAST_SHARE * count.sum()) and above < _ABOVE_PILE * pile
+    return min(white, level) if piled else white
+
+
 def measure_edges(
     image: Image,
     index: int,
@@ -140,7 +157,7 @@ def measure_edges(
 ) -> tuple[Edges, int]:
     """Measure the borders of fiducials (M,) in an image of the frame ``index``, near where they should be.
 
-    ``white`` is the brightest grey level that the video's range allows.
+    ``white`` is the grey level at which pictures are clipped: see `clip_level`.
 
     Also return the number of edges left out because the white beside them is overexposed: its blur is cut
     off at the brightest level, so that the edge seems to lie inside the black square.
