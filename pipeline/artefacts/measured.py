@@ -56,6 +56,9 @@ class RingSamples:
         Distance by which samples were moved inward because dirt on the window displaces the line there
         equally in all rings, 0 elsewhere; None if nothing was moved. Only a probe that rolls distinguishes
         this from a groove.
+    shared_px : (A,) float32 or None
+        1 σ of an error that all rings share at an azimuth, which is also part of ``sigma_px``; None without
+        any.
     """
 
     frame: Int
@@ -67,6 +70,7 @@ class RingSamples:
     amplitude: Float32
     validity: Byte
     moved_px: Float32 | None = None
+    shared_px: Float32 | None = None
 
     @property
     def valid(self) -> Bool:

@@ -1,11 +1,11 @@
-"""Uncertainty of the wall, and warnings, from ring samples that were moved back behind dirt on the window."""
+"""Uncertainty of the wall from errors that rings share, and warnings of samples behind dirt on the window."""
 
 from __future__ import annotations
 
 import numpy as np
 from scipy.ndimage import maximum_filter
 
-from pipeline.arrays import Float32
+from pipeline.arrays import Float32, Int
 from pipeline.artefacts.measured import RingSamples
 from pipeline.machine.scratch import Scratch
 from pipeline.machine.stage import Context
@@ -31,27 +31,38 @@ def warn_of_left_out(rings: RingSamples, kept: RingSamples, context: Context) ->
 
 
 def shared_on_wall(rings: RingsOnWall, grid: MapGrid, gap_mm: float, scratch: Scratch) -> Float32 | None:
-    """Return by how much the wall (S, A) was moved, mm without sign; None if nothing was moved.
+    """Return the error (S, A), mm without sign, that all rings share; None if they share none.
 
-    All rings share this error, so that it is added to the map's σ without averaging. A cell takes the largest
-    of the samples within a column and ``gap_mm`` along the pipe, because the map bridges as much.
+    It is by how much the wall was moved behind dirt, or what is left of a line drawn to rows or columns, and
+    is added to the map's σ without averaging. A cell takes the largest of the samples within a column and
+    ``gap_mm`` along the pipe, because the map bridges as much.
     """
-    moved_px = rings.rings.moved_px
-    if moved_px is None:
+    if rings.rings.moved_px is None and rings.rings.shared_px is None:
         return None
     step = grid.distance_mm[1] - grid.distance_mm[0]
     shared = scratch.zeros((len(grid.distance_mm), len(grid.azimuth_rad)), np.float32)
-    for rows in some_at_a_time(np.flatnonzero(moved_px.any(1))):
+    for rows in some_at_a_time(np.arange(len(rings.rings.sigma_px))):
+        if not (shared_px := _shared_px(rings.rings, rows)).any():
+            continue
         samples = rings.samples(rows)
-        of = samples.valid & (moved_px[rows] != 0)
+        of = samples.valid & (shared_px != 0)
         per_px = samples.sigma_mm[of] / rings.rings.sigma_px[rows][of]
-        size = np.abs(moved_px[rows][of]) * per_px
+        size = shared_px[of] * per_px
         row = np.rint((samples.distance_mm[of] - grid.distance_mm[0]) / step).astype(np.int64)
         column = np.rint((samples.azimuth_rad[of] + np.pi) / (2 * np.pi) * shared.shape[1]).astype(np.int64)
         on_map = (row >= 0) & (row < len(shared))
         cell = row[on_map], column[on_map] % shared.shape[1]
         np.maximum.at(shared, cell, size[on_map].astype(np.float32))
     return _widened(shared, int(np.ceil(gap_mm / step)), scratch)
+
+
+def _shared_px(rings: RingSamples, rows: Int) -> Float32:
+    """Return the error (n, A), px without sign, that some rings share with all others."""
+    shared = np.zeros(rings.sigma_px[rows].shape, np.float32)
+    for part in (None if rings.moved_px is None else rings.moved_px[rows], rings.shared_px):
+        if part is not None:
+            shared = np.hypot(shared, part)
+    return shared
 
 
 def _widened(size_mm: Float32, rows: int, scratch: Scratch) -> Float32:

@@ -97,7 +97,7 @@ def extract_rings(
         samples = set_right(samples, parameters.left_out, context)
     _compare_rings(samples)
     lattices = lattices_of(samples)
-    take_out(lattices, samples)
+    samples = take_out(lattices, samples)
     warn_of_lattices(lattices, context)
     wander = wander_of(_some(samples))
     typical = _typical(samples, wander)

@@ -8,7 +8,7 @@ does, because the wall has no relation to the picture's rows.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.fft import rfft, rfftfreq
@@ -111,17 +111,22 @@ def lattices_of(samples: RingSamples) -> tuple[Lattice, ...]:
     return tuple(found)
 
 
-def take_out(lattices: tuple[Lattice, ...], samples: RingSamples) -> None:
+def take_out(lattices: tuple[Lattice, ...], samples: RingSamples) -> RingSamples:
     """Subtract the repeating errors from the radii of all rings, in place, some rings at a time.
 
-    Their σ includes the part that cannot be removed.
+    Their σ includes the part that cannot be removed. Rings that lie at the same place of the picture share
+    it, so that the returned rings hand it on as shared; neighbouring azimuths share it in part, which σ of
+    means over azimuths does not include.
     """
-    for first in range(0, len(samples.frame) if lattices else 0, _RINGS):
+    if not lattices:
+        return samples
+    left = np.linalg.norm([each.left_px(samples) for each in lattices], axis=0).astype(np.float32)
+    for first in range(0, len(samples.frame), _RINGS):
         rings = slice(first, first + _RINGS)
         for each in lattices:
             samples.radius_px[rings] -= each.error_px(samples, rings).astype(np.float32)
-            left = each.left_px(samples).astype(np.float32)
-            samples.sigma_px[rings] = np.hypot(samples.sigma_px[rings], left)
+        samples.sigma_px[rings] = np.hypot(samples.sigma_px[rings], left)
+    return replace(samples, shared_px=left)
 
 
 def warn_of_lattices(lattices: tuple[Lattice, ...], context: Context) -> None:

@@ -59,9 +59,11 @@ def put_right(run: Trajectory, wall=round_wall, rim_px: float = 0.0) -> RingSamp
     return set_right(rings, (place,), quiet_context())
 
 
-def measured(roll_rad: float, wall=round_wall, rim_px: float = 0.0) -> Wall:
+def measured(roll_rad: float, wall=round_wall, rim_px: float = 0.0, shared_px: float | None = None) -> Wall:
     run, probe = motion(roll_rad), replace(small_probe(), covariance=np.zeros((20, 20)))
     rings = put_right(run, wall, rim_px)
+    if shared_px is not None:
+        rings = replace(rings, shared_px=(shared_px * near(rings.azimuth_rad)).astype(np.float32))
     points = triangulate_rings(rings, probe, TriangulateParameters(), quiet_context())
     chosen = AccumulateParameters(azimuth_samples=AZIMUTHS)
     return accumulate_wall(probe, rings, points, run, chosen, quiet_context())
@@ -96,6 +98,15 @@ def test_with_roll_the_wall_behind_the_rim_of_a_drop_is_known_with_the_whole_mov
     assert np.nanmedian(moved.radius_map.sigma_mm) < 1.1 * np.nanmedian(clean)
 
 
+def test_what_is_left_of_a_line_drawn_to_rows_does_not_average_out_over_rings() -> None:
+    """It was only in σ of each ring, and shrank in their mean."""
+    _, sigma = behind(measured(0.0, shared_px=RIM_PX), 0.0)
+    assert sigma.min() > RIM_MM
+    assert sigma.max() < 1.2 * RIM_MM
+    _, elsewhere = behind(measured(0.0), 0.0)
+    assert elsewhere.max() < 0.2 * RIM_MM
+
+
 @pytest.mark.parametrize("roll_rad", [0.0, ROLL])
 def test_points_of_the_wall_are_those_of_the_rings_kept_by_roll(roll_rad: float) -> None:
     """Where they are not as many, the defects stage cannot tell how bright the line was at a finding."""
@@ -105,13 +116,15 @@ def test_points_of_the_wall_are_those_of_the_rings_kept_by_roll(roll_rad: float)
     np.testing.assert_array_equal(points, told.valid.sum(1))
 
 
-def shared(distance_mm: Float, rows: int, columns: int) -> Float:
-    """Return what is shared on a map of rows of 1 mm, with samples moved by 1 mm at azimuth −π."""
+def shared(distance_mm: Float, rows: int, columns: int, by_dirt: bool = True) -> Float:
+    """Return what is shared on a map of rows of 1 mm, with an error of 1 mm of samples at azimuth −π."""
     sample = distance_mm[:, None]
     one = np.ones_like(sample)
     samples = SimpleNamespace(valid=one > 0, distance_mm=sample, azimuth_rad=-np.pi * one, sigma_mm=0.1 * one)
     rings = SimpleNamespace(
-        rings=SimpleNamespace(moved_px=one, sigma_px=0.1 * one),
+        rings=SimpleNamespace(
+            moved_px=one if by_dirt else None, shared_px=None if by_dirt else one[0], sigma_px=0.1 * one
+        ),
         samples=lambda which: SimpleNamespace(**{k: v[which] for k, v in vars(samples).items()}),
     )
     grid = MapGrid(np.arange(float(rows)), 2 * np.pi * np.arange(columns) / columns - np.pi)
@@ -120,9 +133,10 @@ def shared(distance_mm: Float, rows: int, columns: int) -> Float:
     return got
 
 
-def test_what_is_shared_reaches_as_far_everywhere_and_not_from_beyond_the_map() -> None:
+@pytest.mark.parametrize("by_dirt", [True, False])
+def test_what_is_shared_reaches_as_far_everywhere_and_not_from_beyond_the_map(by_dirt: bool) -> None:
     """A sample beyond the map was taken for one on its first or last row."""
-    got = shared(np.array([-40.0, 0.0, 508.0, 512.0, 515.0, 1500.0]), 1200, 8)
+    got = shared(np.array([-40.0, 0.0, 508.0, 512.0, 515.0, 1500.0]), 1200, 8, by_dirt)
     row, column = np.nonzero(got)
     assert np.unique(column).tolist() == [0, 1, 7]
     assert np.unique(row).tolist() == [0, 1, 2, 3, *range(505, 519)]
