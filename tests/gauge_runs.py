@@ -82,17 +82,19 @@ def facts() -> PipeFacts:
     return PipeFacts(101.6, None, bore, 0.01, fiducials)
 
 
-def made_run(seed: int, frames: int = 120) -> GaugeRun:
-    """Return a run of a probe whose camera is drawn as stated and whose sheet is drawn wider than stated."""
+def made_run(seed: int, frames: int = 120, misdrawn_mm: float = 0.0) -> GaugeRun:
+    """Return a run of a probe whose camera is drawn as stated and whose sheet is drawn wider than stated.
+
+    The radius of the second of three bores is ``misdrawn_mm`` larger than stated.
+    """
     random = np.random.default_rng(seed)
     stated = stated_probe()
     draw = random.multivariate_normal(stated.parameters, stated.covariance)
     draw[8:12] = stated.parameters[8:12] + random.normal(size=4) * [0.3, 0.005, 0.005, 0.003]
     true = stated.with_parameters(draw, stated.covariance)
     gauge = gauge_of(facts(), facts().fiducials)
-    gauge_as_made = Gauge(
-        gauge.start_mm, gauge.radius_mm + random.normal(0, gauge.radius_sigma_mm, 3), 0.0, gauge.fiducials
-    )
+    radius_mm = gauge.radius_mm + random.normal(0, gauge.radius_sigma_mm, 3) + [0, misdrawn_mm, 0]
+    gauge_as_made = Gauge(gauge.start_mm, radius_mm, 0.0, gauge.fiducials)
     T_pc = driven(frames, random)
     time = np.arange(frames) / 30.0
     lit = np.arange(frames) % 4 == 3

@@ -58,7 +58,8 @@ class GaugeRun:
         Line width at the ring bins.
     time_s : (N,)
     encoder : Encoder or None
-    bore_sigma_mm : float
+    bore_sigma_mm : float or (B,)
+        1 σ of the bores' radii; of all, or of each.
     motion_sigma : (N − 3, 6)
         1 σ of each of the poses' third differences.
     edge_weight, ring_weight : (E,), (R,)
@@ -72,7 +73,7 @@ class GaugeRun:
     width_px: Float
     time_s: Float
     encoder: Encoder | None
-    bore_sigma_mm: float
+    bore_sigma_mm: float | Float
     motion_sigma: Float
     edge_weight: Float
     ring_weight: Float

@@ -30,7 +30,7 @@ _REFITTED = 4
 _OTHER_COURSES = 2
 MOST_EFFECTS = 6
 _WORTH_REFITTING = 0.1
-_LEAST_GAIN = 20.0
+LEAST_GAIN = 20.0
 _RIVAL_ITERATIONS = 5
 # Rivals whose χ² is worse by more than this are not considered; number and rounds of recomputed weights.
 # Debt: data/debts.md.
@@ -245,7 +245,7 @@ def _is_needed(better: Fit, found: Fit, scores: Sequence[Scored]) -> bool:
     *others, last = [shift_px(better, t) for t in better.terms]
     large = not others or last > LEAST_SHARE * max(others)
     gain = found.cost - better.cost
-    return len(better.terms) <= MOST_EFFECTS and large and gain > _LEAST_GAIN * alike(scores)
+    return len(better.terms) <= MOST_EFFECTS and large and gain > LEAST_GAIN * alike(scores)
 
 
 def _in_own_units(state: Unknowns) -> Unknowns:

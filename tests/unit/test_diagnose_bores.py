@@ -1,0 +1,56 @@
+"""A gauge with a bore that is not as drawn: it is told, and no effect of the instrument is."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pipeline.errors import UnusableError
+from stages.calibrate.gauge import MeasuredRun
+from stages.diagnose.effects.library import LIBRARY
+from stages.diagnose.gauge import examine as examination
+from stages.diagnose.gauge.bores import misdrawn_bore
+from stages.diagnose.gauge.fit import fit, fit_beside
+from stages.diagnose.gauge.search import Search, prepare
+from tests.gauge_runs import GaugeRun, made_run, measured_run
+
+_FEW = {"baseline": LIBRARY["baseline"]}
+
+
+def exact(misdrawn_mm: float) -> GaugeRun:
+    """Return a run whose probe is as stated."""
+    made = made_run(1, 40, misdrawn_mm)
+    return replace(made, stated=made.true)
+
+
+def searched(measured: MeasuredRun, with_baseline: bool) -> Search:
+    run, start = prepare(measured)
+    nothing = fit(run, start, ())
+    found = fit_beside(nothing, LIBRARY["baseline"], ()) if with_baseline else nothing
+    return Search(run, nothing, found, (), (), 1e-9, 1.0)
+
+
+def test_a_bore_of_another_diameter_is_told_instead_of_an_effect(monkeypatch: pytest.MonkeyPatch) -> None:
+    # Steps, which find it in practice, take long to search: whatever is found counts instead.
+    monkeypatch.setattr(examination, "DETECTED", 1.0)
+    given = exact(-0.2)
+    with pytest.raises(UnusableError, match=r"a bore of 83\.6. mm where recording\.yaml says 84 mm"):
+        examination.examine(measured_run(given), _FEW, given.stated, courses=())
+
+
+def test_the_error_of_a_bore_is_that_drawn() -> None:
+    bore = misdrawn_bore(searched(measured_run(exact(-0.06)), with_baseline=True))
+    assert bore is not None
+    assert bore.section == 1
+    assert bore.error_mm == pytest.approx(-0.06, abs=0.012)
+
+
+@pytest.mark.parametrize("as_stated", [True, False])
+def test_no_bore_is_blamed_in_a_gauge_as_drawn(as_stated: bool) -> None:
+    made = made_run(1, 40)
+    off = np.where(np.array(made.true.parameter_names) == "baseline_mm", 0.1, 0.0)
+    other = made.true.with_parameters(made.true.parameters + off, made.true.covariance)
+    given = replace(made, stated=made.true if as_stated else other)
+    assert misdrawn_bore(searched(measured_run(given), with_baseline=not as_stated)) is None
