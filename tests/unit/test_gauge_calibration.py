@@ -171,19 +171,28 @@ def _with_fiducials(gauge: Gauge, **changes: object) -> Gauge:
 
 def test_fiducials_of_another_size_are_refused(run: GaugeRun) -> None:
     larger = _with_fiducials(run.gauge, size_mm=10.0)
+    dim = replace(run.recording, source=Pictures(np.full((1200, 1600), 180, np.uint8)))
     sightings = _sightings(larger, run.gauge)
     posed = _posed(sightings, larger, run)
     with pytest.raises(UnusableError, match=r"measure (8\.9|9\.0|9\.1)\d* mm where .* says 10 mm"):
-        premises.require_poses(posed, sightings, larger, stated_probe().camera, USUAL)
+        premises.require_poses(dim, posed, sightings, larger, stated_probe().camera, USUAL)
     right = _sightings(run.gauge)
-    premises.require_poses(_posed(right, run.gauge, run), right, run.gauge, stated_probe().camera, USUAL)
+    posed = _posed(right, run.gauge, run)
+    premises.require_poses(run.recording, posed, right, run.gauge, stated_probe().camera, USUAL)
 
 
-@pytest.mark.parametrize(("moved_px", "refused"), [(0.75, False), (1.5, True)])
-def test_fiducials_whose_corners_err_by_less_than_a_pixel_are_not_of_another_size(
-    run: GaugeRun, moved_px: float, refused: bool
+@pytest.mark.parametrize(
+    ("moved_px", "grey", "refused"),
+    [(0.75, 255, False), (1.5, 255, True), (-0.75, 255, True), (0.75, 180, True)],
+)
+def test_fiducials_that_overexposed_white_makes_smaller_by_a_pixel_are_not_of_another_size(
+    run: GaugeRun, moved_px: float, grey: int, refused: bool
 ) -> None:
-    """Overexposed white made fiducials of 25 px .7 px smaller on each side: "measure 4.75 mm", not 5 mm."""
+    """Overexposed white made fiducials of 25 px .7 px smaller on each side: "measure 4.75 mm", not 5 mm.
+
+    Then as much was let pass without overexposure, and larger: 20 % of a fiducial of 10 px.
+    """
+    recording = replace(run.recording, source=Pictures(np.full((1200, 1600), grey, np.uint8)))
     small, smaller = _with_fiducials(run.gauge, size_mm=3.0), []
     for one in _sightings(small):
         inward = one.corner_px.mean(1, keepdims=True) - one.corner_px
@@ -191,7 +200,7 @@ def test_fiducials_whose_corners_err_by_less_than_a_pixel_are_not_of_another_siz
         smaller.append(replace(one, corner_px=one.corner_px + inward))
     posed = _posed(smaller, small, run)
     with pytest.raises(UnusableError, match="measure") if refused else nullcontext():
-        premises.require_poses(posed, smaller, small, stated_probe().camera, USUAL)
+        premises.require_poses(recording, posed, smaller, small, stated_probe().camera, USUAL)
 
 
 def test_mirrored_places_are_refused(run: GaugeRun) -> None:
@@ -203,7 +212,7 @@ def test_mirrored_places_are_refused(run: GaugeRun) -> None:
         [first_pose(s, mirrored, stated_probe().camera, np.random.default_rng(0)) for s in sightings],
     )  # fmt: skip
     with pytest.raises(UnusableError, match="mirrored, swapped or placed otherwise"):
-        premises.require_poses(posed, sightings, mirrored, stated_probe().camera, USUAL)
+        premises.require_poses(run.recording, posed, sightings, mirrored, stated_probe().camera, USUAL)
 
 
 def test_bores_in_the_wrong_order_are_refused(run: GaugeRun) -> None:
@@ -253,7 +262,8 @@ class Pictures:
         self.image_size = (image.shape[1], image.shape[0])
 
     def read(self, frames: Sequence[int], planes: Planes) -> Iterator[tuple[int, Image | None]]:
-        yield from ((int(f), self._image) for f in frames)
+        colours = cv2.cvtColor(self._image, cv2.COLOR_GRAY2BGR)
+        yield from ((int(f), self._image if planes == "grey" else colours) for f in frames)
 
 
 def _picture(dictionary: int, numbers: Sequence[int]) -> Image:

@@ -12,8 +12,8 @@ from scipy.special import erf
 
 from pipeline.arrays import Float, Image
 from pipeline.geometry.rigid import inverse, transform
-from stages.calibrate.gauge import _brightest_grey, premises
-from stages.calibrate.gauge.edges import fit_steps, measure_edges
+from stages.calibrate.gauge import premises
+from stages.calibrate.gauge.edges import brightest_grey, fit_steps, measure_edges
 from stages.calibrate.gauge.geometry import Gauge, gauge_of
 from tests.gauge_runs import USUAL, facts, stated_probe
 from tests.quiet import quiet_context
@@ -94,7 +94,7 @@ def test_pictures_that_are_clipped_below_the_white_of_their_range_are_seen_to_be
     grey = [np.clip(i + random.normal(0, 1.0, i.shape), 0, 255).astype(np.uint8) for i in images]
     shown = {"grey": grey, "bgr": [np.repeat(g[..., None], 3, -1) for g in grey]}
     recording = SimpleNamespace(read=lambda frames, kind: [(int(k), shown[kind][k]) for k in frames])
-    assert _brightest_grey(recording, np.arange(9)) == pytest.approx(level, abs=1)
+    assert brightest_grey(recording, np.arange(9)) == pytest.approx(level, abs=1)
 
 
 def test_overexposed_edges_are_told() -> None:
@@ -115,4 +115,4 @@ def test_no_edge_where_there_is_none_or_where_bright_comes_before_dark() -> None
 
 def test_frames_that_cannot_be_read_leave_white_at_the_end_of_the_range() -> None:
     unread = SimpleNamespace(read=lambda frames, planes: iter((int(n), None) for n in frames))
-    assert _brightest_grey(unread, np.arange(3)) == 255
+    assert brightest_grey(unread, np.arange(3)) == 255

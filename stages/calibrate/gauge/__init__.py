@@ -18,10 +18,16 @@ from pipeline.instrument.probe import Probe
 from pipeline.machine.stage import Context, Stage
 from pipeline.recording.base import Illumination, Recording
 from pipeline.recording.checks import CheckedFrames
-from pipeline.recording.images import WHITE, luma_of_white
 from stages.calibrate.gauge import premises
 from stages.calibrate.gauge.adjust import Measurements
-from stages.calibrate.gauge.edges import Edges, Sighting, clip_level, find_fiducials, joined, measure_edges
+from stages.calibrate.gauge.edges import (
+    Edges,
+    Sighting,
+    brightest_grey,
+    find_fiducials,
+    joined,
+    measure_edges,
+)
 from stages.calibrate.gauge.geometry import BoreRings, Gauge
 from stages.calibrate.gauge.poses import (
     PosedFrames,
@@ -36,9 +42,6 @@ from stages.calibrate.gauge.solve import Finding, RingSource, first_unknowns, so
 from stages.calibrate.gauge.state import GaugeParameters, Unknowns
 
 __all__ = ["GAUGE", "GaugeCalibration", "GaugeParameters", "calibrate_gauge", "require_gauge"]
-
-# Chosen: so many pictures show at which grey level all of them are clipped.
-_LOOKED_AT = 6
 
 
 @dataclass(frozen=True)
@@ -102,7 +105,7 @@ def _posed(
     premises.require_fiducials(recording, gauge, sightings, parameters)
     first = [first_pose(s, gauge, probe.camera, context.random) for s in sightings]
     posed = posed_frames(recording, sightings, first)
-    premises.require_poses(posed, sightings, gauge, probe.camera, parameters)
+    premises.require_poses(recording, posed, sightings, gauge, probe.camera, parameters)
     return posed
 
 
@@ -162,7 +165,7 @@ def _edges(
     """Measure the borders of the consistent fiducials in all posed frames; count overexposed edges."""
     parts, overexposed = [], 0
     frames = recording.frames.frame[posed.index]
-    white = _brightest_grey(recording, frames)
+    white = brightest_grey(recording, frames)
     for k, (_, image) in enumerate(recording.read(frames, "grey")):
         context.progress(len(posed.index) + k + 1, 2 * len(posed.index))
         if image is None:
@@ -178,17 +181,6 @@ def _edges(
     edges = joined(parts)
     premises.warn_of_overexposed(overexposed, len(edges.uv), context)
     return edges, overexposed
-
-
-def _brightest_grey(recording: Recording, frames: Int) -> int:
-    """Return the grey level at which pictures are clipped, from a few of the ``frames`` that can be read.
-
-    The first of them tells the luma of white.
-    """
-    few = frames[:: max(len(frames) // _LOOKED_AT, 1)]
-    both = zip(recording.read(few, "grey"), recording.read(few, "bgr"), strict=True)
-    seen = [(grey.copy(), bgr) for (_, grey), (_, bgr) in both if grey is not None and bgr is not None]
-    return clip_level((grey for grey, _ in seen), luma_of_white(*seen[0])) if seen else WHITE
 
 
 def _require_bores(

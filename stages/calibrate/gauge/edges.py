@@ -16,6 +16,8 @@ from scipy.special import erf
 from pipeline.arrays import Bool, Float, Image, Int
 from pipeline.geometry.rigid import inverse, transform
 from pipeline.instrument.camera import Camera
+from pipeline.recording.base import Recording
+from pipeline.recording.images import WHITE, luma_of_white
 from pipeline.system.parallel import in_threads
 from stages.calibrate.gauge.geometry import Gauge
 from stages.calibrate.gauge.state import GaugeParameters
@@ -30,11 +32,13 @@ _SPAN = 0.7
 # 3703 edges of open-1's gauge run are left out.
 _LEAST_STEP_GREY, _INSIDE, _MOST_NOISE, _BLUR_PX = 8.0, 0.6, 0.12, (0.3, 2.5)
 # White counts as overexposed so few grey levels below the brightest, of which compression takes a few off.
-_BELOW_WHITE_GREY = 5
+BELOW_WHITE_GREY = 5
 # Pictures are clipped below the range's white where so many times more pixels lie within 5 levels of the
 # commonest bright one than in as many below (chosen: a ridge of light on a wall has 2.4 times), of
 # this share of all, and hardly any above. Below 230, the clip of limited range, bright wall is no clip.
 _PILED, _LEAST_SHARE, _ABOVE_PILE, _DARKEST_CLIP = 4.0, 1e-4, 0.05, 230
+# Chosen: so many pictures show at which grey level all of them are clipped.
+LOOKED_AT = 6
 # Least σ, and the part of the border over which a profile reaches. Debt: data/debts.md.
 _LEAST_SIGMA_PX, _OF_BORDER = 0.03, 0.85
 # Markers are drawn in cells; the outermost is black all round.
@@ -139,10 +143,21 @@ def clip_level(images: Iterable[Image], white: int) -> int:
     """
     count = sum((np.bincount(image.ravel(), minlength=256) for image in images), np.zeros(256, np.int64))
     level = _DARKEST_CLIP + int(np.argmax(count[_DARKEST_CLIP:]))
-    low, high = level - _BELOW_WHITE_GREY, level + _BELOW_WHITE_GREY + 1
+    low, high = level - BELOW_WHITE_GREY, level + BELOW_WHITE_GREY + 1
     pile, above, below = count[low:high].sum(), count[high:].sum(), count[2 * low - high : low].sum()
     piled = pile > max(_PILED * below, _LEAST_SHARE * count.sum()) and above < _ABOVE_PILE * pile
     return min(white, level) if piled else white
+
+
+def brightest_grey(recording: Recording, frames: Int) -> int:
+    """Return the grey level at which pictures are clipped, from a few of the ``frames`` that can be read.
+
+    The first of them tells the luma of white.
+    """
+    few = frames[:: max(len(frames) // LOOKED_AT, 1)]
+    both = zip(recording.read(few, "grey"), recording.read(few, "bgr"), strict=True)
+    seen = [(grey.copy(), bgr) for (_, grey), (_, bgr) in both if grey is not None and bgr is not None]
+    return clip_level((grey for grey, _ in seen), luma_of_white(*seen[0])) if seen else WHITE
 
 
 def measure_edges(
@@ -173,7 +188,7 @@ def measure_edges(
         image, at[..., 0].astype(np.float32), at[..., 1].astype(np.float32), cv2.INTER_CUBIC
     ).astype(float)
     offset, sigma = fit_steps(t, grey)
-    overexposed = (grey >= white - _BELOW_WHITE_GREY).any(1)
+    overexposed = (grey >= white - BELOW_WHITE_GREY).any(1)
     uv = predicted.uv + offset[:, None] * predicted.normal
     measured = Edges(**(vars(predicted) | {"uv": uv, "sigma_px": sigma}))
     clear = np.isfinite(offset)
