@@ -269,7 +269,7 @@ def _of_geometry(
     }
 
 
-LINE_PROFILE = Stage("line_profile", "4", Parameters, examine_line, "what the line's light says of effects")
+LINE_PROFILE = Stage("line_profile", "5", Parameters, examine_line, "what the line's light says of effects")
 FIDUCIALS = Stage(
     "fiducials", "6", GaugeParameters, measure_fiducials, "a gauge run's rings and fiducials", "gauge"
 )

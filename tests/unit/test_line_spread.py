@@ -11,20 +11,24 @@ from scipy.stats import exponnorm
 
 from pipeline.arrays import Float
 from stages.diagnose.profile.cells import Cells, LineGeometry, fit_gaussians
-from stages.diagnose.profile.line_spread import Shape, explanations, line_spread
-from stages.diagnose.profile.naming import shape_findings
+from stages.diagnose.profile.finding import Finding
+from stages.diagnose.profile.line_spread import Fitted, Shape, explanations, line_spread
+from stages.diagnose.profile.naming import shape_findings, with_systematic
+from stages.diagnose.profile.shape import cell_skewness
 from tests.profile_lines import probe
 
 OFFSET = np.arange(-59.75, 60.0, 0.5)
 WIDTH_PX, SCALES = 1.3, (5.5, 6.5, 7.0)
 
 
-def cells(light: Callable[[Float, float], Float], seed: int = 0) -> Cells:
+def cells(
+    light: Callable[[Float, float], Float], seed: int = 0, skirt: float = 0.006, noise: float = 2e-3
+) -> Cells:
     """Three blocks at three distances to the wall, each of 72 sectors; ``light`` of px and px per mm."""
     random = np.random.default_rng(seed)
     block, sector = np.repeat(np.arange(3), 72), np.tile(np.arange(72), 3)
     profile = np.array([light(OFFSET, s) for s in SCALES])[block]
-    profile = profile + 0.006 * np.exp(-0.5 * (OFFSET / 4) ** 2) + random.normal(0, 2e-3, profile.shape)
+    profile = profile + skirt * np.exp(-0.5 * (OFFSET / 4) ** 2) + random.normal(0, noise, profile.shape)
     centre, width, peak = fit_gaussians(profile, OFFSET)
     gauss = np.exp(-0.5 * ((OFFSET - centre[:, None]) / width[:, None]) ** 2)
     ones = np.ones(len(block))
@@ -76,33 +80,85 @@ SHEET_MM, BLUR_PX = 0.2, 0.65
 
 
 def geometry_of(of: Cells) -> LineGeometry:
-    """Return the geometry of frames that all look as their block does."""
+    """Return the geometry of frames that all look as their block does; the picture is 600 px high."""
     width, scale = (np.repeat(v.reshape(3, -1), 12, axis=0) for v in (of.width_px, of.px_per_mm))
-    ones = np.ones_like(width)
+    ones, azimuth = np.ones_like(width), np.radians(np.arange(0, 360, 5.0))
     return LineGeometry(
-        of.azimuth_rad[:72], 200 * ones, width, 100 * ones, 40 * ones, ones, scale, 0 * ones, ones[:, 0] > 0
+        azimuth, 300 * place(scale), width, 100 * ones, 40 * ones, ones, scale, 0 * ones, ones[:, 0] > 0
     )
 
 
-@pytest.mark.parametrize(
-    ("sheet_mm", "tail_mm", "name", "size"),
-    [
-        (np.sqrt(SHEET_MM**2 - 0.17**2), 0.17, "line_skew", 2 * (0.17 / SHEET_MM) ** 3),
-        (SHEET_MM, 0.2, "subsurface", 0.2),
-    ],
-)
-def test_the_width_without_a_tail_tells_whether_sheet_or_wall_makes_it(
-    sheet_mm: float, tail_mm: float, name: str, size: float
-) -> None:
-    """The variance of the whole line had left both names for the tail of a skewed sheet."""
+def place(scale: Float | float) -> Float:
+    """Return where the line is seen, over half of the picture's height."""
+    return np.interp(scale, [5.5, 7.0], [0.6, 0.85])
+
+
+def line_findings(sheet_mm: float, tail_mm: float, edge_blur: float) -> list[Finding]:
+    """Return what is found of a sheet of 1 σ ``sheet_mm`` (stated: `SHEET_MM`) with an exponential tail.
+
+    The variance of the blur grows by ``edge_blur`` to the edge of the picture.
+    """
 
     def light(x: Float, scale: float) -> Float:
-        normal = float(np.hypot(BLUR_PX, sheet_mm * scale))
+        blur_px2 = BLUR_PX**2 * (1 + edge_blur * float(place(scale)) ** 2)
+        normal = float(np.sqrt(blur_px2 + (sheet_mm * scale) ** 2))
         density = exponnorm.pdf(-x, tail_mm * scale / normal, scale=normal)
         return np.asarray(density * normal * np.sqrt(2 * np.pi))
 
     of, stated = cells(light), probe()
     stated = replace(stated, laser=replace(stated.laser, line_sigma_mm=SHEET_MM))
-    (found,) = (f for f in shape_findings(of, geometry_of(of), stated) if f.found)
+    return [f for f in shape_findings(of, geometry_of(of), stated) if f.found]
+
+
+@pytest.mark.parametrize(
+    ("sheet_mm", "tail_mm", "edge_blur", "name", "size"),
+    [
+        (np.sqrt(SHEET_MM**2 - 0.17**2), 0.17, 0.0, "line_skew", 2 * (0.17 / SHEET_MM) ** 3),
+        (SHEET_MM, 0.2, 0.0, "subsurface", 0.2),
+        (SHEET_MM, 0.2, 2.0, "subsurface", 0.2),
+    ],
+)
+def test_the_width_without_a_tail_tells_whether_sheet_or_wall_makes_it(
+    sheet_mm: float, tail_mm: float, edge_blur: float, name: str, size: float
+) -> None:
+    """Blur that grows to the edge of the picture had made the width refuse both, and so given both names."""
+    (found,) = line_findings(sheet_mm, tail_mm, edge_blur)
     assert (found.effect, found.alike) == (name, ())
     assert found.sizes[0].value == pytest.approx(size, abs=2 * found.sizes[0].sigma)
+
+
+@pytest.mark.parametrize(
+    ("sheet_mm", "tail_mm", "edge_blur"),
+    [
+        (np.sqrt(SHEET_MM**2 - 0.1**2), 0.1, 1.0),
+        (0.9 * SHEET_MM, 0.1, 0.0),
+    ],
+)
+def test_a_short_tail_leaves_both_names_where_the_width_is_known_no_better(
+    sheet_mm: float, tail_mm: float, edge_blur: float
+) -> None:
+    """Growing blur had named the wall for a skewed sheet, and a narrow sheet itself for the wall."""
+    found = line_findings(sheet_mm, tail_mm, edge_blur)
+    assert [(f.effect, f.alike) for f in found] == [
+        ("line_skew", ("subsurface",)), ("subsurface", ("line_skew",)),
+    ]  # fmt: skip
+
+
+def test_a_shape_without_a_clear_size_gives_none_and_names_nothing_alone() -> None:
+    """A blurred second line .134 ± .436 mm away had named light in the wall alone, with that size."""
+    found = line_findings(SHEET_MM, 0.08, 0.0)
+    assert [(f.effect, f.alike, f.sizes) for f in found] == [
+        ("line_skew", ("subsurface",), ()), ("subsurface", ("line_skew",), ()),
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("ratio", [0.3, 1.0, 2.0, 3.0])
+def test_the_length_of_a_tail_is_as_sure_as_the_skewness_makes_it(ratio: float) -> None:
+    """A third of the relative error of the skewness holds for short tails only."""
+    skewness = []
+    for one in (0.98 * ratio, 1.02 * ratio):
+        drawn = cells(lambda x, _, t=one: exponnorm.pdf(-x, t, scale=WIDTH_PX), skirt=0.0, noise=0.0)
+        skewness.append(np.nanmean(cell_skewness(drawn)))
+    rate = np.log(1.02 / 0.98) / np.log(skewness[1] / skewness[0])
+    shape = Fitted(Shape.TAIL, 1.0, 0.2, 0.0, 0.0, 0.0, 1.0, 0.2 / ratio)
+    assert with_systematic(shape, 1.0).way_sigma_mm == pytest.approx(0.2 * rate, rel=0.1)

@@ -80,6 +80,8 @@ class Fitted:
         Share of the misfit of an ordinary line that remains.
     core : float
         Variance of the line without what the shape adds, over that of a Gaussian fitted to all of it.
+    width_mm : float
+        1 σ of the line without what the shape adds, with the blur of the image, as a length of the wall.
     """
 
     shape: Shape
@@ -89,6 +91,16 @@ class Fitted:
     way_sigma_mm: float
     left: float
     core: float
+    width_mm: float
+
+    @property
+    def added_mm2(self) -> float:
+        """Return the variance, mm², that the shape adds to the line's."""
+        if self.shape is Shape.TAIL:
+            return self.way_mm**2
+        light = self.relative * np.hypot(self.width_mm, self.spread_mm) / self.width_mm
+        share = light / (1 + light)
+        return float(share * self.spread_mm**2 + share * (1 - share) * self.way_mm**2)
 
 
 def line_spread(cells: Cells) -> LineSpread:
@@ -210,8 +222,9 @@ class _Fit:
         log_width = self.parameters[2 : 3 * self.count : 3]
         _, width, _ = fit_gaussians(self.spread.profile, self.spread.offset_px)
         core = float(np.median(np.exp(2 * log_width) / width**2))
+        width_mm = float(np.median(np.exp(log_width) / self.spread.px_per_mm))
         sigma = float(np.sqrt(self.covariance[at, at]))
-        return Fitted(self.shape, float(relative), float(way), wider, sigma, left, core)
+        return Fitted(self.shape, float(relative), float(way), wider, sigma, left, core, width_mm)
 
 
 def exponential_gaussian(t: Float, sigma: Float, tau: Float) -> Float:

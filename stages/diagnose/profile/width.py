@@ -48,7 +48,7 @@ def width_findings(cells: Cells, geometry: LineGeometry, probe: Probe) -> tuple[
         why = "The line is seen at one scale only: its own width and the image's blur look the same."
         return untestable("gamma", why), untestable("albedo_bias", why)
     scale = float(fit.coefficient[0])
-    floor = float(np.hypot(SCALE_FLOOR, _scale_by_edge_blur(float(fit.coefficient[1]), geometry, probe)))
+    floor = float(np.hypot(SCALE_FLOOR, scale_by_edge_blur(float(fit.coefficient[1]), geometry, probe)))
     test = tested(scale - 1, float(fit.sigma[0]), floor, fit.groups)
     sigma = test.sigma
     safe = max(scale, 0.05)
@@ -67,7 +67,7 @@ def stated_variance(geometry: LineGeometry, probe: Probe) -> Float:
     return np.asarray((probe.laser.line_sigma_mm * geometry.px_per_mm) ** 2)
 
 
-def _scale_by_edge_blur(blur_px2: float, geometry: LineGeometry, probe: Probe) -> float:
+def scale_by_edge_blur(blur_px2: float, geometry: LineGeometry, probe: Probe) -> float:
     """Return 1 σ of (σ / stated)² by blur that grows towards the picture's edge by an unknown amount."""
     stated, edge_px = stated_variance(geometry, probe), min(probe.camera.image_size) / 2
     grown = _EDGE_BLUR * max(blur_px2, 0.0) * (geometry.radius_px / edge_px) ** 2
