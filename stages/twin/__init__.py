@@ -291,7 +291,7 @@ PHOTOMETRY = Stage(
 )
 TWIN = Stage(
     "twin",
-    "46",
+    "47",
     TwinParameters,
     compare_with_twin,
     "recorded frames beside the same frames, re-rendered from what the run has measured",

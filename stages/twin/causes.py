@@ -33,11 +33,9 @@ from stages.twin.locate import FALSE_ALARM
 from stages.twin.scene import Ring
 from stages.twin.steps import (
     FEWEST_FRAMES,
-    LEAST_SHARE,
     OWN_STEP,
-    all_round,
-    at_once,
     first_frame,
+    of_a_light,
     steps_named,
 )
 
@@ -88,15 +86,12 @@ def _chosen(
     unsure = None
     for _ in range(_ROUNDS):
         tries = [try_law(cells, base, law, len(laws) * _places(law)) for law in laws]
+        tries = [f for f in tries if f.law.name != "step" or of_a_light(f, cells, base)]
         tries.sort(key=lambda f: -f.fall.sum())
         best = _by_other_sectors(_simplest(tries), cells, base)
         size, led = size_of(best), best.law.name == "led_dead"
         most = 1.0 + _SURE * _size_sd(best) if led else np.inf  # no LED can lose more than all its light
         if not _LEAST[best.law.name] < size < most:
-            break
-        if best.law.name == "step" and not (
-            at_once(best, cells) / best.size > LEAST_SHARE and all_round(best, cells, base)
-        ):
             break
         if best.probability > FALSE_ALARM:
             unsure = best

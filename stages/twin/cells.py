@@ -30,15 +30,17 @@ frames a single one would pull the drift."""
 
 @dataclass(frozen=True)
 class Cells:
-    """Sums over the pixels of sectors, (F, S) each, divided by the pixels' variance.
+    """Sums over the pixels of sectors, (F, S) each.
 
     Attributes
     ----------
     frame : (F,) int
     square, cross, own : float
-        Sums of recorded², recorded · twin and twin²; grey levels above black.
+        Sums of recorded², recorded · twin and twin², in grey levels above black, over the pixels' variance.
     pixels : float
         Number of pixels.
+    predicted : float
+        Sum of the twin: what the photo of the wall, its place and steady lights make it.
     """
 
     frame: Int
@@ -46,6 +48,7 @@ class Cells:
     cross: Float
     own: Float
     pixels: Float
+    predicted: Float
 
     @property
     def usable(self) -> Bool:
@@ -72,7 +75,9 @@ class Cells:
     def on(self, log_factor: Float) -> Cells:
         """Return the sums for a twin multiplied by exp(``log_factor``) (F, S)."""
         factor = np.exp(log_factor)
-        return replace(self, cross=self.cross * factor, own=self.own * factor**2)
+        return replace(
+            self, cross=self.cross * factor, own=self.own * factor**2, predicted=self.predicted * factor
+        )
 
 
 @dataclass
@@ -85,7 +90,8 @@ class CellsOfFrames:
     def add(self, frame: int, above: Float32, twin: TwinFrame, white: float, sector: Byte) -> None:
         """Add a frame's lit wall below ``white``, by sectors (H, W); grey levels are above black."""
         self.frame.append(frame)
-        self.parts.append(self._sums(above, twin, white, sector, (Region.WALL, Region.WALL))[:4])
+        sums = self._sums(above, twin, white, sector, (Region.WALL, Region.WALL))
+        self.parts.append(sums[[0, 1, 2, 3, 5]])
 
     def add_line(self, frame: int, above: Float32, twin: TwinFrame, white: float, sector: Byte) -> None:
         """Add the light of a laser frame within the band about the line, wherever across the line it lies.
@@ -97,7 +103,7 @@ class CellsOfFrames:
         own, pixels, light, predicted = sums[2:]
         ratio = light / np.where(predicted > 0, predicted, np.inf)
         self.frame.append(frame)
-        self.parts.append(np.stack([pixels + ratio**2 * own, ratio * own, own, pixels]))
+        self.parts.append(np.stack([pixels + ratio**2 * own, ratio * own, own, pixels, predicted]))
 
     @staticmethod
     def _sums(above: Float32, twin: TwinFrame, white: float, sector: Byte, kinds: tuple[int, int]) -> Float:

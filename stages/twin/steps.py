@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
-from pipeline.arrays import Float, Int
+from pipeline.arrays import Bool, Float, Int
 from pipeline.artefacts.twin import Mismatch, NamedFigure
 from stages.twin.cells import SECTORS, Cells, Fitted, Law, drift, of_sectors, try_law
 from stages.twin.laws import steps_of
@@ -14,10 +16,14 @@ FEWEST_FRAMES, _BESIDE = 6, 3
 """Least frames per light; frames on each side that show a step."""
 _SURE = 3.0
 """σ, by the spread from frame to frame, by which steps of two lights must differ to be two."""
-LEAST_SHARE, _SIDES_APART = 0.5, 3
-"""Least share of a step that the frames beside it, and every half of the picture, must show by themselves;
-sectors from one half to the next. Chosen."""
+LEAST_SHARE, _SIDES_APART, _LEAST_SEEN = 0.5, 3, 0.5
+"""Least share of a step that the frames beside it must show by themselves, and of the step of the opposite
+half of the picture that every half must; sectors from one half to the next; least share of a half that must
+be usable for it to count. Chosen."""
+_HALVES = (np.arange(SECTORS) - np.arange(0, SECTORS, _SIDES_APART)[:, None]) % SECTORS < SECTORS // 2
+"""(H, S) sectors in each half of the picture."""
 OWN_STEP = {"LEDs": "lamp_step", "laser": "laser_step"}
+_OR_WALL = "The light steps, or other wall begins there, for example a liner or another material."
 
 
 def at_once(step: Fitted, cells: Cells) -> float:
@@ -28,18 +34,52 @@ def at_once(step: Fitted, cells: Cells) -> float:
     return float(after.mean() - before.mean())
 
 
-def all_round(step: Fitted, cells: Cells, base: Float) -> bool:
-    """Return whether all sides of the picture step alike, as a light makes them; wall changes one side.
+def of_a_light(step: Fitted, cells: Cells, base: Float) -> bool:
+    """Return whether a step may be one of a light: it comes at once, and no side contradicts it.
 
-    ``base`` (K, F, S) are the columns beyond which the step was fitted.
+    A side contradicts it if its half of the picture steps by less than half as much as the opposite one, by
+    more than the σ of both. ``base`` (K, F, S) are the columns beyond which the step was fitted.
     """
-    columns = np.concatenate([base, step.law.columns[[step.column]]])
-    for first in range(0, SECTORS, _SIDES_APART):
-        inside = cells.usable & ((np.arange(SECTORS) - first) % SECTORS < SECTORS // 2)
-        size = np.linalg.lstsq(columns[:, inside].T, cells.log_ratio[inside], rcond=None)[0][-1]
-        if size / step.size <= LEAST_SHARE:
-            return False
-    return True
+    if at_once(step, cells) / step.size <= LEAST_SHARE:
+        return False
+    halves = _HALVES[_seen(cells)]
+    if not len(halves):
+        return True
+    own = [_again(step, replace(cells, pixels=np.where(half, cells.pixels, 0.0)), base) for half in halves]
+    size, sd = np.array([(half.size, half.sd) for half in own]).T
+    other, other_sd = (np.roll(value, len(halves) // 2) for value in (size, sd))
+    short = np.sign(step.size) * (LEAST_SHARE * other - size) - np.hypot(sd, LEAST_SHARE * other_sd)
+    return not np.any(short > 0)
+
+
+def _seen(cells: Cells) -> Bool:
+    """Return which halves of the picture (H,), and their opposites as well, have enough usable sectors."""
+    enough = np.array([cells.usable[:, half].mean() >= _LEAST_SEEN for half in _HALVES])
+    return np.asarray(enough & np.roll(enough, len(_HALVES) // 2))
+
+
+def _may_be_wall(step: Fitted, cells: Cells, light: str) -> bool:
+    """Return whether other wall that begins at the step's frame may look like a step of the light.
+
+    It may where no two opposite halves of the picture are seen. The photo of the wall tells the two apart: it
+    is made from lit frames that overlap, so that the same wall is seen before and after a step of the LEDs.
+    Every laser frame has a line on wall of its own: there the photo, by which the line was predicted, must
+    surely step by less than half as much as the line.
+    """
+    if not _seen(cells).any():
+        return True
+    if light == "LEDs":
+        return False
+    mean = cells.predicted / np.maximum(cells.pixels, 1)
+    frames = len(cells.frame)
+    base = np.concatenate([of_sectors(frames, np.eye(SECTORS)), drift(frames)])
+    photo = _again(step, replace(cells, cross=mean, own=np.sign(cells.own)), base)
+    return abs(photo.size) + photo.sd > LEAST_SHARE * abs(step.size)
+
+
+def _again(step: Fitted, cells: Cells, base: Float) -> Fitted:
+    """Return a step at the same frame, fitted to other cells."""
+    return try_law(cells, base, Law("step", step.law.columns[[step.column]], step.place[None]), 1)
 
 
 def first_frame(frame: Int, first: int) -> NamedFigure:
@@ -72,11 +112,13 @@ def steps_named(
             None: f"frames lit by the {light} are",
         }[same]
         way = "brighter" if best.size > 0 else "darker"
+        said = f"From frame {at.value:.0f} on, {what} {100 * abs(size.value):.0f} % {way}."
+        if _may_be_wall(best, cells, light):
+            name, said = f"{name} or other_wall", f"{said} {_OR_WALL}"
         found.append(Mismatch(
             name, "line" if light == "laser" and not same else "intensity", "time", (at,), (size,),
             best.probability, best.chi2_before, best.chi2_after,
-            f"From frame {at.value:.0f} on, {what} {100 * abs(size.value):.0f} % {way}.",
-            ring.whole(cells.frame[first]),
+            said, ring.whole(cells.frame[first]),
         ))  # fmt: skip
     return found
 

@@ -28,7 +28,9 @@ def _cells(change, seed=0, of_photo=0.01):
     ratio = np.exp(photo + change) + random.standard_normal((FRAMES, SECTORS)) / (level * np.sqrt(pixels))
     own = np.full((FRAMES, SECTORS), pixels * level**2)
     square = pixels * (1 + (ratio * level) ** 2)
-    return Cells(NUMBER, square, ratio * own, own, np.full_like(own, pixels))
+    return Cells(
+        NUMBER, square, ratio * own, own, np.full_like(own, pixels), np.full_like(own, pixels * level)
+    )
 
 
 def _found(lit=0.0, line=0.0, seed=0):
@@ -64,6 +66,37 @@ def test_wall_that_is_darker_on_one_side_of_the_last_frames_is_no_step_of_the_la
     away = np.abs((AZIMUTH_DEG - azimuth_deg + 180) % 360 - 180)
     wall = -0.17 * (away < 80) * (np.arange(FRAMES) >= FRAMES - 2)[:, None]
     assert not any("step" in m.name for seed in range(4) for m in _found(0.0, wall, seed))
+
+
+def _of_line(change, predicted=1.0, hidden=0):
+    """Names of what is found in the line, some sectors hidden, beside lit frames without a change."""
+    cells = _cells(np.zeros((FRAMES, SECTORS)) + change, 1000, of_photo=0.05)
+    pixels = np.where(np.arange(SECTORS) < hidden, 30.0, cells.pixels)
+    cells = replace(cells, pixels=pixels, predicted=cells.predicted * predicted)
+    return [m.name for m in causes(_cells(np.zeros((FRAMES, SECTORS))), cells, Lighting(), RING)]
+
+
+def test_a_step_is_told_though_half_of_the_picture_is_not_seen():
+    """A half without usable sectors did not step, and so no step was told."""
+    assert _of_line(-0.3 * _step(8), hidden=18) == ["laser_step"]
+    assert _of_line(-0.3 * _step(8), hidden=22) == ["laser_step or other_wall"]
+
+
+def test_wall_that_is_darker_on_two_thirds_of_the_picture_is_no_step_of_the_laser():
+    """It had been one in 2 of 3 cases: the other third was compared with the mean, not with its opposite."""
+    wall = -0.3 * (np.abs(AZIMUTH_DEG - 20) < 120) * _step(FRAMES - 3)
+    assert not any("step" in m.name for seed in range(3) for m in _found(0.0, wall, seed))
+
+
+def test_a_step_of_the_laser_where_the_photo_steps_too_may_be_other_wall():
+    """Wall that is darker all round from a frame on was a laser that loses power, with certainty."""
+    random = np.random.default_rng(2)
+    texture = np.exp(
+        0.03 * random.standard_normal((FRAMES, 1)) + 0.1 * random.standard_normal((FRAMES, SECTORS))
+    )
+    assert _of_line(-0.3 * _step(12), texture) == ["laser_step"]
+    for wall in (-0.2, 0.3):
+        assert _of_line(-0.3 * _step(12), texture * np.exp(wall * _step(12))) == ["laser_step or other_wall"]
 
 
 def test_a_step_beside_an_error_that_changes_slowly_is_as_large_as_its_sigma_says():
