@@ -40,7 +40,7 @@ def of_a_light(step: Fitted, cells: Cells, base: Float) -> bool:
     A side contradicts it if its half of the picture steps by less than half as much as the opposite one, by
     more than the σ of both. ``base`` (K, F, S) are the columns beyond which the step was fitted.
     """
-    if at_once(step, cells) / step.size <= LEAST_SHARE:
+    if at_once(step, cells) * np.sign(step.size) <= LEAST_SHARE * abs(step.size):
         return False
     halves = _HALVES[_seen(cells)]
     if not len(halves):

@@ -68,6 +68,12 @@ def test_wall_that_is_darker_on_one_side_of_the_last_frames_is_no_step_of_the_la
     assert not any("step" in m.name for seed in range(4) for m in _found(0.0, wall, seed))
 
 
+def test_frames_without_any_difference_have_no_cause():
+    """The step's own size, 0, was a divisor."""
+    same = np.full((FRAMES, SECTORS), 500.0)
+    assert causes(Cells(NUMBER, 2 * same, same, same, same, same), None, Lighting(), RING) == ()
+
+
 def _of_line(change, predicted=1.0, hidden=0):
     """Names of what is found in the line, some sectors hidden, beside lit frames without a change."""
     cells = _cells(np.zeros((FRAMES, SECTORS)) + change, 1000, of_photo=0.05)
