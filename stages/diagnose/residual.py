@@ -111,7 +111,7 @@ def _mean(row: Int, azimuth_rad: Float, values: Float, rows: int) -> Float:
     column = np.floor((azimuth_rad + np.pi) / (2 * np.pi) * AZIMUTHS).astype(np.int64) % AZIMUTHS
     cell = row * AZIMUTHS + column
     count, total = (np.bincount(cell, w, rows * AZIMUTHS) for w in (None, values))
-    mean = np.divide(total, count, out=np.full(len(total), np.nan), where=count > 0)
+    mean: Float = np.divide(total, count, out=np.full(len(total), np.nan), where=count > 0)
     return mean.reshape(rows, AZIMUTHS)
 
 
