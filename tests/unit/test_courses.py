@@ -233,6 +233,14 @@ def test_what_a_drift_comes_to_is_told_with_its_sigma_where_it_is_known(name, sh
     assert bool(told) is bool(words)
 
 
+def test_what_a_tilt_with_a_free_time_constant_comes_to_is_told_in_its_own_two_components():
+    """The time constant is fitted as one amplitude more; taken for a third component it ended the program."""
+    model = with_courses(LIBRARY)["laser_tilt, exponential"]
+    term = Term(model, (3.5,), np.array([3.0, 4.0, 0.1]), bounds=(1.0, 20.0))
+    told = _in_the_end(Sized(term, np.diag([1e-4, 1e-4, 1e-4])), duration_s=8.0)
+    assert told.startswith(" In the end, the ")
+
+
 @pytest.mark.parametrize(
     ("name", "words"),
     [

@@ -188,10 +188,11 @@ def _in_the_end(sized: Sized, duration_s: float) -> str:
     model, size = sized.term.model, next(iter(quantities(sized).values()), Value(0.0, 0.0))
     if not isinstance(model, Drifting | Coursed) or model.kind is not CourseKind.EXPONENTIAL:
         return ""
-    if sized.term.shape[0] > duration_s or not size.sd < TELLING * abs(size.value):
+    shape, amplitude = sized.term.at(sized.term.amplitude)
+    if shape[0] > duration_s or not size.sd < TELLING * abs(size.value):
         return ""
     own = model.own if isinstance(model, Coursed) else ()
-    words = model.static.statement(own, sized.term.amplitude).rstrip(".")
+    words = model.static.statement(own, amplitude).rstrip(".")
     known = effect(model.law).quantities[0]
     scale, unit = (100.0, "%") if known.name == "relative" else (1.0, f" {known.unit}".rstrip())
     return f" In the end, {words[0].lower()}{words[1:]}, ± {scale * size.sd:.1g}{unit}."
