@@ -30,8 +30,7 @@ _AMONG = 10.0
 pipe, and a mirrored line passes it within some degrees of the water."""
 _CLEARLY = 0.5
 """Largest median error of the arc's circle, as a part of that of the circle through all samples. A choice:
-with
-a fifth of the samples elsewhere, Cauchy's weights find the circle by themselves."""
+with a fifth of the samples elsewhere, Cauchy's weights find the circle by themselves."""
 
 
 def circles_through(xy: Float32) -> tuple[Float, Float]:

@@ -48,8 +48,9 @@ class RingSamples:
     centre_px : (2,)
         Origin (u, v) of the polar coordinates.
     radius_px, sigma_px, width_px, amplitude : (F, A) float32
-        Line position along the azimuth, its 1 σ from noise alone, line width (1 σ of the profile) and height
-        above the background in grey levels. NaN where no line was found.
+        Line position along the azimuth; its 1 σ (noise, texture and speckle, a wrong choice among lines,
+        ``moved_px`` and ``shared_px``); line width (1 σ of the profile); and height above the background in
+        grey levels. NaN where no line was found.
     validity : (F, A) uint8
         `RingValidity`; a saturated but usable sample stays VALID with a larger ``sigma_px``.
     moved_px : (F, A) float32 or None
@@ -57,8 +58,8 @@ class RingSamples:
         equally in all rings, 0 elsewhere; None if nothing was moved. Only a probe that rolls distinguishes
         this from a groove.
     shared_px : (A,) float32 or None
-        1 σ of an error that all rings share at an azimuth, which is also part of ``sigma_px``; None without
-        any.
+        1 σ, px, of an error that rings share at an azimuth, also part of ``sigma_px``; None without any. All
+        rings are taken to share it, although those elsewhere in the picture share it only in part.
     """
 
     frame: Int
@@ -159,7 +160,8 @@ class Trajectory:
     knock : LaserKnock or None
         A knock of the laser in the run; ``instrument`` is the probe before it.
     cut_sigma_mm : float
-        Part of ``distance_sigma_mm`` that the probe's ways at cuts of the recording make; 0 without any.
+        Part of ``distance_sigma_mm`` from the unknown distance travelled at cuts of the recording; 0 without
+        cuts.
     """
 
     frame: Int

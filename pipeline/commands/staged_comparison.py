@@ -74,7 +74,8 @@ class StagedComparison:
 
     def _plan(self, pair: RunPair) -> Plan:
         findings = pair.findings()
-        walls = Source(WallPair, pair.walls(), pair.walls_key())
+        found = pair.walls()
+        walls = Source(WallPair, found, pair.walls_key(found))
         return make_plan(
             COMPARISON, self.configuration, (walls, Source(FindingPair, findings, digest(findings)))
         )

@@ -65,13 +65,11 @@ class RunPair:
             _surveyed(self.earlier), _surveyed(self.now), np.array(middles), self.is_one_calibration
         )
 
-    def walls_key(self) -> str:
-        """Return a hash of the result of `walls`, from the keys of its parts."""
-        found = self.walls()
+    def walls_key(self, found: WallPair) -> str:
+        """Return a hash of ``found``, the result of `walls`, from the keys of its parts."""
         facts = (found.welds_mm, found.is_one_calibration)
-        walls = [(w.smoothing_mm, w.ring_spacing_mm) for w in (found.earlier, found.now)]
         keys = [r.files.stage_key(kind) for r in (self.earlier, self.now) for kind in (Wall, WallTexture)]
-        return digest((facts, tuple(walls), tuple(keys)))
+        return digest((facts, tuple(keys)))
 
     def findings(self) -> FindingPair:
         """Return the findings of both after their reviews, without the rejected ones."""

@@ -24,7 +24,7 @@ from pipeline.machine.stage import Context, Parameters, Stage
 from pipeline.pages import notation
 from stages.accumulate.fixed import fixed_to_probe
 from stages.accumulate.grid import MapGrid, map_grid
-from stages.accumulate.moved_back import shared_on_wall, warn_of_left_out
+from stages.accumulate.shared_errors import shared_on_wall, warn_of_left_out
 from stages.accumulate.stretch import cut_stretches, empty_wall, fill, map_of
 from stages.accumulate.survey import RingsOnWall, RingSurvey, in_steady_pictures, survey_of
 from stages.accumulate.unmeasured import warn_of_unmeasured

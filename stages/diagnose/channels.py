@@ -271,13 +271,13 @@ def _of_geometry(
 
 LINE_PROFILE = Stage("line_profile", "5", Parameters, examine_line, "what the line's light says of effects")
 FIDUCIALS = Stage(
-    "fiducials", "6", GaugeParameters, measure_fiducials, "a gauge run's rings and fiducials", "gauge"
+    "fiducials", "7", GaugeParameters, measure_fiducials, "a gauge run's rings and fiducials", "gauge"
 )
 FREE_MOTION = Stage(
     "free_motion", "2", MotionParameters, adjust_freely, "an inspection's motion without encoder", "motion"
 )
 GAUGE_EVIDENCE = Stage(
-    "evidence", "49", DiagnosisParameters, examine_gauge, "what a gauge run shows of effects", "diagnosis"
+    "evidence", "50", DiagnosisParameters, examine_gauge, "what a gauge run shows of effects", "diagnosis"
 )
 FIELD_EVIDENCE = Stage(
     "evidence", "26", DiagnosisParameters, examine_field, "what an inspection shows of effects", "diagnosis"

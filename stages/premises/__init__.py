@@ -21,6 +21,7 @@ from stages.premises.changes import (
     LeftOut,
     interlaced,
     refuse_or_warn_of_interlacing,
+    refuse_unmended,
     warn_of_frames,
 )
 from stages.premises.clock import ClockJump, clock_jumps, warn_of_clock, without_jumps, without_stretch
@@ -29,7 +30,7 @@ from stages.premises.light import Light, light_seen, look_the_same, pattern_brea
 from stages.premises.losses import Steps, row_times, rows_by_motion, steps_of_wall, sway_of_line
 from stages.premises.order import off_the_pipe, out_of_order
 from stages.premises.pictures import Pictures, examine_pictures
-from stages.premises.repeats import copies, repeated, rows_beside_encoder, rows_of_repeats
+from stages.premises.repeats import copies, repeated, rows_of_repeats, rows_that_follow_encoder
 from stages.premises.rows import Alignment, Lights, aligned
 from stages.premises.scale import (
     check_diameter,
@@ -87,7 +88,7 @@ def check_premises(
     seen = _seen(recording, probe, pictures, context)
     found = _matched(recording, probe, seen)
     changes, left_out = found.changes, found.left_out.any
-    _refuse_unmended(changes, parameters)
+    refuse_unmended(changes, parameters.mend)
     factor = _compared(recording, probe, seen, found, context)
     keep = np.concatenate([[True], np.diff(changes.row) > 0]) & ~left_out
     withheld = withheld_frames(changes.label[keep], parameters.withhold)
@@ -153,7 +154,7 @@ def _matched(recording: Recording, probe: Probe, seen: _Seen) -> _Matched:
     label = np.where(copy, _stated(table, alignment.row), _labels(table, alignment, light, pictures))
     steps, sway = steps_of_wall(pictures, seen.shown, copy), sway_of_line(pictures, light)
     again = copy | (np.diff(alignment.row, prepend=-1) < 1)
-    first = rows_beside_encoder(alignment.row, again, table, steps, encoder)
+    first = rows_that_follow_encoder(alignment.row, again, table, steps, encoder)
     rings_mm = rings_seen_mm(pictures, probe)
     along_mm, radius_mm = radius_along_mm(pictures, rings_mm), radius_seen_mm(rings_mm)
     forwards = runs_forwards(encoder, time_s := row_times(table, first), steps)
@@ -280,17 +281,6 @@ def _labels(table: FrameTable, alignment: Alignment, light: Int, pictures: Pictu
         return np.asarray(believed)
     shown = np.where(light == Light.LINE, _LASER, np.where(believed == _LASER, wall, believed))
     return np.asarray(np.where(light == Light.UNKNOWN, believed, shown))
-
-
-def _refuse_unmended(changes: Changes, parameters: PremisesParameters) -> None:
-    wrong = changes.frames.frame[changes.relabelled | changes.retimed]
-    if wrong.size and not parameters.mend:
-        raise UnusableError(
-            "premises",
-            f"from frame {wrong[0]} on, lights or times of frames.csv do not belong to the pictures",
-            frames=wrong.tolist(),
-            hint="correct frames.csv, or let premises.mend be true",
-        )
 
 
 def _report(pictures: Pictures, radius_mm: float, changes: Changes, context: Context) -> None:

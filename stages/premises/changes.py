@@ -83,7 +83,7 @@ def warn_of_frames(
     earlier = int(((changes.rows_later < 0) & ~repeats).sum())
     hint = (
         f"check whether the recorder inserts pictures: the {earlier} frames after them now have the times of "
-        "earlier rows; else correct frames.csv"
+        "earlier rows. If it inserts none, correct frames.csv"
     )
     what = "left out, since they repeat the picture before"
     warn_of(again, what, hint if earlier else "nothing, or repair the recorder", context)
@@ -113,6 +113,24 @@ def refuse_or_warn_of_interlacing(mend: bool, context: Context) -> None:
     if not mend:
         raise UnusableError("premises", what, hint=f"{hint}, or let premises.mend be true")
     context.warn(f"{what}. Only even rows are used, which halves the vertical resolution. What to do: {hint}")
+
+
+def refuse_unmended(changes: Changes, mend: bool) -> None:
+    """Refuse a recording whose lights or times would have to be corrected.
+
+    Raises
+    ------
+    UnusableError
+        When ``mend`` is false and some are wrong.
+    """
+    wrong = changes.frames.frame[changes.relabelled | changes.retimed]
+    if wrong.size and not mend:
+        raise UnusableError(
+            "premises",
+            f"from frame {wrong[0]} on, lights or times of frames.csv do not belong to the pictures",
+            frames=wrong.tolist(),
+            hint="correct frames.csv, or let premises.mend be true",
+        )
 
 
 @dataclass(frozen=True)

@@ -50,7 +50,7 @@ def warn_of_cuts(place: Int, pictures: Pictures, frame: Int, context: Context) -
             f"frame {frame[k]} does not continue the wall of frame {frame[pictures.partner[k]]}: the picture "
             "changes much more than in any step around, and no texture is common to both. Probably the "
             "recording was cut or paused here, or two were joined. The distance travelled in between is "
-            "unknown: distances from here on are wrong by it, and σ, the length of the run, is a guess; "
-            "laser, encoder or pipe may seem to jump. What to do: process the two parts as separate "
-            "recordings"
+            "unknown: distances from here on are wrong by it. Their σ is a guess: the length of the run, or "
+            "of the pipe that one picture shows if that is longer. Laser, encoder or pipe may seem to jump. "
+            "What to do: process the two parts as separate recordings"
         )

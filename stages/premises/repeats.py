@@ -20,7 +20,8 @@ _AROUND_STEP = 9
 # smallest is not used: where all pictures tremble, two that happen to be displaced equally change as little.
 _LEAST_OF_AROUND = 1
 # Other rows are believed if by them the encoder departs from the wall by less than half of the variance, over
-# so many steps (chosen): what it departs at repeated pictures is gone then, and what matching errs is left.
+# so many steps (chosen): the departures at repeated pictures are then gone, and only errors of matching are
+# left.
 _FOLLOWS, _LEAST_STEPS = 0.5, 12
 
 
@@ -44,7 +45,7 @@ def rows_of_repeats(row: Int, pictures: Pictures) -> Int:
     return out
 
 
-def rows_beside_encoder(
+def rows_that_follow_encoder(
     row: Int, again: Bool, table: FrameTable, steps: Steps, encoder: Encoder | None
 ) -> Int:
     """Return rows (F,) that move up behind pictures put in, or do not, as the encoder follows the wall.
@@ -75,7 +76,7 @@ def _in_table(steps: Steps, encoder: Encoder, time_s: Float) -> Bool:
 
 
 def _off_the_wall(steps: Steps, encoder: Encoder, time_s: Float) -> float:
-    """Return the share of the encoder's mean square advance that the wall's, scaled to it, leaves."""
+    """Return the share of the encoder's squared advance that the wall's, scaled to fit, does not explain."""
     read = steps.by_encoder(encoder, time_s)
     scale = float(read @ steps.size) / max(float(steps.size @ steps.size), 1e-12)
     left = read - scale * steps.size

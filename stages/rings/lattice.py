@@ -116,7 +116,7 @@ def take_out(lattices: tuple[Lattice, ...], samples: RingSamples) -> RingSamples
 
     Their σ includes the part that cannot be removed. Rings that lie at the same place of the picture share
     it, so that the returned rings hand it on as shared; neighbouring azimuths share it in part, which σ of
-    means over azimuths does not include.
+    means over azimuths does not include. Only the returned rings carry ``shared_px``.
     """
     if not lattices:
         return samples
@@ -138,10 +138,10 @@ def warn_of_lattices(lattices: tuple[Lattice, ...], context: Context) -> None:
     context.warn(
         f"the line's position has an error that repeats every {most.period_px:.3g} px along the picture's "
         f"{('rows', 'columns')[most.axis]}, by {size_px:.2f} px to either side: the pictures were enlarged "
-        "from fewer pixels, or a codec works in blocks of that size. The repeating error is removed, but "
-        "fine detail is lost: small defects may be missed, and those along the picture's rows or columns may "
-        "be false. What to do: export the pictures in the size in which the camera took them, with less "
-        "compression"
+        "from fewer pixels, or a codec works in blocks of that size. What can be removed of it is removed, "
+        "σ includes the rest, and fine detail is lost: small defects may be missed, and those along the "
+        "picture's rows or columns may be false. What to do: export the pictures in the size in which the "
+        "camera took them, with less compression"
     )
 
 

@@ -291,7 +291,7 @@ PHOTOMETRY = Stage(
 )
 TWIN = Stage(
     "twin",
-    "47",
+    "48",
     TwinParameters,
     compare_with_twin,
     "recorded frames beside the same frames, re-rendered from what the run has measured",

@@ -9,10 +9,12 @@ import pytest
 
 from pipeline.errors import UnusableError
 from stages.calibrate.gauge import MeasuredRun
+from stages.diagnose.effects.courses import with_courses
 from stages.diagnose.effects.library import LIBRARY
 from stages.diagnose.gauge import examine as examination
-from stages.diagnose.gauge.bores import misdrawn_bore
+from stages.diagnose.gauge.bores import free_numbers, misdrawn_bore
 from stages.diagnose.gauge.fit import fit, fit_beside
+from stages.diagnose.gauge.run import Term
 from stages.diagnose.gauge.search import Search, prepare
 from tests.gauge_runs import GaugeRun, made_run, measured_run
 
@@ -54,3 +56,12 @@ def test_no_bore_is_blamed_in_a_gauge_as_drawn(as_stated: bool) -> None:
     other = made.true.with_parameters(made.true.parameters + off, made.true.covariance)
     given = replace(made, stated=made.true if as_stated else other)
     assert misdrawn_bore(searched(measured_run(given), with_baseline=not as_stated)) is None
+
+
+@pytest.mark.parametrize(
+    ("course", "numbers"), [("ramp", 1), ("distance", 1), ("step", 2), ("exponential", 2)]
+)
+def test_only_what_is_estimated_of_a_course_counts_against_an_effect(course: str, numbers: int) -> None:
+    """The time that a ramp refers to counted as a free number, in favour of a bore that is not as drawn."""
+    model = with_courses(LIBRARY)[f"pixel_aspect, {course}"]
+    assert free_numbers(Term(model, (4.0,), np.array([0.1])), 8.0, 30.0) == numbers

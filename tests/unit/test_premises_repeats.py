@@ -11,7 +11,7 @@ from pipeline.recording.base import Encoder, FrameTable
 from stages.premises.light import Light
 from stages.premises.losses import Steps
 from stages.premises.pictures import Pictures, change_between
-from stages.premises.repeats import copies, rows_beside_encoder
+from stages.premises.repeats import copies, rows_that_follow_encoder
 
 
 def test_pictures_exposed_alike_by_chance_are_no_copies() -> None:
@@ -70,7 +70,9 @@ def rows_told(seed: int, copied: slice, covered: slice, put_in: bool) -> tuple[I
     size = np.diff(mm[true[lit]]) / 50 * (1 + 0.05 * random.standard_normal(len(lit) - 1))
     table = FrameTable(np.arange(count), time_s, np.where(np.arange(count) % 2, "led", "laser"))
     encoder = Encoder(time_s[covered], mm[covered])
-    return rows_beside_encoder(np.arange(count), again, table, Steps(lit[:-1], lit[1:], size), encoder), true
+    return rows_that_follow_encoder(
+        np.arange(count), again, table, Steps(lit[:-1], lit[1:], size), encoder
+    ), true
 
 
 @pytest.mark.parametrize(

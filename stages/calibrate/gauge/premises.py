@@ -29,7 +29,8 @@ STAGE = "calibrate"
 # Fiducials of another size are refused beyond this share. Where the white beside them is overexposed, all
 # corners move inward: a side of 25 px was measured 1.4 px too short, and 2 px are let pass.
 _SIZE_TOLERANCE, _SIDE_ERROR_PX = 0.05, 2.0
-# Beside a fiducial is so many times farther from its middle than its corners are: less than a cell of four.
+# The white beside a fiducial is looked at so many times as far from its middle as its corners are: 0.9 cells
+# outside a marker of 6 × 6 cells, border included.
 _BESIDE = 1.3
 # Added to hints, since a recorder that scales or cuts the pictures looks like a wrong gauge: with pictures
 # scaled by 3 % the bores were blamed, with cut ones 24 fiducials.

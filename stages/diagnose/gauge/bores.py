@@ -8,6 +8,8 @@ import numpy as np
 
 from pipeline.errors import UnusableError
 from stages.diagnose.gauge.fit import Fit, fit
+from stages.diagnose.gauge.run import Term
+from stages.diagnose.gauge.scan import span
 from stages.diagnose.gauge.search import LEAST_GAIN, Search
 
 # 1 σ, mm, of a bore whose stated tolerance is set aside: far above any error of turning.
@@ -51,10 +53,15 @@ def misdrawn_bore(searched: Search) -> Misdrawn | None:
     """
     found, nothing = searched.found, searched.nothing
     best = min((_freed(nothing, int(k)) for k in np.unique(searched.run.rings.section)), key=lambda b: b.cost)
-    numbers = sum(len(t.amplitude) + len(t.shape) for t in found.terms)
+    numbers = sum(free_numbers(term, *span(searched.run)) for term in found.terms)
     each = np.log(len(np.unique(found.linearised.equations.cell))) * searched.alike
     explains = nothing.cost - best.cost > LEAST_GAIN * searched.alike
     return best if explains and best.cost < found.cost + each * (numbers - 1) else None
+
+
+def free_numbers(term: Term, duration_s: float, frame_rate: float) -> int:
+    """Return how many numbers of a term are estimated: of a ramp, the time that it refers to is not."""
+    return len(term.amplitude) + (len(term.model.shapes(duration_s, frame_rate)) > 1)
 
 
 def _freed(nothing: Fit, section: int) -> Misdrawn:

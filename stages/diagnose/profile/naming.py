@@ -109,10 +109,12 @@ def _names(
     """Return the effects whose shapes fit, each with the one that fits best."""
     law, named = scale_law(cells, geometry, probe), dict[str, Fitted]()
     for fitted in fitting:
+        if fitted.shape is Shape.COPY:
+            named.setdefault("tube_ghost", fitted)
+            continue
         blur_px2 = max(fitted.core * float(law.coefficient[1]), _SMALLEST_BLUR_PX2)
         edge = scale_by_edge_blur(blur_px2, geometry, probe)
-        tail = _of_sheet_or_wall(fitted, law, probe.laser.line_sigma_mm, edge)
-        for name in ("tube_ghost",) if fitted.shape is Shape.COPY else tail:
+        for name in _of_sheet_or_wall(fitted, law, probe.laser.line_sigma_mm, edge):
             named.setdefault(name, fitted)
     return named
 

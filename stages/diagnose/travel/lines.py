@@ -54,7 +54,9 @@ def amplitudes(
     # Chosen: with fewer pictures, too few degrees of freedom are left for a σ.
     if free < 0.3 * (len(t) - free):
         return np.full((2, 2), np.nan), float("nan")
-    line, xy_mm = (x - slow @ np.linalg.lstsq(slow, x, rcond=1e-6)[0] for x in (line, xy_mm))
+    both = np.concatenate([line, xy_mm], 1)
+    both = both - slow @ np.linalg.lstsq(slow, both, rcond=1e-6)[0]
+    line, xy_mm = both[:, :2], both[:, 2:]
     solution, _, _, strength = np.linalg.lstsq(line, xy_mm, rcond=1e-6)
     noise = float(np.sqrt(np.sum((xy_mm - line @ solution) ** 2) / (xy_mm.shape[1] * free)))
     return np.asarray(solution.T), noise / max(float(strength[-1]), 1e-9)

@@ -17,7 +17,7 @@ from pipeline.geometry.rigid import from_parts, rotation_from_vector
 from pipeline.machine.scratch import Scratch
 from stages.accumulate import AccumulateParameters, accumulate_wall
 from stages.accumulate.grid import MapGrid
-from stages.accumulate.moved_back import shared_on_wall
+from stages.accumulate.shared_errors import shared_on_wall
 from stages.rings.behind_dirt import set_right
 from stages.triangulate import TriangulateParameters, triangulate_rings
 from tests.drawn_run import BASELINE, RADIUS, rings_on_wall, round_wall, small_probe
