@@ -122,7 +122,7 @@ def test_a_swing_is_named_at_its_own_frequency_and_found_without_a_name_too():
     assert 0 < frequency.sd < 0.02
     unknown = seen(hidden, ("laser_tilt",), 63)
     assert verdict_of(unknown) is Verdict.UNEXPLAINED
-    assert "sin(2πft" in formula(unknown)
+    assert "sin(2π 3.2" in formula(unknown)
     assert unknown.location is not None
     assert (unknown.location.fixed_to, unknown.location.time) == ("laser", "periodic")
 

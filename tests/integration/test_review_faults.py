@@ -139,7 +139,7 @@ for _ in range(200):
         kept += 1
     except InputError as error:
         assert "disk is full" in str(error) or "cannot be written" in str(error), error
-        assert "what was decided before is kept" in error.hint
+        assert "earlier decisions are kept" in error.hint
         refused += 1
         break
 assert refused and kept

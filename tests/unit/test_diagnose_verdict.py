@@ -145,17 +145,18 @@ def test_what_repeats_on_other_wall_is_not_consistent_though_nothing_was_found(h
     assert (seen.global_p == pytest.approx(1 / 16)) is (verdict is Verdict.UNEXPLAINED)
     assert bool(seen.shortcomings) is bool(np.isnan([heldout_px, floor_px]).any())
     assert ("0.28 px" in answer.formula(seen)) is (verdict is Verdict.UNEXPLAINED)
-    # It may be the doing of the line's light where that can move the line so far, but not of what disturbs
-    # only poses.
-    by_motion, vague, known = (
-        cast(Any, SimpleNamespace(location=Location(channel, None, None), parameters={"skewness": size}))
-        for channel, size in (
-            ("motion", Value(1.0, 0.5)), ("profile", Value(1.0, 0.5)), ("profile", Value(1.0, 0.1))
+    # A second line may do so if it is high enough to pull the line that far, but nothing that disturbs poses.
+    by_motion, faint, high = (
+        cast(Any, SimpleNamespace(
+            name=name, sure=True, location=Location(channel, None, None),
+            parameters={"relative": Value(size, 0.01)},
+        ))
+        for channel, name, size in (
+            ("motion", "encoder_play", 1.0), ("profile", "tube_ghost", 0.05), ("profile", "tube_ghost", 0.3)
         )
     )  # fmt: skip
-    assert verdict_of_rings(seen, [by_motion]) is verdict
-    assert verdict_of_rings(seen, [by_motion, known]) is verdict
-    assert verdict_of_rings(seen, [known, vague]) is Verdict.CONSISTENT
+    assert verdict_of_rings(seen, [by_motion, faint]) is verdict
+    assert verdict_of_rings(seen, [by_motion, high]) is Verdict.CONSISTENT
 
 
 @pytest.mark.parametrize(

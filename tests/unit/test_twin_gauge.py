@@ -133,7 +133,7 @@ def test_an_exposure_is_left_to_who_can_tell_and_not_withdrawn(tmp_path):
     assert switches_of(folder / "diagnosis.json").of_line == ()
     tried = try_diagnosis(folder, tmp_path / "gauge", SilentDisplay())
     assert tried.withdrawn == ()
-    assert "cannot tell motion blur" in tried.cannot_tell[0]
+    assert "cannot show motion blur" in tried.cannot_tell[0]
 
 
 def test_without_a_gauge_run_pictures_decide_nothing_and_that_is_said(tmp_path):
