@@ -76,6 +76,14 @@ def test_causes_of_a_class_that_say_the_same_are_said_once(tmp_path):
     assert (tmp_path / "diagnosis.html").read_text().count(TILT.statement) == 1
 
 
+def test_the_likeliest_of_a_class_is_no_statement_of_fact(tmp_path):
+    """A tilt of probability .4 among 24 causes stood in bold as what is."""
+    perhaps = replace(TILT, probability=0.404)
+    found = replace(WHOLE, verdict=Verdict.CLASS, effects=(perhaps,), identifiable=TILT.statement)
+    write_page(found, Shown(), tmp_path)
+    assert f"Perhaps (40 %): {TILT.statement}" in (tmp_path / "diagnosis.html").read_text()
+
+
 def test_the_frame_shown_is_the_one_that_departs_most_and_has_most_of_a_ring():
     frame = np.repeat([3, 5, 7, 9], [24, 22, 6, 24])
     residual = np.select([frame == 5, frame == 7], [0.2, 0.9], 0.01)
