@@ -220,11 +220,6 @@ def drift(frames: int) -> Float:
     return np.asarray(np.repeat(hats[..., None], SECTORS, 2), float)
 
 
-def of_sectors(frames: int, around: Float) -> Float:
-    """Return columns (K, F, S) that are constant over the frames, with patterns (K, S) around the image."""
-    return np.asarray(np.repeat(around[:, None], frames, 1), float)
-
-
 def fitted(cells: Cells, base: Float, use: Bool) -> Float:
     """Return the change (F, S) predicted by columns (K, F, S) fitted to the frames in ``use`` (F,)."""
     inside = cells.usable & use[:, None]
@@ -239,9 +234,8 @@ def try_law(cells: Cells, base: Float, law: Law, places: int) -> Fitted:
     """
     frames = np.arange(len(cells.frame))
     fall, before = np.zeros(len(frames)), np.zeros(len(frames))
-    # Half of the frames leave open between which two neighbours a step lies: all frames are used for the
-    # place.
-    column, size, sd = _best(cells, base, law, np.ones(len(frames), bool))
+    # Half of the frames leave open between which two neighbours a step lies: all frames give the place.
+    column, size, sd = best_column(cells, base, law, np.ones(len(frames), bool))
     for half in (frames % 2 == 0, frames % 2 == 1):
         without = fitted(cells, base, half)
         with_it = fitted(cells, np.concatenate([base, law.columns[column][None]]), half)
@@ -257,8 +251,8 @@ def try_law(cells: Cells, base: Float, law: Law, places: int) -> Fitted:
     )  # fmt: skip
 
 
-def _best(cells: Cells, base: Float, law: Law, use: Bool) -> tuple[int, float, float]:
-    """Return the column that explains most beyond the base columns, its size, and its σ over frames."""
+def best_column(cells: Cells, base: Float, law: Law, use: Bool) -> tuple[int, float, float]:
+    """Return a law's best column beyond ``base`` (K, F, S) in frames ``use`` (F,), its size and its σ."""
     inside = cells.usable & use[:, None]
     direction = np.linalg.svd(base[:, inside].T, full_matrices=False)
     kept = direction[0][:, direction[1] > 1e-9 * max(direction[1].max(), 1e-30)]

@@ -8,7 +8,7 @@ import numpy as np
 
 from pipeline.arrays import Float
 from pipeline.instrument.probe import Lighting
-from stages.twin.cells import SECTORS, Cells, Law, drift, half_turn, of_sectors, sector_azimuth_rad
+from stages.twin.cells import SECTORS, Cells, Law, drift, half_turn, sector_azimuth_rad
 from stages.twin.leds import even_light
 from stages.twin.scene import Ring
 
@@ -22,10 +22,20 @@ _LEAST_AHEAD = 0.05
 """Least distance ahead of the LEDs, in radii, from which they are taken to light the wall."""
 
 
+def of_sectors(frames: int, around: Float) -> Float:
+    """Return columns (K, F, S) that are constant over the frames, with patterns (K, S) around the image."""
+    return np.asarray(np.repeat(around[:, None], frames, 1), float)
+
+
+def sectors_and_drift(frames: int) -> Float:
+    """Return columns (K, F, S): a constant of every sector, and slow changes in time that all share."""
+    return np.concatenate([of_sectors(frames, np.eye(SECTORS)), drift(frames)])
+
+
 def lit_laws(cells: Cells, lighting: Lighting, ring: Ring) -> tuple[Float, list[Law]]:
     """Return base columns (K, F, S) for lit frames, and the laws of a step and of an LED that fails."""
     frames = len(cells.frame)
-    base = np.concatenate([of_sectors(frames, np.eye(SECTORS)), drift(frames)])
+    base = sectors_and_drift(frames)
     azimuth = 2 * np.pi * np.arange(LED_AZIMUTHS) / LED_AZIMUTHS
     share = led_share(lighting, azimuth, ring)
     steps, first = steps_of(frames)

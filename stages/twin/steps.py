@@ -8,8 +8,8 @@ import numpy as np
 
 from pipeline.arrays import Bool, Float, Int
 from pipeline.artefacts.twin import Mismatch, NamedFigure
-from stages.twin.cells import SECTORS, Cells, Fitted, Law, drift, of_sectors, try_law
-from stages.twin.laws import steps_of
+from stages.twin.cells import SECTORS, Cells, Fitted, Law, best_column
+from stages.twin.laws import sectors_and_drift, steps_of
 from stages.twin.scene import Ring
 
 FEWEST_FRAMES, _BESIDE = 6, 3
@@ -49,7 +49,7 @@ def of_a_light(step: Fitted, cells: Cells, base: Float) -> bool:
     if not len(halves):
         return True
     own = [_again(step, replace(cells, pixels=np.where(half, cells.pixels, 0.0)), base) for half in halves]
-    size, sd = np.array([(half.size, half.sd) for half in own]).T
+    size, sd = np.array(own).T
     other, other_sd = (np.roll(value, len(halves) // 2) for value in (size, sd))
     short = np.sign(step.size) * (LEAST_SHARE * other - size) - np.hypot(sd, LEAST_SHARE * other_sd)
     return not np.any(short > 0)
@@ -74,15 +74,15 @@ def _may_be_wall(step: Fitted, cells: Cells, light: str) -> bool:
     if light == "LEDs":
         return False
     mean = cells.predicted / np.maximum(cells.pixels, 1)
-    frames = len(cells.frame)
-    base = np.concatenate([of_sectors(frames, np.eye(SECTORS)), drift(frames)])
-    photo = _again(step, replace(cells, cross=mean, own=np.sign(cells.own)), base)
-    return abs(photo.size) + _NO_WALL * photo.sd > LEAST_SHARE * abs(step.size)
+    photo = replace(cells, cross=mean, own=np.sign(cells.own))  # its logarithm is that of the photo alone
+    size, sd = _again(step, photo, sectors_and_drift(len(cells.frame)))
+    return abs(size) + _NO_WALL * sd > LEAST_SHARE * abs(step.size)
 
 
-def _again(step: Fitted, cells: Cells, base: Float) -> Fitted:
-    """Return a step at the same frame, fitted to other cells."""
-    return try_law(cells, base, Law("step", step.law.columns[[step.column]], step.place[None]), 1)
+def _again(step: Fitted, cells: Cells, base: Float) -> tuple[float, float]:
+    """Return size and σ of a step at the same frame, fitted to other cells beyond base columns (K, F, S)."""
+    law = Law("step", step.law.columns[[step.column]], step.place[None])
+    return best_column(cells, base, law, np.ones(len(cells.frame), bool))[1:]
 
 
 def first_frame(frame: Int, first: int) -> NamedFigure:
@@ -135,9 +135,8 @@ def _same_step(best: Fitted, between: Int, other: Cells | None) -> bool | None:
     here = (other.frame[at] > between[0]) & (other.frame[at - 1] < between[1])
     if not here.any():
         return None
-    frames = len(other.frame)
-    base = np.concatenate([of_sectors(frames, np.eye(SECTORS)), drift(frames)])
-    own = try_law(other, base, Law("step", columns[here], first[here, None]), 1)
-    sd = float(np.hypot(own.sd, best.sd))
-    alike, absent = abs(own.size - best.size) < _SURE * sd, abs(own.size) < _SURE * own.sd
+    law, every = Law("step", columns[here], first[here, None]), np.ones(len(other.frame), bool)
+    _, size, sd = best_column(other, sectors_and_drift(len(other.frame)), law, every)
+    apart = float(np.hypot(sd, best.sd))
+    alike, absent = abs(size - best.size) < _SURE * apart, abs(size) < _SURE * sd
     return None if alike == absent else alike
