@@ -109,5 +109,5 @@ CASES = (
     ),
     Case("ambient_light", (0.2,), ("ambient_light", "interreflection")),
     Case("ghost_ring", (0.1,), ("second_line",), changes=_MIRRORS),
-    Case("motion_blur", (0.03,), ("motion_blur",)),
+    Case("motion_blur", (0.02,), ("motion_blur",)),
 )
