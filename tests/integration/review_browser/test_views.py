@@ -70,11 +70,11 @@ def test_a_click_on_the_model_moves_to_what_was_clicked(page: Tab) -> None:
 
 def test_a_click_on_the_frame_moves_to_what_was_clicked(page: Tab) -> None:
     page.js("boresight.session.moveTo([66, 0.4])")
-    page.until("document.querySelector('.zoomed circle.spot')")
-    told(page, "#view-frame", "")
     page.page.uncheck("#close-up")
-    page.until("boresight.session.cursor[0] === 66 && document.querySelector('.zoomed img').complete")
-    page.page.wait_for_timeout(patience(400))
+    sights = "boresight.session.source.sights(66, 0.4)"
+    sought = page.js(f"{sights}.then((all) => all.map((s) => Math.round(s.spot_px[0])).sort().join())")
+    circles = "[...document.querySelectorAll('.zoomed circle.spot')]"
+    page.until(f"{circles}.map((e) => Math.round(e.getAttribute('cx'))).sort().join() === '{sought}'")
     box = page.page.locator(".zoomed circle.spot").first.bounding_box()
     page.js("boresight.session.cursor = [20, -3]")  # moved without any view being told
     page.page.mouse.click(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
