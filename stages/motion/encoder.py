@@ -39,8 +39,7 @@ _COARSE = 3.5
 _USUAL_PERCENT = 90.0
 _LIKE_USUAL = 3.0
 """An encoder has caught up if its jump is the distance that the probe went meanwhile at its mean speed,
-within
-this factor. Not measured."""
+within this factor. Not measured."""
 
 
 @dataclass(frozen=True)

@@ -18,15 +18,13 @@ _TOO_FAR = 4.0
 smaller one shifts distances by 4 σ_pictures² / σ_encoder at most: .15 % at .09 and .2 %."""
 _DOUBTFUL, _SERIOUS = 3.0, 5.0
 """Differences, in σ, from which texture that was mostly lost widens the σ of distances, and from which there
-is
-a warning (chosen): by chance once in 370 and once in 1.7 million recordings."""
+is a warning (chosen): by chance once in 370 and once in 1.7 million recordings."""
 _TELLS_NOTHING = 10.0
 """If texture's σ is this many times the encoder's, a contradiction of 3 to 5 σ moves distances by half of the
 encoder's σ at most, namely by 3 to 5 / √(1 + 10²) of it."""
 _ALIKE = 2.0
 """Factor within which errors of diameter and distance agree. A zoomed picture changes radii by θ / sin θ cos
-θ
-times as much, 3.0 at 65°, and distances by about as much: 2.6 and 2.0 % for 1 % of zoom (open-1-field)."""
+θ times as much, 3.0 at 65°, and distances by about as much: 2.6 and 2.0 % for 1 % of zoom (open-1-field)."""
 
 
 @dataclass(frozen=True)

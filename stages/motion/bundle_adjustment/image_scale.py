@@ -39,8 +39,7 @@ _LARGE = 0.01
 rings' change was taken for a step of the bore. A pipe full of water came to 7 %."""
 _OTHER_CAUSE = 0.1
 """Uncertain share of the course: a laser that moves changes the rings alone, a lens also changes the wall
-seen
-in texture, by a tenth as much, which is below the σ of texture."""
+seen in texture, by a tenth as much, which is below the σ of texture."""
 
 
 @dataclass(frozen=True)

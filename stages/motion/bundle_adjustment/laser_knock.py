@@ -42,23 +42,19 @@ _SURE = float(np.log(1000))
 without a knock, or with a joint, have -9 and less; a09, knocked by .35°, has 9."""
 _WELD = 0.3
 """Largest difference of the permanent change of radius from the jump, as a share of the jump: at the edge of
-a
-weld it is larger."""
+a weld it is larger."""
 _USUAL_MM = 1.0
 """Prior 1 σ of each component of the jump by a knock or a joint. It sets the penalty for the free parameters
-of
-either, equally for both. A choice."""
+of either, equally for both. A choice."""
 _LARGEST = 0.2
 """Prior 1 σ of any change, as a share of the radius or as a slope: it keeps the equations regular."""
 _LASER = 3
 """Parameters of the sheet that may change: baseline and two slopes. In a pipe of one diameter, a change of
-the
-cone is the same as one of the baseline."""
+the cone is the same as one of the baseline."""
 
 LASER_AND_JOINT = np.repeat([True, False], _LASER)
 """Which of six sizes are the laser's change (`LaserKnock.change`); the others are the displacement of the
-pipe
-(x, y) and its change of radius after a joint, mm."""
+pipe (x, y) and its change of radius after a joint, mm."""
 
 
 @dataclass(frozen=True)

@@ -23,8 +23,7 @@ ORIGIN_SIGMA = np.array([1e-4] * 3 + [1e-6] * 3)
 """1 σ, mm and rad, of the first pose, which defines the frame: far below the σ of any other pose."""
 _HELD = 1e-3
 """Shared parameters of the whole run are held to this share of their stated σ: so tightly that a window
-cannot
-move them, yet not exactly, so that the equations stay regular."""
+cannot move them, yet not exactly, so that the equations stay regular."""
 _VIEW_RAD = 0.2
 """1 σ of the angle between camera and pipe: centring skids lean by less than 11°. It matters where no texture
 shows rotations: extrapolated at the rate of the frames before, they came to 86°. Not measured."""

@@ -39,12 +39,10 @@ _FIRST_SCALES = Scales(3.0, 1.0)
 
 _TREMBLES_RAD = 5e-4
 """Rotation from frame to frame, 1 σ, from which pictures count as trembling: a quarter of a pixel at 500 px
-per
-radian. Open-1 shows less than 1e-4, pictures shifted by half a pixel 1.7e-3."""
+per radian. Open-1 shows less than 1e-4, pictures shifted by half a pixel 1.7e-3."""
 _ACROSS = np.array([0, 1, 3, 4])
 """Positions and rotations across the pipe. Along it and in roll, differences from frame to frame are errors
-of
-the poses, which smoothness may reduce."""
+of the poses, which smoothness may reduce."""
 _LOOSER = 3.0
 """Factor on the 1 σ of trembling in its prior. With a prior of 0 at its own 1 σ all lengths shrink: a drawn
 shift of .4 px shortened the pipe by 1.4 %. At three times that σ, the pull is a ninth."""
@@ -58,8 +56,7 @@ _IN_LINE = 4
 influence, and the motion has not changed much. Not measured."""
 _SWING_RAD = np.radians(1)
 """Smallest swing of an end that is not motion: in the few pictures before texture is followed no probe
-rotates
-as far in a pipe. Not measured."""
+rotates as far in a pipe. Not measured."""
 _RAYLEIGH_MEDIAN = float(np.sqrt(2 * np.log(2)))
 """Median length of an error of two coordinates, of 1 σ each."""
 

@@ -35,12 +35,10 @@ _LEAST_FORCE_M_S2 = 0.01
 """Smallest 1 σ of a mean force: a milligravity."""
 _TURNING, _APART = 3.0, 0.5
 """A gyroscope is checked if the camera turns by three of its σ or more. The two may then differ by half of
-the
-rotation; a mount that is wrong by 30° makes them differ by as much."""
+the rotation; a mount that is wrong by 30° makes them differ by as much."""
 _NOT_GRAVITY = 0.1
 """Largest relative difference of the usual force from gravity. Consumer accelerometers err by 4 % at most
-(data
-sheets)."""
+(data sheets)."""
 
 
 def inertia_at(

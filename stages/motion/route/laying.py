@@ -27,8 +27,7 @@ _LEAST_VARIANCE = 1e-10
 """Least variance, rad², of a rotation by vision between nodes: (10 µrad)², far below any pose's."""
 _PLAN_RAD = np.radians(1.0)
 """1 σ of the angle of a planned bend as built: elbows are within 1 % of their angle (EN 10253-2), and weld
-gaps
-add about half a degree. A choice."""
+gaps add about half a degree. A choice."""
 _TOO_FAR = 4.0
 """Largest difference, σ, of a plan's angle from the measured one with which the plan is used."""
 _STEEP = 0.3

@@ -22,8 +22,7 @@ _Parts = list[tuple[Int, Float | float]]
 
 STRAIGHTNESS_RAD = 2e-3
 """1 σ of the direction of a tube relative to its straight line: a bow of 0.0015 of the length, which EN
-10217-1
-allows, deviates by 3.5 mrad rms; as the limit of a uniform distribution, by 2 mrad."""
+10217-1 allows, deviates by 3.5 mrad rms; as the limit of a uniform distribution, by 2 mrad."""
 STRAIGHT_MM = 3000.0
 """Length over which this deviation is constant: half of a tube of 6 m, the usual length. A choice."""
 STANDARD_GRAVITY = 9.80665

@@ -22,8 +22,7 @@ _IMAGE_BLUR_PX = 1.5
 """σ, image px, of the whole blur: √(1.2² + 0.9²), where 0.9 px of lens and pixel are assumed."""
 _SMOOTHED_ROWS = 3.0
 """σ, rows, over which the mean brightness of rows is smoothed: so few that the rest of the light within a
-patch
-of 21 rows is small, so many that single bright rows of the wall are kept. Not measured."""
+patch of 21 rows is small, so many that single bright rows of the wall are kept. Not measured."""
 _FEWEST_USABLE = 0.1
 """Rows with a smaller usable share get the mean brightness of their neighbours. Not measured."""
 _LEAST_SMOOTHING = 0.7

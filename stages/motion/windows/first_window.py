@@ -39,8 +39,8 @@ _FARTHEST_RAD = np.radians(45)
 picture to picture: wall one radius ahead. Codecs move the dim wall beyond it too slowly: in open-1-field's
 copy at crf 30 the stream's own motion vectors lag behind the wall by .3 px a picture at 40°, by .02 px at
 60°. Distances of open-1 to open-3 at crf 30 without encoder are .43, .14 and -.20 % off without such matches,
-.71,
-.28 and .43 % with them. If the error is noise alone (0 px last in open-3, .2 px at crf 30), all are used."""
+.71, .28 and .43 % with them. If the error is noise alone (0 px last in open-3, .2 px at crf 30), all are
+used."""
 _MOST_SHARED_PX = 2.0
 """Where matches disagree by more, the parameter's own limit holds."""
 _IN_REDUCER = 0.005

@@ -29,8 +29,7 @@ _INDEPENDENT_WINDOWS = 3.0
 """Largest number of windows whose information on the shared parameters is added: texture matching has the
 same errors in all of them. As if independent, the eighty windows of a rendered 100 m moved the instrument by
 36 of its σ and the distance by 435 mm; with three, by 1.6 σ and 27 mm (`python -m
-tests.benchmarks.bench_long_run`,
-one run). Chosen on that run."""
+tests.benchmarks.bench_long_run`, one run). Chosen on that run."""
 
 
 @dataclass(frozen=True)
