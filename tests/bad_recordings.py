@@ -1,4 +1,4 @@
-"""A short cut of the sample recording, and ways to spoil it."""
+"""A short cut of the sample recording, and changes that spoil it."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def _copy_packets(source: Path, target: Path, count: int) -> None:
 
 
 def replaced(file: str, pattern: str, text: str) -> Spoil:
-    """Return a way to spoil: the first match of ``pattern`` in a text file becomes ``text``."""
+    """Return a change that replaces the first match of ``pattern`` in a text file by ``text``."""
 
     def spoil(folder: Path) -> None:
         before = (folder / file).read_text()
@@ -56,7 +56,7 @@ def replaced(file: str, pattern: str, text: str) -> Spoil:
 
 
 def rewritten(file: str, change: Callable[[list[str]], list[str]]) -> Spoil:
-    """Return a way to spoil: the lines of a text file below the first are changed."""
+    """Return a change that rewrites all lines of a text file but the first."""
 
     def spoil(folder: Path) -> None:
         header, *lines = (folder / file).read_text().splitlines(keepends=True)
@@ -66,7 +66,7 @@ def rewritten(file: str, change: Callable[[list[str]], list[str]]) -> Spoil:
 
 
 def truncated(share: float) -> Spoil:
-    """Return a way to spoil: the video's file ends early."""
+    """Return a change that cuts the video file off after ``share`` of its bytes."""
 
     def spoil(folder: Path) -> None:
         content = (folder / "frames.mkv").read_bytes()
@@ -76,7 +76,7 @@ def truncated(share: float) -> Spoil:
 
 
 def noised(start: float, length: int) -> Spoil:
-    """Return a way to spoil: ``length`` bytes of the video from ``start`` (a share of it) on are noise."""
+    """Return a change that overwrites ``length`` bytes of the video, from a share of it on, with noise."""
 
     def spoil(folder: Path) -> None:
         content = bytearray((folder / "frames.mkv").read_bytes())
@@ -88,7 +88,7 @@ def noised(start: float, length: int) -> Spoil:
 
 
 def repainted(paint: Callable[[int, Image], Image]) -> Spoil:
-    """Return a way to spoil: every picture is changed by ``paint(frame, bgr)`` and encoded again."""
+    """Return a change that replaces every picture by ``paint(frame, bgr)`` and encodes the video again."""
 
     def spoil(folder: Path) -> None:
         file, new = folder / "frames.mkv", folder / "new.mkv"
@@ -107,12 +107,12 @@ def repainted(paint: Callable[[int, Image], Image]) -> Spoil:
 
 
 def is_laser(frame: int) -> bool:
-    """Tell whether the laser is on in a frame of the sample, whose lights take turns."""
+    """Return whether the laser is on in a frame of the sample, whose laser and LED frames alternate."""
     return frame % 2 == 0
 
 
 def noise(frame: int, picture: Image) -> Image:
-    """Return a picture of noise: what a camera sees that is nowhere near a wall."""
+    """Return a picture of noise, as if no wall were in view."""
     return np.random.default_rng(frame).normal(60, 12, picture.shape).clip(0, 255).astype(np.uint8)
 
 
@@ -134,7 +134,7 @@ def lights_swapped(lines: list[str]) -> list[str]:
 
 
 def spoilt(good: Path, folder: Path, spoil: Spoil) -> Path:
-    """Return a copy of a recording below a folder, spoilt."""
+    """Copy a recording into ``folder``, spoil the copy, and return its path."""
     copy = folder / "recording"
     shutil.copytree(good, copy)
     spoil(copy)

@@ -1,4 +1,7 @@
-"""A batch queue of this machine: ``sbatch`` and ``scancel`` that start and end real processes."""
+"""A stand-in for a batch queue on this machine.
+
+``sbatch`` and ``scancel`` that start and end real processes.
+"""
 
 from __future__ import annotations
 
@@ -18,7 +21,7 @@ for job in "$@"; do kill -KILL -- "-$job"; done
 
 
 def local_queue(folder: Path) -> Path:
-    """Put the two commands into a folder and return it, for the front of the path."""
+    """Write the two commands into a folder and return it, to be put first in PATH."""
     for name, text in (("sbatch", _SUBMIT), ("scancel", _CANCEL)):
         (folder / name).write_text(text.format(folder=folder))
         (folder / name).chmod(0o755)
@@ -26,10 +29,10 @@ def local_queue(folder: Path) -> Path:
 
 
 def queued(folder: Path) -> list[int]:
-    """Return the jobs that were ever queued, in their order: each a group of processes."""
+    """Return the process groups of all jobs ever queued, in the order in which they were queued."""
     return [int(line) for line in (folder / "jobs").read_text().split()]
 
 
 def kill_job(job: int) -> None:
-    """End a job as a node that fails does."""
+    """Kill a job, as the failure of its node would."""
     os.killpg(job, signal.SIGKILL)

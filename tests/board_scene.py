@@ -1,4 +1,4 @@
-"""Boards seen by a known camera, as exact corners with noise and as rendered pictures."""
+"""Boards seen by a known camera: their corners with noise, and rendered pictures."""
 
 import cv2
 import numpy as np
@@ -47,10 +47,11 @@ def views_of(
 
 
 def render(camera: Camera, T_cb, board_picture, px_per_mm, random, grey_sigma=2.0):
-    """Return the picture of a flat board: rays cast through a 3 × 3 grid in every pixel, blur-free, noisy.
+    """Return a noisy picture of a flat board without blur, from 3 × 3 rays in every pixel.
 
-    ``board_picture`` is the board's face; its pixel (c, r) lies at ((c + 0.5), (r + 0.5)) / px_per_mm minus
-    half its size, in the board's plane.
+    ``board_picture`` is the face of the board; its pixel (c, r) lies at ((c + 0.5), (r + 0.5))
+
+    px_per_mm minus half its size, in the board's plane.
     """
     width, height = camera.image_size
     offsets = (np.arange(3) - 1) / 3
@@ -65,14 +66,14 @@ def render(camera: Camera, T_cb, board_picture, px_per_mm, random, grey_sigma=2.
 
 
 def board_points(corners_px, board_picture, px_per_mm):
-    """Return the (N, 3) board-plane points of positions in the board's picture."""
+    """Return the (N, 3) points in the board's frame of positions in the board's picture."""
     size = np.array(board_picture.shape[1::-1])
     xy = (np.asarray(corners_px, float) + 0.5 - size / 2) / px_per_mm
     return np.concatenate([xy, np.zeros((len(xy), 1))], 1)
 
 
 def chessboard_picture(columns, rows, square_px, border_px):
-    """Return a chessboard of inner corners columns × rows, and its corners' positions in the picture."""
+    """Return the picture of a chessboard and the positions of its inner corners, columns × rows, in it."""
     squares = (np.add.outer(np.arange(rows + 1), np.arange(columns + 1)) % 2) * 200 + 30
     face = np.kron(squares, np.ones((square_px, square_px)))
     picture = np.pad(face, border_px, constant_values=230).astype(np.uint8)

@@ -1,4 +1,4 @@
-"""Real board views of others for the calibration tests, from the shared folder."""
+"""Published real board views from the shared folder, for the calibration tests."""
 
 import json
 from pathlib import Path
@@ -38,7 +38,10 @@ def detected(file: Path, board: Chessboard) -> BoardView | None:
 
 
 def matlab_camera(name: str) -> Scaramuzza:
-    """Return MATLAB's fisheyeParameters as a camera: u first, 1-based, stretch normalised to c = 1 for u."""
+    """Return MATLAB's fisheyeParameters as a camera.
+
+    Pixels count from 1, the stretch is scaled to c = 1 for u.
+    """
     file = shared("real", "omni_laser_zhang", "published_calibration", f"fisheyeCameraParams{name}.json")
     values = json.loads(file.read_text())["any"][0]["Intrinsics"]["any"][0]
     a0, a2, a3, a4 = values["MappingCoefficients"][0]
@@ -49,7 +52,7 @@ def matlab_camera(name: str) -> Scaramuzza:
 
 
 def pose_rms_px(view: BoardView, camera: Camera) -> float:
-    """Return the rms distance of a board's corners from their projection, only the pose fitted."""
+    """Return the rms distance, px, of a board's corners from their projection after fitting only the pose."""
     corners = Corners.of([view])
     posed = solve(Estimate(camera, pose(view, camera)[None], np.zeros(3)), corners, POSES_ONLY, 2.0)
     return rms(posed.residuals(corners))

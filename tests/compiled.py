@@ -1,4 +1,4 @@
-"""Compile the inner loops of a run, before tests in several processes would each compile them."""
+"""Compile the inner loops of a run once, so that the test processes do not each compile them."""
 
 from pipeline.cli import kernels_of_a_run
 from pipeline.system.kernels import compile_all

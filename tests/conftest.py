@@ -1,4 +1,7 @@
-"""What all tests share: limits of time that a slow machine does not break, threads, and which files begin."""
+"""Setup common to all tests.
+
+Time limits that allow for slow machines, thread counts, and the order of files.
+"""
 
 import os
 import time
@@ -14,19 +17,19 @@ from tests.patience import patience
 
 @pytest.fixture(scope="session", autouse=True)
 def blas_as_in_a_run() -> Iterator[None]:
-    """Give linear algebra one thread, as a run gives it: see `pipeline.machine.runner`.
+    """Limit linear algebra to one thread, as a run does: see `pipeline.machine.runner`.
 
-    With a thread for each core in each of two processes, threads wait for each other: a small Cholesky
-    factorisation then takes up to a hundred times as long.
+    With one thread per core in each of two processes, threads wait for each other, and a small Cholesky
+    factorisation takes up to a hundred times as long.
     """
     with one_library_thread():
         yield
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Let a test take longer on a slow machine before it is called hung; begin with the slow files.
+    """Lengthen the time limits of tests on a slow machine, and run the slow files first.
 
-    A slow file that comes last keeps one process at work while the other has nothing to do.
+    If a slow file ran last, one process would work while the others had nothing to do.
     """
     limit = patience(float(config.getini("timeout")))
     for item in items:
@@ -37,7 +40,10 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_runtest_setup() -> None:
-    """Skip, and so count, what would start after the moment TESTS_UNTIL (s since 1970), if that is given."""
+    """Skip tests that would start after the time TESTS_UNTIL (s since 1970), if it is set.
+
+    They count as skipped.
+    """
     until = os.environ.get("TESTS_UNTIL")
     if until and time.time() > float(until):
         pytest.skip("not run: the time given to all tests (TESTS_UNTIL) is used up")

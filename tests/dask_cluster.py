@@ -1,4 +1,4 @@
-"""A real Dask cluster: a scheduler and workers, each a process of its own, reached by address."""
+"""A real Dask cluster: scheduler and workers are separate processes that are reached by address."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _PATIENCE_S = patience(90)
 
 @dataclass
 class DaskCluster:
-    """``dask scheduler`` and some ``dask worker``, as an administrator starts them."""
+    """``dask scheduler`` and some ``dask worker`` processes, started as an administrator would."""
 
     folder: Path
     count: int
@@ -45,7 +45,7 @@ class DaskCluster:
             end(process)
 
     def add_worker(self) -> None:
-        """Start another worker; without a nanny, so that one killed stays away."""
+        """Start another worker without a nanny, so that it is not restarted when it is killed."""
         words = [self.address, "--nthreads", "1", "--no-dashboard", "--no-nanny"]
         self.workers.append(self._start("dask_worker", [*words, "--local-directory", str(self.folder)]))
 
@@ -58,7 +58,7 @@ class DaskCluster:
 
 
 def end(process: subprocess.Popen[bytes]) -> None:
-    """Kill a process and whatever it started, as a machine that loses power does."""
+    """Kill a process and its children, as a power failure would."""
     if process.poll() is None:
         os.killpg(process.pid, signal.SIGKILL)
     process.wait()

@@ -1,4 +1,4 @@
-"""Answers to what channels show, made up channel by channel."""
+"""Answers composed from made-up evidence of single channels."""
 
 from __future__ import annotations
 

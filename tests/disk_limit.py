@@ -1,4 +1,4 @@
-"""A disk that is full after so many bytes of a file."""
+"""A limit on file sizes that acts like a full disk."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from contextlib import contextmanager
 
 @contextmanager
 def file_size_limit(limit: int) -> Iterator[None]:
-    """Let no file of this process grow beyond ``limit`` bytes."""
+    """Let no file that this process writes grow beyond ``limit`` bytes."""
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (limit, hard))
     try:

@@ -1,4 +1,4 @@
-"""Whole small recordings of a drawn pipe: textured or plain wall, LED light, laser ring, encoder."""
+"""Small complete recordings of a drawn pipe: textured or plain wall, LED light, laser ring, encoder."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def small_probe() -> Probe:
 
 
 def round_wall(s: Float, psi: Float) -> Float:
-    """Return the radius (...) of a pipe without any shape."""
+    """Return the radius (...) of a plain round pipe."""
     return RADIUS + 0 * psi
 
 
@@ -56,9 +56,9 @@ def drawn_run(
     encoder: bool = True,
     radius_at: WallRadius = round_wall,
 ) -> DrawnRun:
-    """Draw a run whose frames are laser and led by turns; ``contrast`` 0 leaves the wall plain.
+    """Draw a run whose laser and LED frames alternate; ``contrast`` 0 leaves the wall plain.
 
-    ``radius_at`` is a wall that each ray meets once and that slopes by less than half of it.
+    ``radius_at`` must be a wall that each ray meets once, with slopes below a half.
     """
     probe, count = small_probe(), len(z_mm)
     T_pc = _poses(z_mm, roll_rad)

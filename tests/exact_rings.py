@@ -8,10 +8,11 @@ from pipeline.arrays import Float
 from pipeline.simulator.sheet import room_mm
 from pipeline.simulator.truth import SceneTruth
 
-# Image radii between which the ring is searched: off the centre's few px, to beyond the corner of 2 MP
-# (1000 px).
+# Image radii, px, between which the ring is searched: from just off the image centre to beyond the corner of
+# a
+# picture of 2 MP (1000 px).
 _SEARCH_PX = (20.0, 900.0)
-# Step of that search: finer than the image of any step of the wall that a scene may have.
+# Step of that search, px: finer than the image of any step of the wall that a scene may have.
 _SEARCH_STEP_PX = 4.0
 # 4 px halved 34 times is 2e-10 px.
 _BISECTIONS = 34
@@ -20,9 +21,8 @@ _BISECTIONS = 34
 def exact_rings(truth: SceneTruth, frames: Sequence[int], azimuth_rad: Float, centre_px: Float) -> Float:
     """Return the image radius (F, A) of the line's mean about ``centre_px``, px, at image azimuths (A,).
 
-    It is the first point of the sheet, counted from the laser, that lies on the wall; NaN where there is none
-    in view. The wall may hide the point from the camera, which is not tested. A rolling shutter is modelled
-    by row.
+    It is the first point of the sheet, counted from the laser, that lies on the wall; NaN where none is in
+    view. Occlusion of that point by the wall is not tested. A rolling shutter is modelled row by row.
     """
     return np.stack([_ring(truth, frame, azimuth_rad, centre_px) for frame in frames])
 
@@ -52,7 +52,7 @@ def _bracket(room: Callable[[Float], Float], count: int) -> tuple[Float, Float]:
 
 
 def seen_above_water(azimuth_rad: Float, radius: float, centre_y: float, water_y: float) -> Float:
-    """Return points (A, 2) of a round pipe about (0, centre_y), mirrored where the ray meets still water."""
+    """Return points (A, 2) of a round pipe about (0, centre_y), mirrored at a still water surface."""
     direction = np.stack([np.cos(azimuth_rad), np.sin(azimuth_rad)], -1)
 
     def along(y: float) -> Float:

@@ -1,4 +1,4 @@
-"""Faults from below: a disk that is really full, permissions really gone, a world that changes meanwhile."""
+"""Faults of the system: a full disk, missing permissions, and files that change while a stage runs."""
 
 from __future__ import annotations
 
@@ -18,17 +18,17 @@ _CAP_DAC_OVERRIDE, _CAP_DAC_READ_SEARCH = 1, 2
 
 
 class MeddlingDisplay(SilentDisplay):
-    """Does something to the world at the moment a stage starts; shows nothing."""
+    """A display that shows nothing, and calls a function at the moment a stage starts."""
 
     def __init__(self, deeds: Mapping[str, Callable[[], object]]) -> None:
         self._deeds = deeds
 
     def started(self, stage: str) -> None:
-        """Do what is to be done at this stage."""
+        """Call the function if this is its stage."""
         self._deeds.get(stage, lambda: None)()
 
 
-# A disk of its own in a namespace of its own: it is gone with the process.
+# A real file system in a private namespace: it disappears with the process.
 _ON_DISK = """
 import subprocess, sys
 sys.path.insert(0, {root!r})
@@ -42,9 +42,9 @@ subprocess.run(["mount", "-t", "tmpfs", "-o", "size=16m", "boresight-test", str(
 
 
 def on_small_disk(folder: Path, script: str) -> str:
-    """Run Python text with ``disk``, folder of a real small disk, and ``resize(kib)``; return what it prints.
+    """Run Python text with ``disk``, a folder of a small real disk, and ``resize(kib)``.
 
-    The test is skipped where the system lets no user mount one.
+    Return what it prints. The test is skipped on systems that let no user mount a file system.
     """
     disk = folder / "disk"
     disk.mkdir()
@@ -64,7 +64,7 @@ def on_small_disk(folder: Path, script: str) -> str:
 
 
 def obeying_permissions() -> None:
-    """Give up root's right to pass over permissions, for good; to be called in a child before it starts."""
+    """Give up root's right to ignore file permissions; to be called in a child process before it starts."""
     system = ctypes.CDLL(None)
     for capability in (_CAP_DAC_OVERRIDE, _CAP_DAC_READ_SEARCH):
         system.prctl(_PR_CAPBSET_DROP, capability, 0, 0, 0)

@@ -1,4 +1,7 @@
-"""Firefox without a screen, by its own remote protocol, Marionette: no driver has to be installed."""
+"""Firefox without a screen, controlled by its own remote protocol, Marionette.
+
+No driver has to be installed.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +22,7 @@ from tests.patience import patience
 
 _NAMES = ("firefox-esr", "firefox")
 _START_S, _ANSWER_S = patience(60), patience(60)
-# A fresh profile that opens nothing of its own; without a graphics card the processor draws WebGL.
+# A fresh profile that opens no pages by itself; without a graphics card the processor draws WebGL.
 _SETTINGS = {
     "marionette.port": 0, "webgl.force-enabled": True, "browser.shell.checkDefaultBrowser": False,
     "datareporting.policy.dataSubmissionEnabled": False, "toolkit.telemetry.reportingpolicy.firstRun": False,
@@ -36,7 +39,7 @@ _KEYS = {
 
 
 class Firefox:
-    """One window."""
+    """One window of Firefox."""
 
     def __init__(self, port: int) -> None:
         self._socket = socket.create_connection(("127.0.0.1", port), timeout=_ANSWER_S)
@@ -53,7 +56,7 @@ class Firefox:
         return result
 
     def js(self, expression: str) -> Any:
-        """Return the value of an expression in the page's own world."""
+        """Return the value of an expression evaluated in the page."""
         script = f"return (0, eval)({json.dumps(expression)})"
         return self.ask("WebDriver:ExecuteScript", script=script, args=[], sandbox=None)["value"]
 
@@ -66,7 +69,7 @@ class Firefox:
         raise AssertionError(f"never true: {expression}")
 
     def keys(self, *names: str) -> None:
-        """Press keys one after the other; ``Shift+Tab`` presses them together."""
+        """Press keys one after the other; ``Shift+Tab`` presses both together."""
         for name in names:
             pressed = [_KEYS.get(part, part) for part in name.split("+")] if len(name) > 1 else [name]
             down = [{"type": "keyDown", "value": key} for key in pressed]
@@ -89,7 +92,7 @@ class Firefox:
 
 @contextmanager
 def firefox(folder: Path) -> Iterator[Firefox]:
-    """Yield a Firefox with its profile in ``folder``, or skip the calling test, saying why."""
+    """Yield a Firefox with its profile in ``folder``, or skip the calling test and give the reason."""
     program = next((found for name in _NAMES if (found := shutil.which(name))), None)
     if program is None:
         pytest.skip("no Firefox: install the system's, for example firefox-esr of Debian")
@@ -110,7 +113,7 @@ def firefox(folder: Path) -> Iterator[Firefox]:
 
 
 def _port(folder: Path, process: subprocess.Popen[bytes]) -> int:
-    """Return the port that Firefox has taken and written into its profile."""
+    """Return the port that Firefox has chosen and written into its profile."""
     told, end = folder / "MarionetteActivePort", time.monotonic() + _START_S
     while time.monotonic() < end and process.poll() is None:
         if told.exists() and (port := told.read_text().strip()):

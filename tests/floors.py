@@ -1,4 +1,4 @@
-"""The floors of the program and what breaks their order, read from the program's text."""
+"""The layers ("floors") of the program, and the imports that break their order, read from the source text."""
 
 from __future__ import annotations
 
@@ -7,7 +7,8 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-# From the ground up. A room may import itself and the rooms of lower floors, never a room of its own floor.
+# From bottom to top. A room may import itself and the rooms of lower floors, never another room of its own
+# floor.
 # A new room gets a place here and in ARCHITECTURE.md, which shows the same table.
 FLOORS: tuple[tuple[str, tuple[str, ...]], ...] = (
     ("words", ("pipeline", "stages", "pipeline.errors", "pipeline.arrays", "pipeline.pages")),
@@ -41,8 +42,9 @@ FLOORS: tuple[tuple[str, tuple[str, ...]], ...] = (
 )  # fmt: skip
 # Only these rooms of `pipeline` put stages together with the rest, so only they import stages.
 PUT_TOGETHER = ("pipeline.api", "pipeline.commands", "pipeline.cli")
-# What is still to be removed, with the day it was noted. Whoever removes one removes its line as well: a line
-# that nobody needs fails.
+# Exceptions that are still to be removed, with the day each was noted. Whoever removes one removes its line
+# as well:
+# an exception that is no longer needed fails the test.
 IMPORTS_STILL_THERE: Mapping[tuple[str, str], str] = {}
 
 
@@ -52,7 +54,7 @@ _PACKAGES = ("pipeline", "stages")
 
 @dataclass(frozen=True)
 class Import:
-    """One import: the module it stands in, its line, the module imported, and the name taken from it."""
+    """One import: the module that contains it, its line, the imported module, and the imported name."""
 
     module: str
     line: int
@@ -69,7 +71,7 @@ def imports_below(root: Path) -> list[Import]:
 
 
 def against_the_floors(imports: list[Import], allowed: Mapping[tuple[str, str], str]) -> list[str]:
-    """Return a line for every import that a room must not make, and for every allowance nobody needs."""
+    """Return a line for every forbidden import, and one for every exception that is no longer needed."""
     height = {room: floor for floor, (_, rooms) in enumerate(FLOORS) for room in rooms}
     unknown = {room_of(i.module) for i in imports} - set(height)
     wrong = {
@@ -85,7 +87,10 @@ def against_the_floors(imports: list[Import], allowed: Mapping[tuple[str, str], 
 
 
 def private_names(imports: list[Import], allowed: Mapping[tuple[str, str], str]) -> list[str]:
-    """Return a line for every name with a leading underscore of another module, as `against_the_floors`."""
+    """Return a line for every use of another module's private name.
+
+    As in `against_the_floors`, exceptions that are no longer needed get a line too.
+    """
     wrong = {
         (i.module, i.name or i.target): f"{i.module}, line {i.line}: takes {i.name} of {i.target}"
         for i in imports
@@ -114,7 +119,7 @@ def _module(file: Path, root: Path) -> str:
 
 
 def _imports(module: str, text: str, modules: set[str]) -> Iterator[Import]:
-    """Yield a module's imports, also those inside functions, and the names read off imported modules."""
+    """Yield a module's imports, also those inside functions, and names read from imported modules."""
     bound: dict[str, str] = {}
     tree = ast.parse(text)
     for node in ast.walk(tree):

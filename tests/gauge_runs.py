@@ -1,4 +1,4 @@
-"""Gauge runs made at the level of rings and fiducials' edges, with a drawn probe as truth."""
+"""Gauge runs simulated as ring samples and fiducial edges, without pictures; the true probe is drawn."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ _NEAREST, _FARTHEST = 10.0, 55.0
 
 @dataclass(frozen=True)
 class GaugeRun:
-    """What was measured in a made run, and the true probe."""
+    """What was measured in a simulated run, and the true probe."""
 
     recording: Recording
     gauge: Gauge
@@ -53,7 +53,7 @@ class GaugeRun:
 
 
 class NoImages:
-    """A source of no images."""
+    """A frame source without images."""
 
     image_size = (1600, 1200)
 
@@ -83,7 +83,7 @@ def facts() -> PipeFacts:
 
 
 def made_run(seed: int, frames: int = 120, misdrawn_mm: float = 0.0) -> GaugeRun:
-    """Return a run of a probe whose camera is drawn as stated and whose sheet is drawn wider than stated.
+    """Return a run whose camera is drawn within its stated σ and whose sheet is drawn with a larger one.
 
     The radius of the second of three bores is ``misdrawn_mm`` larger than stated.
     """
@@ -109,7 +109,7 @@ def made_run(seed: int, frames: int = 120, misdrawn_mm: float = 0.0) -> GaugeRun
 
 
 def driven(frames: int, random: np.random.Generator) -> Float:
-    """Return poses (N, 4, 4) through the gauge, off-centre, with wobble and roll."""
+    """Return the camera's poses (N, 4, 4) on a drive through the gauge, off-centre, with wobble and roll."""
     t = np.linspace(0, 1, frames)
     phase = random.uniform(0, 2 * np.pi, 4)
     wave = [np.sin(2 * np.pi * k * t + p) for k, p in zip((2, 3, 2.5, 1.5), phase, strict=True)]
@@ -120,7 +120,7 @@ def driven(frames: int, random: np.random.Generator) -> Float:
 
 
 def driven_as(run: GaugeRun) -> Float:
-    """Return the true poses of run 1: the drive is drawn after the probe."""
+    """Return the true poses of run 1, whose drive is drawn after the probe."""
     random = np.random.default_rng(1)
     stated = stated_probe()
     random.multivariate_normal(stated.parameters, stated.covariance)
@@ -190,7 +190,7 @@ def fiducials_of(
 
 
 def calibrated(run: GaugeRun, parameters: GaugeParameters | None = None) -> GaugeCalibration:
-    """Return what the calibration makes of a run."""
+    """Return the result of calibrating with a run."""
     parameters = parameters or USUAL
     given = measured_run(run, parameters)
     finding = solve(given.start, given.measured, given.source, given.posed, parameters)
@@ -198,7 +198,7 @@ def calibrated(run: GaugeRun, parameters: GaugeParameters | None = None) -> Gaug
 
 
 def measured_run(run: GaugeRun, parameters: GaugeParameters = USUAL) -> MeasuredRun:
-    """Return a run as the calibration measures it."""
+    """Return a run in the form in which the calibration receives it."""
     T_pc = poses_of_all_frames(run.recording, run.posed, run.rings, run.stated)
     source = RingSource(run.rings, run.rings.frame, run.gauge)
     measured = Measurements(
@@ -210,7 +210,7 @@ def measured_run(run: GaugeRun, parameters: GaugeParameters = USUAL) -> Measured
 
 
 def in_sigma(run: GaugeRun, result: GaugeCalibration) -> dict[str, float]:
-    """Return how many of its own σ each parameter is off the truth; fx and fy count once."""
+    """Return the error of each parameter over its own σ; fx and fy count once."""
     sigma = np.sqrt(np.diag(result.probe.covariance))
     off = result.probe.parameters - run.true.parameters
     names = result.probe.parameter_names

@@ -1,4 +1,4 @@
-"""Drawn runs of a probe that is pulled by hand: it stops, turns, jerks; pictures may be lost meanwhile."""
+"""Simulated runs of a probe pulled by hand: it stops, turns and jerks, and pictures may be lost."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from pipeline.recording.base import Encoder, FrameTable
 from stages.premises.losses import Steps, rows_by_motion
 
 RADIUS_MM, RATE, MM_A_FRAME = 50.0, 30.0, 1.0
-# The encoder begins so many frames before the pictures, and ends as much later.
+# The encoder starts this many frames before the pictures, and ends as long after them.
 BESIDE = 30
-# Errors of a step as phase correlation makes them in open-3, of its size and in radii; half of it in open-1.
+# Errors of a step by phase correlation in open-3: a share of the step, and in radii; half of it in open-1.
 RELATIVE, ABSOLUTE = 0.03, 0.0015
 NOTHING = np.empty(0, np.int64)
 
 
 @dataclass(frozen=True)
 class Pulled:
-    """A drawn run: what premises sees of it, and the row (F,) that each picture truly has."""
+    """A simulated run: the input of premises, and the true row (F,) of each picture."""
 
     steps: Steps
     table: FrameTable
@@ -31,24 +31,24 @@ class Pulled:
     radius_mm: Float | float = RADIUS_MM
 
     def rows(self) -> Int:
-        """Return the rows that are found."""
+        """Return the rows that premises assigns."""
         rows, sway = np.arange(len(self.true_row)), np.ones(len(self.true_row))
         given = self.steps, self.rhythm, self.table, self.encoder, sway
         return rows_by_motion(rows, *given, self.radius_mm)
 
     def over_steps(self) -> tuple[Int, Int]:
-        """Return by how many rows each step (K,) goes on, as found and in truth."""
+        """Return by how many rows each step (K,) goes on: as found, and in truth."""
         found, true = (np.diff(r[self.steps.end], prepend=0) for r in (self.rows(), self.true_row))
         return found, true
 
     def invented(self) -> int:
-        """Return how many pictures are told as lost that were not."""
+        """Return how many pictures are reported as lost that were not."""
         found, true = self.over_steps()
         return int(np.maximum(found - true, 0).sum())
 
 
 def way_mm(frames: int, random: np.random.Generator, *, steady: bool = False) -> Float:
-    """Return where the probe is (frames, 10), mm, at tenths of each frame's time."""
+    """Return the distance (frames, 10), mm, of the probe at tenths of each frame's time."""
     if steady:
         return MM_A_FRAME * np.arange(10 * frames).reshape(frames, 10) / 10
     speed: list[float] = []
@@ -62,7 +62,7 @@ def way_mm(frames: int, random: np.random.Generator, *, steady: bool = False) ->
 
 
 def encoder_of(way: Float, rate_hz: float, quantum_mm: float, random: np.random.Generator) -> Encoder:
-    """Return an encoder of so many readings a second, which counts quanta and begins before the pictures."""
+    """Return an encoder of so many readings a second; its readings start before the pictures."""
     fine_s = np.arange(way.size) / (10 * RATE)
     time_s = np.arange(random.uniform(0, 1 / rate_hz), fine_s[-1], 1 / rate_hz)
     read = np.interp(time_s, fine_s, way.ravel())
@@ -80,10 +80,10 @@ def pulled(
     steady: bool = False,
     errors: float = 1.0,
 ) -> Pulled:
-    """Draw a run: of each ``rhythm`` pictures one shows the wall, of ``frames`` pictures some are ``lost``.
+    """Simulate a run: of each ``rhythm`` pictures one shows the wall.
 
-    The table counts the pictures that are left. ``encoder_hz`` of 0 is no encoder; ``errors`` of steps are so
-    many times those of open-3.
+    Some of the ``frames`` pictures are ``lost``. The table numbers the remaining pictures. ``encoder_hz`` of
+    0 means no encoder; ``errors`` scales the errors of steps relative to those of open-3.
     """
     random = np.random.default_rng(seed)
     way = way_mm(frames + 2 * BESIDE, random, steady=steady)

@@ -1,4 +1,4 @@
-"""Effects that are put into recorded frames by hand, for the twin to find."""
+"""Effects that are added to recorded frames, for the twin to find."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class Hidden:
 
 
 def effects(scene: Scene, frame: Int, random: np.random.Generator) -> list[Hidden]:
-    """Return the effects that are hidden in frames (N,), two sizes of each, at random places."""
+    """Return the effects to add to frames (N,), two sizes of each, at random places."""
     ring, middle = scene.ring, int(np.median(frame))
     height, width = scene.polar[0].shape
     v, u = np.mgrid[0:height, 0:width].astype(np.float32)

@@ -1,4 +1,4 @@
-"""Light that wall, lamps and laser throw where no photo foretells it, put into recorded frames by hand."""
+"""Light of wall, lamps and laser that no photo can predict, added to recorded frames."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ _GLINTS = 5
 
 
 def shining(scene: Scene, frame: Int, random: np.random.Generator) -> list[Hidden]:
-    """Return effects that are hidden in frames (N,), strong and weak, at random places."""
+    """Return effects to add to frames (N,), a strong and a weak one of each, at random places."""
     found = []
     for weak in (False, True):
         kind, azimuth = ("weak" if weak else "strong"), float(random.uniform(-np.pi, np.pi))
@@ -56,7 +56,7 @@ def _only(light: str, factor: Float32) -> Change:
 
 
 def _streak(scene: Scene, kind: str, azimuth: float, grey: float, random: np.random.Generator) -> Hidden:
-    """Return a lamp mirrored at one place of the image, which sways by some pixels from frame to frame."""
+    """Return the reflection of a lamp at one place of the image, which moves from frame to frame."""
     (u, v), away = scene.ring.centre_px, 1.05 * scene.ring.radius_px
     at = np.array([u + away * np.cos(azimuth), v + away * np.sin(azimuth)])
     sway = 4.0 * random.standard_normal((100_000, 2))
@@ -75,7 +75,7 @@ def _streak(scene: Scene, kind: str, azimuth: float, grey: float, random: np.ran
 
 
 def _spots(scene: Scene, grey: float) -> Change:
-    """Return spots of the laser beside its line, each frame elsewhere."""
+    """Return bright spots of the laser beside its line, at other places in each frame."""
 
     def change(number: int, light: str, image: Float32) -> Float32:
         random, made = np.random.default_rng(number), np.zeros_like(image)
@@ -94,7 +94,7 @@ def _spots(scene: Scene, grey: float) -> Change:
 
 
 def _wet(scene: Scene, distance_mm: float, azimuth: float, size: tuple[float, float]) -> Change:
-    """Return a film of water: the wall beneath is darker, and mirrors lamps when seen flat."""
+    """Return a film of water: the wall beneath it is darker, and reflects the lamps at grazing angles."""
     darker, grey = size
     theta, lobe = np.nan_to_num(scene.polar[0]), np.sin(np.nan_to_num(scene.polar[0])) ** 12
     lobe = (grey * np.where(theta < np.pi / 2, lobe, 1.0)).astype(np.float32)
@@ -112,7 +112,7 @@ def _wet(scene: Scene, distance_mm: float, azimuth: float, size: tuple[float, fl
 
 
 def _bounced(scene: Scene, grey: float) -> Change:
-    """Return the line's light from wall to wall: each place sees all of the line's ring."""
+    """Return the line's light reflected from wall to wall: each place is lit by the whole ring."""
     turn = np.linspace(0, 2 * np.pi, 361)[:-1]
     along = np.linspace(0, 6, 121)
     square = (2 - 2 * np.cos(turn)) + along[:, None] ** 2

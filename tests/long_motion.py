@@ -1,4 +1,7 @@
-"""What motion is fed with on a straight pipe of any length, without pictures: tracks, rings, an encoder."""
+"""Inputs of the motion stage for a straight pipe of any length, without pictures.
+
+Tracks, rings, an encoder.
+"""
 
 from __future__ import annotations
 
@@ -27,7 +30,7 @@ _AT_ONCE = 4000
 
 @dataclass(frozen=True)
 class LongMotion:
-    """What was measured, and the true poses (N, 4, 4) with the first one at the origin."""
+    """The measurements, and the true poses (N, 4, 4) relative to the first one."""
 
     run: MeasuredRun
     T_pc: Float
@@ -36,7 +39,7 @@ class LongMotion:
 def long_motion(
     frames: int, step_mm: float = 0.6, landmarks_per_mm: float = 20.0, seed: int = 0
 ) -> LongMotion:
-    """Return a run of frames laser and led by turns, driven evenly with a slow wobble."""
+    """Return a run with alternating laser and LED frames, at constant speed with a slow wobble."""
     random, probe, k = np.random.default_rng(seed), small_probe(), np.arange(frames)
     T_pc = _poses(step_mm * k)
     laser = k[::2]
@@ -67,7 +70,10 @@ def _poses(z_mm: Float) -> Float:
 
 
 def _guessed(T_pc: Float) -> Float:
-    """Return poses as the tracker has them: pitch and yaw left out, distance a little too long."""
+    """Return poses as the tracker estimates them.
+
+    Without pitch and yaw, and with distances slightly too long.
+    """
     roll = np.arctan2(T_pc[:, 1, 0], T_pc[:, 0, 0])
     origin = T_pc[:, :3, 3] * np.array([1, 1, 1.002])
     return from_parts(rotation_from_vector(np.stack([0 * roll, 0 * roll, roll], -1)), origin)

@@ -1,9 +1,10 @@
-"""A long recording from a short one: driven forward, backward, forward, ... without a jump.
+"""A long recording made of a short one, driven forward, backward, forward and so on without a jump.
 
-usage: python -m tests.long_recording RECORDING FOLDER [PASSES]     writes about 0.25 MB a frame
+usage: python -m tests.long_recording RECORDING FOLDER [PASSES]; it writes about 0.25 MB a frame
 
-Pictures of a backward pass are those of the forward one in reverse order; time goes on, and the encoder's
-readings are mirrored about each turn. Truth is repeated likewise, so that every pass can be scored.
+Pictures of a backward pass are those of the forward one in reverse order. Time goes on, and the encoder's
+readings are mirrored about each turn. The truth is repeated in the same way, so that every pass can be
+scored.
 """
 
 from __future__ import annotations
@@ -28,14 +29,17 @@ _SAME = ("recording.yaml", "probe.yaml", "truth_wall.npz", "truth_albedo.jpg")
 
 
 def to_and_fro(frames: int, passes: int) -> Int:
-    """Return the short recording's frame shown in each frame of the long one; a turn shows its frame once."""
+    """Return the frame of the short recording for each frame of the long one.
+
+    At a turn a frame is shown once.
+    """
     there = np.arange(frames)
     back = there[::-1]
     return np.concatenate([there, *([back[1:], there[1:]][k % 2] for k in range(passes - 1))])
 
 
 def write_long(source: Path, target: Path, passes: int) -> None:
-    """Write the long recording into a new folder; encoding anew costs its pictures hardly anything."""
+    """Write the long recording into a new folder; encoding again hardly changes its pictures."""
     target.mkdir(parents=True)
     for name in _SAME:
         if (source / name).exists():

@@ -1,4 +1,4 @@
-"""A finished run made as long as one likes by repeating a real run's results end to end."""
+"""A finished run of any length, made by repeating the results of a real run end to end."""
 
 from __future__ import annotations
 
@@ -110,7 +110,7 @@ def _radius_map(wall: RadiusMap, times: int, step: float, rows: int, coarser: in
 
 
 def _axis(axis: PipeAxis, shift: Float, step: float) -> PipeAxis:
-    """Return a straight axis: the source's own ends would not meet."""
+    """Return a straight axis, since the two ends of the source's own axis would not join."""
     s = np.linspace(axis.distance_mm[0], axis.distance_mm[0] + shift[-1] + step, 2 + len(shift))
     origin = np.stack([0 * s, 0 * s, s], -1)
     return PipeAxis(s, origin, np.tile(np.eye(3), (len(s), 1, 1)))
@@ -139,7 +139,7 @@ def _write_radius_map(folder: Path) -> None:
 
 
 def _write_model(source: Path, target: Path, times: int, step: float) -> None:
-    """Repeat the model's primitives; what is not positions is there once and used by all."""
+    """Repeat the model's primitives; all data but positions is stored once and shared."""
     content = source.read_bytes()
     length = struct.unpack_from("<I", content, 12)[0]
     document, binary = json.loads(content[20 : 20 + length]), content[28 + length :]

@@ -1,4 +1,4 @@
-"""A run there and back without pictures or adjustment: windows that drift, and a wall to recognise."""
+"""A run forth and back without pictures or adjustment: windows that drift, and a wall to recognise."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from stages.motion.windows.submaps import SharedParameters, Submap, Window, cut_
 STEP_MM, FRAMES, LENGTH, OVERLAP, SHARED = 4.0, 400, 80, 30, 2
 GRID = StripGrid(50.0, 720, 10.5, 64.0)
 _FROM_MM = -100.0
-# 1 σ of the drift from frame to frame: position, mm, and turns, rad.
+# 1 σ of the drift from frame to frame: position, mm, and rotation, rad.
 DRIFT = np.array([2e-3, 2e-3, 0.05, 2e-5, 2e-5, 2e-4])
 _BEND_PER_MM = 2e-6
 _BEND_FROM_MM, _BEND_TO_MM = 300.0, 600.0
@@ -27,7 +27,7 @@ _BEND_FROM_MM, _BEND_TO_MM = 300.0, 600.0
 
 @dataclass(frozen=True)
 class LoopedRun:
-    """What windows gave, and the true distance (N,) and roll (N,)."""
+    """The estimates of all windows, and the true distance (N,) and roll (N,)."""
 
     joined: JoinedRun
     distance_mm: Float
@@ -35,12 +35,15 @@ class LoopedRun:
 
     @property
     def passage(self) -> Passage:
-        """Return how every other frame drove along the pipe, as believed."""
+        """Return the estimated positions along the pipe of every other frame."""
         lit = np.arange(1, FRAMES, 2)
         return Passage.of(lit, self.believed()[0][lit], GRID.near_mm, GRID.far_mm)
 
     def believed(self, joined: JoinedRun | None = None) -> tuple[Float, Float, Float]:
-        """Return distance, roll and offset (N, 2) from the axis as a run has them; the true offset is 0."""
+        """Return distance, roll and offset (N, 2) from the axis as the run estimates them.
+
+        The true offset is 0.
+        """
         run = joined or self.joined
         distance, azimuth, radius = to_pipe(run.axis, run.T_pc[:, :3, 3])
         own = np.swapaxes(frames_at(run.axis, distance)[1], 1, 2) @ run.T_pc[:, :3, :3]
@@ -49,9 +52,9 @@ class LoopedRun:
 
 
 def looped_run(seed: int = 0, curvature_per_mm: float = 0.0) -> LoopedRun:
-    """Return 400 frames, 0.8 m in and back, in windows of 80 that each drift and bend a little.
+    """Return 400 frames, 0.8 m forth and back, in windows of 80 that each drift and bend a little.
 
-    The pipe itself is straight up to 0.3 m, and from there to 0.6 m bent by so much.
+    The pipe itself is straight up to 0.3 m, and bent from there to 0.6 m.
     """
     random, k = np.random.default_rng(seed), np.arange(FRAMES)
     distance = STEP_MM * np.minimum(k, FRAMES - 1 - k).astype(float)
@@ -92,7 +95,7 @@ def _submap(
 
 
 def _bent(z: Float, bend: float, middle: float, curvature: float) -> tuple[Float, Float]:
-    """Return points (n, 3) and lean (n,) of a pipe believed to bend about a middle besides its own bend."""
+    """Return points (n, 3) and lean (n,) of a pipe estimated to bend about a middle beside its true bend."""
     s = np.arange(-200.0, 1200.0, 0.5)
     lean = curvature * np.clip(s - _BEND_FROM_MM, 0, _BEND_TO_MM - _BEND_FROM_MM) + bend * (s - middle)
     x, along = (
@@ -103,7 +106,7 @@ def _bent(z: Float, bend: float, middle: float, curvature: float) -> tuple[Float
 
 
 def rough_wall(seed: int = 1, repeat_mm: float | None = None, welds_every_mm: float | None = None) -> Float32:
-    """Return contrast from −100 to 1000 mm: natural, repeating itself, or with bands that are all alike."""
+    """Return contrast from −100 to 1000 mm: natural, repeating itself, or with identical bands."""
     rows = round(1100 / GRID.step_mm)
     random = np.random.default_rng(seed)
     white = random.standard_normal((rows, GRID.columns)).astype(np.float32)
@@ -125,10 +128,10 @@ def rough_wall(seed: int = 1, repeat_mm: float | None = None, welds_every_mm: fl
 
 @dataclass(frozen=True)
 class DrawnView:
-    """Unrolls a drawn wall as frames see it whose poses are believed otherwise than they are.
+    """Unrolls a drawn wall as seen by frames whose estimated poses are wrong.
 
-    ``later_wall`` is what frames of the second half see; ``shifted_mm`` is by how much some frames' wall is
-    moved, keyed by frame.
+    ``later_wall`` is the wall that frames of the second half see; ``shifted_mm`` gives how far the wall of
+    some frames is moved, keyed by frame.
     """
 
     run: LoopedRun
@@ -142,7 +145,7 @@ class DrawnView:
         return GRID
 
     def strips(self, place: Int, T_pc: Float) -> Iterator[Strip | None]:
-        """Yield the strips that frames see from believed poses in the straightened pipe."""
+        """Yield the strips that frames with the estimated poses see in the straightened pipe."""
         for frame, T in zip(place.tolist(), T_pc, strict=True):
             yield self._strip(frame, T)
 

@@ -1,4 +1,4 @@
-"""A tiny recording, 16 frames of 64 x 48, written in every container that boresight reads."""
+"""A tiny recording, 16 frames of 64 × 48 px, written in every container that boresight reads."""
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -88,7 +88,7 @@ def write_folder(folder: Path, video: str = "frames.mkv", **encoding: object) ->
 def write_ros1(
     folder: Path, *, compressed: bool = False, lights: list[str] | None = LIGHTS, encoding: str = "bgr8"
 ) -> Path:
-    """Write ``run.bag`` and its YAML file; ``lights`` None leaves the illumination topic out."""
+    """Write ``run.bag`` and its YAML file; with ``lights`` None there is no illumination topic."""
     file = _described(folder) / "run.bag"
     with rosbag1.Writer(file) as writer:
         store = get_typestore(Stores.ROS1_NOETIC)

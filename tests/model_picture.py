@@ -1,4 +1,4 @@
-"""Pictures of the textured mesh by ray casting, for report and README; no graphics driver is needed."""
+"""Pictures of the textured mesh by ray casting, for report and README; they need no graphics driver."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class View:
 
 @dataclass(frozen=True)
 class _Hits:
-    """What rays (N,) met: distance, tile (−1: nothing), face within the tile, barycentric weights (N, 3)."""
+    """What rays (N,) hit: distance, tile (−1: nothing), face within the tile, barycentric weights (N, 3)."""
 
     distance: Float
     tile: Int
@@ -78,7 +78,7 @@ def render_inside(mesh: TexturedMesh, width_px: int = 1280, height_px: int = 720
 
 
 def render(mesh: TexturedMesh, view: View, width_px: int, height_px: int, variant: str = "photo") -> Byte:
-    """Return a picture (H, W, 3) BGR of the model; the photo is lit, error colours are shown as they are."""
+    """Return a picture (H, W, 3) BGR of the model; the photo is shaded, error colours are not."""
     width, height = width_px * _SUPERSAMPLING, height_px * _SUPERSAMPLING
     ray = _rays(view, width, height)
     hits = _cast(mesh, view.eye_p, ray)
@@ -151,7 +151,7 @@ def _texels(tile: MeshTile, hits: _Hits, rays: Int, variant: str) -> Float:
 
 
 def _light(tile: MeshTile, hits: _Hits, rays: Int, point: Float, ray: Float, view: View) -> Float:
-    """Return the brightness (N,) of matt wall under all lights, on the side that is seen."""
+    """Return the brightness (N,) of matt wall under all lights, on the side that faces the viewer."""
     normal = np.einsum("nk,nkj->nj", hits.weight[rays], tile.normal_p[tile.face[hits.face[rays]]])
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
     normal = np.where(np.sum(normal * ray, axis=1, keepdims=True) > 0, -normal, normal)

@@ -21,7 +21,7 @@ from stages.motion.tracking.landmarks import TrackedPoses, Tracks
 RADIUS = 50.0
 ENCODER_SIGMA_MM = 0.05
 SHAKE = np.array([0.1, 0.1, 0, 2e-3, 2e-3, 0])
-"""Trembling, 1 σ, mm and rad."""
+"""1 σ of random motion from frame to frame, mm and rad."""
 _SIGMA_PX = 0.1
 _RING_MM_PER_PX = 1.5  # dr = b (1 + r² / b²) dθ, 90 px per radian, b = 22 mm
 RING_PX = 103.0
@@ -58,9 +58,10 @@ def scene(
 ) -> Scene:
     """Return a scene; ``noise`` is in units of the stated σ, ``shake`` in those of `SHAKE`.
 
-    The way swings by ``swing_mm`` about one of even speed. The pipe's radius gains the share ``widens`` of
-    the distance, and pictures are larger in the end than at the beginning by the share ``picture_grows``.
-    From a joint on (`joint_at`) the pipe is wider and lies farther along x by ``joint_mm``.
+    The distance swings by ``swing_mm`` about that of a constant speed. The pipe's radius grows by ``widens``
+    times the distance, and pictures are larger at the end than at the beginning by the share
+    ``picture_grows``. From a joint on (`joint_at`) the pipe is wider and lies farther along x by
+    ``joint_mm``.
     """
     random = np.random.default_rng(seed)
     instrument = probe()
@@ -92,7 +93,7 @@ def scene(
 
 
 def displaced(state: State, random: np.random.Generator, size: float = 1.0) -> State:
-    """Return the state moved at random by about ``size`` times what a first guess is off by."""
+    """Return the state with random errors of about ``size`` times those of a first guess."""
     n, b = len(state.T_pc), state.border_size
     step = size * random.standard_normal((n, 7)) * np.array([0.05] * 3 + [0.003] * 3 + [0.01])
     step[0, :6] = 0
@@ -110,7 +111,7 @@ def _bent(state: State) -> State:
 
 @dataclass(frozen=True)
 class Wall:
-    """A pipe that may widen, and have a joint at ``joint_at_mm``."""
+    """A pipe that may widen, and may have a joint at ``joint_at_mm``."""
 
     state: State
     widens: float
@@ -118,7 +119,7 @@ class Wall:
     joint_mm: tuple[float, float]
 
     def at(self, s: Float, psi: Float) -> Float:
-        """Return its points (M, 3) at distances and azimuths (M,)."""
+        """Return points (M, 3) of the wall at distances and azimuths (M,)."""
         r, a, b, _ = self.state.globals
         behind = s > self.joint_at_mm
         radius = r + self.widens * s + self.joint_mm[0] * behind
@@ -127,7 +128,7 @@ class Wall:
 
 
 def joint_at(frames: int) -> float:
-    """Return where the joint of a scene of so many frames is: at the ring of the middle frame."""
+    """Return the distance of the joint in a scene of so many frames: that of the middle frame's ring."""
     return 1.2 * (frames // 2 - 0.5) + 22.0
 
 

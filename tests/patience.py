@@ -1,13 +1,16 @@
-"""How long tests wait before they call a program hung: longer on a slow machine; no test measures it."""
+"""How long tests wait before they call a program hung. Slow machines get longer.
+
+No test measures this time.
+"""
 
 import time
 
-# This work takes so long on one quiet core of 3 GHz (Python 3.11).
+# This work takes so long on one idle core of 3 GHz (Python 3.11).
 _WORK, _USUAL_S = 100_000, 0.008
 
 
 def _slowness() -> float:
-    """Return how many times slower than usual this machine is just now, at least 1."""
+    """Return how many times slower than usual this machine is at present, at least 1."""
     took = []
     for _ in range(3):
         start = time.perf_counter()

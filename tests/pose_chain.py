@@ -1,4 +1,7 @@
-"""Long runs as chains of poses, without pictures: a pipe, a camera that errs as vision does, and an IMU."""
+"""Long runs as chains of poses without pictures.
+
+A pipe, a camera with the usual errors of vision, and an IMU.
+"""
 
 from __future__ import annotations
 
@@ -18,16 +21,16 @@ from stages.motion.route.rotation_graph import STRAIGHT_MM, STRAIGHTNESS_RAD
 
 STEP_MM, SPEED_MM_S, RADIUS_MM = 50.0, 150.0, 50.0
 WALK = 1e-4 / np.sqrt(1000.0)
-"""1 σ of vision's heading, rad/√mm: 0.1 mrad after a metre, 1 mrad after a hundred."""
+"""1 σ of the heading estimated by vision, rad/√mm: 0.1 mrad after a metre, 1 mrad after a hundred."""
 SCALE = 1e-3
-"""1 σ of the scale of distance: an encoder's wheel worn by a thousandth."""
+"""1 σ of the scale of distance: an encoder wheel worn by a thousandth."""
 RESPONSE = 0.01
-"""1 σ of a gyroscope's scales and of what an axis shows of turns about another, as consumer chips have."""
+"""1 σ of a gyroscope's scale errors and of its cross-axis sensitivity, as of consumer chips."""
 
 
 @dataclass(frozen=True)
 class Chain:
-    """A run as vision has it, and its true poses (N, 4, 4) in the same frame at the start."""
+    """A run as vision estimates it, and its true poses (N, 4, 4), which have the same first pose."""
 
     seen: Trajectory
     T_pc: Float
@@ -35,12 +38,12 @@ class Chain:
 
     @property
     def turn_variance(self) -> Float:
-        """Return the variance (N, 3) of the turns that the camera saw up to each frame."""
+        """Return the variance (N, 3) of the rotation that the camera measured up to each frame."""
         return np.diagonal(self.seen.covariance, axis1=1, axis2=2)[:, 3:]
 
 
 def curved(*pieces: tuple[float, float, float]) -> PipeAxis:
-    """Return an axis of pieces: (length mm, angle rad, azimuth toward which it turns)."""
+    """Return an axis of pieces: (length mm, angle rad, azimuth of the bend)."""
     tangent, across = [], np.eye(3)
     for length, angle, toward in pieces:
         count = max(round(length / STEP_MM), 1)
@@ -53,9 +56,9 @@ def curved(*pieces: tuple[float, float, float]) -> PipeAxis:
 
 
 def bowed(axis: PipeAxis, seed: int) -> PipeAxis:
-    """Return the axis with tubes that lean against its lines as the route's prior has it, smoothly."""
+    """Return the axis with tubes that smoothly deviate from its lines, as the prior of the route assumes."""
     step_mm = float(np.diff(axis.distance_mm).mean())
-    smooth = STRAIGHT_MM / (2 * np.sqrt(np.pi) * step_mm)  # the same integral as even leans of STRAIGHT_MM
+    smooth = STRAIGHT_MM / (2 * np.sqrt(np.pi) * step_mm)  # has the same integral as constant leans
     white = np.random.default_rng(seed).standard_normal((len(axis.distance_mm) - 1, 2))
     lean = gaussian_filter1d(white, smooth, axis=0, mode="wrap") * np.sqrt(2 * np.sqrt(np.pi) * smooth)
     beside = axis.R_pa[:-1, :, :2] @ (STRAIGHTNESS_RAD * lean)[..., None]
@@ -69,7 +72,7 @@ def chain(
 ) -> Chain:
     """Return a run along an axis, its camera's heading drifting by ``drift``, rad/mm about x and y of C.
 
-    The probe stands for ``rest_s`` before it starts and after it has come to the end.
+    The probe stands still for ``rest_s`` before its start and after its end.
     """
     random = np.random.default_rng(seed)
     stops = round(rest_s * SPEED_MM_S / STEP_MM)
@@ -99,7 +102,7 @@ def chain(
 
 
 def errors_in_sigma(found: Trajectory, run: Chain, at: Sequence[int]) -> Float:
-    """Return the errors (k, 6) of place in P and turn in C of some frames, in stated σ."""
+    """Return the errors (k, 6) of position in P and rotation in C of some frames, over their stated σ."""
     way = found.T_pc[at, :3, 3] - run.T_pc[at, :3, 3]
     turn = vector_from_rotation(np.swapaxes(run.T_pc[at, :3, :3], 1, 2) @ found.T_pc[at, :3, :3])
     sigma = np.sqrt(np.diagonal(found.covariance[at], axis1=1, axis2=2))
@@ -107,17 +110,17 @@ def errors_in_sigma(found: Trajectory, run: Chain, at: Sequence[int]) -> Float:
 
 
 def _middle(R: Float) -> Float:
-    """Return the rotations (N - 1, 3, 3) halfway from one to the next of (N, 3, 3)."""
+    """Return the rotations (N - 1, 3, 3) halfway between consecutive ones of (N, 3, 3)."""
     return R[:-1] @ rotation_from_vector(vector_from_rotation(np.swapaxes(R[:-1], 1, 2) @ R[1:]) / 2)
 
 
 def drawn_imu(run: Chain, mount: ImuMount, up_p: Float, seed: int = 0, rate_hz: float = 100.0) -> Imu:
-    """Return the readings of an IMU on the true run, its errors drawn from what its mount states."""
+    """Return the readings of an IMU on the true run, with errors drawn from its stated uncertainties."""
     random, time_s = np.random.default_rng(seed), run.seen.time_s
     turn = vector_from_rotation(np.swapaxes(run.T_pc[:-1, :3, :3], 1, 2) @ run.T_pc[1:, :3, :3])
     rate = turn / np.diff(time_s)[:, None]
     at = np.arange(time_s[0], time_s[-1] + 1 / rate_hz, 1 / rate_hz)
-    # A reading is the mean over its interval, as a chip's filter makes it.
+    # A reading is the mean over its interval, like the output of a chip's filter.
     turned = np.concatenate([np.zeros((1, 3)), np.cumsum(turn, 0)])
     edges = np.append(at - 0.5 / rate_hz, at[-1] + 0.5 / rate_hz)
     passed = np.stack([np.interp(edges, time_s, turned[:, i]) for i in range(3)], -1)

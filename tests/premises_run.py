@@ -1,4 +1,7 @@
-"""A drawn recording for the stage premises: laser and led by turns, a closed line in the laser frames."""
+"""Simulated recordings for the stage premises: laser and LED frames alternate.
+
+Laser frames show a closed line.
+"""
 
 from __future__ import annotations
 
@@ -17,18 +20,18 @@ COUNT, STEP_MM = 60, 1.0
 
 @cache
 def steady_run():
-    """Return a run of `COUNT` frames at a steady speed."""
+    """Return a run of `COUNT` frames at constant speed."""
     return drawn_run(STEP_MM * np.arange(COUNT), np.zeros(COUNT))
 
 
 @cache
 def good_recording():
-    """Return its recording with laser frames drawn as well."""
+    """Return the recording of that run, with its laser frames drawn as well."""
     return with_rings(steady_run())
 
 
 def with_rings(run):
-    """Return the recording of a drawn run, with a closed line in the dark in its laser frames."""
+    """Return the recording of a simulated run whose laser frames show a closed line in the dark."""
     lines = {int(f): ring_image(run.probe, seed=int(f)) for f in run.rings.frame}
     source = MemorySource({**run.recording.source.images, **lines}, run.probe.camera.image_size)
     return replace(run.recording, source=source)

@@ -1,7 +1,7 @@
 """Laser lines with hidden light effects for tests of the profile channel: closed forms, small images.
 
-A gauge of three bores seen by an equidistant camera of half resolution. Every pixel near the ring gets the
-light of an exponentially modified Gaussian at its distance from the line; nothing is shared with the program.
+A gauge of three bores is seen by an equidistant camera of half resolution. Every pixel near the ring gets the
+light of an exponentially modified Gaussian at its distance from the line. No code is shared with the program.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ REACH_PX = 18.0
 
 @dataclass(frozen=True)
 class Hidden:
-    """What the light does beyond a Gaussian line; lengths mm, angles rad."""
+    """The changes of the light against a Gaussian line; lengths mm, angles rad."""
 
     skewness: float = 0.0
     transport_mm: float = 0.0
@@ -115,7 +115,7 @@ def _profile(hidden, outward_px, scale, blurred):
 
 
 def _reflectance(psi, random):
-    """A wall that has moved on by more than its grain from frame to frame."""
+    """A wall that has moved on by more than the grain of its texture from frame to frame."""
     grain = random.normal(size=180)
     smooth = np.convolve(np.concatenate([grain[-2:], grain, grain[:2]]), [0.25, 0.5, 0.25], "same")[2:-2]
     return np.exp(0.15 * np.interp(psi, np.linspace(-np.pi, np.pi, 180), smooth, period=2 * np.pi))

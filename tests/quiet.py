@@ -8,7 +8,7 @@ from pipeline.machine.stage import Context
 
 
 def quiet_context(seed: int = 0, workers: int = 2) -> Context:
-    """Return a context that tells nobody anything."""
+    """Return a context that reports nothing."""
     return Context(
         lambda done, total: None,
         lambda name, value, unit="": None,

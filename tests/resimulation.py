@@ -1,4 +1,4 @@
-"""The open recordings of an independent renderer as scenes of the simulator, from their truth."""
+"""The open recordings of an independent renderer as scenes of the simulator, made from their truth."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ def wall_of(folder: Path, told: dict) -> Wall:
 def fitted_probe(
     truth: SceneTruth, frames: list[int], azimuth_rad: Float, centre_px: Float, radius_px: Float
 ) -> Probe:
-    """Return the instrument, within what is stated, that puts exact rings where they were measured.
+    """Return the instrument, within its stated uncertainty, that predicts the rings where they were measured.
 
     ``radius_px`` (F, A) lies along image azimuths about ``centre_px``, NaN where nothing was measured.
     """

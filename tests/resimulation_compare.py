@@ -1,4 +1,7 @@
-"""A recorded frame against the same frame rendered: where the line lies in both, and how alike they are."""
+"""A recorded frame compared with the same frame rendered.
+
+Position of the line, and similarity of the pictures.
+"""
 
 from __future__ import annotations
 
@@ -18,7 +21,7 @@ _LEAST_HEIGHT, _CLIPPED, _GAIN_STEPS = 12.0, 250, 4
 
 
 def lights_of(truth: SceneTruth, frame: int) -> list[Float]:
-    """Render each light (H, W, 3) of a frame alone, through the lens, full scales, without noise."""
+    """Render each light (H, W, 3) of a frame alone through the lens, in full scales, without noise."""
     shown = truth.frames.illumination[frame]
     kinds = (Illumination.LASER, Illumination.LED) if shown == Illumination.BOTH else (Illumination(shown),)
     parts = []
@@ -30,7 +33,7 @@ def lights_of(truth: SceneTruth, frame: int) -> list[Float]:
 
 
 def matched(recorded: Image, lights: list[Float]) -> Image:
-    """Return the rendered frame, each light's share of each channel fitted to the recorded one, clipped."""
+    """Return the rendered frame, each light's share of each channel fitted to the recording, clipped."""
     out = np.empty(recorded.shape, np.uint8)
     for c in range(3):
         seen = recorded[..., c].astype(float)
@@ -45,10 +48,10 @@ def matched(recorded: Image, lights: list[Float]) -> Image:
 
 
 def line_radii(image: Image, near_px: Float, azimuth_rad: Float, centre_px: Float) -> Float:
-    """Return where the line lies (A,), px, along image azimuths about ``centre_px``; NaN where too faint.
+    """Return the image radius (A,) of the line, px, along image azimuths about ``centre_px``.
 
-    A Gaussian over an even slope is fitted, from ``near_px`` (A,) on: a wall lit by LEDs beside
-    the line would move a centroid.
+    NaN where too faint. A Gaussian on a linear background is fitted, starting at ``near_px`` (A,): a wall lit
+    by LEDs beside the line would move a centroid.
     """
     along = np.arange(-_REACH_PX, _REACH_PX + _STEP_PX / 2, _STEP_PX)
     bell = np.exp(-0.5 * (along / _SIGMA_PX) ** 2)

@@ -23,7 +23,7 @@ _ARGUMENTS = ["--no-sandbox", "--use-gl=swiftshader", "--enable-unsafe-swiftshad
 
 @contextmanager
 def chromium() -> Iterator[Browser]:
-    """Yield a browser, or skip the calling test, saying why."""
+    """Yield a browser, or skip the calling test and give the reason."""
     with sync_playwright() as playwright:
         browser = _launched(playwright)
         try:
@@ -40,7 +40,7 @@ def _launched(playwright: Playwright) -> Browser:
         pytest.skip(
             "no Chromium: install the system's, or run `playwright install chromium`, which needs no root"
         )
-    # A run through a proxy would find 127.0.0.1 elsewhere.
+    # Through a proxy 127.0.0.1 would be another machine.
     plain = {k: v for k, v in os.environ.items() if "proxy" not in k.lower()}
     try:
         return playwright.chromium.launch(executable_path=found[0], args=_ARGUMENTS, env=plain)
@@ -50,7 +50,7 @@ def _launched(playwright: Playwright) -> Browser:
 
 @dataclass
 class Tab:
-    """A page of the review and what went wrong in it."""
+    """A page of the review, and the errors that occurred in it."""
 
     page: Page
     origin: str
@@ -78,7 +78,7 @@ class Tab:
         return self.page.evaluate(expression)
 
     def until(self, expression: str, seconds: float = 15) -> Any:
-        """Wait until an expression is true; the page's policy forbids Playwright's own way."""
+        """Wait until an expression is true; the page's content policy forbids the way of Playwright."""
         end = time.monotonic() + patience(seconds)
         while time.monotonic() < end:
             if found := self.js(expression):
@@ -102,7 +102,7 @@ class Tab:
 
     @contextmanager
     def one_change(self) -> Iterator[None]:
-        """What is done within is one action, taken by the server."""
+        """Perform one action within this context, and wait until the server has accepted it."""
         before = self.revision
         yield
         self.until(f"boresight.session.state.revision === {before + 1} && boresight.session.seal !== null")
@@ -137,7 +137,7 @@ class Tab:
         )
 
     def status(self) -> str:
-        """Return what the unrolled wall says below itself."""
+        """Return the text shown below the unrolled wall."""
         return str(self.page.locator("#view-flat .status").inner_text())
 
     def page_of(self, name: str) -> None:
@@ -146,7 +146,7 @@ class Tab:
 
 @contextmanager
 def tab(context: BrowserContext, origin: str) -> Iterator[Tab]:
-    """Yield a new tab; at its end nothing may have gone wrong in it."""
+    """Yield a new tab; when it is closed, no error may have occurred in it."""
     made = Tab(context.new_page(), origin)
     try:
         yield made

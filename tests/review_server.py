@@ -1,4 +1,4 @@
-"""A review's server as users start it, in its own process, and plain requests to it."""
+"""A review's server as users start it, in a separate process, and plain requests to it."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class Answer:
 
 @dataclass
 class ReviewServer:
-    """``boresight review RUN``, with more ``words`` where given; ``address`` carries the token."""
+    """``boresight review RUN``, with the further arguments ``words``; ``address`` includes the token."""
 
     run: Path
     port: int = 0
@@ -72,7 +72,7 @@ class ReviewServer:
         return f"http://127.0.0.1:{self.port}"
 
     def ask(self, path: str, method: str = "GET", body: object = None, **headers: str) -> Answer:
-        """Ask as the page does; ``headers`` replace the page's own, an empty one leaves it out."""
+        """Send a request as the page does; ``headers`` replace the page's own, an empty one removes it."""
         own = {"Host": f"127.0.0.1:{self.port}", "Cookie": f"boresight-{self.port}={self.token}"}
         own |= {"Origin": self.origin} if method != "GET" else {}
         sent = body if isinstance(body, bytes) else json.dumps(body).encode() if body is not None else b""

@@ -1,4 +1,4 @@
-"""A review with every kind of decision, signed, and its papers as a reader has them."""
+"""A signed review with every kind of decision, and its papers as text."""
 
 from __future__ import annotations
 
@@ -62,5 +62,5 @@ def standing(review: Review) -> list[Finding]:
 
 
 def has(text: str, words: str) -> bool:
-    """Whether words are there; a PDF breaks lines in cells, also behind a dash."""
+    """Return whether a text contains some words; a PDF breaks lines in cells, also after a dash."""
     return re.sub(r"\s", "", words) in re.sub(r"\s", "", text)

@@ -1,4 +1,4 @@
-"""Exact synthetic ring images for tests: a Gaussian line of known place, noise and clipping of known size."""
+"""Synthetic ring images for tests: a Gaussian line of known position, with known noise and clipping."""
 
 from __future__ import annotations
 

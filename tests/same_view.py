@@ -1,4 +1,4 @@
-"""How alike a recorded frame and the model look in the review's page: same place, lens and light."""
+"""How similar a recorded frame and the model look in the review's page at the same place, lens and light."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 
 from tests.review_browser import Tab
 
-# Both pictures as the page draws them, without marks; grey levels, −1 where one of them shows no wall.
+# Both pictures as the page draws them, without marks: grey levels, −1 where one of them shows no wall.
 _BOTH = """(async ([frame, distance, azimuth, width, height, isEven]) => {
   const { model: m, session } = boresight, { source } = session, at = [distance, azimuth];
   session.moveTo(at);
@@ -65,17 +65,17 @@ class Alike:
 
     @property
     def compared(self) -> float:
-        """Share of the picture that both show."""
+        """Return the share of the picture in which both show the wall."""
         return float(np.isfinite(self.model + self.frame).mean())
 
     @property
     def psnr_db(self) -> float:
-        """Peak signal (255) to root mean square difference."""
+        """Return the peak signal (255) over the root mean square difference, dB."""
         return float(20 * np.log10(255 / np.sqrt(np.nanmean((self.model - self.frame) ** 2))))
 
     @property
     def brighter(self) -> float:
-        """How many times as bright the model is as the frame, in grey levels."""
+        """Return how many times as bright the model is as the frame, in grey levels."""
         both = np.isfinite(self.model + self.frame)
         return float(self.model[both].mean() / self.frame[both].mean())
 
@@ -83,7 +83,7 @@ class Alike:
 def side_by_side(
     page: Tab, frame: int, distance: float, azimuth: float, *, is_evenly_lit: bool = False
 ) -> Alike:
-    """Return what the page shows of the model and of a frame, turned to a place of the wall."""
+    """Return the page's pictures of the model and of a frame, with the view turned to a place of the wall."""
     width, height = 640, 400
     found = np.array(
         page.js(f"{_BOTH}({[frame, distance, azimuth, width, height, int(is_evenly_lit)]})"), float

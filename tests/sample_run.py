@@ -1,4 +1,4 @@
-"""The sample recording's run, by the command line."""
+"""The run of the sample recording, made with the command line."""
 
 import subprocess
 import sys
@@ -8,7 +8,7 @@ from tests.shared_data import PROJECT_ROOT
 
 
 def run_sample(folder: Path) -> str:
-    """Run, or run again; return what was told."""
+    """Run the sample, or run it again; return the output."""
     command = [sys.executable, "-m", "pipeline.cli", "run", "data/sample", "-o", str(folder)]
     told = subprocess.run(command, cwd=PROJECT_ROOT, capture_output=True, text=True)
     assert told.returncode == 0, told.stderr

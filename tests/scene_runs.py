@@ -1,4 +1,4 @@
-"""Shipped scenes rendered, run by the whole pipeline, and held against their truth."""
+"""Shipped scenes rendered, run by the whole pipeline, and compared with their truth."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ from tests.truth_comparison import compare_wall
 class SceneScore:
     """How well a run measured a scene; ``stated_mm`` is the median stated 1 σ of a cell's radius.
 
-    ``radius_mm`` is the median radius of the map. ``distance_percent`` is the camera's way along z from first
-    to last frame against the true one, of the path driven; ``distance_sigma_percent`` what the run states for
-    it, its end and its scale together.
+    ``radius_mm`` is the median radius of the map. ``distance_percent`` is the error of the camera's distance
+    along z from first to last frame, in percent of the path driven; ``distance_sigma_percent`` is the σ that
+    the run states for it, of its end and its scale together.
     """
 
     radius_mm: float
@@ -51,7 +51,7 @@ def run_scene(scene: Scene, folder: Path, assignments: Sequence[str] = ()) -> Sc
 
 
 def score(run: Path, truth: Path) -> SceneScore:
-    """Return how a run folder compares with a folder of truth."""
+    """Return the comparison of a run folder with a folder of truth."""
     with np.load(run / "radius_map.npz") as file:
         found = RadiusMap(**{f.name: file[f.name] for f in fields(RadiusMap)})
     wall = compare_wall(found, truth)

@@ -1,4 +1,4 @@
-"""Where the development data lies; a test that needs it skips, saying so, when it is absent."""
+"""Where the development data is; a test that needs it is skipped, with that reason, when it is absent."""
 
 import importlib.util
 from pathlib import Path

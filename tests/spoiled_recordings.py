@@ -1,4 +1,4 @@
-"""Recordings whose tables do not fit their pictures, made of good ones without coding a picture again."""
+"""Recordings whose tables do not fit their pictures, made of good ones without encoding a picture again."""
 
 from __future__ import annotations
 
@@ -36,13 +36,16 @@ class KeptFrames:
 
 @dataclass(frozen=True)
 class Spoiled:
-    """A recording with a wrong table, and what its table should be."""
+    """A recording with a wrong table, and its right table."""
 
     recording: Recording
     right: FrameTable
 
     def wrong(self, found: CheckedFrames) -> tuple[int, int]:
-        """Return in how many frames light and time are wrong; a tenth of a period does not count."""
+        """Return in how many frames the light and the time are wrong.
+
+        Errors up to a tenth of a period do not count.
+        """
         tenth = 0.1 * float(np.median(np.diff(self.right.time_s)))
         lights = self.right.illumination[found.frame] != found.illumination
         times = np.abs(self.right.time_s[found.frame] - found.time_s) > tenth
@@ -62,7 +65,7 @@ def unspoiled(recording: Recording, random: np.random.Generator) -> Spoiled:
 
 
 def lost(count: int, *, together: bool = False, table_cut: bool = False) -> Spoiler:
-    """Return a spoiler: pictures are lost and the table goes on; perhaps it ends when the pictures do."""
+    """Return a change that loses pictures while the table goes on; the table may end with the pictures."""
 
     def spoil(recording: Recording, random: np.random.Generator) -> Spoiled:
         frames = len(recording.frames.frame)
@@ -75,9 +78,9 @@ def lost(count: int, *, together: bool = False, table_cut: bool = False) -> Spoi
 
 
 def lost_often(which: Callable[[Int, np.random.Generator], Int], *, spread: bool) -> Spoiler:
-    """Return a spoiler: of pictures 0 … N−1 those ``which`` says are lost, and a table was made afterwards.
+    """Return a change that loses pictures ``which`` selects of 0 … N−1, with a table made afterwards.
 
-    Its times count the pictures that are left from the start, or ``spread`` them evenly to the true end.
+    Its times number the remaining pictures from the start, or ``spread`` them evenly up to the true end.
     """
 
     def spoil(recording: Recording, random: np.random.Generator) -> Spoiled:
@@ -105,24 +108,24 @@ def _at_random(frame: Int, random: np.random.Generator) -> Int:
 
 
 def repeated(recording: Recording, random: np.random.Generator) -> Spoiled:
-    """One picture comes twice and the table does not know it."""
+    """Show one picture twice, while the table lists it once."""
     frames = len(recording.frames.frame)
     return _kept(recording, np.sort(np.append(np.arange(frames), random.integers(10, frames - 10))))
 
 
 def cut_short(recording: Recording, random: np.random.Generator) -> Spoiled:
-    """Only the first quarter of the pictures is there."""
+    """Keep only the first quarter of the pictures."""
     return _kept(recording, np.arange(len(recording.frames.frame) // 4))
 
 
 def swapped_from(recording: Recording, random: np.random.Generator) -> Spoiled:
-    """Laser and led are taken for each other from some frame on."""
+    """Exchange laser and led from some frame on."""
     frames = len(recording.frames.frame)
     return _relabelled(recording, np.arange(frames) >= random.integers(10, frames - 10))
 
 
 def wrong_at_random(recording: Recording, random: np.random.Generator) -> Spoiled:
-    """One light in ten is wrong."""
+    """Make one light in ten wrong."""
     frames = len(recording.frames.frame)
     wrong = np.zeros(frames, bool)
     wrong[random.choice(frames, frames // 10, replace=False)] = True
@@ -130,7 +133,7 @@ def wrong_at_random(recording: Recording, random: np.random.Generator) -> Spoile
 
 
 def wrong_and_lost(recording: Recording, random: np.random.Generator) -> Spoiled:
-    """One light in ten is wrong, and a picture is lost."""
+    """Make one light in ten wrong and lose a picture."""
     wrong = wrong_at_random(recording, random).recording
     seen = lost(1)(wrong, random)
     kept = seen.recording.source.kept  # type: ignore[attr-defined]

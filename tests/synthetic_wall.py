@@ -1,4 +1,4 @@
-"""Walls made to order: radius maps with correlated noise and defects drawn at random."""
+"""Synthetic walls: radius maps with correlated noise and randomly drawn defects."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def bare_recording(nominal_diameter_mm=101.6, wall_thickness_mm=None, name="draw
 
 
 def wall_of(distance_mm, azimuth_rad, radius_mm, sigma_random_mm=0.03, sigma_mm=0.08):
-    """Return a straight wall with one cloud point a cell, frame = row number."""
+    """Return a straight wall with one cloud point in each cell, whose frame is its row number."""
     shape = radius_mm.shape
     full = lambda v: np.full(shape, v, np.float32)  # noqa: E731
     radius_map = RadiusMap(
@@ -98,7 +98,7 @@ def relief(defect, distance_mm, azimuth_rad, radius_mm, rng):
 
 
 def draw_defect(kind, distance_mm, azimuth_rad, rng):
-    """Draw size and depth as met in pipes; each is at least 0.3 mm deep, 3 mm long and wide."""
+    """Draw size and depth within what occurs in pipes; each is at least 0.3 mm deep, 3 mm long and wide."""
     u = rng.uniform
     length, width, depth = {
         "pit": lambda: (u(3, 10), u(3, 10), u(0.35, 1.5)),

@@ -1,4 +1,4 @@
-"""Three quick stages and two exporters, for the machine's own tests."""
+"""Three quick stages and two exporters, for tests of the runner."""
 
 from __future__ import annotations
 

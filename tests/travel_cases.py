@@ -1,4 +1,4 @@
-"""A probe that travels to and fro, and an encoder that reads it with or without faults, both made up."""
+"""Simulated distances of a probe that drives forth and back, and of an encoder with or without faults."""
 
 from __future__ import annotations
 
@@ -14,7 +14,10 @@ EASING_S = np.linspace(-0.1, 0.1, 21)
 
 
 def way(time_s: Float, reverses: bool = True) -> Float:
-    """Return distances: on at 25 to 35 mm/s, in one case back at 18 mm/s and on again; no jerk of speed."""
+    """Return distances.
+
+    Forward at 25 to 35 mm/s, in one case back at 18 mm/s and forward again, without jerks.
+    """
     knots = [0.0, 1.5, 3.0, 3.6, 5.0, 6.5, 9.0]
     speed = [28.0, 35.0, 25.0, -18.0, 22.0, 30.0] if reverses else [17.0, 19.0, 16.5, 18.0, 19.0, 17.0]
     at = np.concatenate([[0.0], np.cumsum(np.diff(knots) * speed)])
@@ -24,7 +27,10 @@ def way(time_s: Float, reverses: bool = True) -> Float:
 def seen(
     random: np.random.Generator, reverses: bool = True, drift_mm: float = 0.004, every: int = 2
 ) -> Sight:
-    """Return the way as pictures show it: with white noise and a drift that grows with the way."""
+    """Return the distances as estimated from pictures.
+
+    With white noise and a drift that grows with the distance.
+    """
     time_s = np.arange(0, SECONDS, every / 30)
     true = way(time_s, reverses)
     path = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(true)))])
@@ -38,7 +44,7 @@ def read(
     reverses: bool = True, scale: float = 0.0, delay_s: float = 0.0, play_mm: float = 0.0,
     slips: tuple[tuple[float, float], ...] = (),
 ) -> Encoder:  # fmt: skip
-    """Return what the encoder reads; a slip is a time and what the reading gains then."""
+    """Return the encoder's readings; a slip is a time and the distance by which the reading changes then."""
     time_s = np.arange(-0.02, SECONDS + 0.2, 0.01)
     true = way(time_s - delay_s, reverses)
     lag, behind = np.zeros(len(true)), -play_mm / 2

@@ -1,7 +1,7 @@
-"""A run held against a recording's truth, after what no run can know is taken out.
+"""A run compared with a recording's truth, after removing what no run can determine.
 
-That is the pose of the first frame, seen as a shift and a tilt of the pipe, and where distance and roll
-begin.
+That is the pose of the first frame, seen as a shift and a tilt of the pipe, and the zeros of distance and
+roll.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from pipeline.artefacts.measured import RadiusMap, Trajectory
 
 @dataclass(frozen=True)
 class WallComparison:
-    """Radius errors (M,), mm, of cells drawn at random, their stated σ, and the share of cells seen."""
+    """Radius errors (M,), mm, of randomly chosen cells, their stated σ, and the share of measured cells."""
 
     error_mm: Float
     sigma_mm: Float
@@ -55,7 +55,7 @@ def compare_wall(found: RadiusMap, folder: Path, cells: int = 20000) -> WallComp
 
 
 def wall_error(found: RadiusMap, folder: Path, cells: int = 20000) -> Callable[[Float, Float, Float], Float]:
-    """Return what tells the error of a radius at a distance and azimuth of the run's own pipe frame."""
+    """Return a function for the error of a radius at a distance and azimuth in the run's own pipe frame."""
     s, psi, r, _ = _drawn_cells(found, cells)
     truth, middle, length = _true_radius(folder), s.mean(), np.ptp(s)
 
@@ -75,7 +75,7 @@ def wall_error(found: RadiusMap, folder: Path, cells: int = 20000) -> Callable[[
 
 
 def _drawn_cells(found: RadiusMap, cells: int) -> tuple[Float, Float, Float, Float]:
-    """Distance, azimuth, radius and its σ of cells drawn at random."""
+    """Distance, azimuth, radius and its σ of randomly chosen cells."""
     row, column = np.nonzero(np.isfinite(found.radius_mm))
     pick = np.random.default_rng(0).choice(len(row), min(cells, len(row)), replace=False)
     row, column = row[pick], column[pick]

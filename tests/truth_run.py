@@ -1,4 +1,4 @@
-"""Trajectory and wall of an open recording from its truth: what a perfect chain would give."""
+"""Trajectory and wall of an open recording from its truth: the result of a pipeline without errors."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from tests.shared_data import shared
 
 @dataclass(frozen=True)
 class TruthRun:
-    """A recording with its stated probe and true motion and wall."""
+    """A recording with its stated probe, its true motion and its true wall."""
 
     recording: Recording
     probe: Probe
@@ -28,7 +28,7 @@ class TruthRun:
 
 
 def truth_run(name: str, *, margin_mm: float = 1.0) -> TruthRun:
-    """Return the open recording ``name`` with truth; the wall is what the laser ring passed."""
+    """Return the open recording ``name`` with its truth; the wall is the part that the laser ring passed."""
     folder = shared("recordings", name)
     recording = open_folder(folder)
     probe = read_probe(folder / "probe.yaml")

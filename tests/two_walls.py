@@ -1,4 +1,7 @@
-"""Two runs over one made pipe: roughness and paint in common, noise and the motion of rings of their own."""
+"""Two runs through one simulated pipe.
+
+They share roughness and paint, but not noise or the shifts of their rings.
+"""
 
 from dataclasses import replace
 
@@ -24,7 +27,7 @@ SAME = RegisterParameters()
 
 
 class Pipe:
-    """A pipe's roughness, paint and pits (distance, azimuth, depth, 1 σ), as any run would see them."""
+    """A pipe's roughness, paint and pits (distance, azimuth, depth, 1 σ), which all runs share."""
 
     def __init__(self, seed):
         rng = np.random.default_rng(seed)
@@ -42,7 +45,10 @@ class Pipe:
         return (1 - u) * top + u * low
 
     def surface(self, pits, seed, shift=0.0, roll=0.0, scale=1.0):
-        """Return what a run sees whose distances are ``scale`` s + ``shift`` and azimuths ψ + ``roll``."""
+        """Return the surface measured by a run.
+
+        Its distances are ``scale`` s + ``shift``, its azimuths ψ + ``roll``.
+        """
         own, psi = np.arange(0.0, LENGTH, STEP), -np.pi + 2 * np.pi / COLUMNS * np.arange(COLUMNS)
         s, azimuth = (own - shift) / scale, psi - roll
         radius = RADIUS + self.at(self.rough, s, azimuth)
@@ -51,7 +57,7 @@ class Pipe:
             radius += depth * np.exp(-((s - at)[:, None] ** 2 + (RADIUS * turn) ** 2) / (2 * width**2))
         rng = np.random.default_rng(seed)
         radius += smooth_noise(rng, radius.shape, NOISE_MM, 0.8)
-        # what every ring has of its own: size, place and ovality
+        # errors of each ring: size, position and ovality
         for m in range(3):
             radius += 0.05 * rng.standard_normal((len(s), 1)) * np.cos(m * psi - rng.uniform(0, 6))
         full = np.full(radius.shape, 0.05, np.float32)
@@ -65,14 +71,14 @@ PIPE = Pipe(1)
 
 
 def unseen(done, total):
-    """Take progress without showing it."""
+    """Accept progress without showing it."""
 
 
 PLACES = tuple((s, psi) for s in (35.0, 60.0, 85.0) for psi in (-2.5, -1.0, 0.5, 2.0))
 
 
 def family(growth_mm, seed, found_now=12):
-    """Return what becomes of twelve pits of 0.5 mm that grow by ``growth_mm`` (12,), by their number."""
+    """Return the state of twelve pits of 0.5 mm that grow by ``growth_mm`` (12,), by their number."""
     names = [finding(k, *p) for k, p in enumerate(PLACES)]
     before = [(*p, 0.5, 2.0) for p in PLACES]
     after = [(*p, 0.5 + g, 2.0) for p, g in zip(PLACES, growth_mm, strict=True)]
@@ -87,7 +93,7 @@ def finding(name, s, psi, half=6.0, kind="pit"):
 
 
 def moved(found):
-    """Return an earlier finding as the later run has it."""
+    """Return an earlier finding at the place where the later run has it."""
     outline = tuple((SCALE * s + SHIFT_MM, psi + ROLL_RAD) for s, psi in found.outline)
     return replace(found, outline=outline)
 
