@@ -1,4 +1,4 @@
-"""What several integration tests share."""
+"""Fixtures that several integration tests use."""
 
 import fcntl
 import os
@@ -14,16 +14,16 @@ from tests.sample_run import run_sample
 
 
 def _files_of(run: Path) -> dict[str, tuple[int, int]]:
-    """Size and time of every file of a run, by its name."""
+    """Return size and time of every file of a run, by its name."""
     told = {str(p.relative_to(run)): p.stat() for p in run.rglob("*") if p.is_file()}
     return {name: (of.st_size, of.st_mtime_ns) for name, of in told.items()}
 
 
 @pytest.fixture(scope="session")
 def sample(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
-    """The finished run of the sample recording, made once for all test processes; not to be changed.
+    """The finished run of the sample recording, made once for all test processes. No test may change it.
 
-    Other tests copy it meanwhile: whoever changes it, be it for a second, breaks them.
+    Other tests copy it at the same time, so that even a short change breaks them.
     """
     base = tmp_path_factory.getbasetemp()
     folder = base.parent if "PYTEST_XDIST_WORKER" in os.environ else base

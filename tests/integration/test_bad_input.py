@@ -1,4 +1,4 @@
-"""Every bad input ends in a clear error or in a counted rejection, and keeps what was computed before."""
+"""Every bad input ends in a clear error or in a counted rejection, and earlier results are kept."""
 
 from __future__ import annotations
 
@@ -136,7 +136,7 @@ def test_recordings_without_lights(
     assert "What to do" in told.err
 
 
-def test_laser_and_led_taken_for_each_other_are_put_right(
+def test_exchanged_laser_and_led_labels_are_corrected(
     good: Path, tmp_path: Path, boresight: Callable[..., Told]
 ) -> None:
     recording = spoilt(good, tmp_path, rewritten("frames.csv", lights_swapped))
@@ -193,23 +193,23 @@ def test_frames_that_cannot_be_used_are_counted(
     ],
     ids=["truncated", "short table", "long table", "encoder ends early", "encoder jumps", "encoder removed"],
 )
-def test_what_was_mended_is_told(
+def test_repairs_of_a_recording_are_reported(
     spoil: Spoil, noticed: str, good: Path, tmp_path: Path, boresight: Callable[..., Told]
 ) -> None:
     recording = spoilt(good, tmp_path, spoil)
     told = boresight("run", recording, "-o", tmp_path / "run", "--only", "premises", *QUICK)
     assert told.code == 0, told.err
     first, last = told.err.index("Look at this first"), told.err.index("Before you rely on this run")
-    assert noticed in told.err[first:last], "said before anything else"
-    assert noticed in told.err[last:], "and again in the end"
+    assert noticed in told.err[first:last], "reported before anything else"
+    assert noticed in told.err[last:], "and reported again at the end"
     warnings = json.loads((tmp_path / "run" / "run.json").read_text())["reader_warnings"]
     assert any(noticed in w for w in warnings)
 
 
-def test_a_probe_that_does_not_fit_the_recording_is_told(
+def test_a_probe_that_does_not_fit_the_recording_is_reported(
     good: Path, tmp_path: Path, boresight: Callable[..., Told]
 ) -> None:
-    """The principal point stated 3 px off, 50 times its σ: the adjustment finds it, and says that it did."""
+    """The stated principal point is 3 px off, 50 times its σ: the adjustment corrects and reports it."""
     recording = spoilt(good, tmp_path, replaced(PROBE, "796.8972", "799.9"))
     told = boresight("run", recording, "-o", tmp_path / "run", *QUICK)
     assert told.code == 0, told.err
@@ -242,7 +242,7 @@ def test_a_full_disk_keeps_what_was_computed(
         (("--from", "ring"), "rings"),
     ],
 )
-def test_wrong_keys_and_stages_name_the_nearest_right_one(
+def test_for_unknown_keys_and_stages_the_nearest_known_name_is_suggested(
     arguments: tuple[str, ...], message: str, good: Path, tmp_path: Path, boresight: Callable[..., Told]
 ) -> None:
     told = boresight("run", good, "-o", tmp_path / "run", *arguments)
@@ -278,7 +278,7 @@ def undisturbed(good: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[st
     return arrays(run)
 
 
-def test_a_run_killed_in_two_stages_ends_the_same(
+def test_a_run_killed_in_two_stages_ends_with_the_same_result(
     good: Path, tmp_path: Path, undisturbed: dict[str, bytes]
 ) -> None:
     run = tmp_path / "run"

@@ -1,4 +1,7 @@
-"""Many recordings: one failing stops nothing, lost workers lose nothing, results are those of single runs."""
+"""Many recordings.
+
+One that fails stops no other, lost workers lose no results, and results equal single runs.
+"""
 
 import json
 import os
@@ -27,7 +30,7 @@ FEW = ("--set", "rings.azimuths=360")
 
 @pytest.fixture(scope="module")
 def recordings(tmp_path_factory):
-    """Two good recordings, one below another folder, and a broken one."""
+    """Two good recordings, one of them in a subfolder, and a broken one."""
     folder = tmp_path_factory.mktemp("recordings")
     cut_sample(folder / "one", frames=16)
     cut_sample(folder / "deep" / "two", frames=16)
@@ -38,13 +41,13 @@ def recordings(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def single(recordings, tmp_path_factory):
-    """The run of the first recording by itself."""
+    """A run of the first recording outside a batch."""
     run = tmp_path_factory.mktemp("single") / "one"
     assert CliRunner().invoke(app, ["run", str(recordings / "one"), "-o", str(run), *FEW]).exit_code == 0
     return run
 
 
-def test_a_lost_worker_loses_nothing(recordings, single, tmp_path):
+def test_when_a_worker_is_lost_no_result_is_lost(recordings, single, tmp_path):
     found = find_recordings(recordings)
     works = [Work(n, p, tmp_path / n, FEW) for n, p in found.items()]
     with workers(LocalWorkers(count=2)) as client:
@@ -64,10 +67,10 @@ def test_a_lost_worker_loses_nothing(recordings, single, tmp_path):
 
 
 def working(folder):
-    """Wait until a run below a batch's folder is at work in its first stage."""
+    """Wait until a run below a batch's folder is in its first stage."""
     until = time.monotonic() + patience(120)
     while not any("stage rings starts" in f.read_text() for f in folder.glob("*/.boresight/run.log")):
-        assert time.monotonic() < until, "no run came to its first stage"
+        assert time.monotonic() < until, "no run reached its first stage"
         time.sleep(0.05)
 
 
@@ -76,7 +79,7 @@ def batch_of(recordings, folder, *words):
     return subprocess.Popen([*command, *words], cwd=PROJECT_ROOT, stderr=subprocess.PIPE, text=True)
 
 
-def test_workers_of_a_cluster_killed_while_they_work_lose_nothing(recordings, single, tmp_path):
+def test_when_working_cluster_workers_are_killed_no_result_is_lost(recordings, single, tmp_path):
     with DaskCluster(tmp_path, 2) as cluster:
         batch = batch_of(recordings, tmp_path / "out", "--scheduler", cluster.address)
         working(tmp_path / "out")
@@ -94,7 +97,7 @@ def test_workers_of_a_cluster_killed_while_they_work_lose_nothing(recordings, si
     assert run_content(tmp_path / "out" / "one") == run_content(single)
 
 
-def test_jobs_of_a_queue_killed_while_they_work_are_queued_again(recordings, single, tmp_path, monkeypatch):
+def test_killed_jobs_of_a_queue_are_queued_again(recordings, single, tmp_path, monkeypatch):
     queue = local_queue(tmp_path)
     monkeypatch.setenv("PATH", f"{queue}:{os.environ['PATH']}")
     monkeypatch.setenv("PYTHONPATH", str(PROJECT_ROOT))
@@ -110,7 +113,7 @@ def test_jobs_of_a_queue_killed_while_they_work_are_queued_again(recordings, sin
     assert run_content(tmp_path / "out" / "one") == run_content(single)
 
 
-def test_a_scheduler_lost_is_told_and_the_batch_goes_on_later(recordings, single, tmp_path):
+def test_a_lost_scheduler_is_reported_and_the_batch_can_be_continued(recordings, single, tmp_path):
     with DaskCluster(tmp_path, 1) as cluster:
         batch = batch_of(recordings / "one", tmp_path / "out", "--scheduler", cluster.address)
         working(tmp_path / "out")
@@ -146,19 +149,21 @@ def test_a_scheduler_lost_is_told_and_the_batch_goes_on_later(recordings, single
         (0, "", {"state": "completed", "problem": ""}, ("completed", "")),
     ],
 )
-def test_an_ending_is_that_of_this_call_not_of_an_earlier_one(tmp_path, code, told, record, expected):
+def test_the_outcome_of_a_recording_is_that_of_this_call_not_of_an_earlier_one(
+    tmp_path, code, told, record, expected
+):
     (tmp_path / "run.json").write_text(json.dumps(record))
     outcome = outcome_of(Work("a", tmp_path, tmp_path, ()), code, told)
     assert (outcome.state, outcome.problem) == expected
 
 
-def test_a_summary_that_cannot_be_written_is_told(tmp_path):
+def test_a_summary_that_cannot_be_written_is_reported(tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(InputError, match="cannot be written"):
         write_summary([BatchOutcome("a", "completed", "")], tmp_path / "file")
 
 
-def test_the_summary_tells_every_ending_in_the_order_of_names(tmp_path):
+def test_the_summary_lists_every_outcome_in_the_order_of_names(tmp_path):
     made = [
         BatchOutcome("b", "completed", "", (("defects", 3, ""),)),
         BatchOutcome("<i>a</i>", "refused", "no <b>video</b>"),
@@ -172,7 +177,7 @@ def test_the_summary_tells_every_ending_in_the_order_of_names(tmp_path):
     assert 'href="&lt;i' not in page
 
 
-def test_what_a_completed_run_warns_of_is_on_the_page(tmp_path):
+def test_warnings_of_a_completed_run_are_on_the_page(tmp_path):
     record = {"state": "completed", "problem": "", "warnings": ["motion: moved <6 σ>"],
               "reader_warnings": ["2 images are missing"]}  # fmt: skip
     (tmp_path / "run.json").write_text(json.dumps(record))
@@ -188,14 +193,14 @@ def test_what_a_completed_run_warns_of_is_on_the_page(tmp_path):
     assert "with warnings" not in (tmp_path / "batch.html").read_text()
 
 
-def test_workers_and_a_scheduler_exclude_each_other(recordings, tmp_path):
+def test_the_options_workers_and_scheduler_exclude_each_other(recordings, tmp_path):
     batch = batch_of(recordings, tmp_path, "--workers", "2", "--scheduler", "tcp://127.0.0.1:9")
     _, told = batch.communicate(timeout=patience(60))
     assert batch.returncode == 2
     assert "--workers: and --scheduler exclude each other" in told
 
 
-def test_a_scheduler_that_does_not_answer_is_named():
+def test_a_scheduler_that_does_not_answer_is_named_in_the_error():
     nobody = RunningScheduler(address="tcp://127.0.0.1:9")
     with pytest.raises(InputError, match="no scheduler answers"), workers(nobody):
         pass

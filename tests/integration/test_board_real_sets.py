@@ -1,4 +1,4 @@
-"""Calibrations of published real sets: held-out reprojection and boards found."""
+"""Calibrations with published real sets: held-out reprojection errors, and boards found."""
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ from tests.shared_data import shared
 
 @pytest.mark.parametrize(("name", "limit_px"), [("ov_plane", 0.475), ("ov_cube", 0.294)])
 def test_babelcalib_held_out(name, limit_px):
-    """Kannala-Brandt, Huber 1 px, board taken for flat and intrinsics fixed, as the published check did."""
+    """Kannala-Brandt, Huber 1 px, a flat board and fixed intrinsics, like the published check."""
     parameters = BoardCalibrationParameters(board_shape="flat", huber_px=1.0)
     train, size = babelcalib(name, "train")
     test, _ = babelcalib(name, "test")
@@ -26,7 +26,7 @@ def test_babelcalib_held_out(name, limit_px):
 
 
 def test_babelcalib_plane_is_bent():
-    """Estimating the sag of the printed board explains boards that were not fitted to, too."""
+    """Estimating the sag of the printed board also improves the prediction of boards not fitted."""
     train, size = babelcalib("ov_plane", "train")
     test, _ = babelcalib("ov_plane", "test")
     found = fit(train, start(train, size), "kannala_brandt", BoardCalibrationParameters(board_shape="bent"))
@@ -36,7 +36,8 @@ def test_babelcalib_plane_is_bent():
 def test_urban_fisheye_boards_are_found_and_fitted():
     """The published 0.241 px is a mean distance, with board "rotations" left free to be any matrix.
 
-    Ours is the root mean square distance with rigid poses, on a board whose corners were measured as well.
+    Ours is the root mean square distance with rigid poses, and the corners of the board were estimated as
+    well.
     """
     files = sorted(shared("real", "fisheye_urban_ocamcalib", "fish_1").glob("*.jpg"))
     seen = [detected(file, Chessboard(8, 6, 32.5)) for file in files]

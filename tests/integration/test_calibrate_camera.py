@@ -1,4 +1,7 @@
-"""`boresight calibrate-camera`: rendered pictures to a camera, files and page, and its refusals."""
+"""`boresight calibrate-camera`: from rendered pictures to a camera, its files and page.
+
+And refused inputs.
+"""
 
 import json
 from dataclasses import replace
@@ -50,7 +53,7 @@ def run(*arguments):
     return CliRunner().invoke(app, [str(a) for a in arguments], catch_exceptions=False)
 
 
-def test_rendered_chessboards_give_the_camera_that_rendered_them(pictures, tmp_path):
+def test_pictures_rendered_with_a_camera_give_that_camera(pictures, tmp_path):
     (pictures / "notes.txt").write_text("not a picture, not looked at")
     result = run(pictures, *CHESSBOARD, "--model", "kannala_brandt", "-o", tmp_path / "out")
     assert result.exit_code == 0
@@ -65,13 +68,13 @@ def test_rendered_chessboards_give_the_camera_that_rendered_them(pictures, tmp_p
     np.testing.assert_allclose(written.project(CAMERA.unproject(uv).ray).uv, uv, rtol=0, atol=0.8)
 
 
-def test_camera_file_is_a_probe_section(pictures, tmp_path):
+def test_the_camera_file_is_a_section_of_a_probe_file(pictures, tmp_path):
     run(pictures, *CHESSBOARD, "--model", "equidistant", "-o", tmp_path / "out")
     section = yaml.safe_load((tmp_path / "out" / "camera.yaml").read_text())["camera"]
     assert camera_from_mapping(section, tmp_path / "out" / "camera.yaml").model == "equidistant"
 
 
-def test_page_stands_alone_and_a_second_run_writes_the_same(pictures, tmp_path):
+def test_the_page_needs_no_other_file_and_a_second_run_writes_the_same(pictures, tmp_path):
     other = tmp_path / "other.yaml"
     write_camera(replace(CAMERA, centre=(320.0, 240.0)), other, "opencv")
     options = ["--compare", other, "--format", "kalibr", "--model", "kannala_brandt"]
@@ -152,7 +155,7 @@ def test_pictures_of_two_sizes_are_refused(pictures, tmp_path):
         run(pictures / "0.png", small, *CHESSBOARD, "-o", tmp_path / "out")
 
 
-def test_nothing_to_look_at_is_refused(tmp_path):
+def test_an_input_without_pictures_is_refused(tmp_path):
     (tmp_path / "empty").mkdir()
     with pytest.raises(InputError, match="holds no picture"):
         run(tmp_path / "empty", *CHESSBOARD)

@@ -1,4 +1,4 @@
-"""``boresight calibrate`` on an open gauge run whose sheet is tilted unknown to its probe file."""
+"""``boresight calibrate`` on an open gauge run whose sheet has a tilt that its probe file does not state."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def test_hidden_tilt_is_found(calibration: Path) -> None:
     assert probe.calibrated_from == "open-2-gauge"
 
 
-def test_probe_file_carries_a_smaller_covariance(calibration: Path) -> None:
+def test_the_calibrated_probe_file_has_a_smaller_covariance(calibration: Path) -> None:
     stated = read_probe(shared("recordings", "open-2-gauge", "probe.yaml"))
     found = read_probe(calibration / "probe.yaml")
     names = list(found.parameter_names)
@@ -48,7 +48,7 @@ def test_probe_file_carries_a_smaller_covariance(calibration: Path) -> None:
     assert abs(c[cx, tilt]) > 0.5 * np.sqrt(c[cx, cx] * c[tilt, tilt])
 
 
-def test_document_and_page_say_what_moved(calibration: Path) -> None:
+def test_document_and_page_state_what_changed(calibration: Path) -> None:
     document = json.loads((calibration / "calibration.json").read_text("utf-8"))
     moved = {p["name"]: p["change_in_stated_sigma"] for p in document["parameters"]}
     assert moved["tilt_x"] > 30
@@ -78,7 +78,7 @@ def test_unknown_parameter_is_refused() -> None:
 
 
 def states(folder: Path) -> dict[str, str]:
-    """Return how each stage stands by run.json."""
+    """Return the state of each stage as run.json gives it."""
     stages = json.loads((folder / "run.json").read_text("utf-8"))["stages"]
     return {stage["name"]: stage["state"] for stage in stages}
 
@@ -91,12 +91,12 @@ def test_a_second_call_computes_nothing(calibration: Path) -> None:
     assert {name: (calibration / name).read_bytes() for name in before} == before
 
 
-def test_another_prior_keeps_the_rings(calibration: Path) -> None:
+def test_another_prior_reuses_the_rings(calibration: Path) -> None:
     calibrate(shared("recordings", "open-2-gauge"), calibration, settings=["gauge.iterations=11"])
     assert states(calibration) == {"premises": "reused", "rings": "reused", "gauge": "completed"}
 
 
-def test_inspection_is_refused(tmp_path: Path) -> None:
+def test_an_inspection_instead_of_a_gauge_run_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="it is not a gauge run"):
         calibrate(shared("recordings", "open-2-field"), tmp_path / "out")
     assert not (tmp_path / "out").exists()

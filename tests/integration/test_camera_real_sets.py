@@ -1,4 +1,4 @@
-"""Published cameras pose the boards of their own photographs; those of another camera do not."""
+"""Published cameras give poses of the boards in their own photographs, but not in those of another camera."""
 
 import pytest
 
@@ -21,7 +21,7 @@ from tests.shared_data import shared
         ("testr32_1_2.jpg", "Real2old", "Real1", 0.5),
     ],
 )
-def test_matlab_cameras_pose_their_boards(image, own, other, limit_px):
+def test_matlab_cameras_give_the_poses_of_their_boards(image, own, other, limit_px):
     view = detected(
         shared("real", "omni_laser_zhang", "calib_experience_real", image), Chessboard(9, 6, 26.0)
     )
@@ -30,7 +30,7 @@ def test_matlab_cameras_pose_their_boards(image, own, other, limit_px):
     assert pose_rms_px(view, matlab_camera(other)) > 1.3 * pose_rms_px(view, matlab_camera(own))
 
 
-def test_ocamcalib_camera_poses_a_red_and_white_board_far_off_its_axis():
+def test_the_ocamcalib_camera_gives_the_pose_of_a_red_and_white_board_far_off_its_axis():
     """The only photograph there shows the board at 63°, where the published camera is 1.6 px off."""
     camera = read_camera(shared("real", "ocam_umh", "calib_results.txt"))
     image = shared("real", "ocam_umh", "images", "1686048866194162000.png")

@@ -1,4 +1,4 @@
-"""Calibrate and diagnose when things go wrong: killed, no room, no permission, inputs that change."""
+"""Calibrate and diagnose when things go wrong: kills, a full disk, no permission, inputs that change."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from tests.patience import patience
 from tests.shared_data import PROJECT_ROOT
 
 RESULTS = ("a.bin", "b.bin", "answer.json")
-# A call of a command as far as its files go; it is killed at the step that is asked for.
+# Writes the files of one call of a command; the process is killed at the given step.
 _WRITING = """
 import os, signal, sys
 from pathlib import Path
@@ -55,7 +55,7 @@ with written_together(folder, last="answer.json") as new:
 
 
 def generations(folder: Path) -> set[bytes]:
-    """Return which calls the files are of, each of them whole; empty where the answer is not there."""
+    """Return by which calls the present files were written; empty where there is no answer."""
     if not (folder / "answer.json").exists():
         return set()
     contents = [(folder / name).read_bytes() for name in RESULTS]
@@ -63,7 +63,7 @@ def generations(folder: Path) -> set[bytes]:
     return {c[:1] for c in contents}
 
 
-def test_killed_at_any_step_the_answer_stands_for_all_files_of_one_call(tmp_path: Path) -> None:
+def test_killed_at_any_step_the_files_present_are_all_of_one_call(tmp_path: Path) -> None:
     killed, answers = 0, []
     while True:
         folder = tmp_path / str(killed)
@@ -80,10 +80,10 @@ def test_killed_at_any_step_the_answer_stands_for_all_files_of_one_call(tmp_path
         again = [sys.executable, "-c", _WRITING, str(folder), "3", "0"]
         subprocess.run(again, cwd=PROJECT_ROOT, check=True)
         assert generations(folder) == {b"3"}
-        assert sorted(p.name for p in folder.iterdir()) == sorted(RESULTS), "what was left is swept"
+        assert sorted(p.name for p in folder.iterdir()) == sorted(RESULTS), "left-over files are removed"
     assert killed > 8
     assert answers[0] == {b"1"}
-    assert set() in answers  # the old answer is taken away before the first new file takes its place
+    assert set() in answers  # the old answer is removed before the first new file replaces its own
     assert answers[-1] == {b"2"}
 
 
@@ -113,7 +113,7 @@ print(refused)
 """
 
 
-def test_on_a_disk_that_fills_the_results_of_the_earlier_call_stay(tmp_path: Path) -> None:
+def test_when_the_disk_fills_the_results_of_the_earlier_call_stay(tmp_path: Path) -> None:
     assert int(on_small_disk(tmp_path, _FULL)) >= 3
 
 
@@ -137,7 +137,7 @@ def cut_off(file: Path) -> None:
 
 
 class ReachedError(Exception):
-    """The command went on to write its results."""
+    """The command has reached the point at which it writes its results."""
 
 
 def unexpectedly(*_: object, **__: object) -> None:
@@ -149,7 +149,7 @@ def unexpectedly(*_: object, **__: object) -> None:
 def test_a_recording_that_changes_while_it_is_measured_gives_no_result(
     recording: Path, monkeypatch: pytest.MonkeyPatch, name: str, spoil: Callable[[Path], None]
 ) -> None:
-    """What the commands measure is left out here: the change is told whatever was made of the recording."""
+    """The measurement is skipped: the change of the recording is reported whatever was measured."""
 
     def meddling(*_: object) -> None:
         spoil(recording / name)
@@ -169,7 +169,7 @@ def test_a_recording_that_changes_while_it_is_measured_gives_no_result(
 
 @dataclass(frozen=True)
 class Measured:
-    """What the meddling stage makes."""
+    """The result of the stage that changes the recording."""
 
 
 def measure_meddled(recording: Recording, *, parameters: Parameters, context: Context) -> Measured:
@@ -197,7 +197,7 @@ def meddle_with_calibration(monkeypatch: pytest.MonkeyPatch, meddling: Callable[
     monkeypatch.setattr(diagnosing, "result_of", unexpectedly)
 
 
-def test_a_recording_that_is_only_touched_is_no_fault(
+def test_a_recording_of_which_only_the_file_times_change_is_accepted(
     recording: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     meddle_with_calibration(monkeypatch, lambda: os.utime(recording / "frames.mkv", (1, 1)))
@@ -235,7 +235,7 @@ def test_pictures_that_change_while_they_are_read_give_no_camera(
     ],
 )
 @pytest.mark.parametrize("command", ["calibrate", "diagnose"])
-def test_a_spoiled_recording_is_refused_by_name_before_anything_is_written(
+def test_a_spoiled_recording_is_refused_with_its_name_before_anything_is_written(
     recording: Path, command: str, name: str, spoil: Callable[[Path], None], told: str
 ) -> None:
     spoil(recording / name)
@@ -246,7 +246,7 @@ def test_a_spoiled_recording_is_refused_by_name_before_anything_is_written(
 
 
 @pytest.mark.parametrize("command", ["calibrate", "diagnose", "prove"])
-def test_a_folder_that_may_not_be_written_is_told_before_work_is_put_in(
+def test_a_folder_without_write_permission_is_reported_before_the_work_begins(
     recording: Path, tmp_path: Path, command: str
 ) -> None:
     locked = tmp_path / "locked"
@@ -265,6 +265,6 @@ def test_a_folder_that_may_not_be_written_is_told_before_work_is_put_in(
     )  # fmt: skip
     locked.chmod(0o755)
     assert done.returncode == 2, done.stderr
-    if command != "calibrate":  # this recording is no gauge's, which is told first
+    if command != "calibrate":  # this recording is not of a gauge, which is reported first
         assert "locked: cannot be written: Permission denied" in done.stderr
         assert "What to do" in done.stderr

@@ -1,4 +1,4 @@
-"""The command line tells refusals as text with their own exit codes, and helps without loading the world."""
+"""The command line reports refusals as text with an exit code each, and shows help without slow imports."""
 
 from __future__ import annotations
 
@@ -59,13 +59,13 @@ def test_help_names_every_command_and_loads_no_heavy_library() -> None:
 
 
 @pytest.mark.parametrize("name", [a.name for a in _ATTACHED])
-def test_attached_commands_are_there(boresight: Callable[..., Told], name: str) -> None:
+def test_commands_of_other_modules_are_listed(boresight: Callable[..., Told], name: str) -> None:
     told = boresight(name, "--help")
     assert told.code == 0, told.err
     assert f"boresight {name}" in told.out
 
 
-def test_help_groups_the_commands_by_what_they_are_for(boresight: Callable[..., Told]) -> None:
+def test_help_groups_the_commands_by_purpose(boresight: Callable[..., Told]) -> None:
     told = boresight("--help").out
     places = [
         told.index(f"─ {group} ─")
@@ -78,12 +78,12 @@ def test_help_groups_the_commands_by_what_they_are_for(boresight: Callable[..., 
         assert f"─ {attached.group} ─" in told[group : group + 60], attached.name
 
 
-def test_the_version_is_told(boresight: Callable[..., Told]) -> None:
+def test_the_version_is_printed(boresight: Callable[..., Told]) -> None:
     assert boresight("--version").out == f"boresight {program_version()}\n"
 
 
 @pytest.mark.parametrize("asked", ["--version", "--help"])
-def test_version_and_help_do_not_wait_for_what_computes(asked: str) -> None:
+def test_version_and_help_load_no_computing_libraries(asked: str) -> None:
     script = (
         "import atexit, sys; from pipeline.cli import main; "
         "atexit.register(lambda: print('loaded', [m for m in ('numpy', 'pydantic') if m in sys.modules])); "
@@ -111,7 +111,7 @@ def test_the_shell_completes_commands_and_their_options(typed: str, offered: str
 def test_a_command_says_at_once_that_it_starts(
     boresight: Callable[..., Told], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    assert "is starting" not in boresight("verify", "--help").err, "not into a pipe or a log"
+    assert "is starting" not in boresight("verify", "--help").err, "but not into a pipe or a log"
     monkeypatch.setattr("pipeline.cli.sys.stderr.isatty", lambda: True)
     assert boresight("verify", "--help").err.startswith("boresight verify is starting")
 

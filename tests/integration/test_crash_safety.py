@@ -1,4 +1,4 @@
-"""Killed at any moment, the same command goes on to the same result, byte for byte."""
+"""After a kill at any moment the same command completes the run with the same result, byte for byte."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def start(folder: Path) -> subprocess.Popen[bytes]:
 
 
 def content(folder: Path) -> dict[str, bytes]:
-    """Return all files except those that tell times."""
+    """Return the contents of all files except those that contain times."""
     told = ("run.json", "run.log", "lock", "manifest.json")
     return {
         str(p.relative_to(folder)): p.read_bytes()
@@ -32,7 +32,7 @@ def content(folder: Path) -> dict[str, bytes]:
 @pytest.fixture(scope="module")
 def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> tuple[dict[str, bytes], float]:
     folder = tmp_path_factory.mktemp("undisturbed")
-    # The first start also reads all libraries from the disk: a later one tells how long a run takes.
+    # The first run also reads all libraries from the disk: a later one shows how long a run takes.
     assert start(folder / "first").wait() == 0
     begin = time.monotonic()
     assert start(folder / "run").wait() == 0
@@ -91,8 +91,8 @@ print(moment)
 """
 
 
-def test_killed_at_every_fifth_touch_of_the_disk(tmp_path: Path) -> None:
-    """Not by the clock but by place: before the n-th file operation below the run folder."""
+def test_killed_before_every_fifth_file_operation(tmp_path: Path) -> None:
+    """Kill the process before its n-th file operation below the run folder, not after a time."""
     told = subprocess.run(
         [sys.executable, "-c", _KILLED_AT, tmp_path], cwd=PROJECT_ROOT, capture_output=True, text=True
     )

@@ -11,7 +11,7 @@ from tests.quiet import quiet_context
 from tests.shared_data import scorer, shared
 from tests.synthetic_wall import bare_recording, grey_texture, smooth_noise, wall_of
 
-# the shared scorer leaves its files to the garbage collector
+# the shared scoring program does not close its files
 pytestmark = [
     pytest.mark.filterwarnings("ignore::ResourceWarning"),
     pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning"),
@@ -20,7 +20,7 @@ pytestmark = [
 
 @pytest.mark.parametrize(("name", "nominal_mm"), [("open-1-field", 101.6), ("open-2-field", 101.6),
                                                   ("open-3-field", 50.8)])  # fmt: skip
-def test_asked_defects_are_found_to_a_tenth_of_a_millimetre(name, nominal_mm, tmp_path):
+def test_the_demanded_defects_are_found_to_a_tenth_of_a_millimetre(name, nominal_mm, tmp_path):
     score = scorer()
     truth = score.truth_of(str(shared("recordings", name)))
     poses, s_true, psi_true, r_true = truth[:4]

@@ -1,4 +1,4 @@
-"""The diagnosis from end to end on a small simulated pair, and on recordings that lack what it needs."""
+"""The whole diagnosis of a small simulated pair, and of recordings that lack something it needs."""
 
 import json
 import shutil
@@ -27,7 +27,7 @@ from tests.shared_data import PROJECT_ROOT
 from tests.simulated import SCENES, rendered, shipped, smaller
 
 pytestmark = pytest.mark.slow
-# A third of the usual samples a ring: enough for a tilt of 0.8°, and what a run of the field hands on.
+# A third of the usual samples a ring: enough for a tilt of 0.8°. A run of the field passes on as many.
 QUICK = ["--set", "rings.azimuths=480"]
 TILT = {"laser_tilt": {"tilt_deg": 0.8, "direction_deg": 40.0}}
 
@@ -40,7 +40,7 @@ def gauge_scene():
 
 
 def field_scene(gauge):
-    """An inspection with the gauge's own instrument."""
+    """An inspection with the instrument of the gauge run."""
     field = smaller(shipped("bent-2-inch"), 2, 60, effects=TILT, rendering={"line_samples": 2}, codec="ffv1")
     values = field.model_dump(mode="json", exclude_defaults=True)
     same = gauge.model_dump(mode="json", exclude_defaults=True)
@@ -64,7 +64,7 @@ def field_run(pair, tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def first_call(pair, field_run, tmp_path_factory):
-    """The folder of a diagnosis that takes over a run of the field, and how its stages stood."""
+    """The folder of a diagnosis that reuses a run of the field, and the states of its stages."""
     out = tmp_path_factory.mktemp("out")
     words = ["diagnose", "--run", str(field_run), "--gauge", str(pair[1]), "-o", str(out)]
     done = CliRunner().invoke(app, words)
@@ -77,7 +77,7 @@ def diagnosed(first_call):
     return first_call[0]
 
 
-def test_the_tilt_is_named_sized_and_borne_out(diagnosed):
+def test_the_tilt_is_named_with_its_size_and_lowers_held_out_residuals(diagnosed):
     answer = json.loads((diagnosed / "diagnosis.json").read_text())
     assert answer["verdict"] == "named"
     assert set(answer["made_by"]["input_sha256"]) == {"field", "gauge", "probe"}
@@ -108,7 +108,7 @@ ANSWERS = ("diagnosis.json", "diagnosis.html", "probe.yaml", "arrays.npz")
 
 
 def states(folder):
-    """Return how each stage stands by run.json."""
+    """Return the state of each stage as run.json gives it."""
     stages = json.loads((folder / "run.json").read_text())["stages"]
     return {stage["name"]: stage["state"] for stage in stages}
 
@@ -118,7 +118,7 @@ def contents(folder):
 
 
 def results(folder):
-    """Return every file of the answer, whichever the verdict calls for, but not the record of its making."""
+    """Return every file of the answer, for any verdict, except the record of how it was made."""
     files = {f.name: f.read_bytes() for f in folder.iterdir() if f.is_file() and f.name != "run.json"}
     assert {"diagnosis.json", "arrays.npz"} <= set(files)
     return files
@@ -134,20 +134,20 @@ def test_a_second_diagnosis_computes_nothing(diagnosed, field_run, pair):
 
 
 def wait_for_stage(name, folder, process):
-    """Wait until a stage's result is whole."""
+    """Wait until the result of a stage is complete."""
     while process.poll() is None and not list(folder.glob(f".boresight/{name}-*/manifest.json")):
         time.sleep(0.01)
 
 
-def test_killed_and_resumed_it_ends_in_the_same_bytes(diagnosed, pair, tmp_path):
-    # Every call is in a process of its own, after `diagnosed` has compiled the kernels: what compiling in the
-    # same process does to the last digits is another matter.
-    # The inspection alone takes a third of the time; with a gauge the stages are resumed by the same runner.
+def test_killed_and_resumed_it_ends_with_the_same_bytes(diagnosed, pair, tmp_path):
+    # Each call is in a separate process, after `diagnosed` has compiled the kernels: what compiling in the
+    # same process changes in the last digits is tested elsewhere.
+    # The inspection alone takes a third of the time; with a gauge run the same runner resumes the stages.
     words = [sys.executable, "-m", "pipeline.cli", "diagnose", str(pair[0]), *QUICK, "-o"]
     undisturbed, command = [*words, str(tmp_path / "whole")], [*words, str(tmp_path / "out")]
     subprocess.run(undisturbed, cwd=PROJECT_ROOT, stderr=subprocess.DEVNULL, check=True)
     first = subprocess.Popen(command, cwd=PROJECT_ROOT, stderr=subprocess.DEVNULL)
-    # Killed in the middle of a stage: the one before it is whole.
+    # Killed in the middle of a stage: the one before it is complete.
     wait_for_stage("line_profile", tmp_path / "out", first)
     first.kill()
     assert first.wait() == -signal.SIGKILL
@@ -167,7 +167,7 @@ def test_ctrl_c_ends_it_with_130(pair, tmp_path):
     assert json.loads((tmp_path / "out" / "run.json").read_text())["state"] == "cancelled"
 
 
-def test_what_a_run_of_the_field_holds_is_taken_over(first_call):
+def test_the_results_of_a_run_of_the_field_are_reused(first_call):
     out, stood = first_call
     assert stood["field rings"] == stood["field triangulate"] == "reused"
     assert stood["gauge rings"] == stood["diagnosis"] == "completed"
@@ -185,7 +185,7 @@ def test_the_inspection_is_reconstructed_once_with_what_was_found(pair, field_ru
     assert not (out / "run-stated").exists()
 
 
-def test_a_run_of_another_recording_is_refused_by_name(pair, tmp_path):
+def test_a_run_of_another_recording_is_refused_with_its_name(pair, tmp_path):
     record = {
         "state": "completed", "recording": {"path": str(pair[0])}, "configuration": {},
         "probe": {"path": str(pair[0] / "probe.yaml")}, "input_sha256": {"recording": "0" * 64},
@@ -209,7 +209,7 @@ def test_a_run_of_another_recording_is_refused_by_name(pair, tmp_path):
 
 
 class Still:
-    """A source whose laser and lit frames never change."""
+    """A frame source whose laser frames are all the same picture, and whose lit frames are."""
 
     def __init__(self, recording):
         self.recording, self.image_size = recording, recording.source.image_size
@@ -261,7 +261,7 @@ def of_another_size(recording):
         (without_motion, Verdict.NOT_IDENTIFIABLE, "travels only 0 mm"),
     ],
 )
-def test_what_a_recording_lacks_is_told_and_nothing_is_guessed(pair, spoilt, verdict, said, tmp_path):
+def test_what_a_recording_lacks_is_reported_and_no_effect_is_named(pair, spoilt, verdict, said, tmp_path):
     found = field_alone(spoilt(open_recording(pair[0])), pair[0], tmp_path)
     assert found.verdict is verdict
     assert not found.effects
@@ -274,7 +274,7 @@ def test_a_field_whose_size_the_ring_contradicts_is_refused(pair, tmp_path):
 
 
 def field_alone(recording, folder, tmp_path):
-    """What a diagnosis of an inspection alone finds."""
+    """The result of a diagnosis of an inspection alone."""
     probe = read_probe(folder / "probe.yaml")
     stages = diagnosis_stages(with_field=True, with_gauge=False)
     sources = (recording_source(recording, "field"), probe_source(probe), Source(Noticed, Noticed(), ""))
@@ -284,7 +284,7 @@ def field_alone(recording, folder, tmp_path):
     return result_of(job, Diagnosed).found
 
 
-def test_a_gauge_of_another_probe_is_left_out_and_said_to_be(pair, diagnosed, tmp_path):
+def test_a_gauge_of_another_probe_is_left_out_with_a_message(pair, diagnosed, tmp_path):
     field, gauge = pair
     out, other = shutil.copytree(diagnosed, tmp_path / "out"), tmp_path / "gauge"
     shutil.copytree(gauge, other)

@@ -1,7 +1,7 @@
-"""The diagnosis' predictions against the simulator, which shares no model with it: same signs, same sizes.
+"""The predictions of the diagnosis against the simulator, which shares no model with it.
 
-Rings are traced by the simulator with each effect switched on, for a camera on the axis and for one beside it
-that leans; points of the wall are traced back along its viewing rays.
+Rings are traced by the simulator with each effect switched on, for a camera on the axis and for an off-centre
+one that leans. Points of the wall are traced back along its viewing rays. Signs and sizes must agree.
 """
 
 from dataclasses import replace
@@ -26,8 +26,8 @@ ASIDE = Motion(constant(20.0), constant(5.0), constant(-4.0), constant(YAW))
 # Seen from a camera at (5, −4) that leans by the yaw towards +x.
 BESIDE = Bore(RADIUS_MM, (-5.0 * np.cos(YAW), 4.0, -5.0 * np.sin(YAW)), (-np.sin(YAW), 0.0, np.cos(YAW)))
 PLACES = {"on the axis": (CENTRED, Bore(RADIUS_MM)), "beside it and leaning": (ASIDE, BESIDE)}
-# Sizes of some consequence; per cent that a prediction may leave out. What a tilted tube does to camera and
-# laser nearly cancels, so that second order weighs more; far ahead, undoing the straight tube adds to it.
+# Large effects; allowed error of a prediction, per cent. The effects of a tilted tube on camera and
+# laser nearly cancel, so that second order weighs more; far ahead, subtracting the straight tube adds to it.
 SWITCHES = {
     "laser_tilt": ((0.6, 40.0), 0.1),
     "laser_cone": ((0.3,), 0.1),
@@ -55,7 +55,7 @@ SWITCHES = {
 
 
 def asked(name, values):
-    """Shape and amplitudes that a switch's quantities stand for."""
+    """Return shape and amplitudes of the quantities of a switch."""
     found = dict(zip((q.name for q in effect(name).quantities), values, strict=True))
     model, size = LIBRARY[name], values[0]
     shape = tuple(found[n] for n in ("order", "frequency_hz", "time_s") if n in found)
@@ -84,7 +84,7 @@ def test_the_simulators_ring_is_where_the_diagnosis_predicts_it(name, place):
 
 @pytest.mark.parametrize("ahead_mm", [12.0, 30.0, 70.0])
 @pytest.mark.parametrize("name", [n for n in SWITCHES if effect(n).family in ("camera", "window")])
-def test_wall_points_lie_on_the_simulators_rays_of_the_pixels_predicted(name, ahead_mm):
+def test_predicted_wall_points_lie_on_the_simulators_rays_of_their_pixels(name, ahead_mm):
     values, per_cent = SWITCHES[name]
     changed = switch_on(bench_truth(RADIUS_MM), [Switch(name, values)])
     points = texture_points(changed.stated, Bore(RADIUS_MM), ahead_mm)
@@ -110,7 +110,7 @@ def test_the_simulators_rolling_shutter_bends_the_ring_as_predicted():
     moved = np.sum((trace_ring(changed, TIME_S, COUNT).uv - points.uv) * points.outward, axis=1)
     predicted = ring_shift_px(LIBRARY["rolling_shutter"], moving, (), np.array([0.016]))
     assert np.abs(moved).max() > 0.05
-    # Within a row's delay of up to 5 ms the sway's speed itself changes by some per cent.
+    # Within a row's delay of up to 5 ms the speed of the sway itself changes by some per cent.
     assert predicted == pytest.approx(moved, abs=0.05 * np.abs(moved).max())
 
 
@@ -123,7 +123,7 @@ ODOMETERS = {
 
 
 @pytest.mark.parametrize("name", ODOMETERS)
-def test_the_simulators_odometer_reads_too_much_by_what_is_predicted(name):
+def test_the_simulators_encoder_reads_too_much_by_the_predicted_amount(name):
     shape, amplitude, odometer = ODOMETERS[name]
     to_and_fro = Motion(Signal(np.zeros(1), np.zeros(1), (Wave(20.0, 0.15),)))
     true, read = (meter.readings(to_and_fro, 10.0) for meter in (Odometer(quantum_mm=0.0), odometer))
@@ -131,7 +131,7 @@ def test_the_simulators_odometer_reads_too_much_by_what_is_predicted(name):
     travel = Travel(time, way, np.gradient(way, time))
     predicted = LIBRARY[name].reading_shift_mm(travel, shape, np.array(amplitude))
     excess = read.distance_mm - way
-    # Readings count from their first; a delay reaches back before it, where the way is not known.
+    # Readings count from the first; a delay needs the distance before it, which is not known.
     settled = time > 0.5
     difference = (excess - predicted)[settled]
     assert np.ptp(excess[settled]) > 0.3

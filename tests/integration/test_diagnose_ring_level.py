@@ -1,4 +1,4 @@
-"""The gauge's diagnosis on runs traced ray by ray by the simulator, which shares no forward model with it."""
+"""The diagnosis of gauge runs traced ray by ray by the simulator, which shares no forward model with it."""
 
 from functools import cache
 from pathlib import Path
@@ -31,7 +31,7 @@ from tests.benchmarks.ring_level import RingLevelRun, ring_level_run
 
 SCENE = Path(__file__).resolve().parents[2] / "configs" / "scenes" / "gauge-4-inch.yaml"
 pytestmark = pytest.mark.slow
-# Few effects keep the test short; among them what a tilt is taken for.
+# Few effects keep the test short; among them those that can be mistaken for a tilt.
 FEW = ("laser_tilt", "laser_cone", "baseline", "principal_point", "tube_tilt")
 
 
@@ -50,13 +50,13 @@ def seen(
     return examine(run.measured, {n: LIBRARY[n] for n in names}, run.truth.stated, courses=courses)
 
 
-def test_a_run_with_nothing_hidden_is_consistent_and_tells_what_it_could_see():
+def test_a_run_with_nothing_hidden_is_consistent_and_states_what_it_could_detect():
     found = seen((), FEW, 61)
     assert verdict_of(found) is Verdict.CONSISTENT
     assert found.global_p > 1e-3
     assert {f.name for f in found.feasibility} == set(FEW)
     assert found.quality is not None
-    # The floor is what does not repeat, what samples of a fiducial share, 0.05 px beside 0.07, with it.
+    # The floor is the noise that does not repeat, with the errors that samples of a fiducial share: 0.05 px.
     assert found.quality.rms_after == pytest.approx(found.quality.noise_floor, rel=0.05)
 
 
@@ -67,7 +67,7 @@ def test_a_tilt_is_named_with_its_size():
     size = effect.parameters["tilt_deg"]
     assert size.value == pytest.approx(0.3, abs=4 * size.sd)
     assert size.sd < 0.03
-    # A formula that grows as a tilt does says that very tilt, and no other effect.
+    # The formula that grows like a tilt describes that tilt, and no other effect.
     run = found.searched.run
     (pattern,) = [term for term in GENERIC if term.name == "generic_line_1_2"]
     formula_fit = fit(run, found.searched.nothing.state, [Term(pattern, STEADY, np.zeros(2))])
@@ -84,19 +84,19 @@ class ShorterExposure(MotionBlur):
         return -super().reading_shift_mm(travel, shape, amplitude)
 
 
-def test_a_size_that_cannot_be_is_no_evidence():
+def test_an_effect_whose_size_is_impossible_is_not_evidence():
     run = measured(("motion_blur=0.065",), 65)
     measurements, start = prepare(run.measured)
     nothing, stated = fit(measurements, start, ()), stated_belief(run.truth.stated)
     (control,) = scan(measurements, nothing, {"motion_blur": MotionBlur()}, stated)
     assert control.p_value < 1e-4
-    # Pictures are late by half of it, which the encoder tells.
+    # Pictures are late by half of the exposure, which the encoder shows.
     (size,) = control.score.amplitude
     assert size == pytest.approx(0.065, abs=3 * control.score.covariance[0, 0] ** 0.5)
     assert scan(measurements, nothing, {"motion_blur": ShorterExposure()}, stated) == []
 
 
-def test_a_wave_in_the_fraction_of_a_pixel_has_its_size_though_bins_average_over_it():
+def test_the_size_of_pixel_locking_is_right_though_bins_average_over_it():
     run = measured(("pixel_locking=0.06",), 65)
     measurements, start = prepare(run.measured)
     nothing, stated = fit(measurements, start, ()), stated_belief(run.truth.stated)
@@ -104,7 +104,7 @@ def test_a_wave_in_the_fraction_of_a_pixel_has_its_size_though_bins_average_over
     assert found.score.amplitude == pytest.approx(0.06, rel=0.2)
 
 
-def test_a_tilt_that_the_library_lacks_is_not_misnamed_but_described():
+def test_a_tilt_missing_from_the_library_gets_no_wrong_name_but_a_formula():
     found = seen(("laser_tilt=0.3@-70",), tuple(n for n in FEW if n != "laser_tilt"), 62)
     assert verdict_of(found) is Verdict.UNEXPLAINED
     assert found.location is not None
@@ -112,7 +112,7 @@ def test_a_tilt_that_the_library_lacks_is_not_misnamed_but_described():
     assert "cos 1(ψ − ψ₀)" in formula(found)
 
 
-def test_a_swing_is_named_at_its_own_frequency_and_found_without_a_name_too():
+def test_a_swing_is_named_with_its_frequency_and_found_without_a_name_too():
     hidden, between_bins = ("laser_rocking=1.2@40/3.217Hz",), 3.217
     named = seen(hidden, ("laser_rocking", "laser_tilt"), 63)
     (effect,) = effects_found(named)
@@ -135,8 +135,11 @@ def test_a_drift_is_sized_with_its_time_constant():
         assert 0 < effect.parameters[name].sd < 0.25 * true
 
 
-def test_an_even_growth_that_no_drift_may_come_to_is_told_with_its_size():
-    """As a drift it would come to 2.1 mm in the end, and the catalogue's go to 1 mm: it was unexplained."""
+def test_linear_growth_too_large_for_a_drift_is_reported_with_its_size():
+    """As a drift it would reach 2.1 mm in the end, but those of the catalogue reach 1 mm.
+
+    It was unexplained.
+    """
     found = seen(
         ("baseline~ramp=0.3/8s",), ("baseline", "baseline_drift", "laser_cone"), 67, (CourseKind.RAMP,), 40
     )
@@ -156,8 +159,8 @@ def test_an_even_growth_that_no_drift_may_come_to_is_told_with_its_size():
         ("principal_point~ramp=2.8@-158/8s", [], 0.0, 1e-3),
     ],
 )
-def test_an_even_growth_beside_a_swing_may_be_one_course_that_nobody_knows(hidden, swing, low, high):
-    """An optical axis that settles is none that moves evenly while a laser rocks once in the whole run."""
+def test_linear_growth_beside_a_swing_may_be_one_unknown_course(hidden, swing, low, high):
+    """An optical axis that settles does not drift linearly; the laser rocks once during the run."""
     run, axis = measured((hidden,), 67, 40), LIBRARY["principal_point"]
     measurements, start = prepare(run.measured)
     even, stated = (
@@ -186,20 +189,20 @@ def test_a_knock_is_named_as_a_step_at_its_time():
     assert (found.location.fixed_to, found.location.time) == ("laser", "event")
 
 
-def test_rings_beyond_the_last_fiducials_do_not_count():
+def test_rings_beyond_the_last_fiducials_are_not_used():
     found = seen((), FEW, 61)
     run = found.searched.run
     assert run.edges.frame.min() <= run.rings.frame.min()
     assert run.rings.frame.max() <= run.edges.frame.max() < len(run.time_s) - 1
 
 
-def test_an_unknown_wave_in_the_fraction_of_a_pixel_is_found_and_described():
+def test_an_unknown_periodic_error_in_the_fraction_of_a_pixel_is_found_and_described():
     found = seen(("pixel_locking=0.06",), FEW, 65)
     assert verdict_of(found) is Verdict.UNEXPLAINED
     assert "cos(2πρ" in formula(found)
 
 
-def test_waves_of_two_orders_are_two_effects():
+def test_sheet_waves_of_two_orders_are_two_effects():
     scene = read_scene(SCENE).model_copy(update={"seed": 67, "frames": 80, "frame_rate": 10.0})
     hidden = [Switch("sheet_waviness", (1.5, 2.0, 40.0)), Switch("sheet_waviness", (0.9, 3.0, 100.0))]
     run = ring_level_run(scene, SCENE, hidden)

@@ -17,7 +17,7 @@ def run(*arguments: str):
     return CliRunner().invoke(app, list(arguments))
 
 
-def test_json_holds_rows_sums_and_the_designers_answers():
+def test_json_has_rows_sums_and_the_answers_to_the_designers_questions():
     document = json.loads(run("--json", "--draws", "0").stdout)
     table_one = {r["table_one"] for r in document["rows"]} - {""}
     assert table_one == {
@@ -32,7 +32,7 @@ def test_json_holds_rows_sums_and_the_designers_answers():
     assert sum(parts) == pytest.approx(document["total"]["all"]["known"]["rms_mm"] ** 2)
 
 
-def test_files_are_written_alike_twice_and_need_nothing_else(tmp_path):
+def test_two_calls_write_the_same_files_which_need_no_others(tmp_path):
     probe = shared("recordings", "open-1-field", "probe.yaml")
     for name in ("a", "b"):
         result = run(str(probe), "--draws", "128", "-o", str(tmp_path / name))
@@ -50,7 +50,7 @@ def test_files_are_written_alike_twice_and_need_nothing_else(tmp_path):
     assert total["monte_carlo_rms_mm"] == pytest.approx(total["rms_mm"], rel=0.02)
 
 
-def test_a_given_sigma_counts():
+def test_a_stated_sigma_is_used():
     document = json.loads(run("--json", "--draws", "0", "--sigma", "laser_tilt=0.5").stdout)
     assert document["dominant"] == "laser_tilt"
     assert document["rows"][0]["origin"] == "given"
@@ -66,7 +66,7 @@ def test_a_given_sigma_counts():
         (("--offset-x-mm", "60"), "outside the pipe"),
     ],
 )
-def test_bad_input_is_named(arguments, named):
+def test_bad_input_is_named_in_the_error(arguments, named):
     result = run("--json", "--draws", "0", *arguments)
     assert result.exit_code != 0
     assert named in str(result.exception)

@@ -1,4 +1,4 @@
-"""`boresight error-model`: its numbers, its figures, and the page's figures in node and in a browser."""
+"""`boresight error-model`: its numbers and figures, and the page's model in node and in a browser."""
 
 import json
 import math
@@ -51,7 +51,7 @@ def page_parameters() -> str:
 
 
 def in_node(program: str) -> object:
-    """Return what a program tells that knows the page's model as ``b``."""
+    """Return the output of a JavaScript program in which the page's model is ``b``."""
     node = shutil.which("node") or pytest.skip("node is not installed")
     model = json.dumps(str(files("pipeline.pages") / "error_model.js"))
     told = f"const b = require({model}); console.log(JSON.stringify({program}))"
@@ -86,7 +86,7 @@ def assert_same_as_python(computed: list[dict[str, float]]) -> None:
         assert numbers["max_image_shift_px"] == pytest.approx(shift, abs=1e-9)
 
 
-def test_json_has_exactly_its_keys_and_the_figures_of_the_paper():
+def test_json_has_exactly_its_keys_and_the_numbers_of_the_paper():
     result = run("--json", "--diameter-mm", "101.6", "--tilt-deg", "0.6", "--baseline-mm", "22")
     numbers = json.loads(result.stdout)
     assert set(numbers) == KEYS
@@ -102,13 +102,13 @@ def test_json_with_accuracy_adds_the_allowed_tilt():
 
 
 @pytest.mark.parametrize("option", ["--diameter-mm", "--baseline-mm"])
-def test_a_negative_length_is_refused_by_name(option):
+def test_a_negative_length_is_refused_with_its_name(option):
     result = run("--json", option, "-5")
     assert result.exit_code != 0
     assert option.strip("-").replace("-", "_") in str(result.exception)
 
 
-def test_figures_and_page_are_written_alike_twice(tmp_path):
+def test_two_calls_write_the_same_figures_and_page(tmp_path):
     for name in ("a", "b"):
         assert run("-o", str(tmp_path / name)).exit_code == 0
     names = {p.name for p in (tmp_path / "a").iterdir()}
@@ -118,13 +118,13 @@ def test_figures_and_page_are_written_alike_twice(tmp_path):
     assert "baseline 22 mm" in (tmp_path / "a" / "fig5-tilt.svg").read_text("utf-8")
 
 
-def test_page_is_one_file_without_requests():
+def test_the_page_is_one_file_that_loads_nothing():
     page = error_model_page(SCANS[0], CAMERA, "probe.yaml", 0.1)
     assert not re.search(r"""(?:src|href)\s*=\s*["'](?!#)|https?://|@import|url\((?!#)""", page)
     assert "</script>" not in page.split('id="start">')[1].split("</script>")[0]
 
 
-def test_page_model_in_node_is_python():
+def test_the_pages_model_in_node_agrees_with_python():
     assert_same_as_python(
         in_node(
             f"{page_parameters()}.map((p) => {{"
@@ -133,7 +133,7 @@ def test_page_model_in_node_is_python():
     )
 
 
-def test_page_in_a_browser_is_python(tmp_path):
+def test_the_page_in_a_browser_agrees_with_python(tmp_path):
     browser = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
     if browser is None:
         pytest.skip("no chromium: the page was not tried in a browser")
@@ -158,7 +158,7 @@ def test_page_in_a_browser_is_python(tmp_path):
     assert_same_as_python(json.loads(unescape(computed.group(1))))
     shown = re.search(r"Largest radial error, exact</dt><dd>([0-9.]+) mm", done.stdout)
     moved = misalignment_error(MisalignedScan(76.2, 22.0, 1.2)).max_radial_mm
-    assert float(shown.group(1)) == pytest.approx(moved, abs=5e-4), "slider and button reach the figures"
+    assert float(shown.group(1)) == pytest.approx(moved, abs=5e-4), "slider and button change the numbers"
     assert done.stdout.count("<path") > 10, "charts are drawn"
 
 
@@ -172,7 +172,7 @@ def test_page_reads_the_probe_file_as_python_does():
     assert read["camera"]["distortion"] == [-0.011789, 0.000796, -0.000835, 0.0]
 
 
-def test_any_other_camera_becomes_a_table_the_page_projects_with():
+def test_any_other_camera_becomes_a_table_with_which_the_page_projects():
     class Other(KannalaBrandt):
         model = "other"
 

@@ -1,4 +1,7 @@
-"""The disk fills, permission goes, inputs change, the clock is set back: told by name, nothing lost."""
+"""The disk fills, permissions go, inputs change, the clock is set back.
+
+Reported by name, and nothing is lost.
+"""
 
 from __future__ import annotations
 
@@ -40,7 +43,7 @@ def good(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def whole(good: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
-    """What an undisturbed run leaves."""
+    """The result of a run without faults."""
     folder = tmp_path_factory.mktemp("whole") / "run"
     run(good, folder)
     return run_content(folder)
@@ -60,7 +63,7 @@ def cut_off(file: Path) -> None:
 
 
 def mirrored(file: Path) -> None:
-    """Put another recording in its place: as many frames of the same size, in the opposite order."""
+    """Replace the recording by another one: as many frames of the same size, in reverse order."""
     lines = file.read_text().splitlines(keepends=True)
     file.write_text("".join([lines[0], *lines[:0:-1]]))
 
@@ -72,7 +75,10 @@ def other_bytes(file: Path) -> None:
 
 
 def test_inputs_that_change_while_stages_work(good: Path, tmp_path: Path, whole: dict[str, str]) -> None:
-    """Every stage that reads pictures is disturbed; put back, long ago by its date, the run goes on."""
+    """Change the inputs while each stage that reads pictures works.
+
+    Once restored with old file times, the run goes on.
+    """
     copy = shutil.copytree(good, tmp_path / "cut")
     spoils: list[tuple[str, str, Callable[[Path], object]]] = [
         ("rings", "frames.mkv", Path.unlink),
@@ -88,7 +94,7 @@ def test_inputs_that_change_while_stages_work(good: Path, tmp_path: Path, whole:
         assert refusal.value.file == copy / name
         assert "same command" in refusal.value.hint
         told = states(tmp_path / "run")
-        # The stage that runs beside it may be the first to see it, and stops it.
+        # A stage that runs at the same time may notice it first, and stop.
         assert told[stage] in ("unusable", "cancelled")
         assert "unusable" in told.values()
         assert all(told[d] in ("completed", "reused") for d in done)
@@ -101,7 +107,7 @@ def test_inputs_that_change_while_stages_work(good: Path, tmp_path: Path, whole:
 
 
 def removed(folder: Path) -> None:
-    # Files are still being written: what comes while it is removed makes a second round necessary.
+    # Files are still being written: files that appear during the removal make a second round necessary.
     while folder.exists():
         shutil.rmtree(folder, ignore_errors=True)
 
@@ -117,12 +123,14 @@ def file_in_its_place(folder: Path) -> None:
 
 @pytest.mark.parametrize("lose", [removed, moved_away, file_in_its_place])
 @pytest.mark.parametrize("stage", ["draw", "total"])
-def test_a_run_folder_that_is_lost(tmp_path: Path, stage: str, lose: Callable[[Path], object]) -> None:
+def test_a_run_folder_that_is_removed_during_a_run_ends_it_with_an_error(
+    tmp_path: Path, stage: str, lose: Callable[[Path], object]
+) -> None:
     folder = tmp_path / "run"
     job = toy_job(folder)
     with pytest.raises(InputError, match=r"run(/\.boresight)?: cannot be written"):
         run_job(job, Selection(), MeddlingDisplay({stage: partial(lose, folder)}))
-    assert not folder.is_dir(), "half a run folder came back"
+    assert not folder.is_dir(), "a part of the run folder was made again"
     if (tmp_path / "elsewhere").is_dir():
         run_toys(tmp_path / "whole")
         run_toys(tmp_path / "elsewhere")
@@ -130,7 +138,7 @@ def test_a_run_folder_that_is_lost(tmp_path: Path, stage: str, lose: Callable[[P
 
 
 @pytest.mark.parametrize("part", [".", ".boresight"])
-def test_permission_that_is_lost_amid_a_run(tmp_path: Path, part: str) -> None:
+def test_permissions_that_are_removed_during_a_run_end_it_with_an_error(tmp_path: Path, part: str) -> None:
     folder = tmp_path / "run"
     command = [sys.executable, "-m", "tests.toys", str(folder), "draw.pause_s=0.2"]
     pipes = {"stderr": subprocess.PIPE, "text": True, "cwd": PROJECT_ROOT}
@@ -174,7 +182,7 @@ print(refusals)
 """
 
 
-def test_a_disk_that_fills_at_any_page(tmp_path: Path) -> None:
+def test_a_disk_that_fills_after_any_number_of_pages(tmp_path: Path) -> None:
     assert int(on_small_disk(tmp_path, _FILLING)) > 10
 
 
@@ -207,8 +215,10 @@ def test_a_real_run_on_a_disk_that_fills(good: Path, tmp_path: Path, whole: dict
         assert run_content(tmp_path / str(kib)) == whole
 
 
-def test_a_clock_set_back_amid_a_run_changes_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Between two calls and within one; files of every age in the folder; a log that runs backwards."""
+def test_a_clock_set_back_during_a_run_changes_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The clock is set back between two calls and within one; the folder has files of every age."""
     run_toys(tmp_path / "whole")
     job, now = toy_job(tmp_path / "run"), time.time
 

@@ -1,4 +1,4 @@
-"""A recording is followed while it is written, and ends equal to a run made afterwards."""
+"""A recording is followed while it is written; the result equals that of a run made afterwards."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def written_slowly(whole: Path, growing: Path, pieces: int, pause_s: float) -> None:
-    """Write a recording as a recorder does: description first, then tables and video piece by piece."""
+    """Write a recording as a recorder does: the description first, then tables and video piece by piece."""
     growing.mkdir()
     for name in ("recording.yaml", "probe.yaml"):
         shutil.copy(whole / name, growing / name)
@@ -53,7 +53,7 @@ def run(recording: Path, output: Path, *more: str) -> None:
     assert told.returncode == 0, told.stderr
 
 
-def test_followed_and_afterwards_are_the_same(whole: Path, tmp_path: Path) -> None:
+def test_following_and_a_later_run_give_the_same_result(whole: Path, tmp_path: Path) -> None:
     growing = tmp_path / "cut"
     writer = threading.Thread(target=written_slowly, args=(whole, growing, 6, 0.3))
     writer.start()
@@ -66,13 +66,13 @@ def test_followed_and_afterwards_are_the_same(whole: Path, tmp_path: Path) -> No
     page = (tmp_path / "followed" / "live.html").read_text("utf-8")
     with (whole / "frames.csv").open() as file:
         rings = sum(row["illumination"] == "laser" for row in csv.DictReader(file))
-    assert f"<dd>{rings}</dd>" in page, "every ring is on the page once the recording is at rest"
+    assert f"<dd>{rings}</dd>" in page, "every ring is on the page when the recording is complete"
     assert 'http-equiv="refresh"' not in page
     (diameter,) = re.findall(r"([\d.]+) ± ", page)
     assert abs(float(diameter) - 101.6) < 1.0
 
 
-def test_the_preliminary_diameter_is_near_and_nothing_is_told_twice(whole: Path) -> None:
+def test_the_preliminary_diameter_is_about_right_and_no_section_is_reported_twice(whole: Path) -> None:
     recording = open_recording(whole)
     probe = read_probe(recording.probe_file)
     early = preliminary_sections(recording, probe, -1, FEW, quiet_context())
@@ -94,10 +94,10 @@ def half_written(file: Path) -> None:
     ("name", "spoil"),
     [("frames.mkv", Path.unlink), ("probe.yaml", half_written), ("probe.yaml", Path.unlink)],
 )
-def test_what_cannot_be_read_is_tried_again_until_the_recording_rests(
+def test_unreadable_files_are_tried_again_until_the_recording_is_complete(
     whole: Path, tmp_path: Path, name: str, spoil: Callable[[Path], None]
 ) -> None:
-    """A drive that drops out, a file that the recorder is at: no end of following, but told at rest."""
+    """A drive that drops out, or a file being written, does not end following; it is reported at the end."""
     folder = copied(whole, tmp_path)
     snapshot = Snapshot(open_recording(folder), "", complete=False)
     spoil(folder / name)
@@ -106,7 +106,7 @@ def test_what_cannot_be_read_is_tried_again_until_the_recording_rests(
         new_sections(replace(snapshot, complete=True), None, -1, quiet_context())
 
 
-def test_a_recorder_that_starts_again_is_shown_from_its_start(whole: Path, tmp_path: Path) -> None:
+def test_when_the_recorder_starts_again_the_display_starts_again(whole: Path, tmp_path: Path) -> None:
     folder = copied(whole, tmp_path)
     assert not restarted(Snapshot(open_recording(folder), "", complete=False), shown=20)
     cut_sample(tmp_path / "anew", frames=8)
@@ -116,7 +116,7 @@ def test_a_recorder_that_starts_again_is_shown_from_its_start(whole: Path, tmp_p
     assert not restarted(Snapshot(None, "not there", complete=False), shown=20)
 
 
-def test_files_that_come_and_go_while_they_are_counted(tmp_path: Path) -> None:
+def test_files_may_appear_and_vanish_while_they_are_counted(tmp_path: Path) -> None:
     stop = threading.Event()
 
     def come_and_go() -> None:
@@ -136,13 +136,13 @@ def test_files_that_come_and_go_while_they_are_counted(tmp_path: Path) -> None:
         writer.join()
 
 
-def test_what_is_not_there_yet_is_waited_for_and_told_at_rest(tmp_path: Path) -> None:
+def test_missing_files_are_waited_for_and_reported_at_the_end(tmp_path: Path) -> None:
     seen = list(snapshots(tmp_path / "none", 0.2, 0.05, threading.Event()))
     assert [g.complete for g in seen] == [False, True]
     assert all(g.recording is None and g.problem for g in seen)
 
 
-def test_a_wish_to_stop_is_heard(tmp_path: Path) -> None:
+def test_a_request_to_stop_ends_following(tmp_path: Path) -> None:
     wish = threading.Event()
     wish.set()
     with pytest.raises(Cancelled):

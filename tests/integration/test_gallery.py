@@ -1,4 +1,4 @@
-"""The gallery: its figures are the computed ones, residuals follow the laws, every effect has an exhibit."""
+"""The gallery: its numbers are the computed ones, residuals follow the laws, every effect has its section."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ SHOWN = ("laser_tilt", "principal_point", "sheet_waviness", "pixel_aspect", "dus
 
 
 class _Page(HTMLParser):
-    """Table rows by the id of their section, and whatever the page would load."""
+    """Collects table rows by the id of their section, and everything that the page would load."""
 
     def __init__(self, text: str) -> None:
         super().__init__()
@@ -62,7 +62,7 @@ def page(exhibits: list[Exhibit]) -> str:
     return gallery_page(exhibits, [radius_check(e.switch) for e in exhibits if e.name in LAWS])
 
 
-def test_every_figure_of_size_on_the_page_is_the_computed_one(exhibits: list[Exhibit], page: str) -> None:
+def test_every_size_on_the_page_is_the_computed_one(exhibits: list[Exhibit], page: str) -> None:
     rows = _Page(page).rows
     for shown in exhibits:
         sizes = {
@@ -79,7 +79,7 @@ def test_every_figure_of_size_on_the_page_is_the_computed_one(exhibits: list[Exh
 
 
 @pytest.mark.parametrize("name", [n for n in SHOWN if n in LAWS])
-def test_a_rendered_residual_is_what_the_law_says(exhibits: list[Exhibit], name: str) -> None:
+def test_a_rendered_residual_follows_the_law(exhibits: list[Exhibit], name: str) -> None:
     shown = next(e for e in exhibits if e.name == name)
     psi, order = shown.azimuth_rad, shown.harmonic
     assert order is not None
@@ -91,13 +91,13 @@ def test_a_rendered_residual_is_what_the_law_says(exhibits: list[Exhibit], name:
     assert shown.exponent == pytest.approx(EFFECTS[name].radial_exponent, abs=0.03)
 
 
-def test_what_looks_alike_is_named(exhibits: list[Exhibit]) -> None:
+def test_effects_that_look_the_same_are_named(exhibits: list[Exhibit]) -> None:
     alike = {name: {a.name: a for a in found} for name, found in likenesses(exhibits).items()}
     assert alike["laser_tilt"]["principal_point"].one_bore > 0.999
-    # r² against l + r²/l: several bores tell them apart a little
+    # r² against l + r²/l: several bores separate them a little
     assert alike["laser_tilt"]["principal_point"].all_bores < 0.995
     assert alike["laser_tilt"]["off-centre probe"].one_bore > 0.999
-    # the aspect's oval lies at 0°, the sheet's may lie anywhere: it is turned to it
+    # the oval of the aspect ratio lies at 0°; that of the sheet has a free direction, and is turned to it
     assert alike["pixel_aspect"]["sheet_waviness"].one_bore > 0.999
     assert "laser_tilt" not in alike["pixel_aspect"]
     assert alike["dust"] == {}
@@ -123,7 +123,7 @@ def test_the_command_shows_the_whole_catalogue(tmp_path: Path, monkeypatch: pyte
 
 
 @pytest.mark.parametrize("name", EFFECTS)
-def test_every_effect_has_a_scene_in_which_something_is_different(name: str) -> None:
+def test_every_effect_has_a_scene_in_which_it_changes_something(name: str) -> None:
     switch = typical_switch(name)
     plain, changed = scene_pair(switch, 50.8)
     time = moment_s(switch)

@@ -1,4 +1,7 @@
-"""Laser planes of real instruments: the published ones reproduced, and one measured from its pictures."""
+"""Laser planes of real instruments.
+
+Published planes are reproduced, and one is measured from its pictures.
+"""
 
 import re
 
@@ -23,7 +26,7 @@ RED_NM = 650.0
     ("file", "count", "rms_mm"), [("calib_result.txt", 6591, 1.35), ("calib_result_1.txt", 418, 2.49)]
 )
 def test_published_points_give_their_published_plane(file, count, rms_mm):
-    """The file has six digits a coordinate, which leave the plane uncertain in the last digit printed."""
+    """The file has six digits a coordinate, so that the last printed digit of the plane is uncertain."""
     text = shared("real", "pipeblaser_cmu", file).read_text()
     a, b, c, d = (float(n) for n in text.splitlines()[1].split(","))
     points = [[float(n) for n in line.split(",")] for line in re.findall(r"lp: (.*)", text)]
@@ -56,7 +59,7 @@ def test_line_on_pipeblasers_board_lies_in_its_published_plane():
 def test_blasers_plane_from_its_own_pictures():
     """Checked with the data: n = (−0.019, 0.8963, 0.4431), 16.11 mm, rms 0.051 mm.
 
-    A second set of the same sensor differs from it by 0.2° and 0.15 mm; so may this.
+    A second set of the same sensor differs from it by 0.2° and 0.15 mm; as much is allowed here.
     """
     folder = shared("real", "blaser_laserplane_cmu", "640_unified")
     board = Chessboard(9, 6, 5.0)
@@ -88,6 +91,9 @@ def test_laser_alone_in_the_dark_shows_no_board():
 
 
 def _distance_mm(xyz_c, plane):
-    """Return distances of points, mm, from a plane a x + b y + c z + d = 0 in m, towards the camera."""
+    """Return signed distances of points, mm, from a plane a x + b y + c z + d = 0 in m.
+
+    Towards the camera is positive.
+    """
     a, b, c, d = plane
     return 1000 * (xyz_c / 1000 @ np.array([a, b, c]) + d) / np.linalg.norm([a, b, c])

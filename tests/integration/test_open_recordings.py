@@ -1,4 +1,4 @@
-"""Motion and wall of the sample's run against their truth; and without its encoder, from the same rings."""
+"""Motion and wall of the sample's run against the truth, with and without the encoder."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ SAMPLE = PROJECT_ROOT / "data" / "sample"
 
 @dataclass(frozen=True)
 class Run:
-    """What was made of the sample."""
+    """The results for the sample."""
 
     trajectory: Trajectory
     wall: Wall
@@ -66,7 +66,7 @@ def test_wall_lies_within_its_sigma(runs: dict[str, Run], name: str) -> None:
     assert got.inside_95 >= 0.93
 
 
-def test_sigma_is_not_won_by_claiming_nothing(runs: dict[str, Run]) -> None:
+def test_sigma_is_small_enough_to_be_useful(runs: dict[str, Run]) -> None:
     run = runs["encoder"]
     got = compare_wall(run.wall.radius_map, SAMPLE)
     assert np.median(got.sigma_mm) < 5 * np.sqrt(np.mean(np.minimum(np.abs(got.error_mm), 0.2) ** 2))
@@ -82,7 +82,7 @@ def test_encoder_scale_is_found(runs: dict[str, Run]) -> None:
 
 
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")  # it leaves files open
-def test_the_shared_score_agrees(runs: dict[str, Run], tmp_path: Path) -> None:
+def test_the_shared_scoring_program_agrees(runs: dict[str, Run], tmp_path: Path) -> None:
     tool = scorer()
     write_trajectory(runs["encoder"].trajectory, tmp_path)
     thin = _every_fourth_column(runs["encoder"].wall)

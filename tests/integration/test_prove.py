@@ -1,4 +1,4 @@
-"""The proof: answers beside opened truth, without a diagnosis of its own where answers are there."""
+"""`boresight prove`: answers are compared with the opened truth; existing answers are not computed again."""
 
 import json
 import subprocess
@@ -53,12 +53,12 @@ def test_sealed_recordings_without_their_truth_are_refused(drill):
     assert "--truth" in str(done.exception)
 
 
-def test_a_folder_without_recordings_is_no_drill(tmp_path):
+def test_a_folder_without_recordings_is_refused(tmp_path):
     with pytest.raises(InputError, match="NAME-gauge"):
         find_cases(tmp_path)
 
 
-def test_a_diagnosis_that_ends_without_an_answer_is_an_error_not_an_answer(tmp_path):
+def test_a_diagnosis_that_ends_without_an_answer_is_an_error(tmp_path):
     (tmp_path / "a-gauge").mkdir()
     (tmp_path / "a-gauge" / "recording.yaml").write_text("name: x\n")
     case = Case("a", tmp_path / "a-gauge", None)
@@ -91,7 +91,7 @@ def test_the_diagnosing_process_is_given_the_recordings_without_truth_beside_the
     assert [p.name for p in (tmp_path / "out").iterdir()] == ["a"]
 
 
-def test_an_answer_that_is_there_is_not_made_again(drill, monkeypatch):
+def test_an_existing_answer_is_not_computed_again(drill, monkeypatch):
     monkeypatch.setattr(
         "stages.diagnose.drill.cases.subprocess.run", lambda *_, **__: pytest.fail("made again")
     )
@@ -100,7 +100,7 @@ def test_an_answer_that_is_there_is_not_made_again(drill, monkeypatch):
 
 
 @pytest.mark.parametrize("changed", ["recordings", "truth"])
-def test_what_was_changed_after_sealing_is_not_scored(drill, changed):
+def test_a_case_changed_after_sealing_is_not_scored(drill, changed):
     for path in (drill / "recordings").iterdir():
         seal_truth(drill / "truth" / path.name, path)
     file = {"recordings": "recording.yaml", "truth": "truth.json"}[changed]
@@ -112,7 +112,7 @@ def test_what_was_changed_after_sealing_is_not_scored(drill, changed):
         require_seal(case, drill / "truth")
 
 
-def test_a_case_without_an_answer_is_counted_and_told(drill):
+def test_a_case_without_an_answer_is_counted_and_reported(drill):
     (drill / "out" / "answers" / "a" / "diagnosis.json").unlink()
     words = ["prove", "--sealed", str(drill / "recordings"), "--truth", str(drill / "truth")]
     done = CliRunner().invoke(app, [*words, "-o", str(drill / "out"), "--workers", "2"])
@@ -123,7 +123,7 @@ def test_a_case_without_an_answer_is_counted_and_told(drill):
     assert (figures["detected_any"]["value"], figures["detected_any"]["of"]) == (0.0, 1)
 
 
-def test_a_pair_that_cannot_be_rendered_is_told_and_counts_nowhere(tmp_path, monkeypatch):
+def test_a_pair_that_cannot_be_rendered_is_reported_and_counts_nowhere(tmp_path, monkeypatch):
     def refused(drawing, index):
         raise NotRenderedError(f"pair {index} could not be rendered: nothing would show")
 

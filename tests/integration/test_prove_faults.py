@@ -1,4 +1,4 @@
-"""A proof when things go wrong: killed, answers and truth that were changed, files that may not be read."""
+"""`boresight prove` when things go wrong: kills, changed answers and truth, unreadable files."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ def other_truth(file: Path) -> Path:
         ("recordings/a-gauge/sealed.yaml", half_of, "sealed.yaml"),
     ],
 )
-def test_a_proof_is_not_scored_from_what_was_changed(
+def test_a_proof_is_not_scored_with_changed_files(
     drill: Path, place: str, spoil: Callable[[Path], object], told: str
 ) -> None:
     answered(drill, "b")
@@ -89,7 +89,7 @@ def test_a_proof_is_not_scored_from_what_was_changed(
     assert (drill / "out" / "proof.json").read_bytes() == first
 
 
-def test_a_truth_that_may_not_be_read_is_named(drill: Path) -> None:
+def test_a_truth_file_without_read_permission_is_named(drill: Path) -> None:
     answered(drill, "b")
     (drill / "truth" / "a-gauge" / "truth.json").chmod(0)
     done = subprocess.run(
@@ -102,7 +102,7 @@ def test_a_truth_that_may_not_be_read_is_named(drill: Path) -> None:
     assert "correct its permissions" in done.stderr
 
 
-def test_a_diagnosis_that_was_killed_is_no_failure_of_the_diagnosis(
+def test_a_killed_diagnosis_does_not_count_as_a_failed_one(
     drill: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     killed = [sys.executable, "-c", "import os; os.kill(os.getpid(), 9)"]
@@ -114,7 +114,8 @@ def test_a_diagnosis_that_was_killed_is_no_failure_of_the_diagnosis(
     assert not (drill / "out" / "proof.json").exists()
 
 
-# Stands for a diagnosis that is killed after its first stage, and ends once it finds that stage's result.
+# Stands in for a diagnosis that is killed after its first stage, and completes once that stage's result is
+# there.
 _KILLED_ONCE = """
 import os, pathlib, signal, sys
 if {signal} == signal.SIGINT:
@@ -129,7 +130,7 @@ if not stage.exists():
 
 
 @pytest.mark.parametrize("ended_by", [signal.SIGKILL, signal.SIGINT])
-def test_a_stopped_diagnosis_goes_on_from_the_stages_it_completed(
+def test_a_stopped_diagnosis_continues_after_its_completed_stages(
     drill: Path, monkeypatch: pytest.MonkeyPatch, ended_by: signal.Signals
 ) -> None:
     script = _KILLED_ONCE.format(signal=int(ended_by))
@@ -142,11 +143,11 @@ def test_a_stopped_diagnosis_goes_on_from_the_stages_it_completed(
     assert done.exit_code == 0, done.output
     written = json.loads((drill / "out" / "proof.json").read_text())
     assert written["unanswered"] == []
-    assert written["seconds"] is None, "the time of a diagnosis that was stopped is not known"
+    assert written["seconds"] is None, "the duration of a diagnosis that was stopped is unknown"
     assert sorted(p.name for p in (drill / "out" / "answers").iterdir()) == ["a", "b"]
 
 
-def test_wall_errors_kept_half_are_worked_out_again(tmp_path: Path) -> None:
+def test_wall_errors_written_in_part_are_computed_again(tmp_path: Path) -> None:
     case = Case("a", None, None)
     (tmp_path / "wall_errors.json").write_text('{"stated_mm": 1')
     kept = next(iter(tmp_path.iterdir()))
@@ -155,7 +156,7 @@ def test_wall_errors_kept_half_are_worked_out_again(tmp_path: Path) -> None:
     assert wall_errors(case, tmp_path, tmp_path).corrected_mm == 0.5
 
 
-# Stands for a diagnosis that takes its time; the proof is killed while it is at work.
+# Stands in for a slow diagnosis; the proof is killed while it works.
 _SLOW_PROOF = """
 import sys
 from stages.diagnose.drill import cases
@@ -171,7 +172,7 @@ def children_of(pid: int) -> Iterator[int]:
         yield from map(int, (task / "children").read_text().split())
 
 
-def test_a_proof_killed_amid_a_diagnosis_leaves_no_process_and_no_rest(drill: Path) -> None:
+def test_a_proof_killed_during_a_diagnosis_leaves_no_process_and_no_partial_files(drill: Path) -> None:
     command = [sys.executable, "-c", _SLOW_PROOF.format(words=proof(drill))]
     process = subprocess.Popen(command, cwd=PROJECT_ROOT)
     until = time.monotonic() + patience(60)
@@ -185,7 +186,7 @@ def test_a_proof_killed_amid_a_diagnosis_leaves_no_process_and_no_rest(drill: Pa
         assert time.monotonic() < until, "a diagnosis goes on without its proof"
         time.sleep(0.05)
     left = [p.name for p in (drill / "out" / "answers").iterdir()]
-    assert any(name.startswith(".apart-") for name in left), "else this test shows nothing"
+    assert any(name.startswith(".apart-") for name in left), "otherwise this test shows nothing"
     answered(drill, "b")
     assert CliRunner().invoke(app, proof(drill)).exit_code == 0
     assert sorted(p.name for p in (drill / "out" / "answers").iterdir()) == ["a", "b"]

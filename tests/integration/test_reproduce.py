@@ -1,4 +1,4 @@
-"""The sample run is computed again to the same bytes, and a result that was changed is told."""
+"""The sample run computed again gives the same bytes, and a changed result is reported."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from pathlib import Path
 from tests.shared_data import PROJECT_ROOT
 
 
-def test_the_sample_run_is_reproduced_and_a_changed_result_is_told(sample: Path, tmp_path: Path) -> None:
+def test_the_sample_run_is_reproduced_and_a_changed_result_is_reported(sample: Path, tmp_path: Path) -> None:
     run = tmp_path / "run"
     shutil.copytree(sample, run)
     defects = run / "defects.csv"

@@ -1,4 +1,4 @@
-"""A run compared with an earlier one through the program: the page's data, the export, refusals."""
+"""A run compared with an earlier one by the program: the page's data, the export, refused inputs."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from pipeline.review.run_files import RunFiles
 
 @pytest.fixture(scope="module")
 def compared(sample: Path, tmp_path_factory: pytest.TempPathFactory) -> Compared:
-    """The sample's run beside itself: laid exactly on itself, nothing may have changed."""
+    """The sample's run compared with itself: they coincide, and nothing may have changed."""
     earlier = tmp_path_factory.mktemp("earlier") / "earlier"
     shutil.copytree(sample, earlier)
     later = earlier.with_name("later")
@@ -31,7 +31,7 @@ def compared(sample: Path, tmp_path_factory: pytest.TempPathFactory) -> Compared
     return Compared(pair, StagedComparison.configured(None, ()), years=2.0)
 
 
-def test_a_run_lies_on_itself_and_nothing_has_changed(compared: Compared) -> None:
+def test_a_run_compared_with_itself_shows_no_change(compared: Compared) -> None:
     found = compared.document()
     assert abs(found["registration"]["shift_mm"][0]) < 0.1
     assert found["registration"]["agreeing"] == found["registration"]["blocks"]
@@ -40,7 +40,7 @@ def test_a_run_lies_on_itself_and_nothing_has_changed(compared: Compared) -> Non
     assert not any(c["significant"] for c in found["changes"])
 
 
-def test_the_tables_tell_the_same_numbers(compared: Compared) -> None:
+def test_all_tables_hold_the_same_numbers(compared: Compared) -> None:
     rows = list(csv.DictReader(io.StringIO(compared.table("growth.csv")[1].decode("utf-8-sig"))))
     told = json.loads(compared.table("growth.json")[1])
     assert len(rows) == len(told["changes"]) == len(compared.document()["changes"])
@@ -69,7 +69,7 @@ def test_a_second_opening_computes_nothing(compared: Compared) -> None:
     assert len(written()) == 4, "another parameter is another result"
 
 
-def test_every_layer_is_there_for_the_page_and_for_the_copy(compared: Compared, tmp_path: Path) -> None:
+def test_every_layer_is_in_the_page_and_in_the_exported_copy(compared: Compared, tmp_path: Path) -> None:
     later = compared.pair.now.files.path
     earlier = compared.pair.earlier.files.path
     command = ["review", str(later), "--compare", str(earlier), "--export", str(tmp_path / "copy")]

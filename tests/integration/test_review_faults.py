@@ -1,4 +1,4 @@
-"""A review whose recording, probe, files or disk are not what they were opens, and says what is missing."""
+"""A review opens although its recording, probe, files or disk have changed, and says what is missing."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from tests.faults import on_small_disk
 
 @pytest.fixture
 def files(sample: Path, tmp_path: Path) -> RunFiles:
-    """A run with a recording of its own to spoil."""
+    """A run with a recording of its own, which the test may spoil."""
     run, recording = tmp_path / "run", tmp_path / "recording"
     shutil.copytree(sample, run)
     shutil.copytree(SAMPLE, recording)
@@ -56,8 +56,8 @@ def other_probe(recording: Path) -> None:
     probe.write_text(probe.read_text().replace("23.4594", "23.0"))
 
 
-def test_frames_are_shown_while_all_is_as_it_was(files: RunFiles) -> None:
-    """Without this the refusals below would prove nothing."""
+def test_frames_are_shown_while_nothing_has_changed(files: RunFiles) -> None:
+    """Without this test the refusals below would prove nothing."""
     assert run_document(files)["has_recording"]
     assert finder_of(files).picture(0).startswith(b"\xff\xd8")
 
@@ -78,7 +78,7 @@ def test_a_review_opens_but_shows_no_frames_of_another_recording(
 
 
 @pytest.mark.parametrize("spoil", [lost, cut_off, other_lights])
-def test_a_recording_that_changes_under_an_open_review(
+def test_frames_of_a_recording_that_changes_during_the_review_are_not_shown(
     files: RunFiles, spoil: Callable[[Path], None]
 ) -> None:
     finder = finder_of(files)
@@ -87,8 +87,8 @@ def test_a_recording_that_changes_under_an_open_review(
         finder.picture(0)
 
 
-def test_a_file_changed_with_its_old_date_breaks_the_seal(files: RunFiles) -> None:
-    """Same size and time of change, as somebody with an interest would leave it."""
+def test_a_file_changed_with_its_old_file_time_makes_the_signature_invalid(files: RunFiles) -> None:
+    """Size and file time stay the same, as if somebody wanted to hide the change."""
     review = open_review(files)
     review.sign("Ada", "", "", review.state().revision)
     assert review.seal(review.state()).signed
@@ -99,10 +99,10 @@ def test_a_file_changed_with_its_old_date_breaks_the_seal(files: RunFiles) -> No
     assert not review.seal(review.state()).signed
     table.write_bytes(content)
     os.utime(table, (10**8, 10**8))
-    assert review.seal(review.state()).signed, "content counts, not when it was written"
+    assert review.seal(review.state()).signed, "the content counts, not the time of writing"
 
 
-def test_a_clock_set_back_between_decisions_loses_none(
+def test_when_the_clock_is_set_back_between_decisions_none_is_lost(
     files: RunFiles, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     from pipeline.review import decisions as actions
@@ -115,10 +115,12 @@ def test_a_clock_set_back_between_decisions_loses_none(
         review.act(action, "Ada", k)
     state = review.state()
     assert state.revision == 2
-    assert next(f for f in state.findings if f.id == "1").status == "accepted", "the order counts"
+    assert next(f for f in state.findings if f.id == "1").status == "accepted", (
+        "the order counts, not the time"
+    )
 
 
-def test_a_broken_diagnosis_beside_the_run_is_told(files: RunFiles) -> None:
+def test_a_broken_diagnosis_beside_the_run_is_reported(files: RunFiles) -> None:
     (files.path / "diagnosis.json").write_text('{"verdict": "nam')
     assert run_document(files)["diagnosis"]["verdict"] == "unreadable"
 
@@ -151,7 +153,7 @@ print(kept)
 """
 
 
-def test_decisions_on_a_full_disk(tmp_path: Path) -> None:
+def test_on_a_full_disk_decisions_are_refused_with_a_message(tmp_path: Path) -> None:
     assert int(on_small_disk(tmp_path, _FILLING)) > 3
 
 

@@ -1,4 +1,4 @@
-"""A long pipe: the model by stretches, those next to the eye in detail."""
+"""The model of a long pipe is split into stretches; those next to the camera are shown in detail."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _TO_BE_MARKED = """(({ session, model: { marks } }) => {
 
 @pytest.fixture(scope="module")
 def long(sample: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The sample's run again and again."""
+    """The sample's run repeated several times."""
     folder = tmp_path_factory.mktemp("long") / "run"
     write_long_run(sample, folder, LENGTH_MM, coarser=4)
     return folder
@@ -48,7 +48,7 @@ def z_span(model: StretchedModel, number: int) -> tuple[float, float]:
     return float(z.min()), float(z.max())
 
 
-def test_stretches_follow_each_other_and_cover_the_pipe(long: Path) -> None:
+def test_stretches_have_no_gaps_and_cover_the_pipe(long: Path) -> None:
     model = model_of(RunFiles(long))
     stretches = model.stretches()
     assert len(stretches) > 15
@@ -57,8 +57,8 @@ def test_stretches_follow_each_other_and_cover_the_pipe(long: Path) -> None:
         assert z_span(model, k) == pytest.approx((stretches[k].from_mm, stretches[k].to_mm), abs=0.5)
 
 
-def test_where_stretches_lie_is_told_without_what_only_runs_need(long: Path) -> None:
-    """The first view waits for it: SciPy and Numba would take longer to load than all the rest."""
+def test_the_places_of_stretches_are_found_without_slow_imports(long: Path) -> None:
+    """The first view waits for it, and SciPy and Numba would take longer to load than everything else."""
     told = (
         "import sys; from pathlib import Path; from pipeline.review.model_stretches import model_of;"
         "from pipeline.review.run_files import RunFiles;"
@@ -70,7 +70,7 @@ def test_where_stretches_lie_is_told_without_what_only_runs_need(long: Path) -> 
     assert not {"numba", "scipy"} & set(loaded.stdout.split())
 
 
-def test_a_stretch_holds_all_that_it_uses_and_nothing_else(sample: Path) -> None:
+def test_a_stretch_has_all_data_that_it_uses_and_no_other(sample: Path) -> None:
     model = model_of(RunFiles(sample))
     whole = sample / "model.glb"
     sizes = [len(model.stretch(k)) for k in range(len(model.stretches()))]
@@ -83,7 +83,7 @@ def test_a_stretch_holds_all_that_it_uses_and_nothing_else(sample: Path) -> None
     )
 
 
-def test_only_what_is_near_the_eye_is_there_in_detail(long: Path) -> None:
+def test_only_what_is_near_the_camera_is_loaded_in_detail(long: Path) -> None:
     with chromium() as browser, ReviewServer(long) as server:
         context = browser.new_context(viewport={"width": 1280, "height": 720})
         with tab(context, server.origin) as page:
@@ -96,11 +96,11 @@ def test_only_what_is_near_the_eye_is_there_in_detail(long: Path) -> None:
                 assert last - first < LENGTH_MM / 2
                 assert page.js("boresight.model.fine.held.size") <= 10
             seen = page.js("boresight.model.coarse.pieces.filter((p) => p.mesh.visible).length")
-            assert seen > 0, "what is far is seen coarsely"
+            assert seen > 0, "distant stretches are seen coarsely"
             page.until("boresight.model.coarse.pieces.some((p) => p.mesh.material[0].map)")
             marked = "document.querySelectorAll('.mark.finding').length"
-            assert page.js(marked) == page.js(_TO_BE_MARKED), "of a crowd, those near the eye"
+            assert page.js(marked) == page.js(_TO_BE_MARKED), "of many stretches, those near the camera"
             page.js("boresight.session.moveTo([1200, -1])")
             at = page.js("[boresight.flat.x(1200), boresight.flat.size[0]]")
-            assert 0 <= at[0] <= at[1], "the wall follows the spot"
+            assert 0 <= at[0] <= at[1], "the detailed wall follows the chosen place"
         context.close()

@@ -1,4 +1,4 @@
-"""The papers of a review: worked out from the decisions, the same in all of them, and fit to be kept."""
+"""The papers of a review: made from the decisions, consistent with each other, and suitable for archives."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from tests.reviewed import REMARK, has, html_text, pdf_text, rows_of, standing
 
 @pytest.fixture(scope="module")
 def reports(papers: dict[str, bytes]) -> dict[str, str]:
-    """The text of each report as a reader has it."""
+    """The text of each report."""
     return {"PDF": pdf_text(papers["report.pdf"]), "HTML": html_text(papers["report.html"])}
 
 
@@ -45,7 +45,7 @@ def test_csv_and_json_hold_the_same_numbers(papers: dict[str, bytes]) -> None:
                 assert text.removeprefix("'") == ("" if value is None else str(value)), name
 
 
-def test_every_paper_tells_of_each_finding_as_it_was_decided(
+def test_every_paper_lists_each_finding_as_it_was_decided(
     review: Review, reports: dict[str, str], papers: dict[str, bytes]
 ) -> None:
     by_id = {r["id"]: r for r in rows_of(papers["findings.csv"])}
@@ -64,13 +64,13 @@ def test_every_paper_tells_of_each_finding_as_it_was_decided(
         assert f"{row['clock_from']}–{row['clock_to']}" == clock
 
 
-def test_every_report_counts_what_was_decided_not_what_was_measured(
+def test_every_report_counts_the_decided_findings_not_the_measured_ones(
     review: Review, reports: dict[str, str]
 ) -> None:
     count = Counter(f.status for f in standing(review))
     deepest = max((f for f in standing(review) if f.status != "rejected"), key=lambda f: f.size.depth_mm)
     rejected = next(f for f in standing(review) if f.status == "rejected")
-    assert abs(rejected.size.depth_mm) > deepest.size.depth_mm, "or the test shows nothing"
+    assert abs(rejected.size.depth_mm) > deepest.size.depth_mm, "otherwise the test shows nothing"
     for text in reports.values():
         assert has(text, f"Findings accepted {count['accepted']}")
         assert has(text, f"Findings rejected {count['rejected']}")
@@ -94,7 +94,7 @@ def test_the_value_before_editing_stands_beside_the_edited_one(
         assert has(text, "drawn by hand")
 
 
-def test_mean_diameter_and_wall_loss_bear_their_sigma(review: Review, reports: dict[str, str]) -> None:
+def test_mean_diameter_and_wall_loss_have_their_sigma(review: Review, reports: dict[str, str]) -> None:
     wall = review.files.artefact(Wall).radius_map
     diameter = 2 * float(np.nanmean(wall.radius_mm))
     for text in reports.values():
@@ -108,7 +108,7 @@ def test_mean_diameter_and_wall_loss_bear_their_sigma(review: Review, reports: d
                 assert has(text, notation.measured(round(loss, 2), round(sigma, 2), "%"))
 
 
-def test_failure_pressure_is_an_estimate_without_the_sigma_of_the_depth(reports: dict[str, str]) -> None:
+def test_failure_pressure_is_an_estimate_and_ignores_the_sigma_of_the_depth(reports: dict[str, str]) -> None:
     for text in reports.values():
         told = re.findall(r"Estimated failure pressure ([\d.]+) MPa \(B31G\), ([\d.]+) MPa", text)
         assert len(told) == 2
@@ -117,20 +117,20 @@ def test_failure_pressure_is_an_estimate_without_the_sigma_of_the_depth(reports:
         assert has(text, "the criteria's own scatter against burst tests is not included")
 
 
-def test_who_decided_what_when_and_who_signed_is_in_every_report(
+def test_every_report_says_who_decided_what_when_and_who_signed(
     review: Review, reports: dict[str, str]
 ) -> None:
     for text in reports.values():
         assert has(text, "Signed by Ada Lovelace")
         assert has(text, "standard applied: POF 100")
-        assert has(text, REMARK), "a remark is text, never markup"
+        assert has(text, REMARK), "a remark is shown as text, never as markup"
         for entry in review.state().entries:
             assert has(text, f"{notation.moment(entry.at)} {entry.who}")
         assert has(text, "rejected finding 2: a fitting")
         assert has(text, "added a gouge as finding 4 (added)")
 
 
-def test_the_facts_of_the_inspection_and_what_is_missing_are_told(reports: dict[str, str]) -> None:
+def test_the_facts_of_the_inspection_are_printed_and_missing_ones_are_named(reports: dict[str, str]) -> None:
     for text in reports.values():
         for words in ("Client Water Works", "Line A 12", "Operator G. Hopper", "Date 2026-05-31"):
             assert has(text, words)
@@ -139,7 +139,7 @@ def test_the_facts_of_the_inspection_and_what_is_missing_are_told(reports: dict[
         assert has(text, "Instrument diagnosis: not run.")
 
 
-def test_a_change_after_the_signature_shows(review: Review) -> None:
+def test_a_change_after_the_signature_is_shown(review: Review) -> None:
     review.act(do.Reopen(finding="1"), "Bo", review.state().revision)
     try:
         text = pdf_text(paper_of("report.pdf", review, review.state()).content)
@@ -150,14 +150,16 @@ def test_a_change_after_the_signature_shows(review: Review) -> None:
     assert review.seal(review.state()).signed
 
 
-def test_the_colours_of_a_finding_s_picture_hold_its_depth(review: Review) -> None:
+def test_the_colour_range_of_a_finding_s_picture_covers_its_depth(review: Review) -> None:
     canvas = canvas_of(review.files)
     deepest = max(abs(f.size.depth_mm) for f in standing(review))
     assert canvas.limits.high_mm == -canvas.limits.low_mm
-    assert canvas.limits.high_mm >= 0.9 * deepest, "a depth is read from points, colours from cells' means"
+    assert canvas.limits.high_mm >= 0.9 * deepest, (
+        "a depth is read from points, colours show the means of cells"
+    )
 
 
-def test_the_whole_wall_and_every_finding_that_stands_have_their_picture(papers: dict[str, bytes]) -> None:
+def test_the_whole_wall_and_every_accepted_finding_have_a_picture(papers: dict[str, bytes]) -> None:
     with zipfile.ZipFile(BytesIO(papers["pictures.zip"])) as archive:
         assert sorted(archive.namelist()) == sorted(
             ["overview.svg", *(f"finding-{f}.svg" for f in ("1", "3", "a8"))]
@@ -173,14 +175,14 @@ def test_the_same_state_gives_the_same_papers(review: Review, papers: dict[str, 
         assert paper_of(name, review, review.state()).content == papers[name], name
 
 
-def test_shown_values_are_plain(papers: dict[str, bytes]) -> None:
+def test_displayed_numbers_are_formatted_plainly(papers: dict[str, bytes]) -> None:
     data: dict[str, Any] = json.loads(papers["findings.json"])
     for text in json.dumps(data["run"]), json.dumps(data["summary"]):
         assert "nan" not in text.lower()
         assert "None" not in text
 
 
-def test_nothing_half_empty_where_no_wall_thickness_is_known(sample: Path, tmp_path: Path) -> None:
+def test_without_a_wall_thickness_there_are_no_half_empty_tables(sample: Path, tmp_path: Path) -> None:
     shutil.copytree(sample, tmp_path / "run")
     review = open_review(RunFiles(tmp_path / "run"))
     unknown = do.Assume(wall_thickness_mm=None, yield_mpa=None)

@@ -1,4 +1,4 @@
-"""The review's server turns strangers away, leaves no folder, and shows text as text."""
+"""The review's server refuses strangers, serves no file outside its folder, and shows markup as text."""
 
 from __future__ import annotations
 
@@ -25,7 +25,10 @@ WRITE = ("/api/actions", "/api/sign", "/api/measure")
 
 @pytest.fixture(scope="module")
 def run(sample: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The sample's run as a stranger could have sent it: markup in every text, a secret beside it."""
+    """The sample's run as a stranger could have sent it.
+
+    Markup in every text, and a secret file beside it.
+    """
     folder = tmp_path_factory.mktemp("strange")
     (folder / "secret.txt").write_text(SECRET)
     made = folder / "run"
@@ -49,7 +52,7 @@ def server(run: Path):
 
 @pytest.mark.parametrize("path", READ)
 def test_the_page_is_answered(server: ReviewServer, path: str) -> None:
-    """Without this the refusals below would prove nothing."""
+    """Without this test the refusals below would prove nothing."""
     assert server.ask(path).code == 200
 
 
@@ -66,7 +69,9 @@ def test_the_page_is_answered(server: ReviewServer, path: str) -> None:
         ({"host": ""}, 400),
     ],
 )
-def test_strangers_may_not_read(server: ReviewServer, path: str, what: dict[str, str], code: int) -> None:
+def test_requests_without_the_token_may_not_read(
+    server: ReviewServer, path: str, what: dict[str, str], code: int
+) -> None:
     answer = server.ask(path, **{k: v.format(port=server.port) for k, v in what.items()})
     assert answer.code == code
     assert len(answer.body) < 100
@@ -76,14 +81,14 @@ def test_strangers_may_not_read(server: ReviewServer, path: str, what: dict[str,
 @pytest.mark.parametrize(
     "origin", ["", "null", "http://example.org", "http://127.0.0.1:1", "https://127.0.0.1:{port}"]
 )
-def test_foreign_pages_may_not_write(server: ReviewServer, path: str, origin: str) -> None:
+def test_other_web_pages_may_not_write(server: ReviewServer, path: str, origin: str) -> None:
     before = server.ask("/api/state").json()["revision"]
     body = {"action": {"do": "accept", "finding": "1"}, "who": "Eve", "revision": before}
     assert server.ask(path, "POST", body, origin=origin.format(port=server.port)).code == 403
     assert server.ask("/api/state").json()["revision"] == before
 
 
-def test_a_wrong_token_sets_no_cookie_and_the_right_one_leads_home(server: ReviewServer) -> None:
+def test_a_wrong_token_sets_no_cookie_and_the_right_one_opens_the_page(server: ReviewServer) -> None:
     wrong = server.ask("/?token=" + "x" * len(server.token), cookie="")
     assert (wrong.code, "set-cookie" in wrong.headers) == (403, False)
     right = server.ask(f"//example.org/?token={server.token}", cookie="")
@@ -92,7 +97,7 @@ def test_a_wrong_token_sets_no_cookie_and_the_right_one_leads_home(server: Revie
 
 
 @pytest.mark.parametrize("how", [{"transfer_encoding": "chunked"}, {"content_length": str(1 << 30)}])
-def test_bodies_without_end_are_not_read(server: ReviewServer, how: dict[str, str]) -> None:
+def test_request_bodies_of_excessive_length_are_not_read(server: ReviewServer, how: dict[str, str]) -> None:
     headers = {k.replace("_", "-"): v for k, v in how.items()}
     assert server.ask("/api/actions", "POST", b"", **headers).code in (411, 413)
 
@@ -108,7 +113,7 @@ ESCAPES = ("../secret.txt", "..%2fsecret.txt", "%2e%2e/secret.txt", "%2e%2e%2fse
     ["/{}", "/assets/{}", "/api/frames/{}", "/api/frames/{}.jpg", "/api/tiles/{}", "/api/tiles/photo/0/0/{}",
      "/api/tiles/{}/0/0/0.png", "/api/papers/{}", "/api/papers/report.pdf/{}"],
 )  # fmt: skip
-def test_no_path_leads_out(server: ReviewServer, route: str, escape: str) -> None:
+def test_no_path_leads_out_of_the_folder(server: ReviewServer, route: str, escape: str) -> None:
     answer = server.ask(route.format(escape.format(parent=server.run.parent)))
     assert answer.code in (400, 404, 422)
     assert SECRET.encode() not in answer.body
@@ -116,7 +121,7 @@ def test_no_path_leads_out(server: ReviewServer, route: str, escape: str) -> Non
 
 
 @pytest.mark.parametrize("name", ["model.glb", "run.json", "defects.json", "diagnosis.html", "unrolled.png"])
-def test_links_out_of_a_run_are_refused(run: Path, tmp_path: Path, name: str) -> None:
+def test_symbolic_links_out_of_a_run_are_refused(run: Path, tmp_path: Path, name: str) -> None:
     shutil.copytree(run, tmp_path / "run", ignore=shutil.ignore_patterns(".boresight", "*.zarr"))
     (tmp_path / "run" / name).unlink(missing_ok=True)
     (tmp_path / "run" / name).symlink_to(run.parent / "secret.txt")
@@ -124,7 +129,7 @@ def test_links_out_of_a_run_are_refused(run: Path, tmp_path: Path, name: str) ->
         RunFiles(tmp_path / "run").file(name)
 
 
-def test_a_linked_model_is_not_served(server: ReviewServer) -> None:
+def test_a_model_that_is_a_symbolic_link_is_not_served(server: ReviewServer) -> None:
     model = server.run / "model.glb"
     kept = model.rename(model.with_suffix(".kept"))
     model.symlink_to(server.run.parent / "secret.txt")
@@ -138,7 +143,7 @@ def test_a_linked_model_is_not_served(server: ReviewServer) -> None:
 
 
 @pytest.mark.parametrize("path", [*READ, "/nowhere", "/api/papers/nothing", "/api/papers/report.html"])
-def test_every_answer_carries_the_policy(server: ReviewServer, path: str) -> None:
+def test_every_answer_has_the_content_security_policy(server: ReviewServer, path: str) -> None:
     answer = server.ask(path)
     assert {k: answer.headers[k] for k in HEADERS} == HEADERS
     rules = dict(r.strip().split(" ", 1) for r in answer.headers["content-security-policy"].split(";"))
@@ -177,11 +182,11 @@ def test_broken_requests_change_nothing(server: ReviewServer, body: bytes) -> No
 @pytest.mark.parametrize(
     "query", ["distance=nan", "distance=inf", "distance=1e400", "distance=", "", "distance=<b>"]
 )
-def test_numbers_out_of_reason_are_refused(server: ReviewServer, query: str) -> None:
+def test_numbers_outside_their_range_are_refused(server: ReviewServer, query: str) -> None:
     assert server.ask(f"/api/section?{query}").code == 422
 
 
-def test_markup_stays_text_in_every_paper(server: ReviewServer) -> None:
+def test_markup_is_shown_as_text_in_every_paper(server: ReviewServer) -> None:
     revision = server.ask("/api/state").json()["revision"]
     for action in (
         {"do": "comment", "finding": "2", "text": HOSTILE},

@@ -1,6 +1,6 @@
-"""The papers keep the standards that they name: PDF/A, and the tables of POF, PACP and EN 13508-2.
+"""The papers follow the standards that they name: PDF/A, and the tables of POF, PACP and EN 13508-2.
 
-The lists of columns here are written down from the standards, and not from the program.
+The lists of columns here are taken from the standards, not from the program.
 """
 
 from __future__ import annotations
@@ -66,7 +66,7 @@ def fonts_of(resources: DictionaryObject) -> list[DictionaryObject]:
     return [font.get_object() for font in resources.get("/Font", {}).values()]
 
 
-def test_the_pdf_is_fit_to_be_kept(papers: dict[str, bytes]) -> None:
+def test_the_pdf_is_suitable_for_archives(papers: dict[str, bytes]) -> None:
     reader = PdfReader(BytesIO(papers["report.pdf"]))
     metadata = reader.trailer["/Root"]["/Metadata"].get_object().get_data().decode()
     assert re.search(r"pdfaid:part\W+2\W", metadata), "PDF/A-2"
@@ -85,10 +85,11 @@ def test_the_pdf_is_fit_to_be_kept(papers: dict[str, bytes]) -> None:
 
 
 def pdfa_faults(pdf: bytes) -> list[str]:
-    """Return what of ISO 19005-2 a PDF breaks, by clause, as far as its objects show it.
+    """Return the clauses of ISO 19005-2 that a PDF violates, as far as its objects show.
 
-    veraPDF is in no package index; these are the rules that a report could break: structure of the file,
-    encryption, filters, colour, fonts with their meaning, actions, attachments, annotations, transparency.
+    veraPDF is in no package index. These rules are the ones that a report could violate: structure of the
+    file, encryption, filters, colour, fonts and their Unicode maps, actions, attachments, annotations,
+    transparency.
     """
     reader, faults = PdfReader(BytesIO(pdf)), []
     root, head = reader.trailer["/Root"], pdf.split(b"\n", 2)
@@ -114,7 +115,7 @@ def pdfa_faults(pdf: bytes) -> list[str]:
 
 
 def _object_rules(thing: dict[str, Any]) -> list[tuple[str, bool]]:
-    """Return which rules for single objects one keeps."""
+    """Return for each rule on single objects whether one follows it."""
     kind, sort = thing.get("/Type"), thing.get("/Subtype")
     filters = str(thing.get("/Filter", ""))
     rules = [
@@ -137,7 +138,7 @@ def _object_rules(thing: dict[str, Any]) -> list[tuple[str, bool]]:
     return rules
 
 
-def test_the_pdf_keeps_the_rules_of_pdf_a(papers: dict[str, bytes]) -> None:
+def test_planted_violations_of_pdf_a_are_found(papers: dict[str, bytes]) -> None:
     pdf = papers["report.pdf"]
     assert pdfa_faults(pdf) == []
     spoiled = {
@@ -167,14 +168,14 @@ def test_the_pipe_tally_has_the_columns_and_values_of_pof_2016(
         assert row["Surface location"] == "Int"
         assert row["Anomaly dimension classification"] in POF_CLASSES
         assert row["ERF (metal losses)"] == "Not calculated"
-        assert "(POF 2016, appendix 6)" in row["Comments"], "the file says which edition it follows"
+        assert "(POF 2016, appendix 6)" in row["Comments"], "the file states the edition that it follows"
         assert f"depth ± {1.2816 * round(sigma, 3):.3f} mm at 80 % certainty" in row["Comments"]
         told = row["Max. depth [%.t or mm]"]
-        assert told == (f"{depth / 0.06:.1f}%" if depth > 0 else ""), "none where no loss was measured"
-        assert not row["Inward/outward"] + row["Depth / height [%.D or mm]"], "of deformations alone"
+        assert told == (f"{depth / 0.06:.1f}%" if depth > 0 else ""), "empty where no loss was measured"
+        assert not row["Inward/outward"] + row["Depth / height [%.D or mm]"], "for deformations only"
 
 
-def test_a_dent_stands_under_deformations_in_the_pipe_tally(sample: Path, tmp_path: Path) -> None:
+def test_a_dent_is_listed_under_deformations_in_the_pipe_tally(sample: Path, tmp_path: Path) -> None:
     shutil.copytree(sample, tmp_path / "run")
     review = open_review(RunFiles(tmp_path / "run"))
     dent = next(f for f in review.state().findings if f.kind == "dent")
@@ -187,7 +188,7 @@ def test_a_dent_stands_under_deformations_in_the_pipe_tally(sample: Path, tmp_pa
     assert not any(row[c] for c in ("Max. depth [%.t or mm]", "Length [mm]", "ERF (metal losses)"))
 
 
-def test_pacp_rows_fit_the_table_conditions(papers: dict[str, bytes]) -> None:
+def test_pacp_rows_satisfy_the_conditions_of_the_table(papers: dict[str, bytes]) -> None:
     rows = rows_of(papers["pacp.csv"])
     assert list(rows[0]) == PACP_KNOWN
     for number, row in enumerate(rows, 1):

@@ -1,7 +1,7 @@
-"""Ring samples of the open recordings against rings cast from their true poses and walls.
+"""Ring samples of the open recordings against rings computed from their true poses and walls.
 
-The stated probe is off by a draw from its own uncertainty, which moves a ring smoothly: low harmonics of the
-azimuth are taken out of each frame's difference before it is judged.
+The stated probe is off by a draw from its own uncertainty, which moves a ring smoothly. So low harmonics of
+the azimuth are removed from each frame's errors before they are tested.
 """
 
 import json
@@ -21,7 +21,7 @@ from tests.shared_data import shared
 
 
 class TrueRings:
-    """Exact ring radii of a recording as its stated probe would see them."""
+    """Exact ring radii of a recording for its stated probe."""
 
     def __init__(self, folder, probe):
         truth, wall = json.loads((folder / "truth.json").read_text()), np.load(folder / "truth_wall.npz")
@@ -55,7 +55,7 @@ class TrueRings:
         return np.hypot(x, y) - map_coordinates(self.wall, [row, column], order=1, mode="nearest")
 
     def radius_px(self, frame, psi):
-        """Exact ring, by bisection."""
+        """Return the exact ring, px, found by bisection."""
         low, high = np.full(psi.shape, 100.0), np.full(psi.shape, 560.0)
         for _ in range(32):
             middle = (low + high) / 2
@@ -65,7 +65,7 @@ class TrueRings:
 
 
 def smooth_part_removed(error, psi):
-    """Take harmonics 0 to 4 out of each row (F, A), robustly."""
+    """Remove harmonics 0 to 4 from each row (F, A) by a robust fit."""
     waves = [np.ones_like(psi), *(f(m * psi) for m in (1, 2, 3, 4) for f in (np.cos, np.sin))]
     basis, out = np.stack(waves, 1), error.copy()
     for row in out:

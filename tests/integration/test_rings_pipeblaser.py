@@ -1,4 +1,4 @@
-"""Real rings of the CMU pipe probe: all frames extracted as they are, diameters as published."""
+"""Real rings of the CMU pipe probe: all frames are extracted, and diameters are as published."""
 
 import cv2
 import numpy as np
@@ -26,7 +26,10 @@ V2_PLANE = np.array([0.554838, 0.50734, -100.0, 9.74935])
 
 
 def scaled(camera, scale):
-    """The camera of an image smaller by ``scale``, (u + 0.5) · scale − 0.5 being the pixel of the model."""
+    """The camera of an image smaller by ``scale``.
+
+    Its pixel (u + 0.5) · scale − 0.5 is pixel u of the model.
+    """
     fx, fy = camera.focal_px
     cx, cy = ((c + 0.5) / scale - 0.5 for c in camera.centre)
     width, height = camera.image_size
@@ -36,7 +39,7 @@ def scaled(camera, scale):
 
 
 def ring_points_mm(image, camera, plane):
-    """Extract the ring of one colour image and meet its rays with the laser plane; also the coverage."""
+    """Return the points of one colour image's ring in the laser plane; also the coverage."""
     sectors = cut_sectors(camera.image_size, camera.centre_px, 1440)
     trace = trace_ring(mix(image, excess_weights(RED_NM)), sectors, 255.0)
     assert trace is not None

@@ -1,4 +1,4 @@
-"""One command turns the sample recording into a whole run folder; the same command again does nothing."""
+"""One command makes a whole run folder of the sample recording; the same command again does nothing."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def test_every_stage_completed_within_the_memory_allowed(sample: Path) -> None:
     assert max(told["peak_memory_mib"].values()) < 2048
 
 
-def test_headline_numbers_are_those_of_the_recording(sample: Path) -> None:
+def test_the_summary_of_the_run_is_that_of_the_recording(sample: Path) -> None:
     metrics = {m["name"]: m["value"] for m in record(sample)["metrics"]}
     with (PROJECT_ROOT / "data" / "sample" / "frames.csv").open() as stream:
         lit = [row["illumination"] for row in csv.DictReader(stream)]
@@ -58,13 +58,13 @@ def test_headline_numbers_are_those_of_the_recording(sample: Path) -> None:
     assert metrics["wall seen"] > 98
 
 
-def test_tables_fit_together(sample: Path) -> None:
+def test_the_tables_are_consistent_with_each_other(sample: Path) -> None:
     with np.load(sample / "radius_map.npz") as wall:
         shape = (len(wall["distance_mm"]), len(wall["azimuth_rad"]))
         assert all(wall[n].shape == shape for n in ("radius_mm", "sigma_mm", "count", "misalignment_mm"))
         seen = np.isfinite(wall["radius_mm"])
         assert np.all(seen[wall["count"] > 0])
-        assert np.mean(wall["count"][seen] > 0) > 0.99, "hardly anything may be bridged"
+        assert np.mean(wall["count"][seen] > 0) > 0.99, "hardly any wall may be interpolated"
         assert np.all(wall["sigma_mm"][seen] >= wall["sigma_random_mm"][seen])
 
 

@@ -1,4 +1,4 @@
-"""The texture of short cuts of the open recordings, on true motion and wall, against the true reflectance."""
+"""The texture of short cuts of the open recordings, made with true motion and wall, against the truth."""
 
 from dataclasses import replace
 
@@ -13,12 +13,12 @@ from tests.shared_data import scorer, shared
 from tests.truth_run import true_radius_map, truth_run
 
 
-# The scorer leaves its files to the garbage collector.
+# The scoring program does not close its files.
 @pytest.mark.filterwarnings("ignore:unclosed file:ResourceWarning")
 @pytest.mark.parametrize(
     ("name", "frames", "to_mm"), [("open-1-field", 90, 70.0), ("open-3-field", 60, 48.0)]
 )
-def test_cut_meets_the_figures(name, frames, to_mm, tmp_path):
+def test_the_texture_of_a_cut_meets_the_demanded_limits(name, frames, to_mm, tmp_path):
     run = truth_run(name)
     table = run.recording.frames
     cut = replace(

@@ -1,4 +1,4 @@
-"""An installed wheel works where there is no checkout: every command, and the example scripts."""
+"""An installed wheel works without a checkout of the project: every command, and the example scripts."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ QUICK = ("--set", "rings.azimuths=360", "--set", "mesh.texel_mm=1.0")
 
 @dataclass(frozen=True)
 class Installed:
-    """A wheel installed in an environment of its own, and a folder to work in."""
+    """A wheel installed in a separate environment, and a folder to work in."""
 
     environment: Path
     folder: Path
@@ -34,7 +34,7 @@ class Installed:
         return subprocess.run(command, cwd=self.folder, env=own, capture_output=True, text=True)
 
     def done(self, *words: str | Path) -> str:
-        """Call a program that has to succeed; return what it told."""
+        """Call a program that must succeed; return its output."""
         called = self.call(*words)
         assert called.returncode == 0, called.stdout + called.stderr
         return called.stdout + called.stderr
@@ -44,7 +44,7 @@ class Installed:
 def installed(sample: Path, tmp_path_factory: pytest.TempPathFactory) -> Installed:
     """The wheel, built from a copy, in an environment that sees the libraries but not the checkout.
 
-    It comes after the sample's run, which has compiled the inner loops that are copied.
+    It is installed after the sample's run, which has compiled the inner loops that are copied.
     """
     folder = tmp_path_factory.mktemp("wheel")
     _copy_project(folder / "source")
@@ -54,7 +54,7 @@ def installed(sample: Path, tmp_path_factory: pytest.TempPathFactory) -> Install
     (wheel,) = (folder / "dist").glob("*.whl")
     _pip("--python", environment / "bin" / "python", "install", "--no-deps", "--no-index", wheel)
     packages = next((environment / "lib").glob("python*")) / "site-packages"
-    # A line of a .pth file adds a folder, but not what that folder's own .pth files add: not the checkout.
+    # A .pth file adds a folder, but not the folders that .pth files in it would add: not the checkout.
     (packages / "libraries.pth").write_text(sysconfig.get_path("purelib") + "\n", "utf-8")
     for package in ("pipeline", "stages"):
         _share_compiled(PROJECT_ROOT / package, packages / package)
@@ -64,7 +64,7 @@ def installed(sample: Path, tmp_path_factory: pytest.TempPathFactory) -> Install
 
 @pytest.fixture(scope="module")
 def measured(installed: Installed) -> tuple[Path, str]:
-    """The run of the sample's first half by the first example, and what the example told."""
+    """The run of the sample's first half by the first example, and the output of the example."""
     run, recording = installed.folder / "run", cut_sample(installed.folder / "recording", frames=80)
     example = PROJECT_ROOT / "data" / "examples" / "measure.py"
     return run, installed.done("python", example, recording, run)
@@ -77,7 +77,7 @@ def _pip(*words: str | Path) -> None:
 
 
 def _copy_project(target: Path) -> None:
-    """Copy what a wheel is made of: an old build folder in the checkout must not get into it."""
+    """Copy the sources of a wheel: an old build folder in the checkout must not get into it."""
     unwanted = shutil.ignore_patterns("__pycache__")
     for name in ("pipeline", "stages", "configs"):
         shutil.copytree(PROJECT_ROOT / name, target / name, symlinks=True, ignore=unwanted)
@@ -86,9 +86,9 @@ def _copy_project(target: Path) -> None:
 
 
 def _share_compiled(checkout: Path, package: Path) -> None:
-    """Give the installed package the inner loops that were compiled for the checkout: a minute less.
+    """Give the installed package the inner loops compiled for the checkout, which saves a minute.
 
-    Numba takes a compiled loop for that of a source file by the file's time and size.
+    Numba recognises a compiled loop by the time and size of its source file.
     """
     for source in package.rglob("*.py"):
         original = checkout / source.relative_to(package)
@@ -99,7 +99,7 @@ def _share_compiled(checkout: Path, package: Path) -> None:
             shutil.copy(compiled, source.parent / "__pycache__" / compiled.name)
 
 
-def test_nothing_comes_from_the_checkout(installed: Installed) -> None:
+def test_no_module_comes_from_the_checkout(installed: Installed) -> None:
     script = (
         "import boresight, pipeline, stages; print(boresight.__file__, pipeline.__file__, stages.__file__)"
     )
@@ -114,7 +114,9 @@ def test_the_first_example_measures_the_sample(measured: tuple[Path, str]) -> No
     assert (run / "report.html").is_file()
 
 
-def test_run_finds_the_examples_run_complete(installed: Installed, measured: tuple[Path, str]) -> None:
+def test_run_finds_that_the_examples_run_is_complete(
+    installed: Installed, measured: tuple[Path, str]
+) -> None:
     told = installed.done("boresight", "run", installed.folder / "recording", "-o", measured[0], *QUICK)
     assert told.count("reused") == 10
 
@@ -138,7 +140,7 @@ def test_a_folder_that_is_no_run_is_refused(installed: Installed) -> None:
     assert "give the folder of a finished run" in called.stderr
 
 
-def test_the_second_example_simulates_a_scene_by_name(installed: Installed) -> None:
+def test_the_second_example_simulates_a_scene_given_by_name(installed: Installed) -> None:
     example = PROJECT_ROOT / "data" / "examples" / "plan.py"
     told = installed.done("python", example, "long-4-inch", "planned", "laser_tilt=0.6@40")
     assert "8 frames" in told
@@ -155,7 +157,7 @@ def test_gallery_draws_an_effect(installed: Installed) -> None:
     assert (installed.folder / "tilt.html").is_file()
 
 
-def test_prove_draws_from_a_prior_by_name(installed: Installed) -> None:
+def test_prove_draws_from_a_prior_given_by_name(installed: Installed) -> None:
     called = installed.call("boresight", "prove", "-o", "proof", "--prior", "nothing-of-the-kind")
     assert called.returncode == 2
     assert "one of: pairs, small" in called.stderr
@@ -171,7 +173,7 @@ def test_every_command_is_there(installed: Installed) -> None:
     installed.done("python", "-c", script)
 
 
-def test_another_package_named_pipeline_is_told(installed: Installed) -> None:
+def test_another_package_named_pipeline_is_reported(installed: Installed) -> None:
     other = installed.folder / "other" / "pipeline"
     other.mkdir(parents=True)
     (other / "__init__.py").touch()

@@ -1,1 +1,1 @@
-"""Every action of the review's page, by mouse or keyboard, in a real Chromium on a real server."""
+"""Every action on the review's page, by mouse or keyboard, in a real Chromium with a real server."""

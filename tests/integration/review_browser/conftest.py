@@ -1,4 +1,4 @@
-"""One browser, server and tab for the tests of a topic."""
+"""Browser, server and tab shared by the tests of one file."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def shared_tab(context, server: ReviewServer):
 
 @pytest.fixture
 def page(shared_tab: Tab, server: ReviewServer):
-    """The one tab, on its first page; afterwards everything done is undone."""
+    """The shared tab, on its first page; everything done in it is undone afterwards."""
     shared_tab.page_of("Inspect")
     shared_tab.js("boresight.session.take('none')")
     shared_tab.focus_list()

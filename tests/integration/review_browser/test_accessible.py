@@ -1,4 +1,4 @@
-"""The page for everyone: axe finds no serious fault in any state of it, in light and dark."""
+"""Accessibility of the page: axe finds no serious fault in any of its states, in light and dark mode."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ SERIOUS = ("serious", "critical")
 
 
 def faults(page: Tab, where: str) -> list[str]:
-    """Return axe's serious findings in what the page shows now."""
+    """Return the serious faults that axe finds in what the page shows now."""
     if not page.js("!!window.axe"):
         page.js(AXE)
     found = page.js("axe.run(document, {resultTypes: ['violations']})")["violations"]
@@ -56,8 +56,8 @@ def test_axe_finds_no_serious_fault(coloured: Tab) -> None:
     assert not found, "\n".join(found)
 
 
-def test_axe_sees_faults(page: Tab) -> None:
-    """The control: a picture without words is told."""
+def test_axe_reports_a_planted_fault(page: Tab) -> None:
+    """Control: axe reports a picture without alternative text."""
     page.js("document.body.append(Object.assign(new Image(), {id: 'mute'}))")
     assert faults(page, "control")
     page.js("document.querySelector('#mute').remove()")

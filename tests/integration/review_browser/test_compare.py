@@ -1,4 +1,4 @@
-"""The Compare tab: two runs of one pipe, of which the later has a dent where the earlier had sound wall."""
+"""The Compare tab: two runs of one pipe; the later one has a dent where the earlier one had sound wall."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _PLACES = "boresight.session.cursor"
 
 @pytest.fixture(scope="module")
 def earlier(sample: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The sample's run as it was before its deepest finding was there: sound wall in its place."""
+    """The sample's run with sound wall in place of its deepest finding."""
     folder = tmp_path_factory.mktemp("years-ago") / "earlier"
     shutil.copytree(sample, folder)
     files = RunFiles(folder)
@@ -42,7 +42,7 @@ def earlier(sample: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def _healed(wall: Wall, finding: dict[str, Any]) -> Wall:
-    """Return the wall with straight lines along the pipe in place of a finding."""
+    """Return the wall with a finding replaced by straight lines along the pipe."""
     told, margin_mm = wall.radius_map, 3.0
     radius = told.radius_mm.copy()
     s0, s1 = finding["distance_from_mm"] - margin_mm, finding["distance_to_mm"] + margin_mm
@@ -77,7 +77,7 @@ def rows_of(page: Tab) -> list[list[str]]:
     return [rows.nth(k).locator("td").all_inner_texts() for k in range(rows.count())]
 
 
-def test_the_table_tells_what_the_server_found(compared: tuple[Tab, ReviewServer]) -> None:
+def test_the_table_shows_the_growth_that_the_server_found(compared: tuple[Tab, ReviewServer]) -> None:
     page, server = compared
     told = server.ask("/api/comparison").json()
     rows = rows_of(page)
@@ -88,7 +88,7 @@ def test_the_table_tells_what_the_server_found(compared: tuple[Tab, ReviewServer
         assert (change["fate"] in ("new", "grown")) is (k == new)
     growth, rate = rows[new][6], rows[new][-1]
     number, sigma = (told["changes"][new][f"depth_growth{k}_mm"] for k in ("", "_sigma"))
-    assert abs(number) > 10 * sigma, "what was healed by hand is plain to see"
+    assert abs(number) > 10 * sigma, "the replaced wall is clearly found as a change"
     assert growth.startswith("+" if number > 0 else "-")
     assert float(growth.split()[0]) == pytest.approx(number, abs=0.006)
     assert float(rate.split()[0].lstrip("+")) == pytest.approx(number / YEARS, abs=0.006)
@@ -107,7 +107,7 @@ def test_both_halves_are_drawn_as_soon_as_the_tab_opens(compared: tuple[Tab, Rev
     page.until(f"Math.min(...{spread}) > 20")
 
 
-def test_a_finding_of_the_table_is_shown_in_every_view(compared: tuple[Tab, ReviewServer]) -> None:
+def test_a_finding_chosen_in_the_table_is_shown_in_every_view(compared: tuple[Tab, ReviewServer]) -> None:
     page, server = compared
     for k, change in enumerate(server.ask("/api/comparison").json()["changes"]):
         page.page.locator("#compare table.grid tbody button").nth(k).click()
@@ -120,7 +120,9 @@ def test_a_finding_of_the_table_is_shown_in_every_view(compared: tuple[Tab, Revi
 
 
 @pytest.mark.parametrize("way", ["swipe", "beside", "difference", "difference_sigma"])
-def test_every_way_to_compare_paints_another_picture(compared: tuple[Tab, ReviewServer], way: str) -> None:
+def test_every_layer_of_the_comparison_paints_another_picture(
+    compared: tuple[Tab, ReviewServer], way: str
+) -> None:
     page, _ = compared
     other = "beside" if way == "swipe" else "swipe"
     picture = "document.querySelector('#view-compare canvas').toDataURL()"
@@ -136,7 +138,7 @@ def test_every_way_to_compare_paints_another_picture(compared: tuple[Tab, Review
 
 
 def settled(page: Tab, picture: str) -> str:
-    """Return a picture once all its tiles are there: when it has stopped changing."""
+    """Return the picture once it has stopped changing, with all its tiles loaded."""
     before, now = "", str(page.js(picture))
     while before != now:
         page.page.wait_for_timeout(patience(300))
@@ -144,7 +146,9 @@ def settled(page: Tab, picture: str) -> str:
     return now
 
 
-def test_the_wipe_moves_by_mouse_and_by_keyboard(compared: tuple[Tab, ReviewServer]) -> None:
+def test_the_divider_of_the_two_halves_moves_by_mouse_and_by_keyboard(
+    compared: tuple[Tab, ReviewServer],
+) -> None:
     page, _ = compared
     page.page.select_option("[aria-label='how to compare']", "swipe")
     page.page.locator("#view-compare canvas").focus()
@@ -159,7 +163,7 @@ def test_the_wipe_moves_by_mouse_and_by_keyboard(compared: tuple[Tab, ReviewServ
 
 
 @pytest.mark.parametrize("name", ["growth.csv", "growth.json"])
-def test_the_tables_can_be_taken_away(compared: tuple[Tab, ReviewServer], name: str) -> None:
+def test_the_tables_can_be_downloaded(compared: tuple[Tab, ReviewServer], name: str) -> None:
     page, server = compared
     with page.page.expect_download() as taken:
         page.page.locator(f"#compare a[download='{name}']").click()

@@ -1,4 +1,7 @@
-"""Decisions by mouse and by keyboard alone: accept, redraw, merge, split, undo; what a wall assumed tells."""
+"""Decisions by mouse and by keyboard alone: accept, redraw, merge, split, undo.
+
+Results with an assumed wall.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +20,7 @@ def test_decisions_by_keyboard_alone(page: Tab) -> None:
     with page.one_change():
         page.keys("a")
     chosen = page.js("boresight.session.selected")
-    assert chosen != "1", "a decision leads on to the next undecided finding"
+    assert chosen != "1", "after a decision the next undecided finding is chosen"
     page.keys("r")
     page.page.keyboard.type("reflection")
     with page.one_change():
@@ -69,7 +72,7 @@ def test_without_a_name_nothing_is_decided(page: Tab) -> None:
     assert page.revision == before
 
 
-def test_reclassified_and_redrawn_stands_beside_the_original(page: Tab) -> None:
+def test_a_reclassified_and_redrawn_finding_is_shown_beside_the_original(page: Tab) -> None:
     page.choose("2")
     measured = page.finding("2")
     with page.one_change():
@@ -112,7 +115,7 @@ def test_an_outline_is_drawn_with_the_keyboard_alone(page: Tab) -> None:
     assert made["size"]["depth_sigma_mm"] > 0
 
 
-def test_a_kind_that_contradicts_the_measured_depth_warns(page: Tab) -> None:
+def test_a_kind_that_contradicts_the_measured_depth_raises_a_warning(page: Tab) -> None:
     pit = next(f for f in page.standing() if page.finding(f)["size"]["depth_mm"] > 0.5)
     with page.one_change():
         page.js(
@@ -126,7 +129,9 @@ def test_a_kind_that_contradicts_the_measured_depth_warns(page: Tab) -> None:
     assert "added a deposit" in page.page.locator(".history").inner_text()
 
 
-def test_an_outline_is_changed_by_dragging_its_points_and_says_why_the_depth_changed(page: Tab) -> None:
+def test_an_outline_is_changed_by_dragging_its_points_and_the_page_says_why_the_depth_changed(
+    page: Tab,
+) -> None:
     page.choose("2")
     page.js("(boresight.flat.view.mmPerPx *= 1.0, boresight.flat.paint())")
     page.keys("e")
@@ -188,7 +193,7 @@ def test_merge_and_split(page: Tab) -> None:
     assert "2" not in page.standing()
 
 
-def test_assumed_wall_gives_loss_and_strength(page: Tab) -> None:
+def test_with_an_assumed_wall_thickness_loss_and_strength_are_shown(page: Tab) -> None:
     page.page_of("Sign-off")
     page.page.fill("#wall", "6")
     page.page.fill("#yield", "360")

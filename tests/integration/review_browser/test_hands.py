@@ -1,4 +1,4 @@
-"""Fingers and pen: what a mouse can do on model and wall, they can."""
+"""Touch and pen: they can do on model and wall what a mouse can."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from tests.review_browser import Tab, tab
 
 
 class Fingers:
-    """Touches on a page, as a screen reports them."""
+    """Sends touches to a page, as a screen reports them."""
 
     def __init__(self, page: Tab) -> None:
         self._send = page.page.context.new_cdp_session(page.page).send
 
     def slide(self, *ways: tuple[tuple[float, float], tuple[float, float]], steps: int = 6) -> None:
-        """Move a finger along each way, from its first point to its last, all at once."""
+        """Move one finger along each path, from its first point to its last, all at once."""
         self._touch("touchStart", [way[0] for way in ways])
         for k in range(1, steps + 1):
             at = [[a + (b - a) * k / steps for a, b in zip(*way, strict=True)] for way in ways]
@@ -27,7 +27,7 @@ class Fingers:
 
 
 class Pen:
-    """A pen on a page."""
+    """Sends the events of a pen to a page."""
 
     def __init__(self, page: Tab) -> None:
         self._send = page.page.context.new_cdp_session(page.page).send
@@ -61,7 +61,7 @@ def middle(page: Tab, of: str) -> tuple[float, float]:
     return box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
 
 
-def test_a_finger_looks_around_two_fly_and_a_tap_takes_the_spot(screen: Tab) -> None:
+def test_one_finger_looks_around_two_fingers_fly_and_a_tap_chooses_the_place(screen: Tab) -> None:
     fingers, (x, y) = Fingers(screen), middle(screen, ".model canvas")
     screen.page.click("text=Home")
     looked = screen.js("boresight.model.eye.look.yaw")
@@ -70,13 +70,13 @@ def test_a_finger_looks_around_two_fly_and_a_tap_takes_the_spot(screen: Tab) -> 
     flown, spot = screen.js("[boresight.model.eye.flown, boresight.session.cursor]")
     fingers.slide(((x - 20, y), (x - 80, y)), ((x + 20, y), (x + 80, y)))
     assert screen.js("boresight.model.eye.flown") > flown + 10
-    assert screen.js("boresight.session.cursor") == spot, "two fingers take no spot"
+    assert screen.js("boresight.session.cursor") == spot, "two fingers choose no place"
     screen.page.click("text=Home")
     screen.page.touchscreen.tap(x + 130, y)
     screen.until(f"boresight.session.cursor[1] !== {spot[1]}")
 
 
-def test_a_finger_shifts_the_wall_and_two_zoom(screen: Tab) -> None:
+def test_one_finger_moves_the_wall_and_two_zoom(screen: Tab) -> None:
     fingers, (x, y) = Fingers(screen), middle(screen, ".flat canvas")
     view = "[boresight.flat.view.distance, boresight.flat.view.mmPerPx]"
     screen.choose(screen.standing()[0])
@@ -103,7 +103,7 @@ def test_finger_and_pen_drag_a_corner_of_an_outline(screen: Tab, by: str) -> Non
     scale = screen.js("boresight.flat.view.mmPerPx")
     assert s2 == pytest.approx(s - 20 * scale, abs=2 * scale)
     assert a2 < a
-    assert rest2 == rest, "the others stay"
+    assert rest2 == rest, "the other corners keep their places"
     screen.js("boresight.session.take('none')")
 
 

@@ -1,4 +1,4 @@
-"""Measuring on wall and model: every tool gives its σ."""
+"""Measuring on wall and model: every tool states its σ."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from tests.review_browser import Tab
         ("Diameter", [(60, -1.2)], ["diameter", "mean diameter"]),
     ],
 )
-def test_every_tool_gives_its_sigma(page: Tab, tool: str, places: list[Any], names: list[str]) -> None:
+def test_every_tool_states_its_sigma(page: Tab, tool: str, places: list[Any], names: list[str]) -> None:
     page.show_wall(60, -1.2, 0.3)
     page.page.click(f'.tools button:text-is("{tool}")')
     page.click_wall(*places)

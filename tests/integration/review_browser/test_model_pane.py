@@ -1,4 +1,7 @@
-"""The model's pane: it turns to what is chosen, marks findings, distances and ends, in true colours."""
+"""The model's pane.
+
+It turns to the chosen place, marks findings, distances and ends, and shows true colours.
+"""
 
 from __future__ import annotations
 
@@ -23,14 +26,14 @@ def marks(page: Tab, kind: str) -> list[str]:
 
 
 @pytest.mark.parametrize("hour", [12, 3, 6, 9, 1.5])
-def test_the_view_turns_to_a_place_whatever_its_clock(page: Tab, hour: float) -> None:
+def test_the_view_turns_to_a_place_at_any_clock_position(page: Tab, hour: float) -> None:
     azimuth = np.radians(30 * (hour - 3))
     x, y, depth = page.js(f"{_SPOT_ON_SCREEN}([60, {azimuth}])")
     assert max(abs(x), abs(y)) < 0.3
-    assert depth < 1, "in front of the eye"
+    assert depth < 1, "the place lies in front of the camera"
 
 
-def test_findings_are_numbered_and_places_are_told(page: Tab) -> None:
+def test_findings_are_numbered_and_distances_are_labelled(page: Tab) -> None:
     for name in page.standing():
         page.choose(name)
         page.until(
@@ -43,8 +46,10 @@ def test_findings_are_numbered_and_places_are_told(page: Tab) -> None:
     page.js("boresight.model.fly(1e4)")
     page.until("document.querySelector('.mark.end:not([hidden])')")
     last = page.js("boresight.session.run.distance_mm[1]")
-    assert page.js("boresight.model.eye.flown") < last, "the eye stays within the wall"
-    assert page.js("boresight.model.scene.background.getHexString()") == "46525e", "no blank past the end"
+    assert page.js("boresight.model.eye.flown") < last, "the camera stays within the wall"
+    assert page.js("boresight.model.scene.background.getHexString()") == "46525e", (
+        "no empty space beyond the end is shown"
+    )
     (said,) = marks(page, ".end")
     assert float(said.removeprefix("end of the measured wall, ").split()[0]) == pytest.approx(last, abs=0.6)
     page.js("boresight.session.select('1')")
@@ -72,7 +77,7 @@ def test_from_outside_the_pipe_fills_the_pane(page: Tab) -> None:
         const at = camera.position.clone().set(x / 1e3, -y / 1e3, -z / 1e3);
         return at.project(camera).toArray(); })); })()""")
     reach = np.abs(np.array(corners)[:, :2]).max()
-    assert 0.8 < reach <= 1, "all of it is seen, and large"
+    assert 0.8 < reach <= 1, "all of the pipe is seen, and it is large"
     page.page.click("text=Inside")
 
 
@@ -103,8 +108,8 @@ _OUTLINE_DRAWN = """(async () => {
 
 
 @pytest.mark.parametrize(("layer", "askew_rad"), [("photo", 0.0), ("photo", 1.0), ("uncertainty", 0.0)])
-def test_outlines_are_unbroken_from_outside(page: Tab, layer: str, askew_rad: float) -> None:
-    """At 1 rad the dent is seen askew, near the edge of what is seen of the pipe."""
+def test_outlines_have_no_gaps_when_seen_from_outside(page: Tab, layer: str, askew_rad: float) -> None:
+    """At 1 rad the dent is seen at a grazing angle, near the visible edge of the pipe."""
     page.page.select_option("select[aria-label='what the model shows']", layer)
     page.until(f"boresight.model.parts.every((p) => p.mesh.material.name.startsWith('{layer} '))")
     dent = next(f for f in page.standing() if page.finding(f)["kind"] == "dent")
@@ -122,11 +127,11 @@ def test_outlines_are_unbroken_from_outside(page: Tab, layer: str, askew_rad: fl
     page.js("(boresight.model.spot.group.visible = true, boresight.session.show('photo'), 1)")
     page.page.click("text=Inside")
     assert np.mean(drawn) > 0.97
-    assert np.mean(bare) < 0.1, "the colours below are not taken for the outline's"
+    assert np.mean(bare) < 0.1, "the colours below are not mistaken for the outline's"
 
 
 @pytest.mark.parametrize("hour", [12, 3, 6, 9, 4.5])
-def test_from_outside_the_chosen_place_is_on_the_near_side(page: Tab, hour: float) -> None:
+def test_from_outside_the_chosen_place_is_on_the_visible_side(page: Tab, hour: float) -> None:
     page.page.click("text=Outside")
     azimuth = np.radians(30 * (hour - 3))
     x, y, _ = page.js(f"{_SPOT_ON_SCREEN}([60, {azimuth}])")
@@ -139,7 +144,7 @@ def test_from_outside_the_chosen_place_is_on_the_near_side(page: Tab, hour: floa
     assert facing > 0, "not hidden behind the pipe"
 
 
-def test_the_model_alone_and_back(page: Tab) -> None:
+def test_the_model_can_be_shown_alone_and_the_other_views_come_back(page: Tab) -> None:
     before = page.page.locator(".model .stage").bounding_box()
     page.page.click("text=Maximise")
     after = page.page.locator(".model .stage").bounding_box()
@@ -149,7 +154,7 @@ def test_the_model_alone_and_back(page: Tab) -> None:
     assert page.page.locator(".model .stage").bounding_box() == before
 
 
-def test_captions_are_seen_at_720_lines(page: Tab) -> None:
+def test_captions_fit_on_a_screen_of_720_lines(page: Tab) -> None:
     page.page.locator(".foot .hint").wait_for(state="visible")
     for pane in ("#view-frame .told", "#view-section .told", "#view-flat .status"):
         box = page.page.locator(pane).bounding_box()
@@ -157,7 +162,7 @@ def test_captions_are_seen_at_720_lines(page: Tab) -> None:
 
 
 def test_the_photo_is_shown_as_it_was_recorded(page: Tab) -> None:
-    """No light of the viewer is put on the photo; raking light is, on request, and shows the dent."""
+    """The viewer adds no light to the photo; raking light is added on request, and shows the dent."""
     kind = "boresight.model.parts.map((p) => p.mesh.material.type)"
     dent = next(f for f in page.standing() if page.finding(f)["kind"] == "dent")
     page.choose(dent)
@@ -179,7 +184,7 @@ def test_the_photo_is_shown_as_it_was_recorded(page: Tab) -> None:
       return (seen[Math.floor(.98 * seen.length)] - seen[Math.floor(.02 * seen.length)]) / 255; })()"""
     assert page.js(contrast) < 0.02
     page.page.check("#raking")
-    assert page.js(contrast) > 0.25, "a dent of 1.6 mm reads by light and shadow"
+    assert page.js(contrast) > 0.25, "light and shadow show a dent of 1.6 mm"
     page.page.uncheck("#raking")
 
 
@@ -190,25 +195,27 @@ def test_a_recorded_frame_and_the_model_look_the_same_from_the_same_place(page: 
     lit = next(s["frame"] for s in sights if s["illumination"] == "led")
     alike = side_by_side(page, lit, *spot)
     assert alike.compared > 0.8
-    assert alike.psnr_db > 35, "at least 30 are asked for"
+    assert alike.psnr_db > 35, "at least 30 are demanded"
     assert alike.brighter == pytest.approx(1, abs=0.02)
     evenly = side_by_side(page, lit, *spot, is_evenly_lit=True)
-    assert evenly.psnr_db < 30, "the control: without the frame's light it is not the same"
+    assert evenly.psnr_db < 30, "control: without the light of the frame the pictures differ"
     page.page.check("#alike")
     page.until("boresight.session.stand !== null && document.querySelector('.shots img').naturalWidth > 0")
     page.page.focus(".model canvas")
     page.keys("w")
-    assert page.js("boresight.session.stand") is None, "who flies on looks freely again"
+    assert page.js("boresight.session.stand") is None, "after flying on the view can be turned freely again"
     assert not page.page.is_checked("#alike")
 
 
-def test_colours_hold_every_value_and_can_be_fixed(page: Tab) -> None:
+def test_colours_show_the_whole_range_of_values_and_can_be_fixed(page: Tab) -> None:
     page.js("boresight.session.show('deviation')")
     overlay = page.js("boresight.session.overlay()")
     low, high = page.js("boresight.session.limits()")
     assert low <= overlay["full_mm"][0] <= overlay["full_mm"][1] <= high == -low
     page.js("boresight.session.show('misalignment')")
-    assert page.js("boresight.session.limits()")[1] >= 0.25, "no alarming colour at some hundredths"
+    assert page.js("boresight.session.limits()")[1] >= 0.25, (
+        "deviations of some hundredths get no alarming colour"
+    )
     page.js("boresight.session.show('deviation')")
     page.page.click("#view-model .legend >> text=Set limits")
     page.page.fill("#view-model [aria-label='value of the first colour']", "-0.5")
@@ -236,7 +243,10 @@ def test_wall_loss_is_a_layer_in_percent(page: Tab) -> None:
 
 
 def test_the_slower_the_machine_the_less_is_drawn_while_the_view_moves(page: Tab) -> None:
-    """A picture that took a second is no rest: what is wanted at once after it is still a movement."""
+    """A picture that took a second is not a rest.
+
+    What is requested directly after it is still part of the movement.
+    """
     told = page.js("""(() => {
       const { pace } = boresight.model, own = pace.sharpen, told = [];
       pace.sharpen = (...how) => told.push(how);
@@ -246,7 +256,7 @@ def test_the_slower_the_machine_the_less_is_drawn_while_the_view_moves(page: Tab
       }
       pace.sharpen = own;
       return told; })()""")
-    assert len(told) == 1, "the first picture and the one after a rest are drawn whole"
+    assert len(told) == 1, "the first picture and the one after a rest are drawn completely"
     ((sharpness, is_moving),) = told
     assert is_moving
     assert sharpness <= 0.6

@@ -1,4 +1,4 @@
-"""More than one tab, lost servers, runs made anew, strange texts, and the copy that needs no server."""
+"""Several tabs, lost servers, runs computed again, markup in texts, and the copy that needs no server."""
 
 from __future__ import annotations
 
@@ -16,19 +16,20 @@ from tests.shared_data import PROJECT_ROOT
 
 
 def test_two_tabs_at_once(page: Tab, context, server: ReviewServer) -> None:
+    """Decisions in one tab appear in another, and no decision on an outdated view is accepted."""
     with tab(context, server.origin) as other:
         other.open(server.origin + "/")
         other.choose("1")
         page.choose("2")
         other.js(
             "boresight.session.isAsking = true"
-        )  # no look at the server, made every few seconds, comes between
+        )  # no query of the server, sent every few seconds, comes in between
         with page.one_change():
             page.keys("a")
         other.page.keyboard.press("a")
         other.until("document.querySelector('.notice').textContent.includes('made elsewhere')")
         assert other.finding("2")["status"] == "accepted"
-        assert other.finding("1")["status"] == "open", "what was decided on an old view is not taken"
+        assert other.finding("1")["status"] == "open", "a decision made on an outdated view is not accepted"
         other.js("boresight.session.isAsking = false")
         other.focus_list()
         with other.one_change():
@@ -46,7 +47,7 @@ def test_nothing_is_lost_when_the_server_dies(browser, sample: Path, tmp_path: P
             page.open(server.address)
             page.named("Ada")
             for keys in ("a", "o", "a"):
-                page.choose("1")  # a decision leads on to the next
+                page.choose("1")  # after a decision the next finding is chosen
                 with page.one_change():
                     page.keys(keys)
             page.choose("1")
@@ -60,7 +61,7 @@ def test_nothing_is_lost_when_the_server_dies(browser, sample: Path, tmp_path: P
             old = server.port
             server.port = 0
             server.start()
-            assert server.port == old, "the page that was left open finds its server again"
+            assert server.port == old, "the page that stayed open connects to the new server"
             with tab(context, server.origin) as fresh:
                 fresh.open(server.address)
                 assert fresh.finding("1")["status"] == "accepted"
@@ -97,7 +98,7 @@ def test_a_run_computed_anew_while_open(browser, sample: Path, tmp_path: Path) -
         page.page.wait_for_selector(".list .row")
         page.until("window.boresight")
         left = page.js("boresight.session.state.findings.map((f) => [f.kind, f.status])")
-        assert left == [["dent", "accepted"]], "decisions follow their finding"
+        assert left == [["dent", "accepted"]], "decisions stay with their finding"
         page.keys("3")
         assert "Decisions without their finding" in page.page.locator(".page:visible").inner_text()
     context.close()

@@ -8,7 +8,7 @@ from tests.patience import patience
 from tests.review_browser import Tab
 
 
-def test_the_quality_page_tells_how_good_the_run_is(page: Tab) -> None:
+def test_the_quality_page_shows_how_good_the_run_is(page: Tab) -> None:
     page.keys("2")
     shown = page.page.locator(".page:visible")
     shown.locator(".plots figure").first.wait_for()
@@ -20,7 +20,7 @@ def test_the_quality_page_tells_how_good_the_run_is(page: Tab) -> None:
         assert word in text
 
 
-def test_who_signs_with_findings_undecided_must_say_so(page: Tab) -> None:
+def test_signing_with_undecided_findings_needs_a_confirmation(page: Tab) -> None:
     page.keys("3")
     shown = page.page.locator(".page:visible")
     assert "undecided. Sign nevertheless" in shown.inner_text()
@@ -33,7 +33,7 @@ def test_who_signs_with_findings_undecided_must_say_so(page: Tab) -> None:
         assert words in shown.locator("h2").all_inner_texts()
 
 
-def test_any_later_change_shows_as_unsigned(page: Tab) -> None:
+def test_after_any_later_change_the_review_is_shown_as_unsigned(page: Tab) -> None:
     page.keys("3")
     page.page.fill("#sign-name", "Ada Lovelace")
     page.page.fill("#sign-standard", "POF 100")
@@ -53,7 +53,7 @@ def test_any_later_change_shows_as_unsigned(page: Tab) -> None:
     page.until(badge.format("signed"))
 
 
-def test_a_file_of_the_run_changed_behind_its_back_shows_as_unsigned(page: Tab, run: Path) -> None:
+def test_after_a_change_of_a_file_of_the_run_the_review_is_shown_as_unsigned(page: Tab, run: Path) -> None:
     page.keys("3")
     page.page.fill("#sign-name", "Ada")
     page.page.check("#sign-undecided")
@@ -69,7 +69,7 @@ def test_a_file_of_the_run_changed_behind_its_back_shows_as_unsigned(page: Tab, 
     page.until("boresight.session.seal?.signed")
 
 
-def test_for_whom_it_was_inspected_is_given_on_the_page_and_printed(page: Tab) -> None:
+def test_the_client_is_entered_on_the_page_and_printed(page: Tab) -> None:
     page.keys("3")
     page.page.fill("#fact-client", "Water Works")
     page.page.fill("#fact-date", "2026-05-31")
@@ -80,13 +80,13 @@ def test_for_whom_it_was_inspected_is_given_on_the_page_and_printed(page: Tab) -
     page.page.fill("#fact-site", "half written")
     with page.one_change():
         page.page.click("text=Undo")
-    assert page.page.input_value("#fact-client") == "", "fields show what is known, also after an undo"
-    assert page.page.input_value("#fact-site") == "half written", "but keep what is being written"
+    assert page.page.input_value("#fact-client") == "", "fields show the stored value, also after an undo"
+    assert page.page.input_value("#fact-site") == "half written", "but text that is being typed is kept"
     page.page.fill("#fact-site", "")
 
 
-def test_news_leave_the_focus_where_something_is_being_written(page: Tab) -> None:
-    """A field lost it when the seal came, and what was typed next were shortcuts that decide on findings."""
+def test_updates_from_the_server_leave_the_focus_in_the_field_being_edited(page: Tab) -> None:
+    """A field lost it when the signature arrived; what was typed next then acted as shortcuts."""
     page.keys("3")
     page.page.fill("#wall", "")
     page.page.focus("#wall")
@@ -98,7 +98,7 @@ def test_news_leave_the_focus_where_something_is_being_written(page: Tab) -> Non
     page.page.fill("#wall", "")
 
 
-def test_every_paper_can_be_taken_away(page: Tab) -> None:
+def test_every_paper_can_be_downloaded(page: Tab) -> None:
     page.keys("3")
     links = page.page.locator(".papers a")
     starts = {

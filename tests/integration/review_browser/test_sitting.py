@@ -1,4 +1,4 @@
-"""A whole sitting by keyboard alone, from the first view to the signed report, in Chromium and Firefox."""
+"""A whole review by keyboard alone, from the first view to the signed report, in Chromium and Firefox."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _MOST_TABS = 120
 
 
 class Hands(Protocol):
-    """What a sitting needs of a browser: keys in, what the page shows out."""
+    """What the test needs of a browser: pressing keys, and reading what the page shows."""
 
     def keys(self, *names: str) -> None: ...
 
@@ -32,14 +32,17 @@ class Hands(Protocol):
 
 @pytest.fixture
 def server(sample: Path, tmp_path: Path) -> Iterator[ReviewServer]:
-    """A review of its own: what is decided and signed here stays."""
+    """A server for this test alone: its decisions and signature are not undone."""
     shutil.copytree(sample, tmp_path / "run")
     with ReviewServer(tmp_path / "run") as started:
         yield started
 
 
 def tab_to(hands: Hands, place: str) -> None:
-    """Press Tab until a place is focused; what cannot be reached so is closed to whoever has no mouse."""
+    """Press Tab until a certain element has the focus.
+
+    One that cannot be reached is useless without a mouse.
+    """
     for _ in range(_MOST_TABS):
         if hands.js(f"!!document.activeElement?.matches({json.dumps(place)})"):
             return
@@ -53,14 +56,14 @@ def write(hands: Hands, place: str, text: str) -> None:
 
 
 def settled(hands: Hands, condition: str = "true") -> None:
-    """Wait until the server has taken what was done last."""
+    """Wait until the server has accepted the last action."""
     hands.until(f"boresight.session.seal !== null && ({condition})")
 
 
 def sitting(hands: Hands) -> None:
-    """Decide on every finding, add a missed one, give the facts, sign."""
+    """Decide on every finding, add a missed one, enter the facts of the inspection, and sign."""
     hands.until("!!window.boresight && document.querySelectorAll('.list .row').length > 0")
-    # Firefox draws no 3D where the machine has no OpenGL: everything else must work all the same.
+    # Firefox draws no 3D on machines without OpenGL; everything else must work nevertheless.
     no_3d = "document.querySelector('.veil')?.textContent.includes('no 3D')"
     hands.until(f"boresight.model.isReady || {no_3d}", 60)
     hands.until("[...document.querySelectorAll('.shots img')].some((i) => i.naturalWidth > 0)")

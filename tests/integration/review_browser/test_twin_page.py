@@ -1,4 +1,4 @@
-"""The twin's page as a tab of the review: shown, at work, and shut off from the server."""
+"""The twin's page as a tab of the review: it is shown, its controls work, and it cannot query the server."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def server(run: Path, twin: Path):
         yield started
 
 
-def test_the_twin_has_a_tab_in_which_its_slider_works(shared_tab: Tab) -> None:
+def test_the_twin_has_a_tab_in_which_the_slider_works(shared_tab: Tab) -> None:
     shared_tab.page_of("Twin")
     frame = shared_tab.page.frame_locator("iframe[title=twin]")
     assert frame.locator("#shown").inner_text() == "re-rendered"
@@ -48,13 +48,13 @@ def test_the_twin_has_a_tab_in_which_its_slider_works(shared_tab: Tab) -> None:
     assert not shared_tab.faults
 
 
-def test_the_twin_may_ask_the_server_nothing(shared_tab: Tab, server: ReviewServer) -> None:
+def test_the_twins_page_cannot_query_the_server(shared_tab: Tab, server: ReviewServer) -> None:
     shared_tab.page_of("Twin")
     inside = next(f for f in shared_tab.page.frames if f.url.endswith("/twin"))
     asked = inside.evaluate("fetch('/api/state').then(() => 'answered', () => 'refused')")
     assert asked == "refused"
     assert inside.evaluate("origin") == "null"
-    shared_tab.faults.clear()  # the browser tells of the refusal
+    shared_tab.faults.clear()  # the browser reports the refused request
     policy = server.ask("/twin").headers["content-security-policy"]
     assert "sandbox allow-scripts" in policy
     assert "connect-src" not in policy
@@ -77,7 +77,7 @@ def test_a_read_only_copy_holds_the_twin(run: Path, twin: Path, tmp_path: Path) 
     assert '"twin":true' in (copy / "assets" / "data.js").read_text("utf-8")
 
 
-def test_a_folder_without_a_twin_is_refused_by_name(run: Path, tmp_path: Path) -> None:
+def test_a_folder_without_a_twin_is_refused_with_its_name(run: Path, tmp_path: Path) -> None:
     asked = CliRunner().invoke(app, ["review", str(run), "--no-browser", "--twin", str(tmp_path)])
     assert isinstance(asked.exception, InputError)
     assert "twin.html" in str(asked.exception)

@@ -35,7 +35,7 @@ def turned(a: float, b: float) -> float:
 
 
 def told(page: Tab, place: str, old: str) -> str:
-    """Return what a view says once it no longer says ``old`` nor waits for anything."""
+    """Return the text of a view once it differs from ``old`` and the view is no longer loading."""
     words = f"document.querySelector('{place} .told').textContent"
     page.until(f"{words} !== {json.dumps(old)} && !document.querySelector('{place} [aria-busy]')")
     return page.page.locator(f"{place} .told").inner_text()
@@ -76,7 +76,7 @@ def test_a_click_on_the_frame_moves_to_what_was_clicked(page: Tab) -> None:
     circles = "[...document.querySelectorAll('.zoomed circle.spot')]"
     page.until(f"{circles}.map((e) => Math.round(e.getAttribute('cx'))).sort().join() === '{sought}'")
     box = page.page.locator(".zoomed circle.spot").first.bounding_box()
-    page.js("boresight.session.cursor = [20, -3]")  # moved without any view being told
+    page.js("boresight.session.cursor = [20, -3]")  # changed directly, so that no view is notified
     page.page.mouse.click(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
     page.until("boresight.session.cursor[0] !== 20")
     distance, azimuth = cursor(page)
@@ -93,8 +93,8 @@ def test_the_lit_frame_is_first_and_the_laser_frame_beside_it(page: Tab) -> None
     assert laser.startswith("laser frame")
 
 
-def test_what_takes_long_is_said_to_be_loading(page: Tab) -> None:
-    """Where a frame lies, and the frame itself, are held back until the page has said that it waits."""
+def test_what_takes_long_is_shown_as_loading(page: Tab) -> None:
+    """The place and the picture of a frame are held back until the page says that it is loading."""
     said = "[...document.querySelectorAll('#view-frame .told, #view-frame .name')].map((e) => e.textContent)"
     frames, view = "/^Loading the recorded frames/", "/^Loading a recorded frame in the model/"
     picture, held = "/^lit frame \\d+, loading…$/", dict[str, Route]()
@@ -121,8 +121,8 @@ def test_what_takes_long_is_said_to_be_loading(page: Tab) -> None:
         page.page.unroute_all(behavior="ignoreErrors")
 
 
-def test_the_first_view_waits_for_nothing_that_it_does_not_show(context, server) -> None:
-    """Frames and the signature's hash are asked for when a part of the model is seen, not before."""
+def test_the_first_view_waits_only_for_data_that_it_shows(context, server) -> None:
+    """Frames and the hash of the signature are requested after a part of the model is visible, not before."""
     asked: list[str] = []
     with tab(context, server.origin) as fresh:
         fresh.page.on("request", lambda request: asked.append(request.url.removeprefix(server.origin)))
@@ -133,10 +133,12 @@ def test_the_first_view_waits_for_nothing_that_it_does_not_show(context, server)
              for name in ("run", "state", "model", "model/0", "seal", "sights")}  # fmt: skip
     assert first["model/0"] < min(first["seal"], first["sights"])
     script = asked.index("/assets/page.js")
-    assert max(first[name] for name in ("run", "state", "model")) < script + 5, "asked for beside the script"
+    assert max(first[name] for name in ("run", "state", "model")) < script + 5, (
+        "requested in parallel with the script"
+    )
 
 
-def test_a_click_on_the_section_turns_only(page: Tab) -> None:
+def test_a_click_on_the_section_changes_the_azimuth_only(page: Tab) -> None:
     page.js("boresight.session.moveTo([50, -1.5])")
     box = page.page.locator(".section svg[role=img]").bounding_box()
     page.page.mouse.click(box["x"] + box["width"] / 2 + 60, box["y"] + box["height"] / 2)
@@ -144,7 +146,7 @@ def test_a_click_on_the_section_turns_only(page: Tab) -> None:
     assert turned(cursor(page)[1], 0) < 0.05
 
 
-def test_every_overlay_dresses_wall_and_model(page: Tab) -> None:
+def test_every_overlay_is_shown_on_wall_and_model(page: Tab) -> None:
     names = page.js("boresight.session.run.overlays.map((o) => o.name)")
     assert len(names) >= 5
     names.remove("wall_loss")  # needs a wall thickness: see the test of colours
@@ -155,7 +157,7 @@ def test_every_overlay_dresses_wall_and_model(page: Tab) -> None:
         assert ("mm" in page.page.locator("#view-model .legend").inner_text()) == (name != "photo")
 
 
-def test_relief_is_exaggerated_about_the_round_pipe(page: Tab) -> None:
+def test_relief_is_exaggerated_relative_to_the_round_pipe(page: Tab) -> None:
     def radii() -> tuple[float, float]:
         return tuple(page.js(_RADII))
 
@@ -167,7 +169,7 @@ def test_relief_is_exaggerated_about_the_round_pipe(page: Tab) -> None:
     assert np.array(radii()) - radius == pytest.approx(plain, abs=1e-3)
 
 
-def test_the_model_is_cut_open_from_outside_only(page: Tab) -> None:
+def test_the_model_can_be_cut_open_from_outside_only(page: Tab) -> None:
     planes = "boresight.model.parts.every((p) => p.mesh.material.clippingPlanes.length === {})"
     page.page.click("text=Outside")
     page.page.check("#cut")
@@ -190,11 +192,11 @@ def test_the_keyboard_flies_inside(page: Tab) -> None:
     flown, yaw = page.js("[boresight.model.eye.flown, boresight.model.eye.look.yaw]")
     assert flown - before[0] == pytest.approx(6 + 6 + 30 - 6)
     assert yaw < before[1]
-    assert page.standing(), "D beside the model looks around; it adds no defect"
+    assert page.standing(), "beside the model, D looks around and adds no defect"
     assert page.js("boresight.session.tool") == "none"
 
 
-def test_at_rest_the_model_is_sharp_and_not_drawn_on(page: Tab) -> None:
+def test_while_the_view_rests_the_model_is_sharp_and_not_drawn_again(page: Tab) -> None:
     page.page.locator(".model canvas").focus()
     for _ in range(12):
         page.keys("w")
@@ -209,7 +211,7 @@ def test_at_rest_the_model_is_sharp_and_not_drawn_on(page: Tab) -> None:
 
 
 def test_the_page_writes_numbers_and_places_as_the_papers_do(page: Tab) -> None:
-    """Each function of words.ts against that of notation.py: halves of a digit, signs, sizes."""
+    """The functions of words.ts agree with those of notation.py: rounding of halves, signs, sizes."""
     values = [0.0, 0.125, -0.375, 0.15, 2.5, 1.0005, 41.25, 41.75, -1.4825, 99.9996, 12345.6, 7 / 24]
     sigmas = [0.0, 4e-5, 0.0125, 0.0285, 0.25, 0.5, 3.2, 25.0, 1500.0]
     hours = [0.0, 0.0083333, 0.5083333, 3.1415, 7.775, 7.0083333, 11.99166667, 11.9999, 12.5]
