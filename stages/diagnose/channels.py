@@ -22,6 +22,7 @@ from stages.diagnose.effects.base import EffectModel
 from stages.diagnose.effects.library import without as library_without
 from stages.diagnose.field.evidence import FieldEvidence, empty_evidence, field_evidence
 from stages.diagnose.field.run import Adjusted, FieldRun, field_run
+from stages.diagnose.gauge.bores import misdrawn_bore
 from stages.diagnose.gauge.examine import Examined, examine
 from stages.diagnose.profile.evidence import ProfileEvidence, profile_evidence
 from stages.diagnose.travel.evidence import TravelEvidence, travel_evidence
@@ -217,9 +218,14 @@ def examine_gauge(
     if run is not None:
         try:
             library = _of_geometry(library_without(without), light)
-            geometry = examine(run, library, probe, progress=context.progress)
-            travel = gauge_travel(recording, run, geometry.searched.found.state, without)
-            missing += (*geometry.shortcomings, *travel.shortcomings)
+            examined = examine(run, library, probe, progress=context.progress)
+            bore = misdrawn_bore(examined.searched) if examined.best is not None else None
+            geometry = examined if bore is None else None
+            state = examined.searched.found.state if bore is None else bore.state
+            travel = gauge_travel(recording, run, state, without)
+            missing += (*(examined.shortcomings if bore is None else (bore.words,)), *travel.shortcomings)
+            if bore is not None:
+                context.warn(bore.words)
         except UnusableError as error:
             problem = error.problem
     if problem:
@@ -277,7 +283,7 @@ FREE_MOTION = Stage(
     "free_motion", "2", MotionParameters, adjust_freely, "an inspection's motion without encoder", "motion"
 )
 GAUGE_EVIDENCE = Stage(
-    "evidence", "50", DiagnosisParameters, examine_gauge, "what a gauge run shows of effects", "diagnosis"
+    "evidence", "51", DiagnosisParameters, examine_gauge, "what a gauge run shows of effects", "diagnosis"
 )
 FIELD_EVIDENCE = Stage(
     "evidence", "26", DiagnosisParameters, examine_field, "what an inspection shows of effects", "diagnosis"

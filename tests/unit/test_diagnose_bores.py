@@ -1,14 +1,19 @@
-"""A gauge with a bore that is not as drawn: it is told, and no effect of the instrument is."""
+"""A gauge with a bore that is not as drawn: the bore is reported, and no effect of the instrument."""
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
+from functools import partial
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
 
-from pipeline.errors import UnusableError
+from pipeline.machine.stage import unheard
 from stages.calibrate.gauge import MeasuredRun
+from stages.diagnose import channels
 from stages.diagnose.effects.courses import with_courses
 from stages.diagnose.effects.library import LIBRARY
 from stages.diagnose.gauge import examine as examination
@@ -34,12 +39,27 @@ def searched(measured: MeasuredRun, with_baseline: bool) -> Search:
     return Search(run, nothing, found, (), (), 1e-9, 1.0)
 
 
-def test_a_bore_of_another_diameter_is_told_instead_of_an_effect(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_bore_of_another_diameter_is_reported_instead_of_an_effect(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It was raised as an error, and what the motion and the encoder of that run show was lost with it."""
     # Steps, which find it in practice, take long to search: whatever is found counts instead.
     monkeypatch.setattr(examination, "DETECTED", 1.0)
-    given = exact(-0.2)
-    with pytest.raises(UnusableError, match=r"a bore of 83\.6. mm where recording\.yaml says 84 mm"):
-        examination.examine(measured_run(given), _FEW, given.stated, courses=())
+    monkeypatch.setattr(channels, "library_without", lambda _: _FEW)
+    monkeypatch.setattr(channels, "examine", partial(examination.examine, courses=()))
+    monkeypatch.setattr(channels, "gauge_travel", lambda *_: SimpleNamespace(shortcomings=("too slow",)))
+    given, warned = exact(-0.2), list[str]()
+    seen = channels.examine_gauge(
+        given.recording,
+        cast(Any, SimpleNamespace(applied_to=lambda recording: recording)),
+        channels.LineProfile(None),
+        channels.GaugeMeasured(measured_run(given)),
+        given.stated,
+        parameters=channels.DiagnosisParameters(),
+        context=cast(Any, SimpleNamespace(progress=unheard, warn=warned.append)),
+    )
+    assert seen.geometry is None
+    assert seen.travel is not None
+    assert re.search(r"A bore of 83\.6. mm where recording\.yaml says 84 mm", warned[0])
+    assert seen.shortcomings == (warned[0], "too slow")
 
 
 def test_the_error_of_a_bore_is_that_drawn() -> None:

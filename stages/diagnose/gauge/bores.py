@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pipeline.errors import UnusableError
+from stages.calibrate.gauge.state import Unknowns
 from stages.diagnose.gauge.fit import Fit, fit
 from stages.diagnose.gauge.run import Term
 from stages.diagnose.gauge.scan import span
@@ -18,31 +18,35 @@ _UNKNOWN_MM = 1.0
 
 @dataclass(frozen=True)
 class Misdrawn:
-    """A bore that explains a run: its place in the gauge's list, error of its radius, and χ² left."""
+    """A bore that explains a run.
 
-    section: int
+    Attributes
+    ----------
+    stated_mm, error_mm : float
+        The radius that recording.yaml states, and how much larger the bore is.
+    section : int
+        Place in the gauge's list of bores.
+    state : Unknowns
+        Poses and bores with this radius.
+    cost : float
+        χ² left.
+    """
+
+    stated_mm: float
     error_mm: float
+    section: int
+    state: Unknowns
     cost: float
 
-
-def require_bores_as_drawn(searched: Search) -> None:
-    """Refuse a run that one bore of another radius than stated explains as well as the effects found.
-
-    Raises
-    ------
-    UnusableError
-        The instrument cannot be judged by such a gauge.
-    """
-    bore = misdrawn_bore(searched)
-    if bore is None:
-        return
-    run = searched.run
-    stated = 2 * float(run.rings.radius_mm[run.rings.section == bore.section][0])
-    raise UnusableError(
-        "diagnose",
-        f"a bore of {stated + 2 * bore.error_mm:.2f} mm where recording.yaml says {stated:g} mm explains the "
-        "run as well as any effect. Measure the gauge's bore",
-    )
+    @property
+    def words(self) -> str:
+        """A sentence that says what to do."""
+        measured, stated = 2 * (self.stated_mm + self.error_mm), 2 * self.stated_mm
+        return (
+            f"A bore of {measured:.2f} mm where recording.yaml says {stated:g} mm explains rings and "
+            "fiducials of the gauge run as well as any effect, so that they can show none. Measure the "
+            "gauge's bore."
+        )
 
 
 def misdrawn_bore(searched: Search) -> Misdrawn | None:
@@ -70,4 +74,5 @@ def _freed(nothing: Fit, section: int) -> Misdrawn:
     sigma = np.array(np.broadcast_to(run.bore_sigma_mm, nothing.state.bore_mm.shape))
     sigma[section] = _UNKNOWN_MM
     free = fit(replace(run, bore_sigma_mm=sigma), nothing.state, ())
-    return Misdrawn(section, float(free.state.bore_mm[section]), free.cost)
+    stated = float(run.rings.radius_mm[run.rings.section == section][0])
+    return Misdrawn(stated, float(free.state.bore_mm[section]), section, free.state, free.cost)

@@ -17,7 +17,6 @@ from stages.calibrate.gauge import MeasuredRun
 from stages.diagnose.effects.base import EffectModel
 from stages.diagnose.effects.courses import SEARCHED, with_courses
 from stages.diagnose.effects.nameless import Nameless
-from stages.diagnose.gauge.bores import require_bores_as_drawn
 from stages.diagnose.gauge.confirm import Sized, confirmations, sizes_of
 from stages.diagnose.gauge.feasible import ability, feasibility, not_told_apart
 from stages.diagnose.gauge.fit import fit
@@ -171,7 +170,7 @@ def examine(
     Raises
     ------
     UnusableError
-        When the run does not determine its own poses, or one bore that is not as drawn explains it.
+        When the run does not determine its own poses.
     """
     stated = stated_belief(probe)
     library = {name: model for name, model in library.items() if name not in OF_A_PIPE}
@@ -195,7 +194,6 @@ def examine(
             if seen.global_p > DETECTED:
                 seen = replace(seen, quality=_quality_of_stated(searched, stated))
                 return replace(seen, location=_OF_IMAGE if seen.repeats else None)
-            require_bores_as_drawn(searched)
             return _judged(replace(seen, verdicts=judge(searched, coursed, stated, swung)), coursed, stated)
     except np.linalg.LinAlgError as error:
         raise UnusableError("diagnose", f"the gauge run does not determine its poses ({error})") from error
