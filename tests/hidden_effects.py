@@ -17,20 +17,20 @@ Change = Callable[[int, str, Float32], Float32]
 
 @dataclass(frozen=True)
 class Hidden:
-    """An effect put in by hand.
+    """An effect that is added to recorded frames.
 
     Attributes
     ----------
     name : str
     change : callable
-        Makes the grey levels above black, of a frame and a light, those with the effect.
+        Changes the grey levels above black of a frame with a light into those with the effect.
     names : tuple of str
-        What it may be called; any one is right.
+        Names of a mismatch that are right.
     fixed_to : str
     place : dict
-        What the answer's place must be, as name: (value, tolerance).
+        The right place, as name: (value, tolerance).
     size : float or None
-        Of the first parameter.
+        True value of the mismatch's first parameter.
     """
 
     name: str

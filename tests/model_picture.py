@@ -27,9 +27,9 @@ class View:
     Attributes
     ----------
     eye_p, target_p, up_p : (3,)
-        Where it stands, where it looks, and what is up in the picture, in P.
+        Position, point looked at, and upward direction of the picture, in P.
     field_of_view_rad : float
-        Across the picture's width.
+        Over the picture's width.
     light_p : (L, 3)
         Point lights, in P.
     """

@@ -51,7 +51,7 @@ _BOTH = """(async ([frame, distance, azimuth, width, height, isEven]) => {
 
 
 @dataclass(frozen=True)
-class Alike:
+class ViewPair:
     """Model and frame side by side.
 
     Attributes
@@ -82,11 +82,11 @@ class Alike:
 
 def side_by_side(
     page: Tab, frame: int, distance: float, azimuth: float, *, is_evenly_lit: bool = False
-) -> Alike:
+) -> ViewPair:
     """Return the page's pictures of the model and of a frame, with the view turned to a place of the wall."""
     width, height = 640, 400
     found = np.array(
         page.js(f"{_BOTH}({[frame, distance, azimuth, width, height, int(is_evenly_lit)]})"), float
     )
     model, recorded = np.where(found < 0, np.nan, found).reshape(2, height, width)
-    return Alike(model, recorded)
+    return ViewPair(model, recorded)

@@ -1,6 +1,8 @@
-"""Which effects look alike in a gauge run: what free poses leave of each, and which pairs stay collinear.
+"""Which effects look the same in a gauge run.
 
-A stepped bore of 50.8, 42 and 35 mm radius, driven off-centre by 6 mm, yawed and rolled, with fiducials.
+What remains of each when poses are free, and which pairs are collinear. A stepped bore of 50.8, 42 and 35 mm
+radius, driven off-centre by 6 mm, yawed and rolled, with fiducials.
+
 usage: python -m tests.benchmarks.bench_collinearity [FRAMES]
 """
 
@@ -35,7 +37,7 @@ def stated_probe() -> Probe:
 
 
 def frame_points(probe: Probe, k: int, frames: int) -> tuple[ImagePoints, ImagePoints, float]:
-    """The ring, wall points ahead, and the time, of one frame of the drive."""
+    """Return the ring, wall points ahead, and the time, of one frame of the drive."""
     t = k / frames
     bore = Bore(
         RADII_MM[min(int(3 * t), 2)],
@@ -67,7 +69,7 @@ def joined(parts: list[ImagePoints], time_s: float) -> ImagePoints:
 
 
 def seen_moving(points: ImagePoints, roll: float, speed: float, k: int) -> ImagePoints:
-    """Points with the velocities of a drive along the pipe that sways at 2 Hz, and their places in P."""
+    """Return points with their velocities in a drive that sways at 2 Hz, and their places in P."""
     sway = np.array([2.0 * np.cos(k), 1.5 * np.sin(1.3 * k), 0.0])
     passing = -speed * points.along_c - sway
     by_point = points.ring.by_point
@@ -85,7 +87,10 @@ def seen_moving(points: ImagePoints, roll: float, speed: float, k: int) -> Image
 
 
 def eliminated(name: str, drive: list, with_fiducials: bool) -> tuple[np.ndarray, float]:
-    """An effect at its first shape, in σ per plausible size, with poses taken out; and its size before."""
+    """Return an effect at its first shape, in σ per plausible size, without the part that poses can mimic.
+
+    Also return its size before the elimination of poses.
+    """
     model = LIBRARY[name]
     shape = model.shapes(drive[-1][2], RATE_HZ)[0]
     plausible = np.array([a.plausible for a in model.amplitudes]) / SIGMA_PX
@@ -115,7 +120,10 @@ def wall_by_pose(wall: ImagePoints) -> np.ndarray:
 
 
 def likeness(first: np.ndarray, second: np.ndarray) -> float:
-    """Smallest canonical correlation: 1 when every amplitude of the smaller effect is mimicked."""
+    """Return the smallest canonical correlation.
+
+    1 when the other effect can mimic every amplitude of the smaller one.
+    """
     bases = [np.linalg.qr(c / np.linalg.norm(c, axis=0))[0] for c in (first, second)]
     return float(np.linalg.svd(bases[0].T @ bases[1], compute_uv=False).min())
 

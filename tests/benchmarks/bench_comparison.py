@@ -1,11 +1,14 @@
-"""How honest the comparison of two runs is: ``python -m tests.benchmarks.bench_comparison``.
+"""Tests the statistics of the comparison of two runs: ``python -m tests.benchmarks.bench_comparison``.
 
-On made walls: how often growth lies within its 95 % interval, how z scatters, how often anything at all is
-declared in a family of twelve defects where nothing changed. With ``--runs EARLIER LATER`` and the folders of
-their truths: growth of simulated runs beside the true one, read off the true walls within the same outlines;
-the earlier run is to begin at distance 0 and roll 0, so that its places are those of its truth. ``--simulate
-FOLDER`` renders and runs such runs of one pipe, ``earlier``, ``later`` (two defects grown, one new, one gone)
-and ``same`` (none changed), and ``other``, another pipe: 5 minutes of CPU.
+On simulated walls: how often growth lies within its 95 % interval, the spread of z, and how often any change
+is declared in a family of twelve defects of which none has changed.
+
+With ``--runs EARLIER LATER`` and the folders of their truths: growth measured in simulated runs beside the
+true one, which is read from the true walls within the same outlines. The earlier run must begin at distance 0
+and roll 0, so that its places are those of its truth.
+
+``--simulate FOLDER`` renders and runs such runs of one pipe: ``earlier``, ``later`` (two defects grown, one
+new, one gone), ``same`` (none changed), and ``other``, another pipe. It takes 5 minutes of CPU.
 """
 
 from __future__ import annotations
@@ -26,7 +29,7 @@ from tests.two_walls import PLACES, RADIUS, family
 
 
 def made_walls(families: int) -> None:
-    """Print coverage and scatter where pits grow, and what is declared where none does."""
+    """Print coverage and spread where pits grow, and the changes declared where none does."""
     z, declared = [], 0
     for seed in range(families):
         truth = np.random.default_rng(seed).uniform(-0.1, 0.3, len(PLACES))
@@ -81,7 +84,7 @@ def _extreme(wall, place, half, sign) -> float:
 
 
 def simulate(folder: Path) -> None:
-    """Render four recordings of a welded 4 inch pipe and run them: each a drive of its own."""
+    """Render four recordings of a welded 4 inch pipe, each with another drive, and run them."""
     stays = [
         _defect("pit", 70, -20, 8, 7, 0.9), _defect("gouge", 98, 50, 16, 3, 0.6, 20),
         _defect("dent", 64, -170, 24, 28, 1.2),
@@ -114,7 +117,7 @@ def _defect(kind, distance_mm, azimuth_deg, length_mm, width_mm, depth_mm, angle
 
 
 def _drive(name, defects, seed, start_mm, roll_deg, phase_deg):
-    """Return the welded pipe with these defects, driven otherwise."""
+    """Return the welded pipe with these defects and another drive."""
     scene = shipped("welded-4-inch")
     values = scene.model_dump(mode="json", exclude_defaults=True)
     motion = values["motion"] | {"start_mm": start_mm, "legs": [{"duration_s": 20.0, "speed_mm_s": 18.0}]}

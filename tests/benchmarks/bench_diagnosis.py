@@ -1,10 +1,11 @@
-"""Counts of the diagnosis on drawn gauge runs at ring level, one case after the other, to be gone on with.
+"""Counts of the diagnosis on drawn gauge runs at ring level; an interrupted benchmark can be continued.
 
 ``python -m tests.benchmarks.bench_diagnosis run RESULTS.jsonl --mode nulls --first 0 --count 300`` appends
-one line a case and leaves out those that are there; modes are those of `ring_level_cases`.
+one line a case and skips cases that have a line; modes are those of `ring_level_cases`.
+
 ``python -m tests.benchmarks.bench_diagnosis summary RESULTS.jsonl... [--proof PROOF.json]...`` prints the
-table of figures, those of rendered recordings (``boresight prove``) beside those of ring level; with
-``--spoil-answers`` each case is scored by another case's answer, and all must collapse.
+table of figures, those of rendered recordings (``boresight prove``) beside those of ring level. With
+``--spoil-answers`` each case is scored by the answer to another case, and all figures must get bad.
 """
 
 from __future__ import annotations
@@ -45,7 +46,7 @@ app = typer.Typer()
 
 
 def of_positions(library: Mapping[str, EffectModel]) -> dict[str, EffectModel]:
-    """Return what rings and fiducials are asked about when the profile shows nothing."""
+    """Return the effects that rings and fiducials can show when there is no evidence from the profile."""
     return {
         name: model
         for name, model in library.items()
@@ -54,7 +55,7 @@ def of_positions(library: Mapping[str, EffectModel]) -> dict[str, EffectModel]:
 
 
 def diagnosed(case: Drawn, left_out: Sequence[str]) -> dict[str, Any]:
-    """Return the answer as in diagnosis.json, and the SNR that an oracle sees."""
+    """Return the answer as in diagnosis.json, and the SNR for an oracle that knows the effect's name."""
     simulated = ring_level_run(case.scene, case.file, case.switches, case.noise)
     stated = simulated.truth.stated
     geometry, travel = None, None
@@ -71,7 +72,7 @@ def diagnosed(case: Drawn, left_out: Sequence[str]) -> dict[str, Any]:
     answer["candidates"] = [c for c in found["candidates"] if c["probability"] > 1e-3]  # type: ignore[attr-defined]
     answer["shortcomings"] = list(missing)
     if left_out and geometry is not None:
-        # Who knows the name fits it.
+        # The oracle knows the name and fits only its effect.
         travel = gauge_travel(simulated.recording, simulated.measured, geometry.searched.found.state)
     snr = [oracle_snr(s, geometry, travel, stated) for s in case.switches]
     return {"answer": answer, "snr": snr, "expected": geometry.expected if geometry is not None else None}
@@ -82,7 +83,7 @@ def oracle_snr(
 ) -> float | None:
     """Return the true size over the 1 σ of one who knows the effect's name; None where it was not scored.
 
-    The 1 σ is that of the score about the stated instrument, poses and stated uncertainty free.
+    This 1 σ is that of the score about the stated instrument, with poses and stated uncertainties free.
     """
     name, size = switch.name, abs(switch.values[0])
     estimate = travel.estimate(name) if travel is not None else None
@@ -130,7 +131,7 @@ def run(
     seconds: Annotated[float, typer.Option(help="begin no case after so long")] = 1e9,
     version: Annotated[str, typer.Option(help="of the code; else as git describes it")] = "",
 ) -> None:
-    """Diagnose drawn cases and append a line each; those that are there are left out."""
+    """Diagnose drawn cases and append a line for each; cases that have a line are skipped."""
     done = {(r["mode"], r["seed"]) for r in _lines([results])} if results.exists() else set()
     version = version or _described()
     end = time.monotonic() + seconds

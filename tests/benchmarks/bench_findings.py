@@ -1,12 +1,13 @@
-"""Whether the confidence of findings is true: drawn recordings, easy and hard, held against their truth.
+"""Whether the stated confidence of findings is true.
 
-usage: python -m tests.benchmarks.bench_findings OUT [--recordings N] [--first SEED] [--say-sure]
+Drawn recordings, easy and hard, compared with their truth. usage: python -m tests.benchmarks.bench_findings
+OUT [--recordings N] [--first SEED] [--say-sure]
 
 Every recording is drawn: texture, defects, speed, light, and how the footage was spoiled (compression,
-glints, dust on the window, noise, exposure). It is rendered small, run as far as its findings, and each
-finding is held against the drawn defects. What is in OUT is kept, so that many short sittings add up. Printed
-are, over all recordings: how often a finding of stated confidence is real, and the expected against the
-counted number of false ones. ``--say-sure`` states 1 for every finding: the table must then be refused.
+glints, dust on the window, noise, exposure). It is rendered in small and processed up to its findings, and
+each finding is compared with the drawn defects. Results in OUT are kept, so that the benchmark can be run in
+parts. It prints, over all recordings, how often a finding of stated confidence is real, and the expected and
+the counted number of false ones. ``--say-sure`` states 1 for every finding: then the table must be refused.
 """
 
 from __future__ import annotations
@@ -41,14 +42,15 @@ _SHRINK, _FRAMES, _WAY_MM = 3, 100, (50.0, 110.0)
 _BASES = ("straight-4-inch", "oval-3-inch", "welded-4-inch")
 _INTO = ("pit", "corrosion", "gouge")
 _KINDS = (*_INTO, "deposit", "dent")
-# Places of a finding and of the true wall may differ by the motion's error and half a ring's spacing. Beside
+# Positions of a finding and of the true wall may differ by the motion's error and half a ring's spacing.
+# Beside
 # a joint, whose edges are relief too, nothing is counted.
 _NEAR_MM, _JOINT_MM = 2.0, 14.0
-# A finding is real where the wall departs by half of the smallest depth that is reported, and by a part of
-# its own.
+# A finding is real where the true wall departs by half of the smallest depth that is reported, and by a share
+# of the finding's own depth.
 _LEAST_MM, _LEAST_SHARE = 0.1, 0.3
 _BINS = (0.0, 0.2, 0.5, 0.8, 0.95, 1.0)
-# A table is refused where a bin's counts would arise less often than this by chance.
+# A table is refused where chance would give the counts of a bin less often than this.
 _REFUSED = 1e-3
 
 
@@ -66,7 +68,7 @@ class Footage:
 
 @dataclass(frozen=True)
 class Counted:
-    """One finding held against the truth."""
+    """One finding compared with the truth."""
 
     recording: str
     confirmed: bool
@@ -77,7 +79,7 @@ class Counted:
 
 
 def drawn_footage(random: np.random.Generator) -> Footage:
-    """Draw how hard the footage is: one in three is as it was filmed."""
+    """Draw how hard the footage is: one in three is not spoiled."""
     if random.random() < 1 / 3:
         return Footage(16, 0, 0, 0.0, 1.0, 0.0)
     return Footage(
@@ -132,7 +134,7 @@ def _apart(one_deg: float, other_deg: float) -> float:
 
 
 def painter(footage: Footage, seed: int, centre: tuple[float, float]):  # type: ignore[no-untyped-def]
-    """Return what spoils a frame (H, W, 3); specks on the window stay where they are."""
+    """Return a function that spoils a frame (H, W, 3); specks on the window stay at their places."""
     still = np.random.default_rng(seed)
     specks = still.uniform((0, 0.3, 0.3), (2 * np.pi, 0.95, 0.8), (footage.specks, 3))
 
@@ -168,7 +170,7 @@ def _glints(image: Image, count: int, centre: tuple[float, float], random: np.ra
 
 
 def make(seed: int, out: Path) -> Path:
-    """Render and spoil the recording of a seed, unless it is there; return its folder."""
+    """Render and spoil the recording of a seed, unless it exists; return its folder."""
     scene = drawn_scene(seed)
     folder = out / scene.name
     if not (out / f"{scene.name}.footage.json").is_file():
@@ -182,7 +184,7 @@ def make(seed: int, out: Path) -> Path:
 
 
 def run(recording: Path, folder: Path) -> None:
-    """Run a recording as far as its findings."""
+    """Run a recording up to its findings."""
     job = open_job(recording, folder, None, _STAGES, _FILES, resolve(_STAGES, None, ()))
     run_job(job, Selection(), SilentDisplay())
 
@@ -196,7 +198,7 @@ class TrueWall:
     relief_mm: Float
 
     def extreme(self, found: dict[str, float]) -> float:
-        """Return the largest relief of a finding's own sign, where it is or up to 2 mm beside it."""
+        """Return the largest relief with a finding's sign, within its outline or up to 2 mm beside it."""
         rows = self.distance_mm > found["distance_from_mm"] - _NEAR_MM
         rows &= self.distance_mm < found["distance_to_mm"] + _NEAR_MM
         first, last = (np.radians(30 * found[clock] - 90) for clock in ("clock_from", "clock_to"))
@@ -207,7 +209,7 @@ class TrueWall:
 
 
 def true_wall(folder: Path) -> TrueWall:
-    """Read the drawn wall; its own oval is taken out of every row, defects having no say in it."""
+    """Read the drawn wall without its oval, which is fitted in every row robustly against defects."""
     with np.load(folder / "truth_wall.npz") as file:
         distance, azimuth, radius = (
             file[n].astype(float) for n in ("distance_mm", "azimuth_rad", "radius_mm")
@@ -221,7 +223,7 @@ def true_wall(folder: Path) -> TrueWall:
 
 
 def counted(scene: Scene, folder: Path, wall: TrueWall) -> list[Counted]:
-    """Return the findings of a run, each held against the true wall; joints and welds are left out."""
+    """Return the findings of a run, each compared with the true wall, without joints and welds."""
     ends = [w.distance_mm for w in (*scene.pipe.welds, *scene.pipe.joints)]
     out = []
     for name in ("defects", "unconfirmed"):
@@ -236,7 +238,10 @@ def counted(scene: Scene, folder: Path, wall: TrueWall) -> list[Counted]:
 
 
 def table(every: Sequence[Counted]) -> bool:
-    """Print how often findings of each stated confidence are real; return whether that may be chance."""
+    """Print how often findings of each stated confidence are real.
+
+    Return whether chance may explain the differences.
+    """
     stated, real = np.array([c.stated for c in every]), np.array([c.real for c in every])
     good = True
     print("stated        findings  mean stated  real   95 % of that")

@@ -1,7 +1,8 @@
-"""``run --follow`` while a recording is written at the camera's own pace: how far the live page lags.
+"""``run --follow`` while a recording is written at the camera's pace: how far the live page lags behind.
 
-A thread writes a copy of a recording as a recorder would, and the program follows it. Lag: from when a frame
-was in the file until the live page held its section; the last frames' lag includes the wait for rest.
+A thread writes a copy of a recording as a recorder would, and the program follows it. The lag of a frame
+lasts from its writing until the live page shows its section; for the last frames it includes the wait until
+the recording counts as complete.
 
 usage: python -m tests.benchmarks.bench_follow [RECORDING] [--pace FACTOR]
 """
@@ -28,7 +29,7 @@ QUIET_S, GRAIN_S = 3.0, 1 / 30
 
 
 def packet_ends(video):
-    """Times at which the recorder has each packet, s from the first, and where it ends in the file, bytes."""
+    """Return when the recorder has each packet, s from the first, and where it ends in the file, bytes."""
     with av.open(str(video)) as container:
         stream = container.streams.video[0]
         packets = [(p.dts if p.dts is not None else p.pts, p.pos) for p in container.demux(stream) if p.size]
@@ -38,7 +39,7 @@ def packet_ends(video):
 
 
 def write_at_pace(source, place, pace, written):
-    """Write frames, table and encoder of ``source`` into ``place`` as time goes by; note when which were."""
+    """Write frames, table and encoder of ``source`` into ``place`` at the given pace; record the times."""
     tables = {name: rows(source / name) for name in ("frames.csv", "encoder.csv")}
     done = dict.fromkeys(tables, 0)
     time_s, end = packet_ends(source / "frames.mkv")
@@ -62,7 +63,7 @@ def write_at_pace(source, place, pace, written):
 
 
 def rows(table):
-    """Times and lines of a table; the head goes with the first line."""
+    """Return times and lines of a table; the header belongs to the first line."""
     head, *lines = table.read_text().splitlines(keepends=True)
     column = next(csv.reader([head])).index("time_s")
     times = np.array([float(next(csv.reader([line]))[column]) for line in lines])
@@ -70,7 +71,7 @@ def rows(table):
 
 
 def follow_paced(source, pace):
-    """Frames written over time, and pages: (time, last frame on it) each; processor time spent following."""
+    """Return the times of written frames, the pages (time, last frame on it), and the CPU time."""
     written, pages, write = [], [], command.write_live_page
     with tempfile.TemporaryDirectory() as name:
         place = Path(name) / "recording"
@@ -93,7 +94,7 @@ def follow_paced(source, pace):
 
 
 def lags(written, pages):
-    """Seconds from a frame's being written to its being on a page, for the last frame of every new page."""
+    """Return the lag, s, of the last frame of every new page."""
     fresh = pages[np.flatnonzero(np.diff(pages[:, 1], prepend=-1) > 0)]
     there = np.searchsorted(written[:, 1], fresh[:, 1] + 1)
     return fresh[:, 0] - written[np.minimum(there, len(written) - 1), 0]

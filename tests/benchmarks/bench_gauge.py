@@ -1,4 +1,7 @@
-"""Made gauge runs with drawn probes: do the 95 % intervals hold, is there bias? usage: bench_gauge [RUNS]"""
+"""Simulated gauge runs with drawn probes: coverage of the 95 % intervals, and bias.
+
+Usage: bench_gauge [RUNS]
+"""
 
 from __future__ import annotations
 

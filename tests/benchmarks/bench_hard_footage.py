@@ -1,13 +1,12 @@
 """Hard footage made of an open recording, run and scored: one line of the table for each kind and seed.
 
-usage: python -m tests.benchmarks.bench_hard_footage OUT [KIND ...]
-           [--recording NAME] [--frames N] [--seeds N] [--probe FILE] [--spoil-answers]
+usage: python -m tests.benchmarks.bench_hard_footage OUT [KIND ...] [--recording NAME] [--frames N] [--seeds
+N] [--probe FILE] [--spoil-answers]
 
-Without KIND all are made. What is there in OUT is kept: footage, run and score are made once. The footage of
-`SPOILT` is the shared `harder.py`'s; that of `hard_kinds` is ours, so that nothing is fitted to the former.
-
-With `--spoil-answers` runs that are there are scored once more with a wall 0.3 mm too wide and findings moved
-by 30 mm: every figure must then be bad.
+Without KIND all kinds are made. Footage, runs and scores that are in OUT are not made again. The footage of
+`SPOILT` is that of the shared `harder.py`; that of `hard_kinds` is ours, so that nothing is fitted to the
+former. With `--spoil-answers` existing runs are scored once more with a wall 0.3 mm too wide and findings
+moved by 30 mm: then every figure must be bad.
 """
 
 from __future__ import annotations
@@ -61,7 +60,7 @@ SPOILT = {
 
 
 def make(kind: str, source: Path, folder: Path, frames: int, seed: int) -> None:
-    """Make the footage of a kind; our own kinds spoil what `harder.py` makes of the clean recording."""
+    """Make the footage of a kind; our own kinds change what `harder.py` makes of the clean recording."""
     if kind in SPOILT:
         harder = [sys.executable, str(shared("harder.py")), str(source), str(folder), *SPOILT[kind]]
         subprocess.run([*harder, "--frames", str(frames), "--seed", str(seed)], check=True)
@@ -93,7 +92,7 @@ def repaint(
     folder: Path, paint: Paint, seed: int, codec: str = "libx264", options: dict[str, str] = CAREFUL,
     taken: Mapping[int, int] | None = None,
 ) -> None:  # fmt: skip
-    """Put every frame of a recording through ``paint``, and store them with a codec, perhaps exchanged."""
+    """Apply ``paint`` to every frame of a recording and encode them, perhaps in another order."""
     random, video, painted = np.random.default_rng(seed), folder / "frames.mkv", folder / "painted.mkv"
     rows = (folder / "frames.csv").read_text("utf-8").splitlines()[1:]
     laser = [not row.endswith("led") for row in rows]
@@ -124,7 +123,7 @@ def scored(footage: Path, run: Path, more: list[str]) -> dict[str, dict[str, flo
 
 
 def spoilt(footage: Path, run: Path) -> dict[str, dict[str, float]]:
-    """Score the run's answers when wall and findings are wrong."""
+    """Score the run's answers with a wrong wall and wrong findings."""
     with tempfile.TemporaryDirectory() as folder:
         wrong = Path(folder) / "run"
         shutil.copytree(run, wrong, ignore=shutil.ignore_patterns(".boresight", "tileset", "*.glb", "*.ply"))

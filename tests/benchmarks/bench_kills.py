@@ -1,8 +1,9 @@
-"""Kill -9 at random moments of what boresight does, go on, and compare with what was not disturbed.
+"""Kill boresight with -9 at random moments, continue, and compare with undisturbed results.
 
 ``python -m tests.benchmarks.bench_kills [run=140 batch=40 review=40 calibrate=20 diagnose=10 prove=10]``
-prints how often each was killed, in which stages, and what was lost or came out different; it fails when
-anything was. Calibrate, diagnose and prove take a pair drawn from the small prior, minutes of work each.
+prints how often each command was killed, in which stages, and what was lost or came out different; it fails
+if anything was. Calibrate, diagnose and prove use a pair drawn from the small prior, which takes minutes
+each.
 """
 
 from __future__ import annotations
@@ -31,7 +32,7 @@ TIMED = re.compile(r"^(timing\.json|proof\.(json|html)|nonce\.txt|sealed\.yaml)$
 
 
 def main(kills: dict[str, int]) -> int:
-    """Return the number of results lost or different."""
+    """Return the number of results that were lost or different."""
     with tempfile.TemporaryDirectory() as temporary:
         folder = Path(temporary)
         for name in ("one", "two"):
@@ -42,13 +43,13 @@ def main(kills: dict[str, int]) -> int:
 
 
 def killed_runs(folder: Path, kills: int) -> int:
-    """Return how many files of runs came out different."""
+    """Return how many files of runs were different."""
     recording = str(folder / "recordings" / "one")
     return _killed(folder, "run", ["run", recording, *QUICK], kills)
 
 
 def killed_batches(folder: Path, kills: int) -> int:
-    """Return how many files of batches came out different."""
+    """Return how many files of batches were different."""
     return _killed(folder, "batch", ["batch", str(folder / "recordings"), "--workers", "2", *QUICK], kills)
 
 
@@ -58,7 +59,7 @@ def killed_reviews(folder: Path, kills: int) -> int:
     with ReviewServer(folder / "whole-run") as server:
         answered = sum(_added(server, k) for k in range(3))
         for _ in range(kills):
-            # A busy machine answers late: about every second kill is to come before the answer.
+            # A busy machine answers late: about every second kill must come before the answer.
             began = time.perf_counter()
             answered += _added(server, answered)
             stop = _kill_soon(server, 2 * (time.perf_counter() - began) * chance.random())
@@ -75,18 +76,18 @@ def killed_reviews(folder: Path, kills: int) -> int:
 
 
 def killed_calibrations(folder: Path, kills: int) -> int:
-    """Return how many files of calibrations came out different."""
+    """Return how many files of calibrations were different."""
     return _killed_command(folder, ["calibrate", str(_pair(folder) / f"{PAIR}-gauge")], "probe.yaml", kills)
 
 
 def killed_diagnoses(folder: Path, kills: int) -> int:
-    """Return how many files of diagnoses came out different."""
+    """Return how many files of diagnoses were different."""
     field, gauge = (str(_pair(folder) / f"{PAIR}-{kind}") for kind in ("field", "gauge"))
     return _killed_command(folder, ["diagnose", field, "--gauge", gauge], "diagnosis.json", kills)
 
 
 def killed_proofs(folder: Path, kills: int) -> int:
-    """Return how many files of proofs came out different; killed in rendering, diagnosing and scoring."""
+    """Return how many files of proofs were different; kills come while rendering, diagnosing and scoring."""
     return _killed_command(folder, ["prove", "--cases", "1", "--prior", str(PRIOR)], "proof.json", kills)
 
 
@@ -99,7 +100,7 @@ def _pair(folder: Path) -> Path:
 
 
 def _killed_command(folder: Path, words: list[str], answer: str, kills: int) -> int:
-    """Kill a command again and again; whenever its answer is there, all its files must be the right ones."""
+    """Kill a command repeatedly; whenever its answer exists, all its files must be the right ones."""
     started = time.perf_counter()
     _finish(words, folder / f"whole-{words[0]}")
     duration, whole = time.perf_counter() - started, _files(folder / f"whole-{words[0]}")
@@ -127,7 +128,7 @@ def _killed_command(folder: Path, words: list[str], answer: str, kills: int) -> 
 
 
 def _files(folder: Path) -> dict[str, bytes]:
-    """Return the files that must come out the same: all but times, and random nonces of seals."""
+    """Return the files that must be equal: all without times and without the random nonces of seals."""
     return {
         str(p.relative_to(folder)): p.read_bytes()
         for p in sorted(folder.rglob("*"))
@@ -157,7 +158,7 @@ def _kill_soon(server: ReviewServer, delay_s: float):
 
 
 def _killed(folder: Path, name: str, words: list[str], kills: int) -> int:
-    """Kill one command again and again, finishing now and then; return the number of files that differ."""
+    """Kill one command repeatedly and let it finish now and then; return the number of files that differ."""
     started = time.perf_counter()
     _finish(words, folder / f"whole-{name}")
     duration, whole = time.perf_counter() - started, run_content(folder / f"whole-{name}")

@@ -1,18 +1,19 @@
-"""What each stage takes, in time per metre and in memory, for a pipe of 1, 10 and 100 m.
+"""Processor time per metre and memory of each stage, for a pipe of 1, 10 and 100 m.
 
     python -m tests.benchmarks.bench_length RUN --metres 1,10,100          # RUN: a finished run
     python -m tests.benchmarks.bench_length RUN --only motion --metres 1,10
     python -m tests.benchmarks.bench_length RUN --recording FOLDER         # rings and texture, from video
 
-What the stages see: ``motion`` (its adjustment, not the following of texture in pictures) drawn tracks, rings
-and encoder readings of every ``--coarser``-th frame, one each 0.6 mm; ``triangulate`` and all
-after it the rings and the motion of RUN repeated end to end along a straight pipe, every ``--coarser``-th
-azimuth of them, on a map as much coarser; ``rings`` and ``texture``, with ``--recording``, a real video once
-and then repeated, decoded anew each time. Nothing is extrapolated: a length that was not run has no line.
+Inputs of the stages: ``motion`` (its adjustment, not the tracking of texture in pictures) gets simulated
+tracks, rings and encoder readings of every ``--coarser``-th frame, one each 0.6 mm. ``triangulate`` and all
+stages after it get the rings and the motion of RUN repeated end to end along a straight pipe, every
+``--coarser``-th azimuth of them, on a map as much coarser. With ``--recording``, ``rings`` and ``texture``
+get a real video once and then repeated, decoded anew each time. Nothing is extrapolated: a length that was
+not run has no line.
 
-Each stage runs in a process of its own that may hold 4 GiB of its own memory (RLIMIT_DATA) and fails beyond.
-Told is the most that it and its helpers held (RssAnon: pages mapped from files are the system's to drop), and
-the processor time of all of them.
+Each stage runs in a separate process, which fails beyond 4 GiB of private memory (RLIMIT_DATA). Printed are
+the largest memory that it and its helpers held (RssAnon, without pages mapped from files, which the system
+can drop), and the processor time of all of them.
 """
 
 from __future__ import annotations
@@ -111,7 +112,7 @@ def main() -> None:
 
 
 def _measure(given: argparse.Namespace, folder: Path, stage: str, size: float) -> None:
-    """Run one stage in a process of its own and print its line."""
+    """Run one stage in a separate process and print its line."""
     command = [sys.executable, "-m", "tests.benchmarks.bench_length", *sys.argv[1:], "--keep", str(folder)]
     done = subprocess.run(
         [*command, "--child", stage, f"{size:g}"], stdout=subprocess.PIPE, text=True, check=False
@@ -139,7 +140,7 @@ def _child(given: argparse.Namespace, stage: str, size: str) -> None:
 def _work(
     given: argparse.Namespace, store: Store, stage: str, size: float
 ) -> tuple[Callable[[], Any], float]:
-    """Return what is to be measured, all that it needs already at hand, and the length that it covers."""
+    """Return the function to measure, with all its inputs prepared, and the length that it covers."""
     context = replace(quiet_context(workers=1), scratch=Scratch(store.folder))
     if stage in FROM_VIDEO:
         return _from_video(given, stage, int(size), context)
@@ -182,11 +183,11 @@ def _work(
 
 
 def _agree(estimate: Estimate) -> None:
-    """Find nothing wrong with a window."""
+    """Report no problem with any window."""
 
 
 class Made:
-    """Results of the stages before, read when they are needed."""
+    """The results of earlier stages, read from the store when they are needed."""
 
     def __init__(self, store: Store) -> None:
         self._store = store
@@ -216,7 +217,7 @@ def _tileset(recording: Recording, made: Made, folder: Path) -> None:
 
 
 class Inputs:
-    """A run repeated to a length: probe, recording, and rings, motion and photo put into the store."""
+    """A run repeated to a length: probe, recording, and a store with its rings, motion and photo."""
 
     def __init__(self, given: argparse.Namespace, store: Store, metres: float) -> None:
         run = RunFiles(given.run.resolve())

@@ -5,12 +5,12 @@
 Writes into OUT, per length, the scene (pulled_4_inch.yaml made longer), the recording with its
 truth beside it (`boresight simulate`) and the run (`boresight run --config configs/long.yaml`); what is there
 already of scene and recording is kept. 100 m are 20 000 frames: about half an hour of rendering on one core
-and 7 GiB of memory, none of which counts. Nothing is extrapolated: a length that was not run has no line.
+and 7 GiB of memory, which are not counted. Nothing is extrapolated: a length that was not run has no line.
 
-The run is one process with its helpers, and told is the most that they held of their own at one moment
-(RssAnon: pages mapped from files are the system's to drop), and the processor time of all of them. Files for
-people are written beside the stages that follow: what they cost counts there, the last of it as ``files``.
-Stages that work side by side have a line together.
+The run is one process with its helpers. Printed are the largest private memory that they held at one moment
+(RssAnon, without pages mapped from files, which the system can drop), and the processor time of all of them.
+Exported files are written while the next stages work, and count there; the last of them count as ``files``.
+Stages that work at the same time share a line.
 """
 
 from __future__ import annotations
@@ -89,7 +89,7 @@ def require_recording(place: Place, metres: int) -> None:
 
 
 def watched_run(place: Place, config: Path) -> Watch:
-    """Process a recording from nothing; return what each stage took."""
+    """Process a recording from the start; return what each stage took."""
     log = place.run / ".boresight" / "run.log"
     log.unlink(missing_ok=True)
     command = ("run", str(place.recording), "-o", str(place.run), "--config", str(config), "--no-resume")
@@ -138,7 +138,7 @@ def findings(place: Place) -> str:
 
 
 def table(found: dict[int, Watch]) -> str:
-    """Return processor seconds per metre and most MiB of every stage, one column a length."""
+    """Return processor seconds per metre and the largest memory, MiB, of every stage, one column a length."""
     stages = list(dict.fromkeys(s for watch in found.values() for s in watch.cpu_s))
     lines = ["| stage, processor s per m (most MiB) | " + " | ".join(f"{n} m" for n in found) + " |"]
     lines.append("|---" * (len(found) + 1) + "|")

@@ -1,10 +1,11 @@
-"""Loops closed on rendered recordings there and back, against the truth; and welds that must not be confused.
+"""Loop closure on rendered recordings there and back, against the truth; and welds that must not be confused.
 
 ``python -m tests.benchmarks.bench_loops OUT [--length MM] [SCENE ...]``. Scenes (`loop_scenes`) are rendered
-into OUT unless they are there, and processed in windows of 150 frames. For each: how far the way back lies
-off the way out before and after loops are closed, errors against the truth with their stated 1 σ, and a
-control: frames of the way back with a weld in view are compared with frames of the way out that see another
-weld, where nothing may be recognised. Some 10 min of processor time for both scenes at 1.5 m.
+into OUT unless they exist, and processed in windows of 150 frames. Printed for each: the difference between
+the way out and the way back at the same places, before and after loops are closed; errors against the truth
+with their stated 1 σ; and a control, in which frames of the way back with a weld in view are compared with
+frames of the way out at another weld, where nothing may be recognised. Both scenes take some 10 min of
+processor time at 1.5 m.
 """
 
 from __future__ import annotations
@@ -41,7 +42,7 @@ _CONTROL = ExpectedShift(np.zeros(2), np.array([60.0, 30.0]))
 
 @dataclass(frozen=True)
 class Measured:
-    """A recording with what does not depend on loops."""
+    """A recording with the results that do not depend on loops."""
 
     recording: Recording
     probe: Probe
@@ -108,7 +109,7 @@ def _telling(told: dict[str, float | int | str]) -> Context:
 
 
 def _print_errors(found: Trajectory, true_T_pc: Float) -> None:
-    """Print differences of the way back to the way out, and errors at its last lit frame but one."""
+    """Print differences between the ways out and back, and the errors at the last lit frame but one."""
     distance, roll, aside = _errors(found, true_T_pc)
     there, here = _pairs(true_T_pc[:, 2, 3])
     sigma = np.sqrt(np.diagonal(found.covariance, axis1=1, axis2=2))
@@ -126,7 +127,7 @@ def _print_errors(found: Trajectory, true_T_pc: Float) -> None:
 
 
 def _print_wall(found: Trajectory, measured: Measured) -> None:
-    """Print the errors of the wall that both ways together give."""
+    """Print the errors of the wall made from both ways together."""
     parameters, context = AccumulateParameters.model_validate({}), quiet_context()
     wall = accumulate_wall(measured.probe, measured.rings, measured.points, found, parameters, context)
     compared = compare_wall(wall.radius_map, measured.truth)
@@ -150,7 +151,7 @@ def _errors(found: Trajectory, true_T_pc: Float) -> tuple[Float, Float, Float]:
 
 
 def _pairs(true_s: Float) -> tuple[Int, Int]:
-    """Return frames out and back, all lit, at the same place; the last few frames are left out."""
+    """Return lit frames of the ways out and back at the same place, without the last few frames."""
     lit, turn = np.arange(1, len(true_s) - 4, 2), int(np.argmax(true_s))
     here = lit[lit > turn + 30]
     out = lit[lit < turn]
@@ -163,7 +164,7 @@ def _rms(value: Float) -> float:
 
 
 def _control(measured: Measured) -> None:
-    """Compare frames of the way back with those of the way out that see another, like weld."""
+    """Compare frames of the way back with those of the way out that see another weld of the same look."""
     parameters = MotionParameters.model_validate({})
     radius_mm = measured.recording.pipe.nominal_diameter_mm / 2
     near, far = (

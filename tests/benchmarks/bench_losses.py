@@ -1,10 +1,10 @@
-"""How many lost pictures are invented, and how many found, over drawn runs of a probe pulled by hand.
+"""How many lost pictures are reported wrongly and rightly, in simulated runs of a probe pulled by hand.
 
 usage: python -m tests.benchmarks.bench_losses RUNS FIRST_SEED
 
-Of each kind of encoder RUNS are drawn without losses, and a quarter as many with three each: 1, 2 or 4
-periods of the lights. A loss counts as found where as many pictures are told as were lost, within one period
-of the lights; where the wall stands, as for a fifth of the time, none can be.
+Of each kind of encoder RUNS are drawn without losses, and a quarter as many with three each of 1, 2 or 4
+periods of the lights. A loss counts as found where as many pictures are reported as were lost, within one
+period of the lights. While the probe stands still, as for a fifth of the time, none can be found.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ def main(runs: int, first: int) -> None:
 
 
 def three_losses(seed: int, rhythm: int) -> np.ndarray[tuple[int], np.dtype[np.int64]]:
-    """Return the pictures that are lost in three places."""
+    """Return the pictures that are lost, at three places."""
     random = np.random.default_rng(1000 + seed)
     at = np.sort(random.choice(np.arange(20, 380, 40), 3, replace=False))
     return np.concatenate([NOTHING, *(k + np.arange([1, 2, 4][seed % 3] * rhythm) for k in at)])

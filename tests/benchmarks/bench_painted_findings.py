@@ -1,17 +1,18 @@
-"""Whether findings and their depths are true: defects painted into the rings of finished runs.
+"""Whether findings and their depths are true: defects are inserted into the rings of finished runs.
 
 usage: python -m tests.benchmarks.bench_painted_findings RUN=RECORDING ... [--draws N] [--keep FOLDER]
-           [--say-sure] [--shift-truth MM]
+[--say-sure] [--shift-truth MM]
 
-The background is a run's own rings with all that was in its pictures; the search never made it. Defects of
-drawn kind, size and depth are painted into the rings where the run says that each sample lies on the wall;
-the wall is then accumulated and searched as in a run. Each recording is also taken with every second ring
-only, the even and the odd ones: other noise, fewer rings on each defect. What the recording itself has of
-defects is left out of the count.
+The background are the real rings of a run, with all flaws of its pictures; it was not made by the program
+under test. Defects of drawn kind, size and depth are inserted into the rings where the run places each sample
+on the wall; the wall is then accumulated and searched as in a run. Each recording is also used with every
+second ring only, the even and the odd ones: other noise, fewer rings on each defect. The recording's own
+defects are not counted.
 
 Printed are: how often a finding of stated confidence is real, with the expected and the counted false ones;
 how many depths lie in their 95 % interval; how many defects are missed. ``--say-sure`` states 1 for every
-finding, ``--shift-truth`` moves the painted defects by so much after the search: the tables must collapse.
+finding, and ``--shift-truth`` moves the inserted defects by so much after the search: then the tables must
+get bad.
 """
 
 from __future__ import annotations
@@ -49,7 +50,7 @@ _EVERY = {"all": slice(None), "even": slice(0, None, 2), "odd": slice(1, None, 2
 
 @dataclass(frozen=True)
 class Case:
-    """What was painted and what was found."""
+    """The inserted defects and the findings."""
 
     name: str
     painted: list[Painted]
@@ -89,7 +90,7 @@ def cases(bg: Background, draws: int, seed: int) -> Iterator[Case]:
 
 
 def true_extreme(case: Case, found: Defect) -> float:
-    """Return the largest true departure of a finding's sign within its outline, over a millimetre."""
+    """Return the largest true departure with a finding's sign in its outline, averaged over a millimetre."""
     grid_s = np.arange(found.distance_from_mm - _NEAR_MM, found.distance_to_mm + _NEAR_MM, 0.2)
     first, last = (np.radians(30 * c - 90) for c in (found.clock_from, found.clock_to))
     span = (last - first) % (2 * np.pi) if found.clock_to - found.clock_from < 12 else 2 * np.pi
@@ -105,7 +106,7 @@ def true_extreme(case: Case, found: Defect) -> float:
 
 
 def _natural(true: TrueWall, distance: Float, azimuth: Float) -> Float:
-    """Return the relief (n, m) that the wall had before anything was painted."""
+    """Return the relief (n, m) that the wall had before defects were inserted."""
     step = 2 * np.pi / len(true.azimuth_rad)
     column = np.rint((azimuth - true.azimuth_rad[0]) / step).astype(int) % len(true.azimuth_rad)
     row = np.rint((distance - true.distance_mm[0]) / (true.distance_mm[1] - true.distance_mm[0])).astype(int)
@@ -113,7 +114,7 @@ def _natural(true: TrueWall, distance: Float, azimuth: Float) -> Float:
 
 
 def _is_own(case: Case, found: Defect) -> bool:
-    """Whether a finding lies on one of the recording's own defects."""
+    """Return whether a finding lies on one of the recording's own defects."""
     first, last = (np.radians(30 * c - 90) for c in (found.clock_from, found.clock_to))
     middle, half = first + (last - first) % (2 * np.pi) / 2, (last - first) % (2 * np.pi) / 2 * case.radius_mm
     for s, psi, along, around in case.own:
@@ -125,7 +126,7 @@ def _is_own(case: Case, found: Defect) -> bool:
 
 
 def counted(case: Case) -> tuple[list[Counted], list[Float], int, int]:
-    """Return findings against the painted, (found, true, σ) of real ones, and asked and missed defects."""
+    """Return findings beside the truth, (found, true, σ) of real ones, and demanded and missed defects."""
     out, depths = [], []
     every = [(d, True) for d in case.found.items] + [(d, False) for d in case.found.unconfirmed]
     for found, confirmed in every:
@@ -151,7 +152,7 @@ def _covers(case: Case, found: Defect, d: Painted) -> bool:
 
 
 def shifted(case: Case, shift_mm: float) -> Case:
-    """Return a case whose painted defects are said to lie elsewhere."""
+    """Return a case whose inserted defects are moved in the truth."""
     moved = [replace(d, distance_mm=d.distance_mm + shift_mm) for d in case.painted]
     return replace(case, painted=moved)
 
@@ -182,7 +183,7 @@ def main() -> None:
 
 
 def line(case: Case) -> str:
-    """Return what was found of one case, in words."""
+    """Return the result of one case in words."""
     found, depths, asked, missed = counted(case)
     sure, apart = ([c for c in found if c.confirmed is which] for which in (True, False))
     z = [(d[0] - d[1]) / d[2] for d in depths]

@@ -1,8 +1,8 @@
-"""What a real probe's rings say of its two published models. usage: bench_pipeblaser OUT
+"""Tests two published models of a real probe with its rings. usage: bench_pipeblaser OUT
 
-Sixteen single frames of one smooth round pipe at different tilts and offsets, no texture, no motion, the
-pipe's size unknown. Poses and radius are free; every effect of the library is asked about; sizes found on
-half of the frames are tried on the others. Writes tables and pictures into OUT.
+Sixteen single frames of one smooth round pipe at different tilts and offsets, without texture and motion; the
+pipe's size is unknown. Poses and radius are free, and every effect of the library is fitted; sizes found on
+half of the frames are tested on the others. Writes tables and pictures into OUT.
 """
 
 from __future__ import annotations
@@ -33,7 +33,10 @@ SEEN = 1e-8
 
 @dataclass(frozen=True)
 class Told:
-    """One effect: amplitude and 1 σ on all frames, χ², p, and the r.m.s. in px on frames not used for it."""
+    """One effect: amplitude and 1 σ from all frames, χ², p, and the r.m.s.
+
+    In px on frames not used for it.
+    """
 
     name: str
     model: EffectModel
@@ -46,7 +49,10 @@ class Told:
 
 
 def asked() -> list[tuple[str, EffectModel, Shape]]:
-    """Return what single still frames of rings can be asked about: static, without texture of the wall."""
+    """Return the effects that single frames of rings can show.
+
+    Static ones that need no texture of the wall.
+    """
     out: list[tuple[str, EffectModel, Shape]] = []
     for name, model in LIBRARY.items():
         shapes = model.shapes(1.0, 1.0)
@@ -77,7 +83,10 @@ def told(rings: Rings, probe: Probe, found: Fitted, halves: Sequence[tuple[Rings
 def heldout_px(
     halves: Sequence[tuple[Rings, Fitted]], probe: Probe, model: EffectModel, shape: Shape
 ) -> float:
-    """Return the r.m.s. on each half with the size found on the other; poses and radius always anew."""
+    """Return the r.m.s. on each half with the size found on the other.
+
+    Poses and radius are always fitted again.
+    """
     squares = []
     for (use, known), (test, plain) in (halves, halves[::-1]):
         estimate = _estimate(known, use, model, shape)
@@ -88,14 +97,17 @@ def heldout_px(
 
 
 def core(residual_px: Float, weight: Float) -> Float:
-    """Return the squares of what is no outlier under the published model."""
+    """Return the sum of squares without outliers under the published model."""
     return np.asarray(residual_px[weight > 0.1] ** 2)
 
 
 def _estimate(
     found: Fitted, rings: Rings, model: EffectModel, shape: Shape
 ) -> tuple[Float, Float, float] | None:
-    """Return amplitude, covariance (cells of a frame's neighbours err alike) and χ², poses eliminated."""
+    """Return amplitude, covariance and χ², with poses eliminated.
+
+    Errors of neighbouring bins of a frame are correlated, which the covariance allows for.
+    """
     by_effect = -found.mm_per_px[:, None] * columns(model, found.points, shape)
     good = np.isfinite(by_effect).all(1)
     w = np.sqrt(found.weight * good)
@@ -116,7 +128,7 @@ def _estimate(
 
 
 def floor_px(found: Fitted, rings: Rings, waves: int = 10) -> float:
-    """Return the r.m.s. of the residual about so many waves of its own in every frame."""
+    """Return the r.m.s. of the residual about a sum of so many harmonics, fitted in every frame."""
     out = []
     for k in np.unique(rings.frame):
         here = (rings.frame == k) & (found.weight > 0.1)

@@ -1,15 +1,16 @@
 """A real probe's ring pictures beside the same pictures, re-rendered. usage: bench_pipeblaser_twin OUT
 
 Sixteen single frames of one smooth pipe, without texture, motion or photo: what can be modelled is the line's
-profile, the background and the noise. The profile of every other frame is tried on those between, by a noise
-that pixels along the line tell: neither frames nor profile that are judged have a part in it. Brightness
-and background of each frame's line are its own, in blocks of 1.5°. Writes recorded | re-rendered | z of the
-worst frame into OUT, maps of z of all frames (z.png: grey is none, white +8, black −8), and says of what kind
-the rest is that the noise does not explain: each kind is foretold by pixels that have no part in it.
+profile, the background and the noise. The profile measured in every other frame is tested on the frames
+between them. The noise is estimated from differences along the line, independent of the profile. Brightness
+and background of each frame's line are fitted in that frame, in blocks of 1.5°. Writes recorded | re-rendered
+| z of the worst frame into OUT, maps of z of all frames (z.png: grey is none, white +8, black −8), and prints
+which kinds of residual remain beyond the noise: each kind is predicted from other pixels than those it is
+tested on.
 
-Noise is told by pixels two apart, which see no more than what is white, and ten apart, beyond a block of the
-coder (these pictures were JPEGs: steps of the luma's coefficients 8 6 6 7 7 8, quality 75) and beyond grains
-of speckle. The difference is noise that neighbours share.
+Differences of pixels two apart give the white noise. Those ten apart, beyond a block of the codec (these
+pictures were JPEGs: steps of the luma's coefficients 8 6 6 7 7 8, quality 75) and beyond grains of speckle,
+give all noise. The difference of both is noise that neighbours share.
 """
 
 from __future__ import annotations
@@ -32,17 +33,19 @@ from tests.shared_data import shared
 
 RED, RED_NM, WHITE = 2, 650.0, 250.0
 WIDE = 6.0
-"""Widths of the line, to each side, that are looked at for what remains."""
+"""Distances from the line, in its widths to each side, within which residuals are examined."""
 BLOCKS, HALF_PX, BROAD_PX, BINS = 240, 12.0, 8.0, 24
 CENTRE = (0.445, 0.524)
 WHITE_PX, APART_PX, ASIDE, FEWEST = 2, 10, 0.04, 30
-"""How far apart pixels are that tell the noise, both even, for the camera's mosaic; tangent of how far the
-line may turn from a row or column, and fewest pixels of a bin."""
+"""Distances of the pixels whose differences give the noise, both even, for the camera's mosaic.
+
+Then the tangent of the largest angle between line and row or column, and the fewest pixels of a bin.
+"""
 
 
 @dataclass(frozen=True)
 class RealFrame:
-    """A picture's red channel (H, W), its background, where the line is not, and its line in blocks."""
+    """A picture's red channel (H, W), its background away from the line, and its line in blocks."""
 
     grey: Float32
     ground: Float32
@@ -53,7 +56,7 @@ class RealFrame:
 
 
 def real_frame(file: Path) -> RealFrame:
-    """Return a picture with its ring traced."""
+    """Return a picture with its traced ring."""
     image = cv2.imread(str(file))
     assert image is not None
     image[:, -2:] = 0
@@ -88,7 +91,7 @@ def real_frame(file: Path) -> RealFrame:
 
 
 def rendered(frame: RealFrame, light: BlockLight) -> tuple[Float, Float]:
-    """Return grey levels (N,) of the pixels about the line, and the part of them that is the line."""
+    """Return grey levels (N,) of the pixels about the line, and the part of them that is the line's."""
     b = frame.blocks
     x = b.offset_px / b.width_px[b.block]
     shape = np.interp(x, light.x, light.profile, left=0.0, right=0.0)
@@ -103,8 +106,8 @@ def rendered(frame: RealFrame, light: BlockLight) -> tuple[Float, Float]:
 def noise_of(frames: list[RealFrame], apart_px: int) -> Float:
     """Return variances: of dark pixels, per grey level, and relative to the line's square (speckle).
 
-    From second differences along the line, where it runs along rows or columns of the picture: its profile,
-    and light that changes slowly, have no part in them.
+    They are estimated from second differences along the line, where it runs along rows or columns of the
+    picture, so that its profile and light that changes slowly have no influence.
     """
     each = [_along_line(f, apart_px) for f in frames]
     level, line, square = (np.concatenate(p) for p in zip(*each, strict=True))
@@ -117,7 +120,7 @@ def noise_of(frames: list[RealFrame], apart_px: int) -> Float:
 
 
 def _along_line(frame: RealFrame, apart_px: int) -> tuple[Float, Float, Float]:
-    """Return level, line's part and squared noise (N,) of pixels about the line next to the axes."""
+    """Return level, line's part and squared noise (N,) of pixels where the line is parallel to an axis."""
     u, v = frame.column - frame.blocks.centre_px[0], frame.row - frame.blocks.centre_px[1]
     found = []
     for across, along, step in ((u, v, (apart_px, 0)), (v, u, (0, apart_px))):
@@ -134,12 +137,12 @@ def _along_line(frame: RealFrame, apart_px: int) -> tuple[Float, Float, Float]:
 
 
 def variance_of(noise: Float, level: Float, line: Float) -> Float:
-    """Return the variance (N,) of pixels, that of rounding at least."""
+    """Return the variance (N,) of pixels, at least that of rounding."""
     return np.asarray(np.maximum(noise[0] + noise[1] * np.maximum(level, 0) + noise[2] * line**2, 1 / 12))
 
 
 def main(out: Path) -> None:
-    """Print profile, noise and χ² of frames that had no part in them; write the worst frame."""
+    """Print profile, noise and χ² of frames that were not used for them; write the worst frame."""
     files = sorted((shared() / "real" / "pipeblaser_cmu" / "rings_v1").glob("*.png"))
     frames = [real_frame(f) for f in files]
     left: dict[int, Float] = {}
@@ -199,7 +202,7 @@ def _write(frame: RealFrame, z: Float, light: BlockLight, file: Path) -> None:
 
 
 def _remaining(frames: list[RealFrame], left: list[Float]) -> str:
-    """Return in words what part of the squares of z each kind of cell foretells, one after the other."""
+    """Return in words which share of the squares of z each kind of cell predicts, one after the other."""
     z = np.concatenate(left)
     frame = np.repeat(np.arange(len(frames)), [len(part) for part in left])
     blocks = [f.blocks for f in frames]
@@ -226,7 +229,7 @@ def _remaining(frames: list[RealFrame], left: list[Float]) -> str:
 
 
 def _by_other_half(z: Float, cell: Int, half: Int) -> Float:
-    """Return what the other half of the pixels (N,) in a cell has on average, drawn to 0 by its noise."""
+    """Return the mean of the other half of the pixels (N,) in a cell, shrunk by its noise."""
     other, own = 2 * cell + 1 - half, 2 * cell + half
     count, total = (np.bincount(own, v, 2 * cell.max() + 2) for v in (None, z))
     between = max(float((total[other] / np.maximum(count[other], 1) * z).mean()), 1e-6)
@@ -234,7 +237,7 @@ def _by_other_half(z: Float, cell: Int, half: Int) -> Float:
 
 
 def _write_maps(frames: list[RealFrame], left: list[Float], file: Path) -> None:
-    """Write maps of z of all frames, four in a row, a third as large; the largest of nine pixels shows."""
+    """Write maps of z of all frames, four in a row, a third as large; the largest of nine pixels is shown."""
     made = []
     for frame, z in zip(frames, left, strict=True):
         whole = np.zeros(frame.grey.shape, np.float32)

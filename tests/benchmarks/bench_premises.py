@@ -1,4 +1,4 @@
-"""How well wrong tables of frames are mended: wrong lights and times left, per kind of spoiling.
+"""How well wrong tables of frames are repaired: wrong lights and times that remain, per kind of fault.
 
 usage: python -m tests.benchmarks.bench_premises FRAMES SEEDS RECORDING...
 

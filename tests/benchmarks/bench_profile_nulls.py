@@ -1,11 +1,12 @@
-"""Recordings without any effect of the line's light, spoilt as pictures are: every claim is a false alarm.
+"""Recordings without any effect on the line's light, but with degraded pictures.
 
-usage: python -m tests.benchmarks.bench_profile_nulls OUT.jsonl [--cases N] [--seed N]
+Every claim is a false alarm. usage: python -m tests.benchmarks.bench_profile_nulls OUT.jsonl [--cases N]
+[--seed N]
 
 Each case takes a recording of another renderer in which the line's light is ordinary, draws image conditions
-(codec, response, defocus, exposure that clips, noise), encodes its laser frames again, and asks the line's
-profile. A line of OUT.jsonl tells of each case what was found and every p-value; cases that have a line are
-not done again. At the end the false claims are counted, and the p-values are held against uniformity
+(codec, response, defocus, exposure that clips, noise), encodes its laser frames again, and examines the
+line's profile. OUT.jsonl gets a line for each case, with what was found and every p-value; cases that have a
+line are not repeated. At the end the false claims are counted, and the p-values are tested for uniformity
 (Kolmogorov and Smirnov).
 """
 
@@ -41,7 +42,7 @@ SOURCES = (
     "open-1-field", "blind-a/a10-field", "blind-a/a01-field",
 )  # fmt: skip
 MOST_FRAMES = 90
-# A response changes the line's width by its law: to say so is no false alarm.
+# A response changes the line's width by a known law: to report it is not a false alarm.
 TRUE_OF_GAMMA = frozenset({"gamma", "albedo_bias"})
 
 
@@ -75,7 +76,7 @@ class Case:
 
     @property
     def name(self) -> str:
-        """The case in one word."""
+        """Return a file name of the case."""
         return f"{Path(self.source).name}-{self.seed}"
 
 
@@ -108,7 +109,7 @@ def spoilt(image: NDArray[np.uint8], condition: Condition, random: np.random.Gen
 
 
 def make(case: Case, folder: Path) -> None:
-    """Write the recording of a case: laser frames alone, evenly thinned to `MOST_FRAMES` and fewer."""
+    """Write the recording of a case: only laser frames, at most `MOST_FRAMES`, evenly chosen."""
     source, random = shared("recordings", *case.source.split("/")), np.random.default_rng(case.seed)
     with (source / "frames.csv").open() as file:
         rows = list(csv.DictReader(file))
@@ -140,7 +141,7 @@ def make(case: Case, folder: Path) -> None:
 
 
 def examined(case: Case, folder: Path) -> dict[str, Any]:
-    """Return what the line's profile says of a case."""
+    """Return the evidence of the line's profile in a case."""
     make(case, folder)
     recording, probe = open_recording(folder), read_probe(folder / "probe.yaml")
     told: dict[str, Any] = {"case": case.name, "condition": asdict(case.condition)}
@@ -156,13 +157,13 @@ def examined(case: Case, folder: Path) -> dict[str, Any]:
 
 
 def false_claims(told: dict[str, Any]) -> list[str]:
-    """Return the classes of effects of which a case was said to have one, and has none."""
+    """Return the classes of effects that were reported though the case has none of them."""
     true = TRUE_OF_GAMMA if told["condition"]["gamma"] != 1 else frozenset()
     return [name for name in told.get("found", []) if true.isdisjoint(name.split("|"))]
 
 
 def main() -> None:
-    """Do the cases that are missing and print the counts."""
+    """Do the missing cases and print the counts."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )

@@ -3,15 +3,15 @@
 ``python -m tests.benchmarks.bench_resimulation [RECORDING ...]`` prints
 
 bias, rms          recorded less rendered line, px: mean and rms, over frames, of means over 5 degrees
-median, typical    the same without regard to outliers: at steps and marker edges, of which the truth's
-                   reflectance, 0.24 mm a sample, shows no more than a blur (1.4826 times the median size)
+median, typical    the same, robust against outliers at steps and marker edges, which the truth's reflectance,
+                   0.24 mm a sample, shows only blurred (1.4826 times the median size)
 steady             the part of that rms that all frames share
-grain              what the wall's grain does to the same rms: the rendered line, times the grain that the
+grain              the effect of the wall's grain on the same rms: the rendered line, times the grain that the
                    recording shows a few pixels further out, less the rendered line. The truth holds
                    reflectance at 0.24 mm a sample; finer grain is in the recording alone
 exact, rms         recorded less the exact line, to show what rendering explains
 PSNR               of lit frames after one gain, with LEDs by the default law, and with the law (even share,
-                   exponent 1.5) that one frame of the recording tells: its own is not stated
+                   exponent 1.5) fitted to one frame of the recording, which does not state its own
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ class Difference:
 
 @dataclass(frozen=True)
 class Rings:
-    """The line of some frames (F, A), px: where it was recorded, rendered, rendered with grain, and exact."""
+    """The line of some frames (F, A), px: recorded, rendered, rendered with grain, and exact."""
 
     recorded: Float
     rendered: Float
@@ -61,7 +61,7 @@ class Rings:
 
 
 def compared(truth: SceneTruth, pictures: dict[int, Image], frames: list[int]) -> Rings:
-    """Measure the line of frames recorded and rendered in the same way."""
+    """Measure the line in frames, recorded and rendered, in the same way."""
     centre = truth.stated.camera.centre_px
     exact = exact_rings(truth, frames, _AZIMUTH, centre)
     radii: list[list[Float]] = [[], [], []]
@@ -75,7 +75,7 @@ def compared(truth: SceneTruth, pictures: dict[int, Image], frames: list[int]) -
 
 
 def _grain(picture: Image) -> Float:
-    """Return a lit picture's fine contrast (H, W): green over its own blur; 1 where it is dark."""
+    """Return a lit picture's fine contrast (H, W): green over its blurred copy; 1 where it is dark."""
     green = picture[..., 1].astype(np.float32)
     smooth = cv2.GaussianBlur(green, (0, 0), _GRAIN_SIGMA_PX)
     return np.where(smooth > 15, np.clip(green / np.maximum(smooth, 1.0), 0.3, 2.0), 1.0)
@@ -96,7 +96,7 @@ def difference(one: Float, other: Float) -> Difference:
 
 
 def true_probe_put(truth: SceneTruth, pictures: dict[int, Image], frames: list[int]) -> SceneTruth:
-    """Return the scene whose instrument, within what is stated, puts lines where they were recorded."""
+    """Return the scene with the instrument, within its stated σ, that best predicts the recorded lines."""
     centre = truth.stated.camera.centre_px
     near = exact_rings(truth, frames, _AZIMUTH, centre)
     seen = np.stack([line_radii(pictures[n], r, _AZIMUTH, centre) for n, r in zip(frames, near, strict=True)])
@@ -107,7 +107,7 @@ def true_probe_put(truth: SceneTruth, pictures: dict[int, Image], frames: list[i
 
 
 def lit_psnr(truth: SceneTruth, pictures: dict[int, Image], frames: list[int]) -> tuple[float, float]:
-    """Return the mean PSNR of lit frames, dB, by the default law of the LEDs and by the recording's."""
+    """Return the mean PSNR of lit frames, dB, with the default law of the LEDs and with the recording's."""
     default = LightScene.model_validate({})
     told = [with_leds(truth, 1.5, even) for even in (0.0, 1.0)]
     plain = with_leds(truth, default.lobe, default.even)

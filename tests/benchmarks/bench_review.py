@@ -1,10 +1,11 @@
-"""How fast the review's page is and what it keeps in memory, in Chromium without a graphics card.
+"""How fast the review's page is and how much memory it takes, in Chromium without a graphics card.
 
-    python -m tests.benchmarks.bench_review RUN             # a finished run
-    python -m tests.benchmarks.bench_review RUN --metres 100 --keep FOLDER   # repeated to that length
+python -m tests.benchmarks.bench_review RUN for a finished run
 
-``click`` is the start of the command; the address is opened as soon as it is told. The first view is there
-when list, wall and section are drawn and a part of the model is. Times are the wall clock's.
+python -m tests.benchmarks.bench_review RUN --metres 100 --keep FOLDER for the run repeated to that length
+
+``click`` is the start of the command; the address is opened as soon as it is printed. The first view is
+complete when list, wall, section and a part of the model are drawn. Times are by the clock.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from tests.review_browser import Tab, chromium, tab
 from tests.review_server import ReviewServer
 
 SIZE = {"width": 1280, "height": 720}
-# Flat and section have been painted; of the model a part that can be looked at is there.
+# Wall and section have been drawn, and a part of the model is visible.
 DRAWN = """!!window.boresight && document.querySelectorAll('.list .row').length > 0
   && [...boresight.flat.picture.tiles.values()].some((t) => t.naturalWidth > 0)
   && document.querySelectorAll('.section path.measured').length > 0"""
@@ -63,7 +64,7 @@ def main() -> None:
 
 
 def measure(run: Path) -> None:
-    """Open a run and tell what it takes."""
+    """Open a run and print the results."""
     with chromium() as browser:
         start = time.perf_counter()
         with ReviewServer(run) as server:
@@ -107,7 +108,7 @@ def opened(browser: Browser, server: ReviewServer, name: str, before: float) -> 
 
 
 def drawing(page: Tab) -> None:
-    """Tell how fast the model turns, in its pane and over the whole window."""
+    """Print how fast the model turns, in its pane and over the whole window."""
     triangles = page.js("boresight.model.parts.reduce((n, p) => n + p.mesh.geometry.index.count / 3, 0)")
     print(f"{'triangles in detail':34} {triangles:8.0f}")
     for name, width, height in (("pane", 0, 0), ("1280 x 720", 1280, 720), ("320 x 180", 320, 180)):
@@ -122,7 +123,7 @@ def drawing(page: Tab) -> None:
 
 
 def memory(page: Tab) -> None:
-    """Tell what the tab holds after it has gone through the whole pipe."""
+    """Print the tab's memory after a passage through the whole pipe."""
     first, last = page.js("boresight.session.run.distance_mm")
     for k in range(12):
         page.js(f"boresight.session.moveTo([{first + (last - first) * (k + 0.5) / 12}, 0])")
@@ -147,7 +148,7 @@ def by_kind() -> dict[str, float]:
 
 
 def cpu_s() -> float:
-    """Return the CPU time that all Chromium's processes have taken."""
+    """Return the CPU time that all processes of Chromium have taken."""
     own = [p for p in descendants(os.getpid()) if any("--type=" in w for w in command(p))]
     return sum(map(cpu_of, own))
 
@@ -171,7 +172,10 @@ def command(pid: int) -> list[str]:
 
 
 def held(pid: int, which: str) -> float:
-    """Return memory, bytes, of a process: ``Pss`` with its share of what is common, ``Pss_Anon`` its own."""
+    """Return memory, bytes, of a process.
+
+    ``Pss`` with its share of common pages, or ``Pss_Anon``, its own.
+    """
     for line in Path(f"/proc/{pid}/smaps_rollup").read_text().splitlines():
         if line.startswith(f"{which}:"):
             return 1024 * float(line.split()[1])

@@ -24,7 +24,7 @@ NOISES = ((0.7, 0.0), (1.0, 0.1), (2.0, 0.4), (4.0, 1.0), (8.0, 1.0))
 
 
 def seconds(work):
-    """Least wall and processor time of ``ROUNDS`` calls: what the machine can do when left alone."""
+    """Return the least wall and processor time of ``ROUNDS`` calls: that of an otherwise idle machine."""
     spent = []
     for _ in range(ROUNDS):
         start = np.array([time.perf_counter(), time.process_time()])
@@ -34,7 +34,7 @@ def seconds(work):
 
 
 def rates(folder):
-    """Seconds (wall, processor) of decoding alone and of decoding with extraction, and how many frames."""
+    """Return seconds (wall, processor) of decoding alone, the same with extraction, and the frames."""
     recording = open_recording(folder)
     probe = read_probe(recording.probe_file)
     planes = "bgr" if "both" in recording.frames.illumination else "grey"
@@ -56,7 +56,7 @@ def speed(folder):
 
 
 def resampled(image, sectors, truth):
-    """Distances (N,) and grey levels above black (A, N) along each ray about the ring."""
+    """Return distances (N,) and grey levels above black (A, N) along each ray about the ring."""
     x = np.arange(-6 * WIDTH, 6 * WIDTH, 0.2)
     rho = (truth[:, None] + x).astype(np.float32)
     u = sectors.centre_px[0] + rho * np.cos(sectors.azimuth_rad)[:, None]
@@ -66,17 +66,17 @@ def resampled(image, sectors, truth):
 
 
 def centre_of_gravity(image, sectors, truth, noise):
-    """Mean distance weighted by what stands out of three noise σ."""
+    """Return the mean distance weighted by the light above three σ of the noise."""
     x, y = resampled(image, sectors, truth)
     weight = np.where(y > 3 * noise, y, 0.0)
     return weight @ x / np.maximum(weight.sum(1), 1e-9)
 
 
 def steger(image, sectors, truth):
-    """Ridge of the image smoothed by the line's own width, along the line's normal.
+    """Return the ridge of the image smoothed by the line's own width, along the line's normal.
 
-    Smoothing also averages along the line over neighbouring samples: in strong noise it falls below the
-    bound of a single sample, at the price of correlated neighbours.
+    Smoothing also averages along the line over neighbouring samples: in strong noise the error falls below
+    the bound of a single sample, at the price of correlated neighbours.
     """
     x, y = resampled(cv2.GaussianBlur(image.astype(np.float32), (0, 0), WIDTH), sectors, truth)
     at = np.clip(np.argmax(y, 1), 1, len(x) - 2)
@@ -85,7 +85,7 @@ def steger(image, sectors, truth):
 
 
 def bound(sectors, truth, read, shot):
-    """Root mean square Cramér–Rao 1 σ with height, width and background unknown."""
+    """Return the root mean square Cramér–Rao 1 σ with height, width and background unknown."""
     variance = []
     for a, r in enumerate(truth):
         x = sectors.radius_px[sectors.start[a] : sectors.start[a + 1]] - r
@@ -98,7 +98,7 @@ def bound(sectors, truth, read, shot):
 
 
 def rms_errors(sectors, ring, truth, read, shot):
-    """Root mean square errors, px, of the matched fit, of Steger's method and of the centre of gravity."""
+    """Return rms errors, px, of the matched fit, of Steger's method and of the centre of gravity."""
     rows = []
     for seed in range(4):
         light = ring_light(SIZE, CENTRE, ring, WIDTH, AMPLITUDE)
@@ -110,7 +110,7 @@ def rms_errors(sectors, ring, truth, read, shot):
 
 
 def accuracies():
-    """For each noise level: read noise, shot noise, the bound, and the three methods' errors, px."""
+    """Return, for each noise level, read noise, shot noise, the bound, and the three methods' errors, px."""
     sectors, ring = cut_sectors(SIZE, np.array(CENTRE), AZIMUTHS), off_centre(170.0, 2.0)
     truth = ring(sectors.azimuth_rad)
     return [

@@ -1,10 +1,11 @@
-"""σ along the way of drawn pose chains: how often 95 % intervals of place and turn hold, and how large z is.
+"""σ along the route of drawn pose chains.
 
-usage: python -m tests.benchmarks.bench_route [--runs N] [KIND ...]
+Coverage of the 95 % intervals of position and rotation, and spread of z. usage: python -m
+tests.benchmarks.bench_route [--runs N] [KIND ...]
 
 Kinds are straight, bent, and with an IMU imu-straight, imu-bent, imu-curve. Tubes lean, the camera's heading
-drifts, distance has a scale and the IMU errs as drawn from what the program states of them; nothing is
-rendered. With ``--spoil-answers`` σ is doubled: every figure must then be bad.
+drifts, and distance scale and IMU have errors, all drawn from the σ that the program states for them; nothing
+is rendered. With ``--spoil-answers`` σ is doubled: then every figure must be bad.
 """
 
 from __future__ import annotations

@@ -1,11 +1,13 @@
-"""How alike recorded frames and the model look in the review's page: same place, lens and light.
+"""How similar recorded frames and the model look in the review's page: same place, lens and light.
 
-    boresight run RECORDING -o RUN --set premises.withhold=10
-    python -m tests.benchmarks.bench_same_view RUN [--frames N] [--pictures FOLDER]
+boresight run RECORDING -o RUN --set premises.withhold=10
 
-Compared are lit frames that no stage of the run has measured; where the run withheld none, measured ones,
-which is said. The page turns the model to four places around the wall, 60° off the camera's axis. Frames lit
-with the laser on show its line, which the model has not: such recordings reach some 25 dB.
+python -m tests.benchmarks.bench_same_view RUN [--frames N] [--pictures FOLDER]
+
+Lit frames that no stage of the run has used are compared; where the run withheld none, frames that it used
+are, and the output says so. The page turns the model to four places around the wall, 60° off the camera's
+axis. Frames that are lit while the laser is on show its line, which the model lacks: such recordings reach
+some 25 dB.
 """
 
 from __future__ import annotations
@@ -43,7 +45,7 @@ def main() -> None:
 
 
 def lit_frames(files: RunFiles, most: int) -> tuple[list[tuple[int, float]], str]:
-    """Return lit frames with the distances of their cameras, and whether the run has measured them."""
+    """Return lit frames with the distances of their cameras, and whether the run has used them."""
     checked, trajectory = files.artefact(CheckedFrames), files.artefact(Trajectory)
     light = open_recording(Path(files.record()["recording"]["path"])).frames
     lit = light.frame[np.isin(light.illumination, [Illumination.LED, Illumination.BOTH])]

@@ -1,7 +1,7 @@
-"""Every shipped scene rendered, run and held against its truth.
+"""Every shipped scene rendered, run and compared with its truth.
 
-``python -m tests.benchmarks.bench_scenes [--frames N] [--shrink K] [SCENE ...]``. In full, the
-scenes take about an hour of two cores; ``--shrink 2 --frames 120`` is a look at all of them.
+``python -m tests.benchmarks.bench_scenes [--frames N] [--shrink K] [SCENE ...]``. In full, the scenes take
+about an hour of two cores; ``--shrink 2 --frames 120`` gives a quick look at all of them.
 """
 
 from __future__ import annotations

@@ -1,15 +1,15 @@
-"""The simulator against its own exact line, and how quick it is.
+"""Accuracy of the simulator's rendered line against its exact line, and its speed.
 
 ``python -m tests.benchmarks.bench_simulator [converge | speed | plain | gauge ...]`` prints
 
 converge   mean and rms, px, of the rendered line's centroid less the exact line's, by samples a side of a
            pixel: a plain 4 inch pipe at 2 MP, without noise and codec. The line's own width moves the
-           mean a little where image radius is no straight function of height: that part is taken off
-speed      frames a second of laser and LED frames of two shipped scenes at 2 MP, codec left out: CPU time of
-           one frame, and by the clock with the machine as busy as it is
-plain      LED frames against the plain path, which marches along every ray: CPU time of both for the light
-           alone, and their difference in units of the sensor's noise, rms and largest
-gauge      CPU time and time by the clock of the whole gauge run of 240 frames, premises, codec, truth and all
+           mean a little where image radius is not linear in height: that part is subtracted
+speed      frames a second of laser and LED frames of two shipped scenes at 2 MP, without codec: CPU time of
+           one frame, and time by the clock, which depends on the load of the machine
+plain      LED frames against the plain method, which marches along every ray: CPU time of both for the
+           light alone, and their difference in units of the sensor's noise, rms and largest
+gauge      CPU time and time by the clock of the whole gauge run of 240 frames, with premises, codec and truth
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ def scene_truth(name: str, **changes: object) -> SceneTruth:
 
 
 def plain_pipe() -> SceneTruth:
-    """Return the straight 4 inch scene with a bare even wall, so that nothing but sampling moves the line."""
+    """Return the straight 4 inch scene with a bare uniform wall, so that only sampling can move the line."""
     scene = read_scene(SCENES / "straight-4-inch.yaml")
     bare = {"mottle": 0.0, "grain": 0.0, "rust": 0.0, "lime": 0.0, "gloss": 0.0}
     surface = scene.pipe.surface.model_copy(update=bare)
@@ -60,7 +60,7 @@ def plain_pipe() -> SceneTruth:
 
 
 def centroid_error(truth: SceneTruth, samples: int, frame: int = 0) -> tuple[float, float]:
-    """Return mean and rms over azimuth of the rendered centroid less the exact line's, px."""
+    """Return mean and rms over azimuth of the rendered line's centroid less the exact line's, px."""
     rendering = truth.rendering.model_copy(update={"line_samples": samples})
     renderer = renderer_of(replace(truth, rendering=rendering))
     light = through_lens(renderer.light(frame), truth.instrument.sensor, None)[..., 1]
@@ -76,10 +76,11 @@ def centroid_error(truth: SceneTruth, samples: int, frame: int = 0) -> tuple[flo
 
 
 def _drawn_by_width(truth: SceneTruth, exact_px: np.ndarray) -> np.ndarray:
-    """Return by how much the mean of light lies beyond the line: half the curvature of radius over height.
+    """Return by how much the centroid of the light lies beyond the line.
 
-    Brightness per image radius changes across the line too: light per height is even, and falls as the wall
-    is met at a distance, both far below a hundredth of a pixel here; they are left in the error.
+    Half the curvature of radius over height. Brightness per image radius changes across the line too: light
+    per height is uniform, and falls with the angle at which it meets the wall. Both are far below a hundredth
+    of a pixel here; they are left in the error.
     """
     camera, laser = truth.instrument.camera.model, truth.instrument.laser
     wall, height = float(np.mean(truth.wall.radius_mm)), laser.sheet.baseline_mm

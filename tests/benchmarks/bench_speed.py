@@ -2,14 +2,13 @@
 
     python -m tests.benchmarks.bench_speed OUT RECORDING... [--apart] [--score FILE] [--flame]
 
-Every recording is decoded once with PyAV, every frame, on one thread; then it is run from nothing, and
-decoded again: the ratio takes the mean of both, so that a machine that is busy otherwise slows down both
-alike. Told are the processor time of each stage, the ratio, the most memory, and which part of the cores was
-busy. Stages that work side by side have a line together, unless ``--apart`` runs them one after the other.
+All frames of every recording are decoded with PyAV on one thread; then it is run from the start, and decoded
+again: the ratio takes the mean of both decodings, so that a busy machine slows down both sides of it. Printed
+are the processor time of each stage, the ratio, the largest memory, and which part of the cores was busy.
+Stages that work at the same time share a line, unless ``--apart`` runs them one after the other.
 ``--score`` names a script that is called with run folder and recording and prints figures as JSON, from the
-truth beside the recording. Modules are started from bytecode in OUT, as those of an installed program are.
-``--flame`` draws OUT/NAME.svg with py-spy where it is installed; it slows the run
-down.
+truth beside the recording. Modules are loaded from bytecode in OUT, as those of an installed program are.
+``--flame`` draws OUT/NAME.svg with py-spy where it is installed, which slows the run down.
 """
 
 from __future__ import annotations
@@ -39,7 +38,7 @@ ROOT = Path(__file__).resolve().parents[2]
 
 @dataclass(frozen=True)
 class Measured:
-    """What a run took, beside decoding its video before and after it, s of processor time."""
+    """What a run took, and decoding its video before and after it, s of processor time."""
 
     name: str
     frames: int
@@ -50,11 +49,11 @@ class Measured:
 
     @property
     def ratio(self) -> float:
-        """Processor time over that of decoding once."""
+        """Processor time of the run over that of decoding once."""
         return self.watch.all_cpu_s * 2 / sum(self.decoding_s)
 
     def lines(self) -> list[str]:
-        """Return what is printed."""
+        """Return the lines of output."""
         once = sum(self.decoding_s) / 2
         stages = [
             f"| {stage} | {cpu:.2f} | {cpu / once:.2f} | {self.watch.mib[stage]:.0f} |"
@@ -88,7 +87,7 @@ def main() -> None:
 
 
 def run(recording: Path, folder: Path, apart: bool) -> None:
-    """Run a recording from nothing."""
+    """Run a recording from the start."""
     job = prepare(recording, folder, probe=None, configuration=configuration())
     gc.freeze()  # as the command does
     run_job(replace(job, at_once=1 if apart else job.at_once), Selection(resume=False), SilentDisplay())
@@ -118,14 +117,14 @@ def measured(recording: Path, given: argparse.Namespace) -> Measured:
 
 
 def flame(given: argparse.Namespace, name: str) -> Sequence[str]:
-    """Return the words that draw a flame graph of the command behind them."""
+    """Return the arguments that draw a flame graph of the command after them."""
     if not given.flame:
         return ()
     return ("py-spy", "record", "--threads", "--output", str(given.out.resolve() / f"{name}.svg"), "--")
 
 
 def with_bytecode(out: Path) -> dict[str, str]:
-    """Return an environment in which modules are started from bytecode, which is written first."""
+    """Return an environment in which modules are loaded from bytecode, after writing that bytecode."""
     environment = os.environ | {"PYTHONPYCACHEPREFIX": str(out.resolve() / "bytecode")}
     environment.pop("PYTHONDONTWRITEBYTECODE", None)
     once = [sys.executable, "-c", "import pipeline.api.run, tests.benchmarks.bench_speed"]
@@ -144,7 +143,7 @@ def decoding(video: Path) -> tuple[int, float]:
 
 
 def scores(script: Path | None, folder: Path, recording: Path) -> str:
-    """Return the figures of a run in a line."""
+    """Return the scores of a run in a line."""
     if script is None:
         return ""
     command = [sys.executable, str(script), str(folder), str(recording)]

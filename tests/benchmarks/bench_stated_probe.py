@@ -1,17 +1,18 @@
-"""Whether the wall's common σ is true over many instruments: one recording, drawn probes and wheels.
+"""Whether the σ that the whole wall shares is true over many instruments.
 
-The instrument's error is the same in all samples of a recording: one draw. The share of samples inside their
-intervals is therefore near 0 or near 100 % in most single recordings, and no test of that part of σ. Here
-probes are drawn about a calibrated one by the uncertainty that the recording's own file states, and the
-encoder's readings are scaled by a draw of its stated uncertainty. Rings and texture are measured once, in
-px; motion is adjusted anew for each draw. How far radius and way are from those by the calibrated probe and
-the encoder as it is must be one of the stated σ, rms, and 95 % of them within 1.96.
+One recording, drawn probes and wheels. The instrument's error is the same in all samples of a recording: one
+draw. The share of samples inside their intervals is therefore near 0 or near 100 % in most single recordings,
+which cannot test that part of σ. Here probes are drawn about a calibrated one with the uncertainty that the
+recording's own file states, and the encoder's readings are scaled by a draw of its stated uncertainty. Rings
+and texture are measured once, in px; motion is adjusted again for each draw. The reference is the radius and
+distance with the calibrated probe and the unchanged encoder: differences must be one stated σ, rms, and 95 %
+of them within 1.96 σ.
 
 usage: python -m tests.benchmarks.bench_stated_probe RUN RECORDING CALIBRATED [--draws N] [--first N]
-           [--understate F] [--right-wheel]
+[--understate F] [--right-wheel]
 
 With ``--understate 3`` the files state a third of what was drawn, which must show. With ``--right-wheel`` the
-readings stay as they are: what the wheel's σ adds to that of radii then goes unused.
+readings are not scaled: the part of the radii's σ that is due to the wheel is then not used up.
 """
 
 from __future__ import annotations
@@ -38,7 +39,7 @@ from tests.quiet import quiet_context
 
 
 def drawn(stated: Probe, centre: Probe, understate: float, random: np.random.Generator) -> Probe:
-    """Return a probe drawn about ``centre`` as unsure as ``stated``, which states too little by a factor."""
+    """Return a probe drawn about ``centre``; ``stated`` understates the uncertainty by a factor."""
     directions = stated.principal_uncertainties()
     off = directions @ random.standard_normal(directions.shape[1])
     probe = stated.with_parameters(centre.parameters + off, stated.covariance / understate**2)
@@ -47,7 +48,7 @@ def drawn(stated: Probe, centre: Probe, understate: float, random: np.random.Gen
 
 @dataclass(frozen=True)
 class Found:
-    """Radius and way, mm, that a run was found to have, with 1 σ of each by the instrument."""
+    """Radius and distance, mm, that a run has measured, with the 1 σ of each due to the instrument."""
 
     radius_mm: float
     radius_sigma_mm: float
@@ -55,13 +56,13 @@ class Found:
     way_sigma_mm: float
 
     def in_sigma(self, right: Found) -> tuple[float, float]:
-        """Return how far radius and way are from the right ones, in σ."""
+        """Return how far radius and distance are from the right ones, in σ."""
         radius = (self.radius_mm - right.radius_mm) / self.radius_sigma_mm
         return radius, (self.way_mm - right.way_mm) / self.way_sigma_mm
 
 
 def adjusted(back: Background, run: MeasuredRun) -> Found:
-    """Adjust the motion and return what it finds of the pipe."""
+    """Adjust the motion and return the radius and distance found."""
     joined = adjust_run(run, MotionParameters(), lambda *_: None, lambda *_: None).joined
     motion = trajectory_of(joined, back.recording.frames, run.probe, run.encoder is not None)
     probe = run.probe.as_found_in(motion)

@@ -1,11 +1,12 @@
-"""What the twin can tell, by figures.
+"""What the twin can detect, in figures.
 
-``python -m tests.benchmarks.bench_twin swaps OUT``: every gauge run of the shared recordings, its line
-re-rendered as stated, with its own answer, with the true effects, and with the answers of other probes. A
-right answer must fit better than any other. The truth is opened for scoring alone.
+``python -m tests.benchmarks.bench_twin swaps OUT``: every gauge run of the shared recordings; its line is
+re-rendered with the stated probe, with its own answer, with the true effects, and with the answers of other
+probes. A right answer must fit better than any other. The truth is opened for scoring alone.
 
-``python -m tests.benchmarks.bench_twin like OUT --run RUN``: a recording like a run, with a pit put in, is
-rendered and run in its turn: its wall against the one that was measured, and the pit.
+``python -m tests.benchmarks.bench_twin like OUT --run RUN``: a recording like that of a run, with an added
+pit, is rendered and run again: its wall is compared with the one that was measured, and the pit must be
+found.
 """
 
 from __future__ import annotations
@@ -113,7 +114,7 @@ def gauge_line(case: Case, folder: Path) -> GaugeLine:
 
 
 def swaps(folder: Path, answers: Path, only: str) -> None:
-    """Print χ² per pixel of each gauge's line under each instrument, and how many wrong ones fit worse."""
+    """Print χ² per pixel of each gauge's line with each instrument, and how many wrong ones fit worse."""
     every = cases(answers)
     different = [c for c in every if c.answer]
     worse = better_than_stated = pairs = named = 0
@@ -147,7 +148,7 @@ def swaps(folder: Path, answers: Path, only: str) -> None:
 
 
 def like(folder: Path, run: Path, frames: int) -> None:
-    """Render a recording like a run with a pit put in, run it, and print how alike the two walls are."""
+    """Render a recording like a run with an added pit, run it, and print how similar the two walls are."""
     first, last = (float(open_run(run).wall.radius_map.distance_mm[k]) for k in (0, -1))
     at = min(first + 0.5 * _SEEN_AHEAD_MM, (first + last) / 2)
     start = time.process_time()

@@ -1,15 +1,15 @@
-"""What the twin finds of effects hidden in recorded frames by hand, and where nothing is hidden.
+"""What the twin finds of effects added to recorded frames, and in frames to which nothing was added.
 
 ``python -m tests.benchmarks.bench_twin_hidden hidden RUN``: RUN is a run with ``premises.withhold=10``. Each
-effect is put into the recorded frames, those measured and those withheld alike, and the twin is made again;
-wall, motion and photo stay those of the clean run. Printed are what was located, named and how large, against
-what was put in, and the same counts with every case scored by another one's answer: they must collapse.
+effect is added to the recorded frames, both measured and withheld ones, and the twin is made again; wall,
+motion and photo stay those of the clean run. It prints what was located, named and sized, against what was
+added, and the same counts with every case scored by the answer to another one, which must be bad.
 
-``python -m tests.benchmarks.bench_twin_hidden nulls RUN...``: whole twins of runs in which nothing is hidden,
-each of frames that no other one compares; what is found is a false alarm.
+``python -m tests.benchmarks.bench_twin_hidden nulls RUN...``: whole twins of runs to which nothing was added,
+each of frames that no other twin compares; whatever is found is a false alarm.
 
-``python -m tests.benchmarks.bench_twin_hidden cost RUN``: processor time of rendering a frame, and of all
-that is done with a compared one; the first comparison also decodes its frames.
+``python -m tests.benchmarks.bench_twin_hidden cost RUN``: processor time of rendering a frame, and of all the
+work on a compared one; the first comparison also decodes its frames.
 """
 
 from __future__ import annotations
@@ -41,13 +41,13 @@ from tests.hidden_effects import Change, Hidden, effects
 from tests.hidden_shine import shining
 
 Few = tuple[int, int]
-"""Measured frames of each light that are sampled, and withheld frames that are compared."""
+"""Numbers of measured frames of each light that are sampled, and of withheld frames that are compared."""
 _OTHER = 3
-"""A case is also scored by the answer of the third one after it, which is of another kind."""
+"""A case is also scored by the answer to the third case after it, which is of another kind."""
 
 
 class KeptScene(Scene):
-    """A scene that keeps what frames look at: effects by hand change pictures alone."""
+    """A scene that caches the geometry of its frames: added effects change pictures alone."""
 
     kept: ClassVar[dict[tuple[str, bytes], Any]] = {}
 
@@ -68,7 +68,7 @@ class KeptScene(Scene):
 
 @dataclass
 class Opened:
-    """A run's results, as the twin takes them, with its frames' pictures."""
+    """A run's results, as inputs of the twin, with its frames' pictures."""
 
     frames: CheckedFrames
     rings: RingSamples
@@ -77,7 +77,7 @@ class Opened:
     pictures: dict[int, Any]
 
     def read(self, numbers: Int, planes: str) -> Iterator[tuple[int, Any]]:
-        """Yield pictures as a recording does, each read from the video once."""
+        """Yield pictures as a recording does; each is read from the video once."""
         if planes == "bgr":
             yield from self.recording.read(numbers, "bgr")
             return
@@ -88,7 +88,7 @@ class Opened:
 
 @dataclass
 class Changed:
-    """A recording with an effect in its pictures."""
+    """A recording with an effect added to its pictures."""
 
     opened: Opened
     change: Change
@@ -124,7 +124,7 @@ def _context() -> Context:
 
 
 def hidden(run: Opened, few: Few, seed: int, only: str) -> None:
-    """Print what is found of each effect, and counts with the right answers and with those of others."""
+    """Print what is found of each effect, and the counts with the right answers and with those of others."""
     made = (
         of(run.scene, run.scene.trajectory.frame, np.random.default_rng(seed)) for of in (effects, shining)
     )
@@ -166,12 +166,12 @@ def _found(run: Opened, few: Few, change: Change) -> tuple[Mismatch, ...]:
 
 
 def _score(case: Hidden, found: tuple[Mismatch, ...]) -> Any:
-    """Return located, named, size within 2 σ, sizes, and false alarms of a case."""
+    """Return whether a case is located, whether named, sizes within 2 σ, all sizes, and false alarms."""
     right = [m for m in found if _is_there(case, m)]
     named = [m for m in right if any(n in m.names for n in case.names)]
     told = named[0].parameters[0] if named and case.size is not None else None
     inside = told is not None and case.size is not None and abs(told.value - case.size) < 2 * told.sd
-    # What a flicker or a step does to both lights may be told of each; charge leaks from clipped pixels.
+    # A flicker or a step of both lights may be reported for each; charge leaks from clipped pixels.
     alike = {"flicker": ("laser_flicker",), "exposure_step": ("lamp_step", "laser_step"),
              "bloom": ("saturation",)}  # fmt: skip
     allowed = {a for n in case.names for a in (n, *alike.get(n, ()))}
@@ -186,15 +186,15 @@ def _is_there(case: Hidden, found: Mismatch) -> bool:
         away = min(away, abs(360 - away)) if name == "azimuth_deg" else away
         if not away <= max(tolerance, 2 * sd.get(name, 0.0)):
             return False
-    # What is everywhere has no place: only its name tells that it was seen.
+    # What affects the whole picture has no place: only its name shows that it was found.
     named = any(n in found.names for n in case.names if n or case.fixed_to == found.fixed_to)
     return named or (bool(case.place) and case.fixed_to in found.fixed_to)
 
 
 def nulls(run: Opened, size: int) -> tuple[int, int]:
-    """Return disjoint sets of a run's frames, of that size, that were compared, and those with an alarm.
+    """Return the numbers of disjoint sets of a run's frames that were compared, and of those with an alarm.
 
-    Frames that the run has measured are among them: wall and photo hold their noise, too.
+    Frames that the run has measured are among them: their noise is also in wall and photo.
     """
     kept, recording = run.scene, cast(Any, run)
     scene = Scene(kept.probe, kept.surface, kept.reflectance, kept.trajectory)
@@ -215,7 +215,7 @@ def nulls(run: Opened, size: int) -> tuple[int, int]:
 
 
 def cost(run: Opened, few: Few) -> None:
-    """Print the processor time of rendering a frame, and of comparing one with all that is made of it."""
+    """Print the processor time of rendering a frame, and of comparing one with all its results."""
     kept, recording = run.scene, cast(Any, run)
     scene = Scene(kept.probe, kept.surface, kept.reflectance, kept.trajectory)
     photometry = photometry_of(
@@ -226,7 +226,7 @@ def cost(run: Opened, few: Few) -> None:
         lit = np.isin(run.frames.frame, scene.trajectory.frame) & (run.frames.illumination == light)
         numbers = run.frames.frame[lit][: few[1]]
         renderer = Renderer(replace(scene, outside=state.outside), state)
-        renderer.frame(int(numbers[0]), Illumination(light))  # compiles, and works out what all share
+        renderer.frame(int(numbers[0]), Illumination(light))  # compiles, and computes what all frames share
         start = time.process_time()
         for number in numbers[1:]:
             renderer.frame(int(number), Illumination(light))

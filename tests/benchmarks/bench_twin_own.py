@@ -1,13 +1,13 @@
-"""What the twin tells of recordings that the project's own simulator renders with an effect switched on.
+"""What the twin finds in recordings that the project's own simulator renders with an effect switched on.
 
 ``python -m tests.benchmarks.bench_twin_own OUT``: a shipped scene at half its size is rendered once for each
-effect, of a drawn size, run with withheld frames, and compared: wall, motion and photo are measured in the
-spoilt pictures, as a user's would be. ``--nulls N`` renders N scenes in which nothing is switched on, each of
-another wall, probe and noise: what is found there is a false alarm. With ``--as-shipped`` nulls keep the
-scenes' light and gloss: they clip and shine, which may be told, by ``saturation`` and without a name; any
-other name is false: their answers have names of their own. A case that has its answer in OUT is not done
-again. At last every case is scored by the answer to another effect, too: those counts must collapse. With one
-effect there is no other.
+effect, of a drawn size, run with withheld frames, and compared. Wall, motion and photo are measured in the
+affected pictures, as a user's would be. ``--nulls N`` renders N scenes without an effect, each with another
+wall, probe and noise: what is found there is a false alarm. With ``--as-shipped`` these nulls keep the
+scenes' light and gloss: they clip and shine, which may be reported, as ``saturation`` and as a mismatch
+without a name; any other name is false. Their answers are stored under names of their own. A case that has
+its answer in OUT is not done again. Finally every case is also scored by the answer to another effect: those
+counts must be bad. With a single effect there is no such answer.
 """
 
 from __future__ import annotations
@@ -45,15 +45,23 @@ _STAGES = (*PIPELINE[: PIPELINE.index(TEXTURE) + 1], PHOTOMETRY, TWIN)
 _WITHHOLD, _SHRINK = 4, 2
 _NEAR_PX, _NEAR_DEG = 24.0, 20.0
 _PEAK, _LEVEL = 0.6, 0.35
-"""Of the line and of lit wall: as the scenes have them, speckle and pale wall clip, and walls are glossy."""
+"""Power of the line and of lit light.
+
+At the scenes' own values, speckle and pale wall clip, and walls are glossy.
+"""
 _OTHER, _CLOSE = 3, 0.2
-"""A case is also scored by the answer to the third other effect after it. Relative error within which a
-figure tells."""
+"""A case is also scored by the answer to the third other effect after it.
+
+The other number is the relative error within which a figure counts as right.
+"""
 _NULLS = ("straight-4-inch", "oval-3-inch", "welded-4-inch", "corroded-4-inch", "vibrating-3-inch")
 
 
 def scene_of(name: str, case: Case | None, frames: int, seed: int, dull: bool = True) -> Scene:
-    """Return a shipped scene at half its size, with an effect switched on; ``dull`` takes light and gloss."""
+    """Return a shipped scene at half its size, with an effect switched on.
+
+    ``dull`` reduces light and gloss.
+    """
     on = () if case is None else (Switch(case.effect, case.numbers),)
     scene = smaller(shipped(name), _SHRINK, frames, seed=seed, probe_seed=seed)
     if not dull:
@@ -70,7 +78,7 @@ def scene_of(name: str, case: Case | None, frames: int, seed: int, dull: bool = 
 
 
 def _changed(part: Any, path: str, value: Any) -> Any:
-    """Return a part of a scene with one of its values changed; dots join the names of parts within parts."""
+    """Return a part of a scene with one of its values changed; dots join the names of nested parts."""
     name, _, inner = path.partition(".")
     if inner:
         value = _changed(part[name] if isinstance(part, dict) else getattr(part, name), inner, value)
@@ -78,7 +86,10 @@ def _changed(part: Any, path: str, value: Any) -> Any:
 
 
 def answer(scene: Scene, folder: Path) -> dict[str, Any]:
-    """Render a scene, run it with withheld frames, and return what its twin tells; nothing else stays."""
+    """Render a scene, run it with withheld frames, and return the result of its twin.
+
+    Nothing else is kept.
+    """
     shutil.rmtree(folder, ignore_errors=True)
     start, recording = time.process_time(), folder / "recording"
     renderer = renderer_of(build_truth(scene, SCENES / "scene.yaml"))
@@ -96,7 +107,7 @@ def answer(scene: Scene, folder: Path) -> dict[str, Any]:
 
 
 def answers(given: argparse.Namespace) -> Iterator[tuple[str, Case | None, dict[str, Any]]]:
-    """Yield name, case and answer of every case and every null; what is there is read."""
+    """Yield name, case and answer of every case and every null; stored answers are read."""
     chosen = [c for c in CASES if any(o in c.effect for o in given.only.split("+"))]
     drawn = [c.drawn(given.seed + k) for k in range(given.draws) for c in chosen]
     wanted: list[tuple[str, str, Case | None, int]] = [
@@ -118,7 +129,7 @@ def answers(given: argparse.Namespace) -> Iterator[tuple[str, Case | None, dict[
 
 
 def score(case: Case, told: dict[str, Any], spot: tuple[float, float]) -> Any:
-    """Return whether a case is located and named, its size inside 2 σ, sizes told, and false alarms."""
+    """Return whether a case is located, whether named, sizes within 2 σ, all sizes, and false alarms."""
     right = [m for m in told["found"] if _named(case, m)]
     placed = [m for m in told["found"] if _lies_at(case, m, spot) and (case.place or m in right)]
     right = [m for m in right if m in placed]
@@ -140,7 +151,7 @@ def _named(case: Case, found: dict[str, Any]) -> bool:
 
 
 def _lies_at(case: Case, found: dict[str, Any], spot: tuple[float, float]) -> bool:
-    """Return whether a mismatch lies where its effect was put."""
+    """Return whether a mismatch lies where its effect was added."""
     at = {p["name"]: p["value"] for p in found["place"]}
     if case.place == "spot":
         if found["fixed_to"] == "line" and "azimuth_deg" in at:  # the spot lies on the line
@@ -167,7 +178,7 @@ def spot_of(case: Case, given: argparse.Namespace) -> tuple[float, float]:
 
 
 def main(given: argparse.Namespace) -> None:
-    """Print what every case shows, and the counts."""
+    """Print the result of every case, and the counts."""
     cases: list[tuple[Case, dict[str, Any], tuple[float, float]]] = []
     nulls: list[bool] = []
     for name, case, told in answers(given):
@@ -196,7 +207,7 @@ Answered = tuple[Case, dict[str, Any], tuple[float, float]]
 
 
 def exchanged(cases: Sequence[Answered]) -> list[Answered]:
-    """Return cases, each with the answer to another effect; one that has no other is left out."""
+    """Return cases, each with the answer to another effect; one for which there is none is left out."""
     out = []
     for k, (case, _, at) in enumerate(cases):
         after = [*cases[k + 1 :], *cases[:k]]

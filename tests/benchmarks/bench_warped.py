@@ -1,12 +1,12 @@
-"""Errors of lens and cable put by hand into a sound pair of another renderer, and their names by diagnosis.
+"""Errors of lens and encoder added to a sound pair of another renderer, and their names by diagnosis.
 
 usage: python -m tests.benchmarks.bench_warped OUT [CASE ...] [--pair blind-a/a10] [--others]
 
-The pictures of gauge and inspection are warped as the error of a lens would move them, or the readings of
-the encoder are changed; neither renderer nor warp shares code with the diagnosis. A case is
-right when exactly its names are told with a probability of .99 or more. Cases without a name lie outside the
-library: any sure name is wrong, and "unexplained" is right. ``--others`` holds every answer against the next
-case of other names or another verdict instead: the count of right ones must collapse.
+The pictures of gauge and inspection are warped as the error of a lens would move them, or the readings of the
+encoder are changed; neither renderer nor warp shares code with the diagnosis. A case is right when exactly
+its names are given with a probability of .99 or more. Cases without a name lie outside the library: any sure
+name is wrong, and "unexplained" is right. ``--others`` compares every answer with the next case that has
+other names or another verdict instead: the count of right ones must fall to nearly none.
 """
 
 from __future__ import annotations
@@ -34,15 +34,15 @@ from tests.shared_data import shared
 
 RATE = 30.0
 Shift = Callable[[Float32, Float32, float], tuple[Float32, Float32]]
-"""Where the light of the place (x, y), in focal lengths from the centre, goes at a time in s: dx, dy."""
+"""Where the light of the place (x, y), in focal lengths from the centre, appears at a time in s: dx, dy."""
 Reading = Callable[[Float, Float], Float]
 
 
 @dataclass(frozen=True)
 class Case:
-    """An error put in by hand, and the names that are right; ``where`` lists the recordings that have it.
+    """An added error, and the names that are right; ``where`` lists the recordings that have it.
 
-    Without a name the right verdict is told instead.
+    Without a name ``verdict`` is the right one.
     """
 
     names: tuple[str, ...]
@@ -150,7 +150,7 @@ CASES = {
 
 @dataclass(frozen=True)
 class Warp:
-    """Warps pictures as a case says; ``x`` and ``y`` are the places of the pixels, in focal lengths."""
+    """Warps pictures as a case defines; ``x`` and ``y`` are the places of the pixels, in focal lengths."""
 
     case: Case
     x: Float32
@@ -176,7 +176,10 @@ class Warp:
 
 
 def make(case: Case, source: Path, folder: Path, kind: str) -> None:
-    """Make one recording of a case: the source's, with the pictures warped and the encoder changed."""
+    """Make one recording of a case.
+
+    A copy of the source with warped pictures and changed encoder readings.
+    """
     shutil.copytree(source, folder, ignore=shutil.ignore_patterns("truth*"))
     camera = yaml.safe_load((folder / "probe.yaml").read_text("utf-8"))["camera"]
     if kind not in case.where:
@@ -196,12 +199,12 @@ def _rewrite(path: Path, reading: Reading) -> None:
 
 
 def answered(case: Case, pair: str, folder: Path) -> dict[str, object]:
-    """Diagnose a case, unless its answer is there, and return the answer."""
+    """Diagnose a case, unless its answer exists, and return the answer."""
     told = folder / "answer" / "diagnosis.json"
     if not told.is_file():
         for kind in ("gauge", "field"):
             if not (folder / kind).is_dir():
-                # Whole or not there: what was stopped half-way is no recording of the case.
+                # Moved into place when complete: a recording made only in part must not count as the case.
                 half = folder / f"{kind}-half"
                 shutil.rmtree(half, ignore_errors=True)
                 make(case, shared("recordings", f"{pair}-{kind}"), half, kind)
@@ -215,7 +218,7 @@ def answered(case: Case, pair: str, folder: Path) -> dict[str, object]:
 
 
 def line(name: str, case: Case, told: dict[str, object]) -> tuple[str, str]:
-    """Return what became of a case in a word (right, silent, WRONG or failed), and a line about it."""
+    """Return the result of a case in a word (right, silent, WRONG or failed), and a line about it."""
     effects = told.get("effects") or []
     assert isinstance(effects, list)
     sure = {e["name"] for e in effects if e["probability"] >= 0.99}
@@ -233,7 +236,7 @@ def _sizes(effect: dict[str, dict[str, dict[str, float]]]) -> str:
 
 
 def another(name: str) -> Case:
-    """Return the next of all cases, whichever were asked for, whose right answer is another than a name's."""
+    """Return the next case of all, requested or not, whose right answer differs from that of a name's."""
     own, every = CASES[name], [*CASES]
     after = every[every.index(name) :] + every
     return next(c for c in map(CASES.__getitem__, after) if (c.names, c.verdict) != (own.names, own.verdict))

@@ -1,9 +1,9 @@
-"""Kinds of hard footage: pictures held, exchanged, lost or coded hastily, and other files changed.
+"""Kinds of hard footage: pictures repeated, exchanged, lost or coded badly, and changes of other files.
 
-`FROZEN` are frames that all show the picture before them, `FILTERED` filters against noise, `EXCHANGED`
-pictures in another's place, `LOST` which pictures are left when some are lost and the table of frames does
-not know, `CODED` codecs; one of `REWRITTEN` changes other files of the recording, one of `DAMAGED`
-the video's bytes.
+`FROZEN` lists frames that all show the picture before them, `FILTERED` noise filters, `EXCHANGED` pictures
+shown in place of others, `LOST` the pictures that remain when some are lost without a note in the table of
+frames, `CODED` codecs. Functions of `REWRITTEN` change other files of the recording, those of `DAMAGED` the
+video's bytes.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ Frame = TypeVar("Frame")
 
 
 def held_still(frames: range) -> Paint:
-    """Return what shows the picture before ``frames`` in all of them."""
+    """Return a change that shows the picture before ``frames`` in all of them."""
     shown: list[Image] = []
 
     def paint(image: Image, laser: bool, k: int, random: np.random.Generator) -> Image:
@@ -37,9 +37,9 @@ def held_still(frames: range) -> Paint:
 
 
 def filtered(keep: float, edges: float) -> Paint:
-    """Return a filter against noise that keeps a share of the picture before in the same light.
+    """Return a noise filter that mixes in a share of the previous picture in the same light.
 
-    Where a picture differs by ``edges`` grey levels or more, less of it is kept.
+    Where a pixel differs by ``edges`` grey levels or more, the share is smaller.
     """
     shown: dict[bool, Image] = {}
 
@@ -65,7 +65,10 @@ def half_size_probe(folder: Path, random: np.random.Generator) -> None:
 
 
 def late_stamps(folder: Path, random: np.random.Generator) -> None:
-    """Times are of arrival: late by an exponential part of a period, 0.2 in the mean, never out of order."""
+    """Replace times by times of arrival.
+
+    Late by an exponential part of a period, mean 0.2, never out of order.
+    """
     head, *rows = (folder / "frames.csv").read_text("utf-8").splitlines()
     cells = [row.split(",") for row in rows]
     times = np.array([float(c[1]) for c in cells])
@@ -77,7 +80,7 @@ def late_stamps(folder: Path, random: np.random.Generator) -> None:
 
 
 def damaged_stream(video: bytes, random: np.random.Generator) -> bytes:
-    """Twenty bytes in the second third of the video are others, as after a bad copy."""
+    """Change twenty bytes in the second third of the video, as a bad copy would."""
     out = bytearray(video)
     for at in random.integers(len(out) // 3, 2 * len(out) // 3, 20):
         out[at] ^= 0x55
@@ -96,7 +99,7 @@ def exchanged(frames: Iterable[Frame], taken: Mapping[int, int]) -> Iterator[Fra
 
 
 def clock_jump(folder: Path, random: np.random.Generator) -> None:
-    """The camera's clock is set 5 s ahead at frame 70; the encoder's goes on."""
+    """Set the camera's clock 5 s ahead at frame 70; the encoder's clock goes on."""
     head, *rows = (folder / "frames.csv").read_text("utf-8").splitlines()
     cells = [row.split(",") for row in rows]
     lines = [f"{c[0]},{float(c[1]) + 5 * (int(c[0]) >= 70):.6f},{c[2]}" for c in cells]
@@ -104,14 +107,14 @@ def clock_jump(folder: Path, random: np.random.Generator) -> None:
 
 
 def kept_pictures(lost: int, together: bool, count: int, random: np.random.Generator) -> NDArray[np.int_]:
-    """Return the pictures that are left of ``count`` when some are lost, one after the other or anywhere."""
+    """Return the remaining pictures of ``count`` when some are lost, in a row or at random."""
     inner = np.arange(10, count - 10 - lost)
     gone = random.choice(inner) + np.arange(lost) if together else random.choice(inner, lost, replace=False)
     return np.setdiff1d(np.arange(count), gone)
 
 
 def forget_lost(folder: Path, kept: NDArray[np.int_]) -> None:
-    """Give the pictures that are left the first rows of the table, and their own true poses."""
+    """Give the remaining pictures the first rows of the table, and their own true poses."""
     table = folder / "frames.csv"
     table.write_text("\n".join(table.read_text("utf-8").splitlines()[: len(kept) + 1]) + "\n", "utf-8")
     truth = json.loads((folder / "truth.json").read_text("utf-8"))
@@ -120,19 +123,19 @@ def forget_lost(folder: Path, kept: NDArray[np.int_]) -> None:
 
 
 def labels_swapped(folder: Path, random: np.random.Generator) -> None:
-    """From a frame in the middle third on, the table says laser of lit pictures and led of the laser's."""
+    """Exchange laser and led in the table from some frame in the middle third on."""
     _relabel(folder, lambda count: np.arange(count) >= random.integers(count // 3, 2 * count // 3))
 
 
 def labels_wrong(folder: Path, random: np.random.Generator) -> None:
-    """One label in ten, anywhere, is the other one."""
+    """Make one label in ten, at random, the other one."""
     _relabel(
         folder, lambda count: np.isin(np.arange(count), random.choice(count, count // 10, replace=False))
     )
 
 
 def _relabel(folder: Path, wrong_of: Callable[[int], NDArray[np.bool_]]) -> None:
-    """Exchange laser and led in the rows of the table that ``wrong_of`` their number says."""
+    """Exchange laser and led in the rows of the table for which ``wrong_of`` their number is true."""
     with (folder / "frames.csv").open(encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
     if {row["illumination"] for row in rows} != {"laser", "led"}:
@@ -146,9 +149,9 @@ def _relabel(folder: Path, wrong_of: Callable[[int], NDArray[np.bool_]]) -> None
         writer.writerows(rows)
 
 
-# Frames whose pictures all are the one before the first of them.
+# Frames whose pictures are all replaced by the one before the first of them.
 FROZEN = {"frozen-picture": range(90, 99), "frozen-second": range(60, 90)}
-# Filters against noise: one that mixes pictures by halves, and one that lets edges through.
+# Noise filters: one that averages two pictures, and one that preserves edges.
 FILTERED = {"pictures-mixed": partial(filtered, 0.5, 1e4), "noise-filtered": partial(filtered, 0.75, 32.0)}
 REWRITTEN = {
     "half-size": half_size_probe, "late-stamps": late_stamps, "clock-jump": clock_jump,
@@ -160,8 +163,9 @@ LOST = {
     "lost-5-together": partial(kept_pictures, 5, True),
 }
 DAMAGED = {"damaged-stream": damaged_stream}
-# Stored as HEVC, from careful to hasty: what is held over from picture to picture differs. As MPEG-2, which
-# is asked for less than it can do (its coarsest steps make 6.6 Mbit/s of open-1): blocks show.
+# Stored as HEVC, from careful to fast presets, which differ in what is kept from picture to picture; and as
+# MPEG-2
+# at a lower rate than its coarsest steps allow (6.6 Mbit/s for open-1), so that blocks show.
 _HEVC = {
     f"hevc-{crf}-{preset}": {"crf": str(crf), "preset": preset, "x265-params": "log-level=none"}
     for crf, preset in (
@@ -178,7 +182,7 @@ CODED = {name: ("libx265", options) for name, options in _HEVC.items()} | {
     "mpeg-2": ("mpeg2video", {"b": "1M"}),
     "vp9": ("libvpx-vp9", {"b": "500k", "deadline": "realtime", "cpu-used": "6"}),
 }
-# Pictures that change places, laser against led and led against led.
+# Pictures that are exchanged: laser for led, and led for led.
 _PAIRS = {
     "neighbours-exchanged": [(k, k + 1) for k in (20, 41, 60, 77, 98, 112)],
     "lit-exchanged": [(k, k + 2) for k in (41, 77, 113)],

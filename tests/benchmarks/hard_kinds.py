@@ -1,7 +1,7 @@
-"""Kinds of hard footage: how one picture of a recording is painted over.
+"""Kinds of hard footage: how single pictures of a recording are changed.
 
-A kind of `PAINTED` takes (image (H, W, 3) in grey levels, whether the laser alone lights it, number of the
-frame, random numbers) and returns the picture that is stored. Sizes are of pictures 1200 px high.
+A function of `PAINTED` takes (image (H, W, 3) in grey levels, whether the laser alone lights it, number of
+the frame, random generator) and returns the picture that is stored. Sizes are for pictures 1200 px high.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ GREEN = np.array([0.25, 1.0, 0.15], np.float32)
 
 
 def hot_pixels(image: Image, laser: bool, k: int, random: np.random.Generator) -> Image:
-    """One pixel in 500 white or black, anew in each frame."""
+    """One pixel in 500 is white or black, others in each frame."""
     struck = random.random(image.shape[:2])
     image[struck < 0.001] = 255.0
     image[struck > 0.999] = 0.0
@@ -26,7 +26,7 @@ def hot_pixels(image: Image, laser: bool, k: int, random: np.random.Generator) -
 
 
 def static_reflection(image: Image, laser: bool, k: int, random: np.random.Generator) -> Image:
-    """A bright spot of the laser's colour beside the line, at one place of the image in all frames."""
+    """A bright spot of the laser's colour beside the line, at the same place of the image in all frames."""
     if laser:
         h, w = image.shape[:2]
         v, u = np.mgrid[:h, :w]
@@ -36,7 +36,7 @@ def static_reflection(image: Image, laser: bool, k: int, random: np.random.Gener
 
 
 def droplet(image: Image, laser: bool, k: int, random: np.random.Generator) -> Image:
-    """A drop on the window draws what is behind it aside by up to four pixels."""
+    """A drop on the window displaces what is behind it by up to four pixels."""
     return _drop(image, int(0.1 * len(image)), image.shape[1] // 2 - 45)
 
 
@@ -57,19 +57,19 @@ def _drop(image: Image, top: int, left: int) -> Image:
 
 
 def banding(image: Image, laser: bool, k: int, random: np.random.Generator) -> Image:
-    """Exposure that varies by a third over the rows and rolls from frame to frame."""
+    """Exposure varies by a third over the rows, and the pattern rolls from frame to frame."""
     rows = np.arange(len(image)) / 140 + 0.37 * k
     return image * (1 + 0.33 * np.sin(2 * np.pi * rows))[:, None, None].astype(np.float32)
 
 
 def interlaced(image: Image, laser: bool, k: int, random: np.random.Generator) -> Image:
-    """Every second row is half a pixel aside."""
+    """Every second row is displaced by half a pixel."""
     image[1::2] = 0.5 * (image[1::2] + np.roll(image[1::2], 1, axis=1))
     return image
 
 
 def dim_sector(image: Image, laser: bool, k: int, random: np.random.Generator) -> Image:
-    """The laser is ten times weaker over 40 degrees, and over 10 of these it is not there at all."""
+    """The laser is ten times weaker over 40 degrees, and missing over 10 of these."""
     if laser:
         psi = _azimuth(image)
         image[np.abs(psi - 1.2) < np.radians(20)] *= 0.1
@@ -95,7 +95,7 @@ def text_overlay(image: Image, laser: bool, k: int, random: np.random.Generator)
 
 
 def clock_and_logo(image: Image, laser: bool, k: int, random: np.random.Generator) -> Image:
-    """A clock that counts, at the left; at the lower right a logo that lets the wall through by a third."""
+    """A running clock at the left, and at the lower right a logo that is one third transparent."""
     drawn = np.clip(image, 0, 255).astype(np.uint8)
     clock = f"{k // 1800:02d}:{k // 30 % 60:02d}.{100 * (k % 30) // 30:02d}"
     cv2.putText(drawn, clock, (290, 560), cv2.FONT_HERSHEY_DUPLEX, 1.4, (60, 220, 255), 4, cv2.LINE_AA)
@@ -117,7 +117,7 @@ def cable(image: Image, laser: bool, k: int, random: np.random.Generator) -> Ima
 
 
 def debris(image: Image, laser: bool, k: int, random: np.random.Generator) -> Image:
-    """Six flakes float through the picture; one in the laser's plane glows in its colour."""
+    """Six flakes float through the picture; one lies in the laser's plane and shines in its colour."""
     drawn = np.clip(image, 0, 255).astype(np.uint8)
     for n in range(6):
         place = np.array([311.0 * n + 6.1 * k, 197.0 * n + (3.0 + n) * k]) % (image.shape[1], image.shape[0])
@@ -136,7 +136,7 @@ def black_frames(image: Image, laser: bool, k: int, random: np.random.Generator)
 
 
 def fog(image: Image, laser: bool, k: int, random: np.random.Generator) -> Image:
-    """Mist takes away half of the light and scatters it into a wide glow over a grey veil."""
+    """Mist removes half of the light and scatters it into a wide glow over a grey veil."""
     small = cv2.resize(image, None, fx=0.125, fy=0.125, interpolation=cv2.INTER_AREA)
     glow = cv2.resize(cv2.GaussianBlur(small, (0, 0), 6), image.shape[1::-1])
     return 0.4 * image + 0.5 * glow + 12
@@ -148,30 +148,30 @@ def grey_camera(image: Image, laser: bool, k: int, random: np.random.Generator) 
 
 
 def standing_water(image: Image, laser: bool, k: int, random: np.random.Generator) -> Image:
-    """Still water at 6 o'clock mirrors what is above it, half as bright."""
+    """Still water at 6 o'clock reflects what is above it, half as bright."""
     level = int(0.5 * len(image) + 370)
     image[level:] = 0.5 * image[level - 1 : 2 * level - len(image) - 1 : -1]
     return image
 
 
 def shake(image: Image, laser: bool, k: int, random: np.random.Generator) -> Image:
-    """The camera trembles on its mount: every picture is shifted by one pixel or so."""
+    """The camera vibrates on its mount: every picture is shifted by about one pixel."""
     move = np.hstack([np.eye(2), random.normal(0, 0.8, (2, 1))]).astype(np.float32)
     return np.asarray(cv2.warpAffine(image, move, image.shape[1::-1], flags=cv2.INTER_CUBIC), np.float32)
 
 
 def scale_shrinks(image: Image, laser: bool, k: int, random: np.random.Generator) -> Image:
-    """The lens warms up: the picture shrinks by 0.25 % over 170 frames, evenly."""
+    """The lens warms up: the picture shrinks linearly by 0.25 % over 170 frames."""
     return _scaled(image, 1 - 0.0025 * k / 170)
 
 
 def scale_grows(image: Image, laser: bool, k: int, random: np.random.Generator) -> Image:
-    """The picture grows by 0.25 % over 170 frames, evenly."""
+    """The picture grows linearly by 0.25 % over 170 frames."""
     return _scaled(image, 1 + 0.0025 * k / 170)
 
 
 def scale_settles(image: Image, laser: bool, k: int, random: np.random.Generator) -> Image:
-    """The picture shrinks by 0.3 %, fast at first, to an end: an e-th of the way is left after 60 frames."""
+    """The picture shrinks by 0.3 %, exponentially with a time constant of 60 frames."""
     return _scaled(image, 1 - 0.003 * (1 - np.exp(-k / 60)))
 
 
@@ -182,12 +182,12 @@ def dark_edges(image: Image, laser: bool, k: int, random: np.random.Generator) -
 
 
 def exposure_pumping(image: Image, laser: bool, k: int, random: np.random.Generator) -> Image:
-    """Automatic exposure swings between a third and one and a half within 40 frames, and is late."""
+    """Automatic exposure swings between a third and one and a half within 40 frames, with a delay."""
     return image * np.float32(0.9 + 0.6 * np.sin(2 * np.pi * k / 40))
 
 
 def fouled_lens(image: Image, laser: bool, k: int, random: np.random.Generator) -> Image:
-    """Grease over a sector of 50 degrees: blurred by five pixels, milky, half as bright."""
+    """Grease over a sector of 50 degrees: blurred by five pixels, hazy, half as bright."""
     weight = np.clip((np.radians(25) - np.abs(_azimuth(image) + 2.0)) / 0.1, 0, 1)[..., None]
     greasy = 0.5 * cv2.GaussianBlur(image, (0, 0), 5) + 8
     return np.asarray(image + weight * (greasy - image), np.float32)
@@ -201,7 +201,7 @@ def greasy_half(image: Image, laser: bool, k: int, random: np.random.Generator) 
 
 
 def unspoilt(image: Image, laser: bool, k: int, random: np.random.Generator) -> Image:
-    """The picture as it is, for what only the codec spoils."""
+    """The picture is unchanged; only the codec degrades it."""
     return image
 
 
@@ -213,13 +213,13 @@ def lamp_out(image: Image, laser: bool, k: int, random: np.random.Generator) -> 
 
 
 def laser_flicker(image: Image, laser: bool, k: int, random: np.random.Generator) -> Image:
-    """The laser's brightness is drawn anew in each frame, and it stays off in one of twelve."""
+    """The laser's brightness is random in each frame, and it is off in one of twelve."""
     strength = random.uniform(0.15, 1.2) * (random.random() > 1 / 12)
     return image * np.float32(strength) if laser else image
 
 
 def mirrored(image: Image, laser: bool, k: int, random: np.random.Generator) -> Image:
-    """Left and right are exchanged, and the probe file does not know."""
+    """Left and right are exchanged, which the probe file does not state."""
     return np.ascontiguousarray(image[:, ::-1])
 
 
@@ -229,30 +229,30 @@ def half_size(image: Image, laser: bool, k: int, random: np.random.Generator) ->
 
 
 def enlarged(image: Image, laser: bool, k: int, random: np.random.Generator) -> Image:
-    """A careless export: made smaller to a fifth, which is coarser than the line, and enlarged again."""
+    """A careless export: reduced to a fifth of the size, coarser than the line, and enlarged again."""
     small = cv2.resize(image, None, fx=0.2, fy=0.2, interpolation=cv2.INTER_AREA)
     return np.asarray(cv2.resize(small, image.shape[1::-1], interpolation=cv2.INTER_CUBIC), np.float32)
 
 
 def sharpened(image: Image, laser: bool, k: int, random: np.random.Generator) -> Image:
-    """The camera sharpens: one and a half of what is finer than two pixels is added."""
+    """The camera sharpens: one and a half times the detail finer than two pixels is added."""
     return np.asarray(image + 1.5 * (image - cv2.GaussianBlur(image, (0, 0), 2)), np.float32)
 
 
 def white_balance_drifts(image: Image, laser: bool, k: int, random: np.random.Generator) -> Image:
-    """Red grows by 30 % over 170 frames, blue falls by as much."""
+    """Red grows by 30 % over 170 frames, and blue falls by as much."""
     share = 0.3 * k / 170
     return image * np.array([1 - share, 1, 1 + share], np.float32)
 
 
 def view_drifts(image: Image, laser: bool, k: int, random: np.random.Generator) -> Image:
-    """The camera comes loose: the picture moves aside by three pixels over 170 frames."""
+    """The camera comes loose: the picture shifts by three pixels over 170 frames."""
     move = np.float32([[1, 0, 3 * k / 170], [0, 1, 0]])
     return np.asarray(cv2.warpAffine(image, move, image.shape[1::-1], flags=cv2.INTER_CUBIC), np.float32)
 
 
 def outside_first(image: Image, laser: bool, k: int, random: np.random.Generator) -> Image:
-    """The first 24 pictures show a room: the probe is not in the pipe yet, its lamps and laser are on."""
+    """The first 24 pictures show a room: the probe is not yet in the pipe; its lamps and laser are on."""
     if k >= 24:
         return image
     coarse = np.random.default_rng(k // 8).normal(60, 20, (60, 80)).astype(np.float32)

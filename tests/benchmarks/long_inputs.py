@@ -1,4 +1,4 @@
-"""A run repeated end to end along a straight pipe: rings, motion, the wall's picture, and its video."""
+"""A run repeated end to end along a straight pipe: rings, motion, the wall's photo, and its video."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def _tiled(values: NDArray[Any], times: int, scratch: Scratch) -> NDArray[Any]:
 
 
 def repeated_motion(motion: Trajectory, times: int, length_mm: float) -> Trajectory:
-    """Return the motion along a straight pipe; the source's bent axis would not meet itself."""
+    """Return the motion along a straight pipe; the ends of the source's bent axis would not join."""
     count, every = len(motion.frame), np.arange(times)
     T_pc = np.tile(motion.T_pc, (times, 1, 1))
     T_pc[:, 2, 3] += np.repeat(length_mm * every, count)
@@ -49,7 +49,7 @@ def repeated_motion(motion: Trajectory, times: int, length_mm: float) -> Traject
 def repeated_photo(
     photo: WallTexture, times: int, length_mm: float, coarser: int, scratch: Scratch
 ) -> WallTexture:
-    """Return the wall's picture so many times over, as much coarser."""
+    """Return the wall's photo so many times over, at a coarser resolution."""
     rows = round(length_mm / photo.mm_per_px)
     one = photo.bgra[np.minimum(np.arange(0, rows, coarser), len(photo.bgra) - 1), ::coarser]
     return replace(
@@ -59,7 +59,7 @@ def repeated_photo(
 
 
 class RepeatedFrames:
-    """A video shown again and again, decoded anew each time."""
+    """A video repeated again and again, decoded anew each time."""
 
     def __init__(self, recording: Recording) -> None:
         self._recording, self._count = recording, int(recording.frames.frame[-1]) + 1
@@ -77,7 +77,7 @@ class RepeatedFrames:
 
 
 def even_wall(wall: Wall, times: int, length_mm: float) -> Wall:
-    """Return a wall of the mean radius at every place: what lies on it is the photo's business."""
+    """Return a wall of the mean radius at every place: only the photo matters here."""
     radius_map = wall.radius_map
     s = np.arange(radius_map.distance_mm[0], radius_map.distance_mm[0] + times * length_mm, 0.5)
     even = {f.name: np.full((len(s), len(radius_map.azimuth_rad)), np.nanmedian(getattr(radius_map, f.name)),

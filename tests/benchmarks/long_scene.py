@@ -1,4 +1,7 @@
-"""A pulled scene of any length: its metre repeated, with other defects and welds every other metre."""
+"""A pulled scene of any length.
+
+Its metre repeated, with other defects in each metre and welds in every second.
+"""
 
 from __future__ import annotations
 
@@ -9,12 +12,12 @@ from pipeline.simulator.wall.description import Defect
 
 _METRE_MM = 1000.0
 _WELD_EVERY_M = 2
-# Turned by this, no two metres have their defects at one place around the pipe.
+# With this rotation no two metres have their defects at the same place around the pipe.
 _TURN_DEG = 137.5
 
 
 def lengthened(scene: Scene, metres: int) -> Scene:
-    """Return a scene of one metre made as many metres long; of texture nothing repeats."""
+    """Return a scene of one metre made as many metres long; its texture does not repeat."""
     pipe = scene.pipe
     beyond_mm = pipe.to_mm - _METRE_MM
     welds = tuple(

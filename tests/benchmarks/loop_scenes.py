@@ -1,4 +1,4 @@
-"""There-and-back recordings to close loops in: equal welds at equal spacing, natural texture between them."""
+"""Recordings there and back for loop closure: equal welds at equal spacing, natural texture between them."""
 
 from __future__ import annotations
 
@@ -14,14 +14,17 @@ _PLAIN = {"mottle": 0.12, "grain": 0.04, "rust": 0.0, "gloss": 0.1, "seam_deg": 
 
 
 def back(length_mm: float) -> Scene:
-    """Return a textured pipe at 4 mm a frame; the encoder is 0.1 % long and slips by 6 mm on the way back."""
+    """Return a textured pipe at 4 mm a frame.
+
+    The encoder reads 0.1 % too much and slips by 6 mm on the way back.
+    """
     slip_s = 1.4 * length_mm / 120.0
     effects = {"encoder_scale": {"relative": 0.001}, "encoder_slip": {"slip_mm": -6.0, "time_s": slip_s}}
     return _scene("back", length_mm, 120.0, effects, {})
 
 
 def faint(length_mm: float) -> Scene:
-    """Return a pipe with little texture at 8 mm a frame: what drifts most."""
+    """Return a pipe with little texture at 8 mm a frame, which gives the largest drift."""
     return _scene("faint", length_mm, 240.0, {}, _PLAIN)
 
 
@@ -49,7 +52,7 @@ def _scene(
 
 
 def _shrink(values: dict[str, Any]) -> None:
-    """Give the camera 640 × 480 pixels in place of 1600 × 1200, and a line as wide in them."""
+    """Reduce the camera from 1600 × 1200 to 640 × 480 pixels; the line stays as wide in pixels."""
     camera, unsure = values["probe"]["camera"], values["probe"]["standard_uncertainty"]
     camera["image_size"] = [640, 480]
     camera["focal_px"] = [f / _SHRINK for f in camera["focal_px"]]

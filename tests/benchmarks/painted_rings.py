@@ -1,4 +1,4 @@
-"""Defects painted into the rings of a finished run, where the run says that each sample lies."""
+"""Defects inserted into the rings of a finished run, where the run places each sample."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ from tests.quiet import quiet_context
 _KINDS = ("pit", "corrosion", "gouge", "groove", "deposit", "ridge", "dent")
 _INWARD = ("deposit", "ridge", "dent")
 _DEPTH_MM, _SIZE_MM = (0.12, 3.0), (1.5, 22.0)
-# Free wall between two painted defects, and from the recording's own: what a finding's foot may reach over.
+# Free wall between two inserted defects, and from the recording's own: as far as a finding may extend.
 _APART_MM, _MOST = 16.0, 14
 
 
 @dataclass(frozen=True)
 class Painted:
-    """A defect: place on the run's own wall, size, sign times depth, and by how much it is turned, rad."""
+    """A defect: place on the run's own wall, size, sign times depth, and its rotation, rad."""
 
     kind: str
     distance_mm: float
@@ -64,7 +64,7 @@ class Painted:
 
 @dataclass(frozen=True)
 class Background:
-    """A finished run, where its own defects lie on its wall (distance, azimuth, reach), its true relief."""
+    """A finished run, its own defects (distance, azimuth, reach), and the true relief of its wall."""
 
     name: str
     recording: Recording
@@ -77,13 +77,13 @@ class Background:
     true: TrueWall | None
 
     def every(self, which: slice) -> Background:
-        """Return it with some of its rings."""
+        """Return the background with some of its rings only."""
         rings, points = (_rows(x, which, len(self.rings.frame)) for x in (self.rings, self.points))
         return replace(self, rings=rings, points=points)
 
 
 def _rows(artefact, which, count):  # type: ignore[no-untyped-def]
-    """Return an artefact with some of its rings."""
+    """Return an artefact with some of its rings only."""
     values = {f.name: getattr(artefact, f.name) for f in fields(artefact) if f.name != "azimuth_rad"}
     of_rings = {n: v for n, v in values.items() if isinstance(v, np.ndarray) and len(v) == count}
     return replace(artefact, **{n: v[which] for n, v in of_rings.items()})
@@ -126,7 +126,7 @@ def _own_defects(truth, shift: float, turn: float) -> Float:  # type: ignore[no-
 def drawn(
     bg: Background, radius: float, span: tuple[float, float], random: np.random.Generator
 ) -> list[Painted]:
-    """Draw defects clear of each other and of the recording's own."""
+    """Draw defects that are clear of each other and of the recording's own."""
     out: list[Painted] = []
     for _ in range(300):
         new = _one(span, random)
@@ -147,7 +147,7 @@ def _one(span: tuple[float, float], random: np.random.Generator) -> Painted:
 
 
 def _clear(new: Painted, s: float, psi: float, along: float, around: float, radius: float) -> bool:
-    """Whether a drawn defect is clear of what reaches so far along and around."""
+    """Return whether a drawn defect is clear of one that reaches so far along and around."""
     aside = radius * abs(turned(new.azimuth_rad - psi)) if np.isfinite(around) else 0.0
     return bool(
         abs(new.distance_mm - s) > along + new.reach_mm + _APART_MM
@@ -156,12 +156,12 @@ def _clear(new: Painted, s: float, psi: float, along: float, around: float, radi
 
 
 def turned(angle: float) -> float:
-    """Return an angle between −π and π."""
+    """Return an angle wrapped into −π … π."""
     return float((angle + np.pi) % (2 * np.pi) - np.pi)
 
 
 def painted_rings(bg: Background, defects: Sequence[Painted]) -> RingSamples:
-    """Return the rings with the defects in them: every sample moved along its ray of the image."""
+    """Return the rings with the defects in them: every sample is moved along its ray of the image."""
     rows = np.arange(len(bg.rings.frame))
     probe = bg.probe.as_found_in(bg.motion)
     here = wall_samples(probe, bg.rings, bg.points, bg.motion, rows)
@@ -176,6 +176,6 @@ def painted_rings(bg: Background, defects: Sequence[Painted]) -> RingSamples:
 
 
 def walled(bg: Background, rings: RingSamples, context: Context) -> Wall:
-    """Return the wall of these rings."""
+    """Return the wall accumulated from these rings."""
     parameters = AccumulateParameters.model_validate({})
     return accumulate_wall(bg.probe, rings, bg.points, bg.motion, parameters, context)

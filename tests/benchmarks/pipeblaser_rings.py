@@ -89,7 +89,7 @@ def probe_of(camera: Camera) -> Probe:
 
 
 def fitted(rings: Rings, probe: Probe, shift_px: Float | None = None, start: Float | None = None) -> Fitted:
-    """Fit a cylinder to the rings of all frames, each with its own place and lean, by Gauss-Newton."""
+    """Fit a cylinder to the rings of all frames, with position and lean for each, by Gauss-Newton."""
     away = rings.uv - probe.camera.centre_px
     outward = away / np.linalg.norm(away, axis=1)[:, None]
     uv = rings.uv if shift_px is None else rings.uv - np.nan_to_num(shift_px)[:, None] * outward
@@ -117,7 +117,7 @@ def fitted(rings: Rings, probe: Probe, shift_px: Float | None = None, start: Flo
 
 
 def _start(xyz: Float, row: Int, frames: int) -> Float:
-    """Return each frame's circle in the sheet's plane, no lean, and the median radius."""
+    """Return each frame's circle in the plane of the sheet as the start, no lean, and the median radius."""
     state, radius = np.zeros((frames, POSE)), np.zeros(frames)
     for k in range(frames):
         xy = xyz[(row == k) & np.isfinite(xyz).all(1), :2]

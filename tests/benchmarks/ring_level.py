@@ -1,8 +1,8 @@
-"""Gauge runs measured without rendering: rings and fiducials traced ray by ray, with noise.
+"""Gauge runs measured without rendering: rings and fiducials are traced ray by ray, with noise.
 
-Shares no forward model with the diagnosis: rays, sheet, windows and motion are the simulator's. Serves to
-count on many runs what rendered ones, which take minutes each, can only be spot checks of. The line's profile
-and the wall's own effects are not in it: those are for rendered runs.
+Shares no forward model with the diagnosis: rays, sheet, windows and motion are the simulator's. It allows
+counts over many runs, of which rendered runs, at minutes each, can only check a few. The line's profile and
+effects of the wall itself are not modelled: they need rendered runs.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ _INTERPOLATED = 2 / 3
 
 @dataclass(frozen=True)
 class Noise:
-    """1 σ of what is measured: of single samples, and what neighbours on the wall share."""
+    """1 σ of the measurements: of single samples, and of errors that neighbours on the wall share."""
 
     ring_px: float = 0.05
     ring_cell_px: float = 0.02
@@ -60,7 +60,7 @@ class Noise:
 
 @dataclass(frozen=True)
 class RingLevelRun:
-    """A gauge run as it would be measured, the recording it stands for (without pictures), and its truth."""
+    """A gauge run as it would be measured, a recording without pictures, and its truth."""
 
     measured: MeasuredRun
     recording: Recording
@@ -69,7 +69,7 @@ class RingLevelRun:
 
 @dataclass(frozen=True)
 class _NoPictures:
-    """A source that has no images."""
+    """A frame source without images."""
 
     image_size: tuple[int, int]
 
@@ -152,7 +152,7 @@ class Eye:
 
     @classmethod
     def at(cls, truth: SceneTruth, time_s: float) -> Eye:
-        """Return the instrument at a frame's time, its pose row by row."""
+        """Return the instrument at a frame's time, with its pose row by row."""
         instrument = truth.instrument_at(time_s)
         shutter, rows = instrument.shutter, instrument.camera.model.image_size[1]
         readout_s = shutter.readout_s if shutter.kind == "rolling" else 0.0
@@ -165,7 +165,7 @@ class Eye:
         )
 
     def poses(self, row: Float) -> Float:
-        """Return ``T_pc`` (A, 4, 4) at image rows (A,), straight between those given."""
+        """Return ``T_pc`` (A, 4, 4) at image rows (A,), linear between those given."""
         if len(self.row) == 1:
             return np.broadcast_to(self.T_pc, (len(row), 4, 4))
         at = np.clip((row - self.row[0]) / (self.row[1] - self.row[0]), 0, len(self.row) - 1 - 1e-9)
@@ -177,7 +177,8 @@ class Eye:
 def traced_ring(eye: Eye, gauge: Gauge, centre: Float, outward: Float) -> tuple[Float, Float]:
     """Return image radii (A,) at which the lit wall is seen, and the lit points (A, 3) in P.
 
-    A pixel farther out sees nearer wall, so that it passes the sheet once; NaN where it does so in a leap.
+    A pixel farther out sees nearer wall, so that its sight line crosses the sheet once along the image
+    radius; NaN where it does so in a jump.
     """
 
     def ahead(rho: Float) -> tuple[Float, Float]:
@@ -215,7 +216,7 @@ def _ahead(eye: Eye, gauge: Gauge, uv: Float) -> tuple[Float, Float]:
 
 
 def _to_bore(gauge: Gauge, origin_p: Float, ray_p: Float) -> Float:
-    """Return the way (N,) of rays from within the bore to its wall, stepping down where it narrows."""
+    """Return the distance (N,) along rays from within the bore to its wall or a step down in it."""
     a, b = np.sum(ray_p[:, :2] ** 2, 1), np.sum(origin_p[:, :2] * ray_p[:, :2], 1)
     c = np.sum(origin_p[:, :2] ** 2, 1)
     best = np.full(len(a), np.inf)
@@ -279,7 +280,7 @@ def seen_at(eye: Eye, xyz_p: Float, first: Float) -> Float:
 
 
 def _miss(eye: Eye, xyz_p: Float, uv: Float) -> Float:
-    """Return by how much (M, 2) rays pass the points, as tangents about the points' own direction."""
+    """Return by how much (M, 2) rays miss the points, as tangents about the points' own direction."""
     origin, ray = viewing_rays(eye.instrument.camera, uv)
     towards = transform(inverse(eye.poses(uv[:, 1])), xyz_p) - origin
     towards /= np.linalg.norm(towards, axis=1)[:, None]

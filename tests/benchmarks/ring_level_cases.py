@@ -1,4 +1,4 @@
-"""Drawn gauge runs at ring level: what is concealed in each, and how noisy its measurements are."""
+"""Drawn gauge runs at ring level: the effects concealed in each, and the noise of its measurements."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ from pipeline.simulator.scene import Scene
 from tests.benchmarks.ring_level import Noise
 
 PRIOR = Path(__file__).with_name("ring_level.yaml")
-# Fewer frames at a lower rate: the same way and time, for less computing.
+# Fewer frames at a lower rate: the same distance and time with less computing.
 _FRAMES = 1 / 3
 _TEXEL_MM = 1.0
 _REPEATED = "sheet_waviness"
 _BORE_MM = 50.8
-# Courses that are drawn; a swing is drawn as `laser_rocking` and the like.
+# Courses that are drawn; swings are drawn as `laser_rocking` and similar effects.
 _COURSES = (
     CourseKind.STEP, CourseKind.RAMP, CourseKind.EXPONENTIAL, CourseKind.SPEED, CourseKind.REVERSAL,
     CourseKind.DISTANCE,
@@ -55,7 +55,7 @@ class Drawn:
 
 
 def drawn(mode: Mode, seed: int) -> Drawn:
-    """Return case ``seed`` of a mode; single effects take their turns, so that all come equally often."""
+    """Return case ``seed`` of a mode; single effects come in turn, so that all come equally often."""
     prior = read_prior(PRIOR)
     turn = prior.effects[seed % len(prior.effects)]
     drawn_here = (Mode.SINGLES, Mode.LEFTOUT)
@@ -69,7 +69,7 @@ def drawn(mode: Mode, seed: int) -> Drawn:
     noise = Noise(0.05 * louder[0], 0.02 * louder[1], 0.07 * louder[2], 0.05 * louder[1])
     frames = round(_FRAMES * pair.gauge.frames)
     rate = _FRAMES * pair.gauge.frame_rate
-    # Nobody looks at the wall's paint.
+    # Ring-level runs do not use the wall's paint, so that coarse texels suffice.
     pipe = pair.gauge.pipe.model_copy(update={"texel_mm": _TEXEL_MM})
     scene = pair.gauge.model_copy(update={"frames": frames, "frame_rate": rate, "pipe": pipe, "effects": {}})
     switches = switches_from_mapping(pair.gauge.effects, PRIOR)
@@ -84,8 +84,8 @@ def drawn(mode: Mode, seed: int) -> Drawn:
 def with_a_course() -> tuple[tuple[str, CourseKind], ...]:
     """Return steady effects of the prior with each course that the simulator can give them.
 
-    Whether the diagnosis searches them makes no difference. What the catalogue has as an effect of its own
-    comes under that name among the single effects.
+    Whether the diagnosis searches them makes no difference. A combination that the catalogue has as a
+    separate effect comes under that name among the single effects.
     """
     scene, out = bench_truth(_BORE_MM), []
     for one in read_prior(PRIOR).effects:
@@ -101,7 +101,7 @@ def with_a_course() -> tuple[tuple[str, CourseKind], ...]:
 
 
 def _with_course(prior: Prior, seed: int, duration_s: float) -> Switch:
-    """Return a law with a course, both drawn; they take their turns."""
+    """Return a law with a course, both drawn; laws and courses come in turn."""
     random = np.random.default_rng([seed, 13])
     pairs = with_a_course()
     name, kind = pairs[int(random.integers(len(pairs)))]
@@ -121,7 +121,7 @@ def _with_course(prior: Prior, seed: int, duration_s: float) -> Switch:
 
 
 def _several(prior: Prior, seed: int) -> tuple[Switch, ...]:
-    """Return two to four effects: by turns any, with two that look alike, and with one law twice."""
+    """Return two to four effects: in turn any, with two that look the same, and with one law twice."""
     random = np.random.default_rng([seed, 17])
     known = {e.name: e for e in prior.effects}
     first = known[_REPEATED] if seed % 3 == 2 else known[str(random.choice(list(known)))]
@@ -135,7 +135,7 @@ def _several(prior: Prior, seed: int) -> tuple[Switch, ...]:
 
 
 def _switch(prior: Prior, one: Concealable, seed: int, place: int) -> Switch:
-    """Return an effect with sizes drawn; waves that come twice have different orders."""
+    """Return an effect with drawn sizes; two sheet waves get different orders."""
     if one.name == _REPEATED:
         one = one.model_copy(update={"others": {"order": (2.0 + place % 3, 2.0 + place % 3)}})
     alone = prior.model_copy(update={"concealed": (0.0, 1.0), "effects": (one,)})

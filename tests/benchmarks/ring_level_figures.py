@@ -1,4 +1,7 @@
-"""Counts at ring level beyond the drill's table: nulls' p, courses, probabilities, several effects."""
+"""Counts at ring level beyond the drill's table.
+
+P-values of nulls, courses, probabilities, several effects.
+"""
 
 from __future__ import annotations
 
@@ -15,7 +18,7 @@ from stages.diagnose.drill.score import SNR, Rate, Trial, rate
 from stages.diagnose.effects.library import LIBRARY
 
 Line = dict[str, Any]
-# How near to its time a step is to be found.
+# Largest error of a step's time that counts as found.
 _NEAR_S = 0.1
 _BINS = (0.0, 1e-3, 0.01, 0.1, 0.5, 0.9, 0.99, 1.000001)
 _CREDIBLE = 0.9
@@ -46,14 +49,14 @@ def _of_nulls(nulls: Sequence[Line]) -> Iterator[str]:
     p_values = [line["answer"]["global_p"] for line in nulls if line["answer"].get("global_p") is not None]
     if p_values:
         below = " ".join(f"{q:g}: {np.mean(np.array(p_values) < q):.3f}" for q in (0.5, 0.2, 0.1, 0.05, 0.01))
-        # Corrected for all that is tried, p may be conservative, never the other way.
+        # Because p is corrected for all tests, it may be conservative, but never too small.
         test = kstest(p_values, "uniform", alternative="greater").pvalue
         yield f"share of {len(p_values)} nulls with p below {below}; chance of so many small ones {test:.2g}"
     yield from _expected(nulls)
 
 
 def _expected(nulls: Sequence[Line]) -> Iterator[str]:
-    """Yield how many of the scores that are expected by chance count as one."""
+    """Yield how many scores are expected by chance to count as one."""
     expected = [e for line in nulls if (e := line.get("expected")) is not None]
     if expected:
         one = 1 / np.mean(expected)
@@ -61,7 +64,7 @@ def _expected(nulls: Sequence[Line]) -> Iterator[str]:
 
 
 def _of_courses(lines: Sequence[Line]) -> Iterator[str]:
-    """Yield how often the course of what was rightly named is right, and the time of a step."""
+    """Yield how often the course of a rightly named effect is right, and the time of a step."""
     named = [
         (line["concealed"][0][2], e["course"])
         for line in lines
@@ -96,13 +99,13 @@ def _law(name: str) -> str:
 
 
 def _of_probabilities(lines: Sequence[Line]) -> Iterator[str]:
-    """Yield how often a law is there that is given such a probability, and the Brier score over all laws."""
+    """Yield how often a law is present when given such a probability, and the Brier score over all laws."""
     pairs, untold = [], 0
     for line in lines:
         told = {law: sum(c["probability"] for c in line["answer"].get("candidates", ()) if law in
                          map(_law, c["names"])) for law in LIBRARY}  # fmt: skip
         true = {c[0] for c in line["concealed"]}
-        # Candidates are of rings: what they give no chance to is ruled out, unless rings do not tell of it.
+        # Candidates come from rings: those without a probability are excluded, unless rings cannot show them.
         is_told = {law for law, p in told.items() if p > 0 or law in true - set(TRAVEL_EFFECTS)}
         told |= {e["name"]: e["probability"] for e in line["answer"]["effects"]}
         is_told |= {e["name"] for e in line["answer"]["effects"]}
@@ -121,9 +124,9 @@ def _of_probabilities(lines: Sequence[Line]) -> Iterator[str]:
 
 
 def _in_credible_set(line: Line) -> bool | None:
-    """Return whether the likeliest that reach `_CREDIBLE` hold the truth; None where nothing is told.
+    """Return whether the likeliest names that reach `_CREDIBLE` hold the truth; None where none is given.
 
-    Rings and fiducials do not tell of what motion and encoder do.
+    Rings and fiducials do not show the effects of motion and encoder.
     """
     true = sorted(c[0] for c in line["concealed"] if c[0] not in TRAVEL_EFFECTS)
     each = sorted(line["answer"].get("candidates", ()), key=lambda c: -c["probability"])

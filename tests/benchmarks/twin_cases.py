@@ -1,4 +1,4 @@
-"""Photometric effects that are hidden in own simulations for the twin to find, and what is right to say."""
+"""Photometric effects switched on in own simulations for the twin to find, and the right answers."""
 
 from __future__ import annotations
 
@@ -12,12 +12,15 @@ import numpy as np
 from stages.twin.reflectance import LUMA_BGR
 
 _SPREAD = 1.33
-"""Most by which a drawn size departs from the usual one, as a factor. Chosen: an effect stays what it is."""
+"""Largest factor by which a drawn size departs from the usual one.
+
+Chosen so that the effect keeps its character.
+"""
 
 
 @dataclass(frozen=True)
 class Case:
-    """An effect that is switched on, and what is right to say of it.
+    """An effect that is switched on, and the right answer.
 
     Attributes
     ----------
@@ -29,13 +32,13 @@ class Case:
     size : float or None
         True value of the mismatch's first parameter, over the effect's first quantity.
     place : str
-        ``azimuth`` or ``spot``: where the mismatch must lie; empty for what is everywhere.
+        ``azimuth`` or ``spot``: where the mismatch must lie; empty for effects on the whole picture.
     figure : tuple of (str, function)
-        A figure of noise, lamps or lens that tells it, and its true value by the first quantity; or none.
+        A figure of noise, lamps or lens that shows the effect, and its true value by the first quantity.
     changes : tuple of (path, value)
-        Of the scene, for the effect to show.
+        Changes of the scene that make the effect visible.
     also : tuple of str
-        Names that are right beside it and do not tell it.
+        Names of mismatches that may be reported too, but do not count as the effect.
     seed : int
         Of the scene and its probe.
     """
@@ -63,7 +66,7 @@ class Case:
     def drawn(self, seed: int) -> Case:
         """Return the case with another size and seed, and at another azimuth where it has a place.
 
-        No share is more than 1: such a size is drawn from the lower side alone.
+        No share is more than 1: such a size is drawn only below the usual one.
         """
         random = np.random.default_rng([seed, *self.effect.encode()])
         first, *others = self.numbers
@@ -78,12 +81,16 @@ class Case:
 _OF_COLOUR = float(np.linalg.norm(LUMA_BGR))  # noise of grey over that of each colour
 _EXACT = (("codec", "ffv1"),)  # a lossy codec takes fine noise away
 _BRIGHT = (("laser.peak", 4.0),)
-"""Else a wall throws half a grey level back of the line at most, which rounding takes away."""
+"""Otherwise a wall returns at most half a grey level of the line, which rounding removes."""
 _MIRRORS = (("probe.laser.opening_angle_deg", 168.0), ("pipe.relief.roughness_mm", 0.002))
-"""A wall mirrors a flat sheet's line onto itself; a cone's, 6° forward, lands 10.7 mm ahead. Rough wall blurs
-that over a dozen pixels: what mirrors is smooth."""
+"""A wall reflects a flat sheet's line onto itself.
+
+That of a cone, 6° forward, lands 10.7 mm ahead. Rough wall blurs that over a dozen pixels, so the wall that
+reflects is smooth.
+"""
 CASES = (
-    # Lit frames withheld, every eighth of 30 a second, would see a flicker of 3.7 Hz always at one phase.
+    # Lit frames withheld, every eighth of 30 a second, would see a flicker of 3.7 Hz always at the same
+    # phase.
     Case("light_flicker", (0.08, 2.3), ("flicker", "laser_flicker")),
     Case("led_dead", (1.0, 60.0), ("led_dead",), 1.0, "azimuth"),
     Case("laser_sector", (0.8, 60.0, 20.0), ("laser_sector",), 1.0, "azimuth"),

@@ -1,4 +1,4 @@
-"""Processor time and memory of a process and all below it, looked at while they work."""
+"""Processor time and memory of a process and all its descendants, sampled while they work."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ _CHANGE = re.compile(
 
 
 class Watch:
-    """Processor time and most memory of their own, that a process and those below it take, by phase.
+    """Processor time and largest private memory of a process and its descendants, by phase.
 
-    Memory is RssAnon: pages mapped from files are the system's to drop.
+    Memory is RssAnon, without pages mapped from files, which the system can drop.
 
     Parameters
     ----------
     pid : int
-        The first of the family; absent: this process.
+        The process at the top; absent: this process.
     phase : callable
-        Names what the family is at; what it takes counts there.
+        Returns the name of the present phase, to which time and memory are added.
 
     Attributes
     ----------
@@ -68,13 +68,13 @@ class Watch:
         pids, phase = family(self._pid), self._phase()
         self.mib[phase] = max(self.mib.get(phase, 0.0), sum(map(_anonymous_mib, pids)))
         used = _used_s(pids)
-        # a helper that has ended is counted by its parent once that has waited for it
+        # the time of an ended helper is counted for its parent once that has waited for it
         self.cpu_s[phase] = self.cpu_s.get(phase, 0.0) + max(used - self._used, 0.0)
         self._used = max(used, self._used)
 
 
 class Progress:
-    """Tells from a run's log, read on as it grows, at which stages it is, and whether files are written."""
+    """Reads from a growing log of a run which stages are active, and whether files are being written."""
 
     def __init__(self, log: Path) -> None:
         self._log, self._read, self._at = log, 0, ["start"]

@@ -1,1 +1,1 @@
-"""The page that holds boresight against what people would use instead, made anew by one command."""
+"""A page that compares boresight with alternative programs, made by one command."""

@@ -1,4 +1,4 @@
-"""Boresight against what people would use instead: one page and one file of figures, made in one go.
+"""Boresight compared with what people would use instead: one page and one file of figures.
 
 usage: python -m tests.benchmarks.page -o DIR [--recording DIR] [--parts PART ...] [--colmap-limit S]
 """

@@ -1,4 +1,4 @@
-"""COLMAP in a process of its own, which may be ended: features, sequential matches, incremental mapping.
+"""COLMAP in a separate process that can be stopped: features, sequential matches, incremental mapping.
 
 usage: python -m tests.benchmarks.page.colmap PICTURES PARAMETERS RESULT
 """
@@ -15,7 +15,7 @@ _OVERLAP, _THREADS, _LEAST_ANGLE_DEG = 8, 2, 8.0
 
 
 def installed() -> bool:
-    """Tell whether pycolmap, which is optional, is there."""
+    """Return whether pycolmap, which is optional, is installed."""
     return find_spec("pycolmap") is not None
 
 
@@ -39,9 +39,9 @@ def reconstruct(pictures: Path, parameters: str, result: Path) -> None:
         device=pycolmap.Device.cpu,
     )  # fmt: skip
     options = pycolmap.IncrementalPipelineOptions(num_threads=_THREADS)
-    # Left alone it refuses to begin: a probe in a pipe moves along its line of sight.
+    # With its default it refuses to start: a probe in a pipe moves along its line of sight.
     options.mapper.init_max_forward_motion, options.mapper.init_min_tri_angle = 1.0, _LEAST_ANGLE_DEG
-    # The probe file's camera is the best there is: refining it on a tube only bends the tube.
+    # The camera of the probe file is the best available: refining it in a tube only bends the tube.
     options.ba_refine_focal_length = options.ba_refine_principal_point = options.ba_refine_extra_params = (
         False
     )

@@ -1,4 +1,4 @@
-"""The recording, boresight's run of it, and what the run made: the common ground of all comparisons."""
+"""The recording, boresight's run of it, and its results: the inputs of all comparisons."""
 
 from __future__ import annotations
 
@@ -63,12 +63,12 @@ class Inputs:
 
     @property
     def lit(self) -> np.ndarray:
-        """Numbers of the frames lit by the LEDs."""
+        """Return the numbers of the frames lit by the LEDs."""
         return self.recording.frames.of(Illumination.LED, Illumination.BOTH)
 
     @cached_property
     def true_poses(self) -> np.ndarray:
-        """(N, 4, 4) camera to pipe, of all frames."""
+        """Return the true poses (N, 4, 4) of all frames, camera to pipe."""
         truth = json.loads((self.folder / "truth.json").read_text("utf-8"))
         poses = np.zeros((len(truth["camera_pose_in_pipe"]), 4, 4))
         poses[:, :3], poses[:, 3, 3] = truth["camera_pose_in_pipe"], 1
@@ -86,7 +86,7 @@ class Inputs:
 
 
 def prepare(folder: Path, work: Path) -> Inputs:
-    """Run boresight twice, the first time for the compiled code's sake, and read back what it made."""
+    """Run boresight twice, the first time to compile the code, and read its results."""
     cv2.setNumThreads(0)
     _run(folder, work / "first")
     with clocked() as spent:

@@ -53,7 +53,7 @@ _Surface = tuple[np.ndarray, np.ndarray]
 
 @dataclass(frozen=True)
 class _Rays:
-    """Where rays go, and which error a hit at a radius has."""
+    """Test rays, and the error of a hit at a given radius on each."""
 
     distance_mm: np.ndarray
     azimuth_rad: np.ndarray
@@ -115,7 +115,7 @@ def _figures(surface: _Surface, rays: _Rays, error: Callable[..., np.ndarray]) -
 
 
 def _by_boresight(inputs: Inputs) -> Iterator[_Surface]:
-    """Yield the surface that the stage makes, then those of other costs of a triangle."""
+    """Yield the surface that the stage makes, then those for other costs of a triangle."""
     results, parameters = inputs.results, MeshParameters()
     made = make_mesh(inputs.wall, results[WallTexture], results[Overlays], parameters, quiet_context())
     yield _joined([(t.vertex_p, t.face) for t in made.tiles])
@@ -137,7 +137,7 @@ def _depth(inputs: Inputs) -> int:
 
 
 def _by_open3d(inputs: Inputs) -> Iterator[_Surface]:
-    """Yield open3d's surface, then what it leaves of it with fewer triangles."""
+    """Yield open3d's surface, then its simplifications to fewer triangles."""
     o3d = open3d()
     cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(inputs.cloud.xyz_p.astype(float)))
     cloud.normals = o3d.utility.Vector3dVector(inputs.cloud.normal_p.astype(float))
@@ -151,7 +151,7 @@ def _by_open3d(inputs: Inputs) -> Iterator[_Surface]:
 
 
 def _by_pymeshlab(inputs: Inputs) -> Iterator[_Surface]:
-    """Yield pymeshlab's surface, then what it leaves of it with fewer triangles."""
+    """Yield pymeshlab's surface, then its simplifications to fewer triangles."""
     meshes = pymeshlab.MeshSet()
     meshes.add_mesh(
         pymeshlab.Mesh(inputs.cloud.xyz_p.astype(float), v_normals_matrix=inputs.cloud.normal_p.astype(float))

@@ -1,4 +1,4 @@
-"""Motion against a textbook's visual odometry on the same LED frames."""
+"""Motion compared with textbook visual odometry on the same LED frames."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
-"""Visual odometry as textbooks have it: features from frame to frame, essential matrix, pose, scale.
+"""Textbook visual odometry: features from frame to frame, essential matrix, pose, scale.
 
-D. Scaramuzza, F. Fraundorfer, "Visual odometry, part I", IEEE RAM 2011, with OpenCV's parts. Pixels become
-rays by the probe's own fisheye model, so that the wide angle costs the method nothing; steps are made
-comparable by the pipe's known radius, which a textbook's chain of scales would only drift away from.
+D. Scaramuzza, F. Fraundorfer, "Visual odometry, part I", IEEE RAM 2011, with functions of OpenCV. Pixels
+become rays by the probe's own fisheye model, so that the wide angle is no disadvantage. Steps are scaled by
+the pipe's known radius; a textbook's chain of relative scales would only drift away from it.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ _FEWEST = 8
 
 
 def klt(before: np.ndarray, after: np.ndarray, mask: np.ndarray) -> Pairs:
-    """Follow corners by pyramidal Lucas-Kanade, there and back."""
+    """Follow corners by pyramidal Lucas-Kanade, forward and back."""
     corners = cv2.goodFeaturesToTrack(before, _FEATURES, _QUALITY, _APART_PX, mask=mask)
     there, found, _ = cv2.calcOpticalFlowPyrLK(before, after, corners, None, **_KLT)
     back, found_back, _ = cv2.calcOpticalFlowPyrLK(after, before, there, None, **_KLT)
@@ -36,7 +36,7 @@ def klt(before: np.ndarray, after: np.ndarray, mask: np.ndarray) -> Pairs:
 
 
 def orb(before: np.ndarray, after: np.ndarray, mask: np.ndarray) -> Pairs:
-    """Match ORB descriptors, best against second best."""
+    """Match ORB descriptors with a test of the best against the second best."""
     detector = cv2.ORB_create(_FEATURES, fastThreshold=8)
     (first, a), (second, b) = (detector.detectAndCompute(image, mask) for image in (before, after))
     matches = cv2.BFMatcher(cv2.NORM_HAMMING).knnMatch(a, b, k=2)
@@ -90,7 +90,7 @@ def _normalised(probe: Probe, uv: np.ndarray) -> np.ndarray:
 
 
 def _wall_mask(probe: Probe) -> np.ndarray:
-    """Return the pixels in which the wall is looked for features."""
+    """Return the mask of the pixels in which features of the wall are searched."""
     width, height = probe.camera.image_size
     centre = tuple(round(float(c)) for c in probe.camera.centre_px)
     low, high = (int(r) for r in _ring_radii(probe))

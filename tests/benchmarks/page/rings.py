@@ -1,4 +1,4 @@
-"""Ring extraction against Steger's method and the centre of gravity: accuracy over noise, and rate."""
+"""Ring extraction compared with Steger's method and the centre of gravity: accuracy over noise, and rate."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What every part of the page hands over: methods side by side, figures, charts, and how it was set up."""
+"""The results of every part of the page: methods side by side, figures, charts, and how it was set up."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from typing import Literal
 
 @dataclass(frozen=True)
 class Quantity:
-    """A column: ``key`` in the figures, its name and unit, and whether more or less of it is better."""
+    """A column: its ``key`` in the figures, its name and unit, and whether more or less of it is better."""
 
     key: str
     name: str
@@ -26,7 +26,7 @@ class Quantity:
 
 @dataclass(frozen=True)
 class Method:
-    """A row: figures by quantity, None where there is none, and what must be said of it."""
+    """A row: figures by quantity, None where there is none, and remarks about it."""
 
     name: str
     figures: dict[str, float | None]
@@ -56,7 +56,7 @@ class Section:
     why_behind: dict[str, str] = field(default_factory=dict)
 
     def ratios(self) -> dict[str, dict[str, float]]:
-        """Return each other method's figures over boresight's, where both are there and not zero."""
+        """Return each other method's figures over boresight's, where both exist and are not zero."""
         own = self.methods[0].figures
         return {
             m.name: {k: v / own[k] for k, v in m.figures.items() if v is not None and own.get(k)}
@@ -64,7 +64,7 @@ class Section:
         }
 
     def behind(self) -> tuple[str, ...]:
-        """Return a sentence for each quantity in which a method is better than boresight's."""
+        """Return a sentence for each quantity in which a method is better than boresight."""
         return tuple(
             f"{q.name}: better by {', '.join(ahead)}. {self.why_behind.get(q.key, 'The cause is not known.')}"
             for q in self.quantities
@@ -95,7 +95,7 @@ TIMES = (Quantity("wall_s", "time", "s"), Quantity("cpu_s", "processor time", "s
 
 @contextmanager
 def clocked() -> Iterator[Spent]:
-    """Fill in the time spent inside when left."""
+    """Record the times spent inside on leaving."""
     spent, wall, cpu = Spent(), time.perf_counter(), _processor_s()
     try:
         yield spent

@@ -1,4 +1,4 @@
-"""Texture against the projection of pictures onto a mesh, as multi-view pipelines end, by open3d."""
+"""Texture compared with open3d's projection of pictures onto a mesh, the last step of usual pipelines."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ def section(inputs: Inputs, work: Path) -> Section:
 
 
 def _views(inputs: Inputs, frames: np.ndarray, even: bool) -> dict[int, _View]:
-    """Return frames as pinhole pictures; ``even``: divided by the light on a centred pipe's wall."""
+    """Return frames as pinhole pictures; ``even`` divides them by the light on the wall of a centred pipe."""
     size = 2 * int(np.ceil(_FOCAL_PX * np.tan(np.radians(_NEAREST_DEG))))
     intrinsic = np.array([[_FOCAL_PX, 0, size / 2], [0, _FOCAL_PX, size / 2], [0, 0, 1]])
     pixel = np.stack(np.meshgrid(*[np.arange(size) + 0.5] * 2), -1)
@@ -130,7 +130,7 @@ def _piece(inputs: Inputs, own: WallTexture, rows: int, start_mm: float, views: 
 
 
 def _before(inputs: Inputs, start_mm: float) -> np.ndarray:
-    """Return frames taken from where the piece beginning at ``start_mm`` is seen whole, spread evenly."""
+    """Return frames, evenly spread, from which the piece beginning at ``start_mm`` is completely visible."""
     frames = np.intersect1d(inputs.lit, inputs.trajectory.frame)
     z = inputs.trajectory.T_pc[np.searchsorted(inputs.trajectory.frame, frames), 2, 3]
     least = inputs.recording.pipe.nominal_diameter_mm / 2 / np.tan(np.radians(_NEAREST_DEG - 2))

@@ -1,4 +1,4 @@
-"""The whole run against COLMAP on the LED frames, where that runs."""
+"""The whole run compared with COLMAP on the LED frames, where COLMAP is installed."""
 
 from __future__ import annotations
 
@@ -102,7 +102,7 @@ def _found(inputs: Inputs, result: Path, given: np.ndarray) -> dict[str, float |
 
 
 def _cylinder_radius(points: np.ndarray, centres: np.ndarray) -> float:
-    """Return the radius of the cylinder fitted robustly to points, begun along the camera's path."""
+    """Return the radius of a cylinder fitted robustly to points, starting along the camera's path."""
     along = np.linalg.svd(centres - centres.mean(0))[2][0]
     across = np.linalg.svd(along[None])[2][1:]
     off = (points - centres.mean(0)) @ np.stack([*across, along], 1)
