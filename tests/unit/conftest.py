@@ -1,4 +1,4 @@
-"""What tests of several files share: a drawn recording, and a probe."""
+"""Fixtures that tests of several files use: a drawn recording, and a probe."""
 
 import pytest
 

@@ -41,7 +41,7 @@ def small_probe(scale=4.0):
 
 
 def reflectance(s, psi):
-    """Return the wall's colours (..., 3) between 0.2 and 0.8; wavelengths of 12 mm and more."""
+    """Return the wall's colours (..., 3) between 0.2 and 0.8, with wavelengths of 12 mm and more."""
     wave = 0.5 + 0.15 * np.sin(0.5 * s + 2 * psi) + 0.12 * np.cos(5 * psi - 0.23 * s)
     return np.stack([wave, wave, 0.8 * wave + 0.05 * np.cos(psi)], -1)
 
@@ -68,7 +68,10 @@ def wall_hits(probe, T_pc):
 
 
 def led_light(probe, T_pc, xyz_p):
-    """Return the light on the wall from the LED ring, written plainly: sum of cos cos / d² over the LEDs."""
+    """Return the light on the wall from the LED ring by the plain formula: the sum of cos cos
+
+    d² over the LEDs.
+    """
     total = 0.0
     lamp = probe.lighting
     for n in range(lamp.leds):
@@ -87,7 +90,7 @@ def led_light(probe, T_pc, xyz_p):
 
 
 def _wall_in_view(probe, T_pc):
-    """Return polar angle, LED light and reflectance per pixel; those of the last poses are kept."""
+    """Return polar angle, LED light and reflectance per pixel; those of the last poses are cached."""
     key = repr(probe.camera), repr(probe.lighting), T_pc.tobytes()
     if key not in _IN_VIEW:
         xyz = wall_hits(probe, T_pc)
@@ -101,7 +104,10 @@ def _wall_in_view(probe, T_pc):
 
 
 def draw(probe, T_pc, *, exposure=1.0, vignetting=0.0, laser=False):
-    """Return the image (H, W, 3) uint8; with ``vignetting`` the image loses light as cos^n of θ / 2."""
+    """Return the image (H, W, 3) uint8; with ``vignetting`` its light falls as cos^n of θ
+
+    2.
+    """
     theta, led, colour = _wall_in_view(probe, T_pc)
     light = led * np.cos(theta / 2) ** vignetting
     image = colour * (light * 1.8e5 * exposure)[..., None]

@@ -1,4 +1,4 @@
-"""Rays through glass, traced in three dimensions by Snell's law: what the predictions are held to."""
+"""Rays through glass, traced in three dimensions by Snell's law, as the reference for predictions."""
 
 from __future__ import annotations
 
@@ -15,7 +15,10 @@ def through_cylinder(
     ratio: float,
     aside: tuple[float, ...] = (0, 0, 0),
 ) -> tuple[Float, Float]:
-    """Rays (M, 3) from inside a cylinder whose axis passes ``aside``; ``ratio``: index before over after."""
+    """Refract rays (M, 3) from inside a cylinder whose axis passes ``aside``.
+
+    ``ratio`` is the index before the surface over the one after it.
+    """
     axis = axis / np.linalg.norm(axis)
     flat_origin, flat_ray = _flat(origin - np.array(aside), axis), _flat(ray, axis)
     reach = _leaving(flat_origin, flat_ray, radius_mm)
@@ -26,7 +29,7 @@ def through_cylinder(
 def through_sphere(
     origin: Float, ray: Float, centre: Float, radius_mm: float, ratio: float
 ) -> tuple[Float, Float]:
-    """Rays (M, 3) from inside a sphere."""
+    """Refract rays (M, 3) from inside a sphere."""
     reach = _leaving(origin - centre, ray, radius_mm)
     place = origin + reach[:, None] * ray
     return place, _refract(ray, (place - centre) / radius_mm, ratio)

@@ -20,7 +20,7 @@ def bent_axis(curvature_per_mm: float) -> PipeAxis:
 
 
 def drawn_radius(distance_mm: np.ndarray, azimuth_rad: np.ndarray) -> np.ndarray:
-    """Return the radius: an oval with one Gaussian pit."""
+    """Return the radius of the wall: an oval with one Gaussian pit."""
     at, around, depth, width = PIT
     turn = (azimuth_rad - around + np.pi) % (2 * np.pi) - np.pi
     far2 = (distance_mm - at) ** 2 + (RADIUS * turn) ** 2
@@ -35,7 +35,7 @@ def small_wall(
     hole: tuple[slice, slice] | None = None,
     columns: int = 360,
 ) -> Wall:
-    """Return a wall of rows each 0.5 mm; ``hole`` are rows and columns that were not seen."""
+    """Return a wall with a row each 0.5 mm; rows and columns ``hole`` are unmeasured."""
     axis = axis or straight_axis(-40.0, 120.0)
     distance = np.arange(0.0, length_mm + 0.25, 0.5)
     azimuth = -np.pi + np.arange(columns) * 2 * np.pi / columns

@@ -1,4 +1,4 @@
-"""Rings of a known wall through a known motion give that wall back, within σ."""
+"""The wall accumulated from rings of a known wall and a known motion equals that wall, within σ."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def pitted(s: Float, psi: Float) -> Float:
 
 
 @pytest.mark.parametrize("shape", [round_wall, oval, pitted])
-def test_wall_comes_back_within_sigma(shape) -> None:
+def test_the_wall_is_reconstructed_within_sigma(shape) -> None:
     got = accumulated(drawn_rings(shape)).radius_map
     wanted = shape(*np.meshgrid(got.distance_mm, got.azimuth_rad, indexing="ij"))
     inner = slice(4, -4)
@@ -72,14 +72,14 @@ def test_wall_comes_back_within_sigma(shape) -> None:
     assert np.median(sigma) < 0.04
 
 
-def test_sigma_is_that_of_the_noise() -> None:
+def test_sigma_equals_the_noise() -> None:
     got = accumulated(drawn_rings()).radius_map
     error = (got.radius_mm - RADIUS)[4:-4]
     assert 0.8 < np.median(got.sigma_random_mm[4:-4]) / error.std() < 1.4
 
 
-def test_sigma_is_that_of_the_noise_at_its_place() -> None:
-    """Grease on a quarter of the window: a σ for the whole wall held one interval in two there."""
+def test_sigma_equals_the_noise_at_each_place() -> None:
+    """With grease on a quarter of the window, one σ for the whole wall covered half of the errors there."""
     rings = drawn_rings()
     greasy = np.abs(rings.azimuth_rad - 1.0) < np.pi / 4
     more = greasy * 4 * SIGMA_PX * np.random.default_rng(1).normal(size=rings.radius_px.shape)
@@ -107,7 +107,7 @@ def test_normals_follow_the_slope_of_a_cone() -> None:
     assert np.median(cone.normal_p[inner, 2]) == pytest.approx(0.05, abs=0.01)
 
 
-def test_gaps_stay_unseen_and_others_are_covered() -> None:
+def test_wide_gaps_stay_unmeasured_and_all_else_is_covered() -> None:
     rings = drawn_rings()
     validity = rings.validity.copy()
     validity[15:25] = RingValidity.NO_LINE
@@ -131,15 +131,15 @@ def test_a_gap_narrower_than_allowed_is_bridged() -> None:
     assert np.isfinite(got.radius_mm[2:-2]).all()
 
 
-def test_calibration_adds_what_does_not_average_away() -> None:
+def test_the_uncertainty_of_calibration_is_added_and_does_not_average_out() -> None:
     wall = accumulated(drawn_rings(), small_probe()).radius_map
     # σ of the baseline, 5 µm, moves r = l tan θ by r / l times as much.
     added = np.sqrt(wall.sigma_mm**2 - wall.sigma_random_mm**2)[4:-4]
     assert np.median(added) > 0.005 * RADIUS / BASELINE * 0.9
 
 
-def test_a_ring_off_centre_by_its_pose_is_centred() -> None:
-    """A pose error across the pipe, alike over many rings, must not become a shape."""
+def test_rings_that_a_pose_error_puts_off_centre_are_centred() -> None:
+    """A pose error across the pipe that many rings share must not become a shape of the wall."""
     rings, run, probe = drawn_rings(), motion(), exact_probe()
     moved = run.T_pc.copy()
     moved[:, 0, 3] += 0.1
@@ -157,7 +157,7 @@ def test_without_a_valid_sample_the_run_is_refused() -> None:
 
 
 def plain_line(d: Float, radius: Float, variance: Float, width: float) -> tuple[float, float]:
-    """Return value at 0 and 1 σ of the weighted line, by the normal equations."""
+    """Return value at 0 and 1 σ of the weighted regression line, by the normal equations."""
     kernel = np.exp(-0.5 * (d / width) ** 2)
     design = np.stack([np.ones_like(d), d], -1)
     weight = kernel / variance
@@ -170,7 +170,7 @@ def plain_line(d: Float, radius: Float, variance: Float, width: float) -> tuple[
     return fit[0], float(np.sqrt(np.sum(share[0] ** 2 * variance) * excess))
 
 
-def test_regression_is_the_plain_one() -> None:
+def test_regression_agrees_with_the_plain_formula() -> None:
     random = np.random.default_rng(0)
     rings, width, gap = 60, 0.7, 2.0
     distance = np.sort(random.uniform(0, 20, (3, rings)), 1)
@@ -197,24 +197,26 @@ def test_regression_is_the_plain_one() -> None:
     assert checked > 80
 
 
-def test_a_wall_made_in_stretches_is_the_wall_made_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_wall_made_in_stretches_equals_the_wall_made_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
     rings = drawn_rings(pitted)
     whole = accumulated(rings)
     monkeypatch.setattr(stretch, "_ROWS", 9)
     monkeypatch.setattr(survey, "_AT_ONCE", 7)
     cut = accumulated(rings)
-    # Width of the kernel and size of the noise are those of a stretch, and differ a little.
+    # The width of the kernel and the size of the noise are estimated per stretch, and differ a little.
     np.testing.assert_allclose(cut.radius_map.radius_mm, whole.radius_map.radius_mm, atol=0.006)
     ratio = cut.radius_map.sigma_random_mm / whole.radius_map.sigma_random_mm
     assert np.nanpercentile(np.abs(np.log(ratio)), 95) < 0.5
     for name in ("xyz_p", "radius_mm", "distance_mm", "azimuth_rad", "frame"):
         np.testing.assert_array_equal(getattr(cut.cloud, name), getattr(whole.cloud, name))
     assert np.median(np.sum(cut.cloud.normal_p * whole.cloud.normal_p, 1)) > 0.9999
-    assert not np.array_equal(cut.radius_map.sigma_random_mm, whole.radius_map.sigma_random_mm), "the control"
+    assert not np.array_equal(cut.radius_map.sigma_random_mm, whole.radius_map.sigma_random_mm), (
+        "control: other stretches give another wall"
+    )
 
 
-def test_radii_that_no_pipe_has_end_the_run() -> None:
-    """The motion's pipe is three times as wide as what the rings show."""
+def test_impossible_radii_end_the_run() -> None:
+    """The motion's pipe is three times as wide as the rings show."""
     probe, rings = exact_probe(), drawn_rings()
     points = triangulate_rings(rings, probe, TriangulateParameters(), quiet_context())
     wide = replace(motion(), radius_mm=3 * motion().radius_mm)

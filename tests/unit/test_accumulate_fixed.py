@@ -1,4 +1,4 @@
-"""What stays at one place of the image is told from the wall, by its length and by the probe's roll."""
+"""What stays at one place of the image is separated from the wall by its length and by the probe's roll."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from tests.drawn_run import BASELINE, RADIUS, rings_on_wall, round_wall, small_p
 from tests.quiet import quiet_context
 
 RINGS, STEP_MM, ROLL = 60, 2.0, 0.25
-WHERE, WIDTH = 0.8, 0.06  # azimuth and 1 σ, rad, of everything that departs
+WHERE, WIDTH = 0.8, 0.06  # azimuth and 1 σ, rad, of the departure
 DROPLET_PX = 1.5
 
 
@@ -69,8 +69,8 @@ def test_a_droplet_does_not_follow_the_wall(from_ring: int) -> None:
     assert place.frame_from == pytest.approx(from_ring, abs=6)
 
 
-def test_a_departure_is_known_as_well_as_clear_places_are() -> None:
-    """Its σ was said to be an eighth of it, .29 mm here; twelve draws scatter by .015 mm."""
+def test_the_sigma_of_a_departure_is_that_of_clear_places() -> None:
+    """Formerly σ was an eighth of the departure, .29 mm here, while twelve draws scatter by .015 mm."""
 
     def place(noise_px: float, seed: int) -> FixedPlace:
         fixed = measured(ROLL, droplet_px=DROPLET_PX, noise_px=noise_px, seed=seed).fixed
@@ -86,10 +86,10 @@ def test_a_departure_is_known_as_well_as_clear_places_are() -> None:
 
 
 @pytest.mark.parametrize(("width_deg", "height_mm"), [(90, 1.0), (100, 1.5)])
-def test_sigma_of_a_wide_departure_holds_what_the_smooth_fit_takes_of_it(
+def test_sigma_of_a_wide_departure_includes_what_the_smooth_fit_absorbs(
     width_deg: float, height_mm: float
 ) -> None:
-    """Of 1 mm over 90° .78 ± .06 mm was told, of 1.5 mm over 100° 1.17 ± .08 mm."""
+    """Formerly 1 mm over 90° was reported as .78 ± .06 mm, and 1.5 mm over 100° as 1.17 ± .08 mm."""
 
     def ridge(s: Float, psi: Float) -> Float:
         turn = np.clip(psi / np.radians(width_deg), -0.5, 0.5)
@@ -102,7 +102,7 @@ def test_sigma_of_a_wide_departure_holds_what_the_smooth_fit_takes_of_it(
     assert place.departure_sd_mm < 0.3 * height_mm
 
 
-def test_without_roll_droplet_and_seam_cannot_be_told_apart() -> None:
+def test_without_roll_droplet_and_seam_cannot_be_distinguished() -> None:
     for wall, droplet_px in ((round_wall, DROPLET_PX), (seam, 0.0)):
         fixed = measured(0.0, wall, droplet_px).fixed
         assert fixed is not None
@@ -110,8 +110,8 @@ def test_without_roll_droplet_and_seam_cannot_be_told_apart() -> None:
 
 
 @pytest.mark.parametrize("roll_rad", [0.0, ROLL])
-def test_in_a_pass_of_less_than_half_a_diameter_a_droplet_is_seen_too(roll_rad: float) -> None:
-    """It was a deposit of 3.15 ± .06 mm with confidence .98, as nothing was looked at in so short a pass."""
+def test_a_droplet_is_found_even_in_a_pass_of_less_than_half_a_diameter(roll_rad: float) -> None:
+    """It was a deposit of 3.15 ± .06 mm with confidence .98, since so short a pass was not examined."""
     step_mm = 0.8 * RADIUS / RINGS
     fixed = measured(roll_rad, droplet_px=DROPLET_PX, step_mm=step_mm).fixed
     assert fixed is not None
@@ -120,15 +120,15 @@ def test_in_a_pass_of_less_than_half_a_diameter_a_droplet_is_seen_too(roll_rad: 
 
 
 @pytest.mark.parametrize("wall", [round_wall, gouge])
-def test_what_is_short_or_nothing_belongs_to_the_wall(wall) -> None:
+def test_short_departures_and_none_belong_to_the_wall(wall) -> None:
     assert measured(0.0, wall).fixed is None
 
 
-def test_a_seam_that_the_roll_shows_to_be_on_the_wall_is_left_alone() -> None:
+def test_a_seam_that_roll_shows_to_be_on_the_wall_is_not_moved() -> None:
     assert measured(ROLL, seam).fixed is None
 
 
-def test_sigma_holds_what_a_droplet_does_to_the_wall() -> None:
+def test_sigma_includes_the_effect_of_a_droplet_on_the_wall() -> None:
     got = measured(ROLL, droplet_px=DROPLET_PX)
     error = np.abs(got.radius_map.radius_mm - RADIUS)
     off = error > 0.25

@@ -1,4 +1,7 @@
-"""What was moved back behind dirt on the window is wall only where the probe rolls, and its σ stays."""
+"""Wall seen through dirt on the window, after correction, counts only where the probe rolls.
+
+Its σ remains large.
+"""
 
 from __future__ import annotations
 
@@ -23,12 +26,12 @@ from stages.triangulate import TriangulateParameters, triangulate_rings
 from tests.drawn_run import BASELINE, RADIUS, rings_on_wall, round_wall, small_probe
 from tests.quiet import quiet_context
 
-RINGS, STEP_MM, AZIMUTHS, HALF = 80, 1.0, 360, 0.05  # HALF a width, rad, of what departs at azimuth 0
+RINGS, STEP_MM, AZIMUTHS, HALF = 80, 1.0, 360, 0.05  # HALF a width, rad, of the departure at azimuth 0
 RIM_PX, RIM_MM = 0.6, 0.9  # at 108 px a pixel is 1.5 mm of a wall of 50 mm
 ROLL, LITTLE = (
     0.6,
     0.15,
-)  # rad: half of the rings lie within half of it: more than three widths, and less than one
+)  # rad, and half of the rings lie within half of it: more than three widths, and less than one
 
 
 def motion(roll_rad: float) -> Trajectory:
@@ -50,7 +53,7 @@ def seam(s: Float, psi: Float) -> Float:
 
 
 def put_right(run: Trajectory, wall=round_wall, rim_px: float = 0.0) -> RingSamples:
-    """Return rings whose line a rim moves, set right as the rings stage does."""
+    """Return rings whose line the rim of a drop moves, corrected as the rings stage does."""
     probe = small_probe()
     rings = rings_on_wall(probe, run.T_pc, run.frame, np.random.default_rng(0), wall, 0.05, AZIMUTHS)
     rings.radius_px[:] += rim_px * near(rings.azimuth_rad)
@@ -70,7 +73,7 @@ def measured(roll_rad: float, wall=round_wall, rim_px: float = 0.0, shared_px: f
 
 
 def behind(wall: Wall, roll_rad: float) -> tuple[Float, Float]:
-    """Radius and σ of cells behind the middle of what departs, for rings that are not the first or last."""
+    """Return radius and σ of cells behind the middle of the departure, without the first and last rings."""
     of = wall.radius_map
     row = np.arange(20, len(of.distance_mm) - 20)
     roll = roll_rad * (of.distance_mm[row] - BASELINE) / (STEP_MM * RINGS)
@@ -79,16 +82,18 @@ def behind(wall: Wall, roll_rad: float) -> tuple[Float, Float]:
 
 
 @pytest.mark.parametrize("roll_rad", [0.0, LITTLE])
-def test_without_roll_the_wall_behind_dirt_is_not_known(roll_rad: float) -> None:
-    """A seam behind dirt was levelled, and the wall there said to be measured and sound."""
+def test_without_roll_the_wall_behind_dirt_is_unknown(roll_rad: float) -> None:
+    """Formerly a seam behind dirt was levelled, and the wall there was reported as measured and sound."""
     radius, _ = behind(measured(0.0, seam), 0.0)
     assert np.isnan(radius).mean() > 0.9
     radius, _ = behind(measured(roll_rad, rim_px=RIM_PX), roll_rad)
     assert np.isnan(radius).mean() > 0.9
 
 
-def test_with_roll_the_wall_behind_the_rim_of_a_drop_is_known_with_the_whole_move_as_sigma() -> None:
-    """The error is that of all rings; counted to that of each ring, it shrank in their mean."""
+def test_with_roll_the_wall_behind_the_rim_of_a_drop_is_known_and_sigma_includes_the_whole_correction() -> (
+    None
+):
+    """All rings share the error; when it was counted for each ring, it shrank in their mean."""
     moved = measured(ROLL, rim_px=RIM_PX)
     radius, sigma = behind(moved, ROLL)
     assert np.isfinite(radius).mean() > 0.95
@@ -98,8 +103,8 @@ def test_with_roll_the_wall_behind_the_rim_of_a_drop_is_known_with_the_whole_mov
     assert np.nanmedian(moved.radius_map.sigma_mm) < 1.1 * np.nanmedian(clean)
 
 
-def test_what_is_left_of_a_line_drawn_to_rows_does_not_average_out_over_rings() -> None:
-    """It was only in σ of each ring, and shrank in their mean."""
+def test_residual_errors_of_a_line_fixed_to_image_rows_do_not_average_out_over_rings() -> None:
+    """This error was only in the σ of each ring, and shrank in their mean."""
     _, sigma = behind(measured(0.0, shared_px=RIM_PX), 0.0)
     assert sigma.min() > RIM_MM
     assert sigma.max() < 1.2 * RIM_MM
@@ -108,8 +113,8 @@ def test_what_is_left_of_a_line_drawn_to_rows_does_not_average_out_over_rings() 
 
 
 @pytest.mark.parametrize("roll_rad", [0.0, ROLL])
-def test_points_of_the_wall_are_those_of_the_rings_kept_by_roll(roll_rad: float) -> None:
-    """Where they are not as many, the defects stage cannot tell how bright the line was at a finding."""
+def test_points_of_the_wall_are_those_of_the_rings_selected_by_roll(roll_rad: float) -> None:
+    """If their numbers differed, the defects stage could not look up the line's brightness at a finding."""
     run = motion(roll_rad)
     told = kept_by_roll(put_right(run, rim_px=RIM_PX), run)
     points = np.bincount(measured(roll_rad, rim_px=RIM_PX).cloud.frame, minlength=RINGS)
@@ -117,7 +122,7 @@ def test_points_of_the_wall_are_those_of_the_rings_kept_by_roll(roll_rad: float)
 
 
 def shared(distance_mm: Float, rows: int, columns: int, by_dirt: bool = True) -> Float:
-    """Return what is shared on a map of rows of 1 mm, with an error of 1 mm of samples at azimuth −π."""
+    """Return the shared error on a map with rows of 1 mm, for samples at azimuth −π with an error of 1 mm."""
     sample = distance_mm[:, None]
     one = np.ones_like(sample)
     samples = SimpleNamespace(valid=one > 0, distance_mm=sample, azimuth_rad=-np.pi * one, sigma_mm=0.1 * one)
@@ -134,8 +139,8 @@ def shared(distance_mm: Float, rows: int, columns: int, by_dirt: bool = True) ->
 
 
 @pytest.mark.parametrize("by_dirt", [True, False])
-def test_what_is_shared_reaches_as_far_everywhere_and_not_from_beyond_the_map(by_dirt: bool) -> None:
-    """A sample beyond the map was taken for one on its first or last row."""
+def test_shared_errors_spread_equally_everywhere_and_not_from_beyond_the_map(by_dirt: bool) -> None:
+    """Formerly a sample beyond the map was counted on its first or last row."""
     got = shared(np.array([-40.0, 0.0, 508.0, 512.0, 515.0, 1500.0]), 1200, 8, by_dirt)
     row, column = np.nonzero(got)
     assert np.unique(column).tolist() == [0, 1, 7]
@@ -143,8 +148,8 @@ def test_what_is_shared_reaches_as_far_everywhere_and_not_from_beyond_the_map(by
     assert got.max() == pytest.approx(1.0)
 
 
-def test_a_long_map_of_what_is_shared_stays_on_the_disk() -> None:
-    """All of it was copied into memory: 2.3 GB for 100 m of pipe."""
+def test_a_long_map_of_shared_errors_stays_on_the_disk() -> None:
+    """Formerly all of it was copied into memory: 2.3 GB for 100 m of pipe."""
     rows, columns = 12_000, 720
     assert rows * columns * 4 > 1 << 25  # smaller ones are kept in memory
     tracemalloc.start()

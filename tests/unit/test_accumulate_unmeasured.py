@@ -1,4 +1,4 @@
-"""Places inside the wall that no ring measured are told; ends, gaps that are bridged, and slits are none."""
+"""Unmeasured places inside the wall are reported; ends, bridged gaps and slits are not."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ CELL_MM = 2 * np.pi * RADIUS / COLUMNS
 
 
 def wall(*, from_row: int = 4000, from_column: int = 100, rows: int = 0, columns: int = 0) -> RadiusMap:
-    """Return a wall with a hole; its ends lie askew, as rings do."""
+    """Return a wall with a hole; its ends are oblique, as rings are."""
     radius = np.full((ROWS, COLUMNS), RADIUS, np.float32)
     askew = np.rint(20 + 12 * np.sin(np.linspace(0, 2 * np.pi, COLUMNS))).astype(int)
     for column, missing in enumerate(askew):
@@ -30,7 +30,7 @@ def wall(*, from_row: int = 4000, from_column: int = 100, rows: int = 0, columns
 
 
 def every(step_mm: float) -> Float:
-    """Return where rings lie along the whole wall."""
+    """Return rings along the whole wall."""
     return np.arange(0, ROWS / 2, step_mm)
 
 
@@ -41,7 +41,7 @@ def told_of(radius_map: RadiusMap, gap_mm: float, ring_at_mm: Float) -> list[str
 
 
 def between_rings(ring_at_mm: Float, reach_mm: float) -> RadiusMap:
-    """Return a wall that is known only near rings."""
+    """Return a wall that is measured only near rings."""
     found = wall()
     far = np.abs(found.distance_mm[:, None] - np.unique(ring_at_mm)).min(1) > reach_mm
     found.radius_mm[far] = np.nan
@@ -49,7 +49,7 @@ def between_rings(ring_at_mm: Float, reach_mm: float) -> RadiusMap:
 
 
 @pytest.mark.parametrize("from_column", [100, COLUMNS - 4])
-def test_a_place_that_was_passed_and_not_measured_is_told_once(from_column: int) -> None:
+def test_a_place_that_was_passed_but_not_measured_is_reported_once(from_column: int) -> None:
     told: list[str] = []
     hidden = wall(from_column=from_column, rows=14, columns=8)
     warn_of_unmeasured(hidden, RADIUS, 3.0, every(1.3), replace(quiet_context(), warn=told.append))
@@ -59,11 +59,11 @@ def test_a_place_that_was_passed_and_not_measured_is_told_once(from_column: int)
 
 
 @pytest.mark.parametrize(("rows", "columns"), [(0, 0), (2, 8), (40, 1)])
-def test_ends_askew_gaps_and_slits_are_no_places(rows: int, columns: int) -> None:
+def test_oblique_ends_gaps_and_slits_are_not_reported(rows: int, columns: int) -> None:
     assert unmeasured_places(wall(rows=rows, columns=columns), RADIUS, 3.0) == []
 
 
-def test_a_sector_hidden_all_along_is_a_place_of_each_lot_of_rows() -> None:
+def test_a_sector_hidden_along_the_whole_wall_is_reported_for_each_block_of_rows() -> None:
     found = unmeasured_places(wall(from_row=0, rows=ROWS, columns=9), RADIUS, 3.0)
     assert len(found) == 3
     assert sum(p.area_mm2 for p in found) == pytest.approx(9 * CELL_MM * ROWS / 2, rel=0.02)
@@ -85,7 +85,7 @@ FAST = np.r_[np.arange(0, 3000, 2.0), np.arange(3000, ROWS / 2, 6.0)]
     ids=["steady", "rests for half of the time", "twice at the same places", "each second lost", "faster"],
 )
 def test_rings_too_far_apart_are_named_as_the_cause(ring_at_mm: Float, apart: str) -> None:
-    """A pull at three times the speed lost two of three defects, and the window was to be cleaned."""
+    """A pull at three times the speed lost two of three defects; the advice was to clean the window."""
     known = ring_at_mm[np.isfinite(ring_at_mm)]
     words = told_of(between_rings(known, 0.8), 3.0, ring_at_mm)
     assert len(words) == 1
@@ -96,14 +96,16 @@ def test_rings_too_far_apart_are_named_as_the_cause(ring_at_mm: Float, apart: st
 @pytest.mark.parametrize(
     "ring_at_mm", [np.r_[THERE, THERE[::-1] + 2], np.r_[every(1.3)[:1500], every(1.3)[1600:]]]
 )
-def test_a_hidden_place_is_told_where_the_rings_of_all_passes_lie_close(ring_at_mm: Float) -> None:
-    """Forth and back with 4 mm each, 2 mm together: "rings are 4 mm apart", and the place was not told."""
+def test_a_hidden_place_is_reported_where_the_rings_of_all_passes_together_are_close(
+    ring_at_mm: Float,
+) -> None:
+    """Two passes have rings every 4 mm, together 2 mm; only "rings are 4 mm apart" was reported."""
     words = told_of(wall(rows=14, columns=8), 3.0, ring_at_mm)
     assert len(words) == 1
     assert "1 place inside the wall" in words[0]
 
 
-def test_a_hidden_place_is_told_beside_rings_too_far_apart() -> None:
+def test_a_hidden_place_is_reported_beside_rings_too_far_apart() -> None:
     sparse = between_rings(FAST, 0.8)
     sparse.radius_mm[2000:2014, 100:108] = np.nan
     words = told_of(sparse, 3.0, FAST)
@@ -112,7 +114,7 @@ def test_a_hidden_place_is_told_beside_rings_too_far_apart() -> None:
     assert "at 1004 mm" in words[1]
 
 
-def test_long_is_advised_only_where_it_bridges_more() -> None:
+def test_a_larger_limit_for_bridging_is_advised_only_where_it_bridges_more() -> None:
     ring_at_mm = every(14.0)
     words = told_of(between_rings(ring_at_mm, 3.0), LONG_GAP_MM, ring_at_mm)
     assert len(words) == 1

@@ -30,7 +30,7 @@ def information(random: np.random.Generator, size: int, rows: int = 40) -> tuple
 
 
 @pytest.mark.parametrize("rcond", [None, 1e-13])
-def test_what_is_marginalised_is_free_least_squares(rcond: float | None) -> None:
+def test_marginalisation_agrees_with_least_squares_over_free_parameters(rcond: float | None) -> None:
     design, residual = information(np.random.default_rng(1), 6)
     out, kept = np.array([4, 0, 2]), [1, 3, 5]
     found = marginalised(design.T @ design, -design.T @ residual, out, rcond)
@@ -46,7 +46,7 @@ def test_what_is_marginalised_is_free_least_squares(rcond: float | None) -> None
     np.testing.assert_allclose(design @ found.follow, own, rtol=1e-6, atol=1e-8 * np.abs(own).max())
 
 
-def test_unknowns_that_only_their_sum_shows_leave_by_least_squares_only() -> None:
+def test_unknowns_of_which_only_the_sum_is_known_are_eliminated_by_least_squares_only() -> None:
     design, residual = information(np.random.default_rng(2), 3)
     tied = np.concatenate([design, design[:, :1]], 1)
     alone = marginalised(design.T @ design, design.T @ residual, np.array([0]))
@@ -56,7 +56,7 @@ def test_unknowns_that_only_their_sum_shows_leave_by_least_squares_only() -> Non
         marginalised(np.zeros((2, 2)), np.zeros(2), np.array([0]))
 
 
-def test_covariance_and_determinant_bear_scales_apart() -> None:
+def test_covariance_and_determinant_are_right_for_very_different_scales() -> None:
     design, _ = information(np.random.default_rng(3), 5)
     a = design.T @ design
     np.testing.assert_allclose(covariance_of(a) @ a, np.eye(5), atol=1e-6)
@@ -66,11 +66,11 @@ def test_covariance_and_determinant_bear_scales_apart() -> None:
     np.testing.assert_allclose(a @ solved(a, a[:, 0]), a[:, 0], rtol=1e-8)
 
 
-def test_what_is_not_seen_stays_uncertain() -> None:
+def test_unobserved_parameters_stay_uncertain() -> None:
     assert covariance_of(np.array([[1.0, 1.0], [1.0, 1.0]]))[0, 0] > 1e12
 
 
-def test_promised_decrease_of_shared_and_blocks_is_that_of_dense_squares() -> None:
+def test_the_predicted_decrease_with_shared_and_block_parameters_agrees_with_dense_squares() -> None:
     random = np.random.default_rng(4)
     shared, block, residual = (
         random.normal(size=(3, 9, 2)),
@@ -103,7 +103,7 @@ def test_scores_of_clusters_are_summed_before_they_are_squared() -> None:
     )
 
 
-def test_independent_errors_are_not_widened_and_copies_are() -> None:
+def test_independent_errors_do_not_widen_sigma_and_repeated_ones_do() -> None:
     random = np.random.default_rng(6)
     scores = random.normal(size=(4000, 1))
     plain = np.sum(scores**2)
@@ -113,12 +113,12 @@ def test_independent_errors_are_not_widened_and_copies_are() -> None:
 
 
 @pytest.mark.parametrize("rows", [1, 2, 5, 8, 9, 40])
-def test_running_medians_of_two_halves_are_those_of_the_whole(rows: int) -> None:
+def test_running_medians_of_two_halves_equal_those_of_the_whole(rows: int) -> None:
     value = np.random.default_rng(rows).normal(size=(rows, 30)).astype(np.float32)
     assert np.array_equal(running_median(value, (9, 5)), median_filter(value, (9, 5), mode="nearest"))
 
 
-def test_the_border_follows_with_frames_at_their_best() -> None:
+def test_the_response_of_border_parameters_keeps_frames_at_their_optimum() -> None:
     random = np.random.default_rng(7)
     count, frames, border = 120, 6, 4
     rows = Rows(
@@ -144,12 +144,12 @@ def test_the_border_follows_with_frames_at_their_best() -> None:
     np.testing.assert_allclose(response, wanted, rtol=1e-7, atol=1e-9)
 
 
-# --- the search
+# --- the Levenberg-Marquardt search
 
 
 @dataclass(frozen=True)
 class Valley:
-    """Rosenbrock's residuals (10 (y − x²), 1 − x), and an error put into their slope."""
+    """Rosenbrock's residuals (10 (y − x²), 1 − x), with an optional error in their derivatives."""
 
     at: Float
     wrong: float = 0.0
@@ -181,20 +181,20 @@ def search(start: Float, stop: Stop, wrong: float = 0.0) -> Minimum[Float, Valle
     return minimise(start, lambda x, _: Valley(x, wrong), lambda x, step: x + step, lambda e: (e, None), stop)
 
 
-def test_the_bottom_of_a_bent_valley_is_found() -> None:
+def test_the_minimum_of_a_curved_valley_is_found() -> None:
     found = search(np.array([-1.2, 1.0]), Stop(200, 1e-9))
     assert found.settled
     np.testing.assert_allclose(found.state, [1.0, 1.0], atol=1e-6)
 
 
-def test_the_cost_never_rises_and_few_trials_are_told() -> None:
+def test_the_cost_never_rises_and_few_trials_are_needed() -> None:
     starts = [search(np.array([-1.2, 1.0]), Stop(n, 0.0)) for n in range(1, 12)]
     cost = [s.equations.cost for s in starts]
     assert np.all(np.diff(cost) <= 0)
     assert not starts[2].settled
 
 
-def test_wrong_slopes_end_the_search_where_they_promise_too_little() -> None:
+def test_wrong_derivatives_end_the_search_when_they_predict_too_little_decrease() -> None:
     found = search(np.array([-1.2, 1.0]), Stop(200, 1e-9, doubtful=0.5), wrong=8.0)
     assert found.settled
     assert found.trials < 200

@@ -1,4 +1,4 @@
-"""Pipe coordinates there and back, on a straight and on a bent axis."""
+"""Conversion to pipe coordinates and back, on a straight and on a bent axis."""
 
 import numpy as np
 import pytest
@@ -9,7 +9,7 @@ from pipeline.geometry.axis import PipeAxis, distance_along, frames_at, from_pip
 
 
 def arc_axis(curvature_per_mm: float) -> PipeAxis:
-    """Axis bending toward +x in the x-z plane, with a point each 5 mm from -50 to 300 mm."""
+    """Return an axis bending toward +x in the x-z plane, with a point each 5 mm from -50 to 300 mm."""
     s = np.arange(-50.0, 301.0, 5.0)
     turn = s * curvature_per_mm
     if curvature_per_mm:
@@ -47,7 +47,7 @@ def test_frames_are_rotations_and_straight_beyond_the_ends() -> None:
     assert np.linalg.norm(origin[0] - origin[1]) == pytest.approx(149.0, abs=0.01)
 
 
-def test_distance_of_poses_goes_round_a_bend() -> None:
+def test_distances_of_poses_are_right_in_a_bend() -> None:
     axis = arc_axis(0.0105)  # half a turn and more: z in P comes back down
     s = np.array([0.0, 100.0, 200.0, 290.0])
     T_pc = np.tile(np.eye(4), (len(s), 1, 1))
@@ -56,7 +56,7 @@ def test_distance_of_poses_goes_round_a_bend() -> None:
     assert T_pc[-1, 2, 3] < T_pc[1, 2, 3]
 
 
-def test_every_kind_of_array_uses_the_code_compiled_for_the_first() -> None:
+def test_arrays_of_any_layout_use_the_code_compiled_for_the_first() -> None:
     axis = arc_axis(2e-3)
     stored = PipeAxis(*(read_only(a) for a in (axis.distance_mm, axis.origin_p, axis.R_pa)))
     points = np.random.default_rng(3).normal(size=(7, 6)) + np.array([30.0, 0, 20] * 2)
@@ -67,7 +67,7 @@ def test_every_kind_of_array_uses_the_code_compiled_for_the_first() -> None:
         for xyz_p in (points[:, :3], read_only(points[:, :3]), np.asfortranarray(points[:, :3])):
             np.testing.assert_array_equal(to_pipe(same, xyz_p), first)
             frames_at(same, read_only(first[0]))
-    assert len(before) >= 3, "the control: compiled functions are looked at"
+    assert len(before) >= 3, "control: there are compiled functions to look at"
     assert compiled() == before
 
 

@@ -1,4 +1,4 @@
-"""Iterating in the background: order, errors in their place, and an end when the caller stops."""
+"""Iterating in a background thread: order, errors at their place, and an end when the caller stops."""
 
 import threading
 
@@ -16,13 +16,13 @@ def numbered(count, error_at=None, made=None):
         yield k, k * k
 
 
-def test_items_come_in_order_and_are_made_elsewhere():
+def test_items_come_in_order_and_from_another_thread():
     made = []
     assert list(in_background(numbered(50, made=made), 4)) == [(k, k * k) for k in range(50)]
     assert threading.get_ident() not in {thread for _, thread in made}
 
 
-def test_an_error_is_raised_in_its_place():
+def test_an_error_is_raised_at_its_place():
     seen = []
     with pytest.raises(ValueError, match="damaged"):
         seen.extend(k for k, _ in in_background(numbered(9, error_at=5), 3))
@@ -32,7 +32,7 @@ def test_an_error_is_raised_in_its_place():
         next(items)
 
 
-def test_no_more_is_made_than_asked_for_ahead_and_threads_end_with_the_caller():
+def test_only_so_many_items_are_made_ahead_and_threads_end_with_the_caller():
     made, before = [], threading.active_count()
     items = in_background(numbered(1000, made=made), 4)
     next(items)

@@ -1,4 +1,4 @@
-"""The benchmark of the twin on own simulations keeps apart what it must not mix."""
+"""The benchmark of the twin on own simulations keeps different kinds of case apart."""
 
 import math
 from argparse import Namespace
@@ -10,7 +10,7 @@ from tests.benchmarks import bench_twin_own
 from tests.simulated import SCENES
 
 
-def test_scenes_as_shipped_and_dulled_ones_are_not_taken_for_each_other(
+def test_answers_for_scenes_as_shipped_and_for_dulled_ones_are_stored_apart(
     tmp_path, monkeypatch: pytest.MonkeyPatch
 ):
     monkeypatch.setattr(bench_twin_own, "scene_of", lambda name, case, frames, seed, dull: dull)
@@ -24,8 +24,8 @@ def test_scenes_as_shipped_and_dulled_ones_are_not_taken_for_each_other(
     assert told == [[True, True], [False, False]]
 
 
-def test_a_ghost_that_is_asked_for_lies_beside_the_line():
-    """Of a flat sheet the wall mirrors the line onto itself, and no picture shows it."""
+def test_a_requested_ghost_line_lies_beside_the_line():
+    """With a flat sheet the wall reflects the line onto itself, and no picture shows it."""
     (case,) = (c for c in bench_twin_own.CASES if c.effect == "ghost_ring")
     scene = bench_twin_own.scene_of("straight-4-inch", case, 4, 1)
     laser = build_truth(scene, SCENES / "scene.yaml").instrument.laser
@@ -35,7 +35,10 @@ def test_a_ghost_that_is_asked_for_lies_beside_the_line():
 
 
 def test_a_case_is_never_scored_again_by_an_answer_to_its_own_effect():
-    """With one case, or three, the third one after it was the case itself: the same counts, as if it held."""
+    """With one case, or three, the third one after it was the case itself.
+
+    The counts stayed the same, as if right.
+    """
     dust, dim = (c for c in bench_twin_own.CASES if c.effect in ("dust", "laser_sector"))
     for cases in ([dust], [dust, dust, dust], [dust, dim, dust], [dust, dim]):
         answered = [(case, {"found": case.effect}, (0.0, 0.0)) for case in cases]
@@ -45,7 +48,7 @@ def test_a_case_is_never_scored_again_by_an_answer_to_its_own_effect():
 
 
 @pytest.mark.parametrize("case", bench_twin_own.CASES, ids=lambda c: c.effect)
-def test_drawn_sizes_differ_by_a_third_at_most_and_are_possible(case):
+def test_drawn_sizes_differ_by_a_third_at_most_and_are_in_range(case):
     drawn = [case.drawn(seed) for seed in range(20)]
     assert drawn[0] == case.drawn(0)
     assert len({c.numbers for c in drawn}) == 20

@@ -1,4 +1,4 @@
-"""The warped cases: every answer can be held against another case, however few were asked for."""
+"""The warped cases: every answer can be compared with another case, however few were requested."""
 
 import json
 import sys
@@ -15,8 +15,8 @@ def test_every_case_has_another_with_a_different_right_answer(name):
     assert (other.names, other.verdict) != (CASES[name].names, CASES[name].verdict)
 
 
-def test_one_case_alone_is_held_against_another_and_is_wrong(tmp_path, monkeypatch, capsys):
-    """It ended in StopIteration: only cases asked for were looked through."""
+def test_one_case_alone_is_compared_with_another_and_is_wrong(tmp_path, monkeypatch, capsys):
+    """It ended in StopIteration, since only the requested cases were searched."""
     folder = tmp_path / "open-1-focal" / "answer"
     folder.mkdir(parents=True)
     told = {"verdict": "named", "effects": [{"name": "focal_scale", "probability": 0.999, "parameters": {}}]}

@@ -1,4 +1,4 @@
-"""The benchmark page: alternatives are set up so that they can be right, and figures are as shown."""
+"""The benchmark page: the alternatives are set up in a way that works, and figures are as computed."""
 
 import json
 
@@ -39,11 +39,11 @@ def test_odometry_finds_the_motion_from_perfect_tracks():
     found = truth[0] @ odometry(frames, Probe, RADIUS, tracker)
     turned = found[:, :3, :3] @ truth[:, :3, :3].transpose(0, 2, 1)
     assert np.abs(turned - np.eye(3)).max() < 1e-4
-    # The scale takes the camera for centred; it is off by 0.4 mm of 50.
+    # The scale assumes a centred camera, which is off by 0.4 mm of 50.
     assert np.abs(found[:, 2, 3] - truth[:, 2, 3]).max() < 0.02 * 6
 
 
-def test_the_cylinder_through_points_has_their_radius_in_spite_of_outliers():
+def test_the_cylinder_through_points_with_outliers_has_the_right_radius():
     random = np.random.default_rng(4)
     psi, z = random.uniform(-np.pi, np.pi, 4000), random.uniform(0, 200, 4000)
     points = np.stack([3 * np.cos(psi), 3 * np.sin(psi), z / 17], -1) + random.normal(0, 0.004, (4000, 3))
@@ -53,7 +53,7 @@ def test_the_cylinder_through_points_has_their_radius_in_spite_of_outliers():
     assert abs(_cylinder_radius(points @ turn, centres @ turn) - 3) < 0.003
 
 
-def test_page_and_figures_say_the_same(tmp_path):
+def test_page_and_figures_agree(tmp_path):
     methods = (
         Method("boresight", {"wall_s": 2.0, "error": 0.5}),
         Method("other", {"wall_s": 5.0, "error": None}),

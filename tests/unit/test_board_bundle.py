@@ -1,4 +1,4 @@
-"""The bundle solver: exact steps, true parameters within their σ, honest covariance, robustness."""
+"""The bundle solver: exact steps, true parameters within their σ, true covariance, robustness."""
 
 from dataclasses import replace
 
@@ -34,7 +34,7 @@ def _setup(camera=KANNALA_BRANDT, seed=0, count=10, widest_rad=1.3, **options):
     return views_of(camera, varied_poses(random, count, widest_rad), random, **options)
 
 
-def test_step_by_schur_complement_is_the_dense_step():
+def test_the_step_by_schur_complement_equals_the_dense_step():
     views = _setup(count=4)
     corners, free = Corners.of(views), Free(np.arange(8), BENT)
     estimate = replace(start(views, KANNALA_BRANDT.image_size), camera=KANNALA_BRANDT)
@@ -56,7 +56,7 @@ def test_step_by_schur_complement_is_the_dense_step():
 
 
 def test_gradient_is_that_of_the_cost():
-    """Of all blocks, Huber weights and board shape included, against finite differences."""
+    """All blocks, Huber weights and board shape included, are compared with finite differences."""
     views = _setup(count=3)
     corners, free = Corners.of(views), Free(np.arange(8), BENT)
     estimate = replace(start(views, KANNALA_BRANDT.image_size), shape_mm=np.array([0.2, -0.1, 0.3]))
@@ -97,7 +97,7 @@ def test_true_camera_is_found_within_its_uncertainty(name, widest_rad):
     assert np.sqrt(np.mean(error**2)) < 2.5
 
 
-def test_scaramuzza_follows_another_model_and_keeps_its_idle_parameter():
+def test_scaramuzza_fits_another_model_and_its_unused_parameter_stays():
     views = _setup(widest_rad=1.4, count=20)
     found = adjust(views, start(views, KANNALA_BRANDT.image_size), "scaramuzza", PARAMETERS)
     assert isinstance(found.camera, Scaramuzza)
@@ -135,7 +135,7 @@ def test_covariance_grows_when_the_corners_of_a_picture_err_together():
     assert ratio[1] > 1.5 * ratio[0]
 
 
-def test_wrong_corners_are_outvoted():
+def test_wrong_corners_are_rejected():
     views = _setup(count=16)
     random = np.random.default_rng(8)
     spoiled = []
@@ -159,7 +159,7 @@ def test_sag_of_the_board_is_found():
 
 
 def test_solver_ends_where_the_gradient_vanishes():
-    """Unlike a solver that stops early: at the end no step of the undamped system is worth taking."""
+    """Not too early: at the end the undamped system gives no step worth taking."""
     views = _setup(count=10)
     corners, free = Corners.of(views), Free(np.arange(8), FLAT)
     first = replace(start(views, KANNALA_BRANDT.image_size), camera=ROUGH)

@@ -34,7 +34,7 @@ def _calibrate(views, models=("kannala_brandt",), reference=None):
 
 
 def _parallel(tilt, count=10):
-    """Boards in parallel planes, at different places and distances."""
+    """Return boards in parallel planes, at different places and distances."""
     random = np.random.default_rng(2)
     turn = rotation_from_vector(np.array(tilt))
     places = random.uniform([-70, -50, 80], [70, 50, 150], (count, 3))
@@ -62,7 +62,7 @@ def test_a_board_turned_in_its_own_plane_is_refused():
 
 
 def test_tilted_boards_are_not_refused():
-    """The control: the same scene with tilts."""
+    """Control: the same scene with tilts."""
     report = _calibrate(_good_views(10))
     np.testing.assert_allclose(
         report.calibration.camera.parameters[:4], CAMERA.parameters[:4], rtol=0, atol=1.0
@@ -77,14 +77,17 @@ def test_too_few_views_are_refused():
 
 
 def test_small_central_boards_leave_the_wide_angle_undetermined():
-    """A board far away near the axis says little of focal length: refused, with the weakest direction."""
+    """A board far away near the axis shows little of the focal length.
+
+    Refused, with the weakest direction.
+    """
     random = np.random.default_rng(7)
     far = varied_poses(random, 6, 0.05, (2500.0, 2600.0), 0.08)
     with pytest.raises(UnusableError, match=r"uncertain by|parallel planes"):
         _calibrate(_views(far, sigma_px=0.3))
 
 
-def test_a_pinhole_is_refused_for_boards_beyond_its_reach():
+def test_a_pinhole_is_refused_for_boards_beyond_its_field_of_view():
     views = _good_views(16, 1.6)
     report = _calibrate(views, MODEL_NAMES)
     refused = {s.model: s.refusal for s in report.scores}
@@ -130,14 +133,17 @@ def test_pose_of_a_board_beyond_a_pinhole_view(name, theta):
     np.testing.assert_allclose(pose(BoardView("", xyz_b, uv), camera), true, rtol=0, atol=1e-3)
 
 
-def test_displacement_from_itself_is_nothing():
+def test_displacement_between_equal_cameras_is_zero():
     map_ = displacement_map(CAMERA, CAMERA)
     assert np.nanmax(np.abs(map_.displacement_px)) < 1e-9
     np.testing.assert_allclose(map_.rotation_rad, 0, atol=1e-12)
 
 
-def test_displacement_is_what_no_rotation_undoes():
-    """A shifted centre is mostly a turned camera: the map is smaller than the shift, and least."""
+def test_displacement_is_what_no_rotation_can_remove():
+    """A shifted centre acts mostly like a turned camera.
+
+    The map is smaller than the shift, and the smallest possible.
+    """
     moved = replace(CAMERA, centre=(CAMERA.centre[0] + 0.5, CAMERA.centre[1]))
     map_ = displacement_map(CAMERA, moved)
     ray = CAMERA.unproject(map_.uv).ray

@@ -1,4 +1,4 @@
-"""Boards in rendered fisheye pictures: corners where they truly are, and none where there is no board."""
+"""Boards in rendered fisheye pictures: corners at their true places, and none where there is no board."""
 
 import cv2
 import numpy as np
@@ -38,7 +38,7 @@ def _chess_scene(T_cb, grey_sigma=2.0, picture=None):
 
 
 @pytest.mark.parametrize("theta", [0.0, 0.5, 0.9])
-def test_chessboard_corners_are_where_they_are(theta):
+def test_chessboard_corners_are_at_their_true_places(theta):
     T_cb = facing_pose([np.sin(theta), 0.4 * np.sin(theta), np.cos(theta)], 150.0, [0.2, -0.3, 0.15])
     image, true = _chess_scene(T_cb)
     view = detect(image, BOARD, "a.png")
@@ -76,8 +76,11 @@ def test_red_and_white_board_is_found_in_its_darkest_channel():
     assert _rms_to_nearest(view.uv, true) < LIMIT_PX
 
 
-def test_corners_in_a_defocused_picture_are_better_than_detected_and_than_always_refined():
-    """Blur as wide as the slanted squares: OpenCV's detector and its refinement both err by up to some px."""
+def test_refinement_is_chosen_where_it_helps_in_a_defocused_picture():
+    """Blur is as wide as the slanted squares: OpenCV's detector and its refinement both err by up to some px.
+
+    The result must be better than the detected corners and than corners that are always refined.
+    """
     random = np.random.default_rng(11)
     errors = {"detected": [], "refined": [], "chosen": []}
     for blur_px, theta in ((0.0, 0.6), (3.0, 0.6), (5.0, 0.1), (5.0, 0.5)):
@@ -96,7 +99,7 @@ def test_corners_in_a_defocused_picture_are_better_than_detected_and_than_always
     assert rms["chosen"] < min(rms["detected"], rms["refined"]), (rms, errors)
 
 
-def test_corners_beside_the_picture_stay_where_they_were_detected():
+def test_corners_beside_the_picture_are_not_refined():
     image, uv = _chess_scene(facing_pose([0.0, 0.0, 1.0], 90.0, [0.1, 0.2, 0.0]))
     uv = np.concatenate([uv, [[-0.4, 20.0], [799.6, 599.6], [800.3, 30.0]]])
     refined = refine_in_windows(image, uv, WINDOW_SHARE)
@@ -104,7 +107,7 @@ def test_corners_beside_the_picture_stay_where_they_were_detected():
     assert np.abs(refined[:-3] - uv[:-3]).max() < LIMIT_PX * 3
 
 
-def test_no_board_no_corners():
+def test_a_picture_without_a_board_gives_no_corners():
     random = _random()
     noise = random.integers(0, 255, (150, 200)).astype(np.uint8)
     blurred = np.asarray(cv2.GaussianBlur(noise, (0, 0), 6))
@@ -115,7 +118,7 @@ def test_no_board_no_corners():
 
 @pytest.mark.parametrize("legacy", [False, True])
 @pytest.mark.parametrize("theta", [0.0, 0.8])
-def test_charuco_corners_are_where_they_are(legacy, theta):
+def test_charuco_corners_are_at_their_true_places(legacy, theta):
     T_cb = facing_pose([np.sin(theta), -0.3 * np.sin(theta), np.cos(theta)], 130.0, [0.2, 0.25, -0.1])
     image, board = _charuco_scene(T_cb, legacy)
     view = detect(image, CHARUCO, "a.png")
@@ -156,7 +159,10 @@ def _rms_to_nearest(uv, true):
 
 
 def _grid_is_consistent(view):
-    """A homography of a locally flat patch would fit; here: neighbours on the board are near in the image."""
+    """A homography would fit only a flat patch.
+
+    Tested here: neighbours on the board are near in the image.
+    """
     spacing = np.linalg.norm(view.uv[1:] - view.uv[:-1], axis=1)
     row = np.isclose(np.linalg.norm(view.xyz_b[1:] - view.xyz_b[:-1], axis=1), BOARD.square_mm)
     return spacing[row].max() < 6 * np.median(spacing[row])

@@ -1,4 +1,4 @@
-"""Pictures of another pattern than the one stated are named at once, those of the stated one are not."""
+"""Pictures of another pattern than the stated one are refused by name; those of the stated one are not."""
 
 import cv2
 import numpy as np
@@ -14,7 +14,7 @@ CHARUCO = Charuco(9, 7, 20.0, 15.0, "DICT_4X4_50")
 
 
 def _blurred(face):
-    """Return a picture as a camera would take it: soft, dimmed, noisy, 800 × 600 px."""
+    """Return a picture as a camera would take it: blurred, dimmed, noisy, 800 × 600 px."""
     picture = cv2.resize(np.pad(face, 40, constant_values=230), (800, 600), interpolation=cv2.INTER_AREA)
     noisy = 0.8 * cv2.GaussianBlur(picture, (0, 0), 1.0) + np.random.default_rng(1).normal(0, 3, (600, 800))
     return np.clip(noisy, 0, 255).astype(np.uint8)

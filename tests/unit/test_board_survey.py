@@ -1,4 +1,4 @@
-"""Measuring the board in its own views: offsets found, orientation and place of partial views found."""
+"""Measuring the board in its own views: offsets of corners, and orientation and place of partial views."""
 
 from dataclasses import replace
 
@@ -26,7 +26,7 @@ def _offsets(seed=3, sigma_mm=0.3):
 
 
 def _views(offset_mm, count=20, seed=1):
-    """Return whole views of a board whose corners lie elsewhere than they should."""
+    """Return whole views of a board whose corners are displaced."""
     random = np.random.default_rng(seed)
     true = NOMINAL + offset_mm
     views = []
@@ -38,7 +38,7 @@ def _views(offset_mm, count=20, seed=1):
 
 
 def _without_motion_and_scale(offset):
-    """Return what of the offsets no movement and no scale of the whole board makes."""
+    """Return the part of the offsets that no movement and no scale of the whole board can make."""
     x, y, _ = (NOMINAL - NOMINAL.mean(0)).T
     zero, one = np.zeros_like(x), np.ones_like(x)
     motions = [(one, zero, zero), (zero, one, zero), (zero, zero, one), (-y, x, zero), (zero, zero, x)]
@@ -61,7 +61,7 @@ def test_offsets_of_the_corners_are_found():
     assert np.sqrt(np.mean(error[:, 2] ** 2)) < 0.15
 
 
-def test_surveying_predicts_views_it_has_not_seen():
+def test_surveying_predicts_other_views_better():
     views = _views(_offsets())
     scores = {}
     for shape in ("flat", "bent", "surveyed"):
@@ -74,8 +74,8 @@ def test_surveying_predicts_views_it_has_not_seen():
 
 
 @pytest.mark.parametrize(("sigma_mm", "shape"), [(0.0, "bent"), (0.3, "surveyed")])
-def test_the_shape_that_predicts_best_is_taken(sigma_mm, shape):
-    """The control: a perfect board is not surveyed."""
+def test_the_shape_that_predicts_best_is_chosen(sigma_mm, shape):
+    """Control: a perfect board is not surveyed."""
     views = _views(_offsets(sigma_mm=sigma_mm), count=12)
     report = calibrate_boards(
         views, CAMERA.image_size, ["kannala_brandt"], None, BoardCalibrationParameters(), quiet_context()
@@ -83,7 +83,7 @@ def test_the_shape_that_predicts_best_is_taken(sigma_mm, shape):
     assert report.board_shape == shape
 
 
-def test_views_upside_down_and_in_part_find_their_place():
+def test_the_place_of_inverted_and_partial_views_is_found():
     views = _views(_offsets())
     survey, _, estimate = survey_board(views, start(views, CAMERA.image_size), SURVEYED)
     upside_down = replace(views[2], uv=views[2].uv[::-1], numbered=False)
@@ -95,14 +95,14 @@ def test_views_upside_down_and_in_part_find_their_place():
     np.testing.assert_allclose(placed(survey, part, estimate.camera, 1.0).xyz_b, NOMINAL[inner], atol=1e-6)
 
 
-def test_numbered_views_stay_where_they_are():
+def test_numbered_views_keep_their_place():
     views = _views(_offsets())
     survey, _, estimate = survey_board(views, start(views, CAMERA.image_size), SURVEYED)
     wrong = replace(views[2], uv=views[2].uv[::-1])
     np.testing.assert_array_equal(placed(survey, wrong, estimate.camera, 1.0).xyz_b, wrong.xyz_b)
 
 
-def test_a_corner_that_is_not_on_the_board_stays():
+def test_a_corner_that_is_not_on_the_board_is_not_moved():
     survey = replace(nominal_board(_views(_offsets())), offset_mm=np.full((54, 3), 0.2))
     view = BoardView("x", np.array([[0.0, 0.0, 0.0], [500.0, 0.0, 0.0]]), np.zeros((2, 2)))
     np.testing.assert_allclose(applied(survey, view).xyz_b, [[0.2, 0.2, 0.2], [500, 0, 0]])

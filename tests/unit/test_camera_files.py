@@ -1,4 +1,7 @@
-"""Camera files: what is written is read back the same, what is wrong is refused with its place named."""
+"""Camera files: what is written is read back the same.
+
+Wrong files are refused with the place of the error.
+"""
 
 import cv2
 import numpy as np
@@ -131,7 +134,7 @@ def test_wrong_files_are_refused_naming_the_place(tmp_path, name, right, wrong, 
 
 
 @pytest.mark.parametrize("content", [b"", b"\x00\xff\xfe", b"hello", b"a: 1", b"- 1\n- 2"])
-def test_unknown_files_say_what_was_tried(tmp_path, content):
+def test_for_unknown_files_the_error_lists_the_formats_tried(tmp_path, content):
     (tmp_path / "camera").write_bytes(content)
     with pytest.raises(InputError) as raised:
         read_camera(tmp_path / "camera")
@@ -144,7 +147,7 @@ def test_absent_file_and_folder_are_refused(tmp_path):
             read_camera(path)
 
 
-def test_a_format_that_cannot_hold_the_model_says_so(tmp_path):
+def test_a_format_that_cannot_hold_the_model_is_refused(tmp_path):
     with pytest.raises(InputError, match="cannot hold a scaramuzza camera"):
         write_camera(CAMERAS["scaramuzza"], tmp_path / "camera", "opencv")
     with pytest.raises(InputError, match="cannot hold a pinhole camera"):
@@ -213,7 +216,7 @@ def test_spoiled_files_are_read_or_refused(tmp_path, name, where, length, put):
 
 @fuzz
 @given(content=st.binary(max_size=200))
-def test_any_bytes_are_refused(tmp_path, content):
+def test_random_bytes_are_refused(tmp_path, content):
     _read_or_refuse(tmp_path, content)
 
 

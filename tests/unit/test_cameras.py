@@ -1,4 +1,4 @@
-"""Every camera model: round trips, derivatives, validity, independence from its arguments."""
+"""Every camera model: round trips, derivatives, validity, unchanged arguments."""
 
 import pickle
 
@@ -105,7 +105,7 @@ def test_does_not_change_its_arguments(camera):
         np.testing.assert_array_equal(array, before)
 
 
-def test_invalid_is_nan_and_masked(camera):
+def test_invalid_results_are_nan_and_masked(camera):
     points = np.array([[0.0, 0.0, 0.0], [np.nan, 1.0, 1.0], [np.inf, 0.0, 1.0]])
     projected = camera.project(points)
     assert not projected.valid.any()
@@ -118,7 +118,7 @@ def test_invalid_is_nan_and_masked(camera):
     assert np.isnan(rays.ray).all()
 
 
-def test_masks_say_what_is_nan(camera):
+def test_masks_mark_exactly_the_nan_results(camera):
     uv = np.random.default_rng(4).uniform(-4000, 6000, (500, 2))
     rays = camera.unproject(uv)
     np.testing.assert_array_equal(np.isfinite(rays.ray).all(-1), rays.valid)
@@ -142,7 +142,7 @@ def test_takes_any_leading_shape(camera):
 def test_kannala_brandt_agrees_with_opencv():
     camera = KANNALA_BRANDT
     points = 3.0 * sample_directions(camera, 0.6)
-    points = points[points[:, 2] > 0.05]  # OpenCV's function maps the half space ahead only
+    points = points[points[:, 2] > 0.05]  # OpenCV's function maps only the half space ahead
     expected, _ = cv2.fisheye.projectPoints(
         points[:, None],
         np.zeros(3),
@@ -186,7 +186,7 @@ def test_equidistant_is_kannala_brandt_without_distortion():
 
 
 def test_scaramuzza_follows_ocamcalib_cam2world():
-    """The C code's formula, written out: row first, x down, z backward."""
+    """The formula of the C code: row first, x down, z backward."""
     row, column = 200.0, 1300.0
     c, d, e = SCARAMUZZA.affine
     a, b = row - SCARAMUZZA.centre[1], column - SCARAMUZZA.centre[0]
@@ -197,7 +197,7 @@ def test_scaramuzza_follows_ocamcalib_cam2world():
 
 
 def test_direction_behind_a_model_that_turns_back_is_refused():
-    """ρ(θ) of this camera falls again before 180°: two directions would share a pixel."""
+    """ρ(θ) of this camera falls again before 180°, so that two directions would share a pixel."""
     camera = CAMERAS["kannala_brandt that turns back"]
     assert camera.theta_max < np.pi
     beyond = directions(np.array([camera.theta_max + 0.02]), np.array([0.3]))
@@ -205,7 +205,7 @@ def test_direction_behind_a_model_that_turns_back_is_refused():
 
 
 def test_inversion_stays_inside_its_bracket():
-    """Newton alone diverges on x³ near 0; the bracket keeps it."""
+    """Newton's method alone diverges on x³ near 0; the bracket prevents it."""
     value = np.array([-1.0, 0.0, 1e-12, 0.3, 1.0, 2.0, np.nan])
     x = invert_increasing(lambda x: x**3, lambda x: 3 * x**2, value, np.linspace(0, 1, 5))
     np.testing.assert_allclose(x[:-1], [0, 0, 1e-4, 0.3 ** (1 / 3), 1, 1], atol=1e-6)
@@ -234,7 +234,7 @@ def _by_parameters(camera, function):
 
 
 def _assert_close(analytic, numeric):
-    """Compare column by column: parameters differ in scale by many powers of ten."""
+    """Compare column by column, since the scales of parameters differ by many powers of ten."""
     known = np.isfinite(numeric)
     assert known.mean() > 0.9
     scale = np.abs(np.where(known, numeric, 0)).max(tuple(range(numeric.ndim - 1)))

@@ -1,4 +1,4 @@
-"""The user's wish to stop reaches into every solver: it ends at its next step, not after its last."""
+"""When the user asks to stop, every solver ends at its next step."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from tests.motion_scene import displaced, scene
 
 @dataclass
 class Wish:
-    """A wish to stop ``after`` some steps of a part; keeps what the solver told of its progress."""
+    """A request to stop ``after`` some steps of a part; it also records the reported progress."""
 
     after: int
     part: int = 0
@@ -63,7 +63,7 @@ def test_a_solver_stops_at_its_next_step(
     assert len(wish.told) == 4
 
 
-def test_a_diagnosis_tells_how_far_it_is_and_stops_within_its_search(gauge_run: GaugeRun) -> None:
+def test_a_diagnosis_reports_its_progress_and_stops_within_its_search(gauge_run: GaugeRun) -> None:
     wish = Wish(after=3, part=1)
     with pytest.raises(Cancelled):
         diagnose_gauge(gauge_run, wish)

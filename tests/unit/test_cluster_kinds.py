@@ -1,4 +1,4 @@
-"""The section ``cluster`` of a configuration: what it may say, and who reads it."""
+"""The section ``cluster`` of a configuration: what it may contain, and who reads it."""
 
 from pathlib import Path
 
@@ -35,7 +35,7 @@ def test_a_configuration_names_the_kind(tmp_path, text, expected):
     assert read_cluster(written(tmp_path, text)) == expected
 
 
-def test_without_a_file_it_is_this_machine():
+def test_without_a_file_the_cluster_is_this_machine():
     assert read_cluster(None) == LocalWorkers()
 
 
@@ -51,17 +51,17 @@ def test_without_a_file_it_is_this_machine():
         ("{kind: pbs, jobs: 1, walltime: forever}", r"cluster\.walltime: .*match"),
     ],
 )
-def test_a_wrong_section_is_refused_by_its_key(tmp_path, section, message):
+def test_a_wrong_section_is_refused_with_its_key(tmp_path, section, message):
     with pytest.raises(InputError, match=f"(?s)c.yaml.*{message}"):
         read_cluster(written(tmp_path, f"cluster: {section}"))
 
 
-def test_a_run_takes_the_same_file_and_is_not_changed_by_it(tmp_path):
+def test_a_run_accepts_the_same_file_and_is_not_changed_by_it(tmp_path):
     file = written(tmp_path, "cluster: {kind: slurm, jobs: 2}\nrings: {azimuths: 360}")
     assert resolve(PIPELINE, file) == resolve(PIPELINE, None, ["rings.azimuths=360"])
 
 
-def test_a_machine_without_the_queue_is_told_so(monkeypatch):
+def test_a_machine_without_the_queue_is_refused_with_that_reason(monkeypatch):
     monkeypatch.setenv("PATH", "")
     jobs = QueuedJobs(kind="pbs", jobs=1)
     with pytest.raises(InputError, match="qsub: is not on the path"), workers(jobs):

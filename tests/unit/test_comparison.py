@@ -1,4 +1,7 @@
-"""Two walls laid on each other: the shift and roll put in come out, what grew is told from what did not."""
+"""Two walls registered to each other.
+
+Shift and roll are found, and growth is distinguished from no change.
+"""
 
 from dataclasses import replace
 
@@ -33,7 +36,7 @@ from tests.two_walls import (
 )
 
 
-def test_shift_scale_and_roll_come_out_within_their_sigma():
+def test_shift_scale_and_roll_are_found_within_their_sigma():
     found = register(PIPE.surface((), 1), later((), 2), NO_WELDS, SAME)
     at = np.array([40.0, 70.0, 95.0])
     now, azimuth = found.to_now(at, np.zeros(3))
@@ -65,7 +68,7 @@ def test_another_bore_is_refused():
         register(PIPE.surface((), 1), wide, NO_WELDS, SAME)
 
 
-def test_growth_new_and_vanished_are_found_and_told_from_what_stays():
+def test_grown_new_and_vanished_defects_are_found_and_others_are_unchanged():
     grown, stays, new, gone = (45.0, 0.3), (65.0, -2.0), (85.0, 1.5), (75.0, -0.5)
     before = [(*grown, 0.4, 2.0), (*stays, 0.6, 2.0), (*gone, 0.5, 2.0)]
     after = [(*grown, 0.6, 2.0), (*stays, 0.6, 2.0), (*new, 0.5, 2.0)]
@@ -82,24 +85,24 @@ def test_growth_new_and_vanished_are_found_and_told_from_what_stays():
     assert growth.sigma < 0.08
 
 
-def test_growth_lies_in_its_95_percent_interval_as_often_as_it_should():
+def test_growth_lies_in_its_95_percent_interval_in_95_percent_of_cases():
     inside = []
     for seed in range(3):
         truth = np.random.default_rng(seed).uniform(-0.1, 0.3, len(PLACES))
         found = family(truth, 50 + 2 * seed)
         growth = [found[k].growth.depth_mm for k in range(len(PLACES))]
         inside += [abs(g.value - t) < 1.96 * g.sigma for g, t in zip(growth, truth, strict=True)]
-    # 36 of them; fewer than 31 would come by chance in one of 150 cases were the intervals honest
+    # 36 of them; with true intervals fewer than 31 would occur by chance in one of 150 cases
     assert sum(inside) >= 31
 
 
-def test_nothing_is_declared_where_nothing_changed():
+def test_no_change_is_declared_where_nothing_changed():
     families = [family(np.zeros(len(PLACES)), 300 + 2 * seed, found_now=9) for seed in range(3)]
     assert FAMILY_ERROR == 0.01
     assert not any(c.is_significant for found in families for c in found.values())
 
 
-def test_wall_that_one_run_did_not_see_is_not_called_unchanged():
+def test_wall_that_one_run_did_not_measure_is_not_called_unchanged():
     before, after = PIPE.surface([(60.0, 0.3, 0.5, 2.0)], 1), later((), 2)
     hidden = np.array(before.wall.radius_mm)
     hidden[108:132, 380:412] = np.nan
@@ -111,7 +114,7 @@ def test_wall_that_one_run_did_not_see_is_not_called_unchanged():
     assert found.seen_earlier < 0.5 < found.seen_now
 
 
-def test_a_deposit_is_not_taken_for_the_pit_beside_it():
+def test_a_deposit_is_not_mistaken_for_the_pit_beside_it():
     registration = register(PIPE.surface((), 1), later((), 2), NO_WELDS, SAME)
     places = put_together(
         [finding(1, 60.0, 0.3)], [moved(finding(1, 60.0, 0.3, kind="deposit"))], registration, RADIUS
@@ -120,15 +123,15 @@ def test_a_deposit_is_not_taken_for_the_pit_beside_it():
     assert len(places) == 2
 
 
-def test_holm_steps_down_and_leaves_out_what_was_not_tested():
+def test_the_holm_correction_steps_down_and_ignores_what_was_not_tested():
     assert holm([0.01, float("nan"), 0.04, 0.03]) == pytest.approx(
         [0.03, float("nan"), 0.06, 0.06], nan_ok=True
     )
 
 
 @pytest.mark.parametrize("alike", [0.0, 0.6, 0.9])
-def test_the_spread_of_a_median_of_correlated_diameters_is_stated_right(alike):
-    """Medians of 300 drawn series, against their own σ; taken as independent they are 4 times too sure."""
+def test_the_spread_of_a_median_of_correlated_diameters_is_stated_rightly(alike):
+    """Medians of 300 drawn series against their own σ; if taken as independent, σ is 4 times too small."""
     random = np.random.default_rng(3)
     drawn, white = random.normal(size=(300, 400)), []
     for row in drawn:
@@ -141,8 +144,8 @@ def test_the_spread_of_a_median_of_correlated_diameters_is_stated_right(alike):
 
 
 @pytest.mark.parametrize("radius_mm", [RADIUS, 25.0])
-def test_the_foot_of_a_finding_reaches_across_the_seam_as_far_as_it_reaches_elsewhere(radius_mm):
-    """The foot beyond the first or last column was called clean wall; in narrow pipes it was too narrow."""
+def test_the_foot_of_a_finding_reaches_as_far_across_the_seam_as_elsewhere(radius_mm):
+    """The foot beyond the first or last column counted as clean wall; in narrow pipes it was too narrow."""
     wall = PIPE.surface((), 3).wall
     wall = replace(wall, radius_mm=np.full_like(wall.radius_mm, radius_mm))
     registration = register(PIPE.surface((), 3), later((), 4), NO_WELDS, SAME)
@@ -157,8 +160,8 @@ def test_the_foot_of_a_finding_reaches_across_the_seam_as_far_as_it_reaches_else
     assert wide_mm == pytest.approx(10 + 2 * 2.0, abs=1.5)  # the finding, and 2 mm of foot on either side
 
 
-def test_where_the_later_wall_was_not_seen_a_finding_has_no_coverage_there():
-    """Its radius, NaN, was made a number of cells, which ended the comparison."""
+def test_where_the_later_run_did_not_measure_a_finding_its_coverage_is_zero():
+    """The radius there, NaN, was converted to a number of cells, which ended the comparison."""
     wall = PIPE.surface((), 3).wall
     unknown = wall.radius_mm.copy()
     unknown[wall.rows(40.0, 70.0)] = np.nan

@@ -1,7 +1,7 @@
-"""Kernels round alike whether they were compiled in this process or come from the cache on the disk.
+"""Kernels give the same bytes whether they were compiled in this process or come from the cache on the disk.
 
-A fast-math function that is not inlined exists twice in the process that compiles it, once on its own and
-once within its caller, each optimised for itself; the cache holds the one within the caller.
+A fast-math function that is not inlined exists twice in the process that compiles it: on its own and within
+its caller, each optimised separately. The cache holds the one within the caller.
 """
 
 from __future__ import annotations
@@ -30,13 +30,13 @@ print(hashlib.sha256(found.offset.tobytes() + found.correlation.tobytes()).hexdi
 
 def test_matches_are_the_same_bytes_freshly_compiled_and_from_the_cache(tmp_path: Path) -> None:
     first, second = (_printed(_MATCHED, tmp_path) for _ in range(2))
-    assert any(tmp_path.rglob("patches._match*.nbi")), "the control: the second time it was in the cache"
+    assert any(tmp_path.rglob("patches._match*.nbi")), "control: the second time it came from the cache"
     assert len(first) == 64
     assert first == second
 
 
 def _printed(script: str, cache: Path) -> str:
-    """Return what a script prints in a process of its own that keeps compiled kernels in a folder."""
+    """Return the output of a script in a separate process with its kernel cache in a folder."""
     environment = os.environ | {"NUMBA_CACHE_DIR": str(cache), "PYTHONPATH": str(PROJECT_ROOT)}
     command = [sys.executable, "-c", script]
     done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)

@@ -1,4 +1,4 @@
-"""The configuration is typed and strict, and its complaints name the nearest right key."""
+"""The configuration is typed and strict, and its errors name the nearest right key."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from tests.shared_data import PROJECT_ROOT
 from tests.toy_stages import TOYS, DrawParameters, Mood, SmoothParameters, TotalParameters
 
 
-def test_defaults_then_file_then_assignments(tmp_path: Path) -> None:
+def test_assignments_override_the_file_and_the_file_overrides_defaults(tmp_path: Path) -> None:
     file = tmp_path / "c.yaml"
     file.write_text("draw: {count: 5, mood: wild}\nsmooth: {width: 9}\ntotal: {weights: [2, 1e-3]}\n")
     configuration = resolve(TOYS, file, ["draw.count=6", "smooth.unusable_above=1e3"])
@@ -81,7 +81,7 @@ def test_default_and_resolved_texts_read_back_as_the_defaults(tmp_path: Path, st
         assert resolve(stages, file) == resolve(stages)
 
 
-def test_every_parameter_says_what_it_means() -> None:
+def test_every_parameter_has_a_description() -> None:
     for stage in PIPELINE:
         for name, field in stage.parameters.model_fields.items():
             assert field.description, f"{stage.name}.{name}"
@@ -93,7 +93,7 @@ def test_the_default_file_is_up_to_date() -> None:
     assert list(yaml.safe_load(text)) == [s.name for s in PIPELINE]
 
 
-def test_the_configuration_for_long_pipes_is_one_and_differs_in_all_it_names() -> None:
+def test_the_configuration_for_long_pipes_is_valid_and_differs_from_the_default_in_every_line() -> None:
     file = PROJECT_ROOT / "configs" / "long.yaml"
     long, usual = resolve(PIPELINE, file), resolve(PIPELINE)
     for stage, named in yaml.safe_load(file.read_text("utf-8")).items():

@@ -1,4 +1,4 @@
-"""Every constant that decides something says beside it where it comes from, or is listed in data/debts.md."""
+"""Every constant that affects a result says beside it where it comes from, or is listed in data/debts.md."""
 
 import ast
 import re
@@ -7,7 +7,7 @@ from pathlib import Path
 
 from tests.shared_data import PROJECT_ROOT
 
-# Units, signs, layouts and bounds on time: nothing that is measured or found depends on them.
+# Units, signs, layouts and limits on time: no measurement and no finding depends on them.
 NO_DECISIONS = {
     "_AZIMUTH", "_BIN_LEVELS", "_BUSY_S", "_INCH_MM", "_LEFT", "_OUTSIDE", "_QUARTER_TURNS", "_REFERENCE_MM",
     "_SIDES", "_STEP_MM", "_TIME", "_UNITS_MM", "_WAVES", "_WIDTH", "_ZERO", "DIRECTION", "HALF_TURN_ABOUT_X",
@@ -19,7 +19,7 @@ NAME = re.compile(r"_?[A-Z][A-Z0-9_]*")
 
 
 def unexplained(text: str, listed: set[str]) -> Iterator[str]:
-    """Yield constants of a module that hold a decimal number, without a reason beside them or in the list."""
+    """Yield constants of a module that hold a decimal number without a reason beside them or in the list."""
     lines = text.splitlines()
     for node in ast.parse(text).body:
         if not isinstance(node, ast.Assign) or not any(is_decimal(part) for part in ast.walk(node.value)):
@@ -32,7 +32,7 @@ def unexplained(text: str, listed: set[str]) -> Iterator[str]:
 def unexplained_limits(text: str) -> Iterator[str]:
     """Yield decimals that a function compares with, without a comment on their line or on the one above.
 
-    Halves, ones and twos, what guards a division (below 1e-5) and 1.4826 (MAD to σ) need none.
+    Halves, ones and twos, guards of divisions (below 1e-5) and 1.4826 (MAD to σ) need none.
     """
     lines = text.splitlines()
     functions = [n for n in ast.walk(ast.parse(text)) if isinstance(n, ast.FunctionDef)]
@@ -49,7 +49,7 @@ def is_decimal(node: ast.AST) -> bool:
 
 
 def is_explained(node: ast.Assign, lines: list[str]) -> bool:
-    """Return whether a comment stands in its lines or above its block, or a text below it."""
+    """Return whether there is a comment in its lines or above its block, or a docstring below it."""
     above = node.lineno - 2
     while above >= 0 and re.match(r"_?[A-Z][A-Z0-9_]*( = |, )", lines[above]):
         above -= 1
@@ -79,20 +79,20 @@ def test_every_limit_inside_a_function_has_its_reason() -> None:
     assert found == [], "write above it where the number comes from, or give it a name"
 
 
-def test_a_planted_limit_is_found() -> None:
+def test_a_planted_limit_without_a_reason_is_found() -> None:
     assert list(unexplained_limits("def f(x):\n    return x > 0.3 * 7\n")) == ["2: 0.3"]
     for line in ("x > 0.3  # chosen", "x > 0.5", "x < 1e-9", "0.3 * x"):
         assert list(unexplained_limits(f"def f(x):\n    return {line}\n")) == []
 
 
-def test_every_debt_is_of_a_constant_that_is_there() -> None:
+def test_every_listed_debt_is_of_an_existing_constant() -> None:
     debts = (PROJECT_ROOT / "data" / "debts.md").read_text("utf-8")
     files = [f for package in ("pipeline", "stages") for f in (PROJECT_ROOT / package).rglob("*.py")]
     there = set(NAME.findall("\n".join(f.read_text("utf-8") for f in files)))
-    assert sorted(set(re.findall(r"`(_?[A-Z][A-Z0-9_]*)`", debts)) - there) == [], "take its row out"
+    assert sorted(set(re.findall(r"`(_?[A-Z][A-Z0-9_]*)`", debts)) - there) == [], "remove its row"
 
 
-def test_a_planted_constant_is_found() -> None:
+def test_a_planted_constant_without_a_reason_is_found() -> None:
     assert list(unexplained("import math\n_LIMIT = 0.3\n", set())) == ["2: _LIMIT"]
     assert list(unexplained("_A, _B = 1, math.radians(1.2)\n", set())) == ["1: _A, _B"]
     for text in ("# Chosen.\n_LIMIT = 0.3\n", "_LIMIT = 0.3  # chosen\n", '_LIMIT = 0.3\n"""Chosen."""\n'):
@@ -100,7 +100,7 @@ def test_a_planted_constant_is_found() -> None:
     assert list(unexplained("_LIMIT = 0.3\n", {"_LIMIT"})) == []
 
 
-def test_the_list_of_debts_names_files_that_are_there() -> None:
+def test_the_list_of_debts_names_existing_files() -> None:
     rows = [r.split("|") for r in (PROJECT_ROOT / "data" / "debts.md").read_text("utf-8").splitlines()]
     named = {n for row in rows if len(row) > 4 for n in re.findall(r"`([\w/]+\.py)`", row[2])}
     there = [str(Path("/") / f.relative_to(PROJECT_ROOT)) for f in PROJECT_ROOT.glob("[ps]*/**/*.py")]

@@ -1,4 +1,7 @@
-"""Courses of effects: what they mean, in the simulator and in the diagnosis' library."""
+"""Courses of effects over time or motion.
+
+What they mean in the simulator and in the library of the diagnosis.
+"""
 
 from dataclasses import replace
 
@@ -40,7 +43,7 @@ BORE = Bore(42.0, (4.0, -7.0, 0.0), (0.03, -0.02, 1.0))
         (Course(CourseKind.DISTANCE, (100.0,)), 0.3),
     ],
 )
-def test_a_course_gives_the_part_of_the_size(course, factor):
+def test_a_course_scales_the_size_of_its_effect(course, factor):
     assert course.factor(3.0, 30.0, -8.0) == pytest.approx(factor, abs=1e-12)
     assert course.factor(np.full(4, 3.0), np.full(4, 30.0), np.full(4, -8.0)).shape == (4,)
 
@@ -52,7 +55,7 @@ def test_a_course_with_a_wrong_number_is_refused():
         Course(CourseKind.SPEED, (0.0,))
 
 
-def test_a_switch_with_a_course_is_read_as_it_is_written():
+def test_a_switch_with_a_course_is_read_back_from_its_text():
     switch = parse_switch("laser_tilt~step=0.35@25/4.6s")
     assert switch.course == Course(CourseKind.STEP, (4.6,))
     assert parse_switch(switch.text) == switch
@@ -65,7 +68,7 @@ def test_a_switch_with_a_course_is_read_as_it_is_written():
         parse_switch("laser_tilt~jump=0.35")
 
 
-def test_the_simulated_sheet_is_knocked_at_its_time_and_keeps_other_changes():
+def test_the_simulated_sheet_is_displaced_at_its_time_and_other_changes_stay():
     texts = ["laser_tilt~step=0.35@25/4.6s", "baseline~ramp=0.2/8s", "laser_tilt=0.1@115"]
     truth = switch_on(bench_truth(50.8), parse_switches(texts))
     start = float(truth.frames.time_s[0])
@@ -78,8 +81,8 @@ def test_the_simulated_sheet_is_knocked_at_its_time_and_keeps_other_changes():
 
 
 @pytest.mark.parametrize("drift", ["baseline_drift", "focal_drift", "centre_drift"])
-def test_a_ramp_and_a_slow_drift_are_one_curve_and_both_are_searched(drift):
-    """Where one of them alone was, the other got a wrong name, or none where its size was out of range."""
+def test_a_ramp_and_a_slow_drift_are_nearly_the_same_curve_and_both_are_searched(drift):
+    """With one of them alone, the other got a wrong name, or none where its size was out of range."""
     points = ring_points(plain_probe(), BORE, 90, 1.3)
     run_s = 8.0
     points = replace(points, time_s=np.linspace(0, run_s, len(points.uv)))
@@ -96,8 +99,8 @@ def test_a_ramp_and_a_slow_drift_are_one_curve_and_both_are_searched(drift):
     assert shape_alike(model, coursed(model.static.name, CourseKind.STEP), (4.0,), size, run_s) is None
 
 
-def test_beside_a_large_ramp_there_is_no_drift_that_would_come_to_what_is_impossible():
-    """A baseline that has grown by .3 mm in a run is no drift of 6.4 runs: that would come to 2.1 mm."""
+def test_a_large_ramp_is_not_described_as_a_drift_with_an_impossible_end():
+    """A baseline that grew by .3 mm in a run is not a drift of 6.4 runs, which would come to 2.1 mm."""
     ramp = coursed("baseline", CourseKind.RAMP)
     (quick,) = shape_alike(LIBRARY["baseline_drift"], ramp, (4.0,), np.array([0.15]), 8.0) or (np.inf,)
     assert quick < 6.4 * 8.0
@@ -106,7 +109,7 @@ def test_beside_a_large_ramp_there_is_no_drift_that_would_come_to_what_is_imposs
 
 
 @pytest.mark.parametrize("text", ["ovality~step=0.1", "encoder_scale~ramp=0.01"])
-def test_what_is_no_part_of_the_instrument_has_no_course(text):
+def test_effects_outside_the_instrument_have_no_course(text):
     with pytest.raises(InputError, match="cannot change with time"):
         switch_on(bench_truth(50.8), [parse_switch(text)])
 
@@ -116,7 +119,7 @@ def coursed(name, kind, own=()):
 
 
 @pytest.mark.parametrize("name", ["laser_tilt", "principal_point", "sensor_tilt"])
-def test_a_step_is_nothing_before_its_time_and_the_law_itself_after(name):
+def test_a_step_is_zero_before_its_time_and_the_law_itself_after(name):
     model, law = coursed(name, CourseKind.STEP), LIBRARY[name]
     size = np.array([a.plausible for a in law.amplitudes])
     for points, shift in (
@@ -127,7 +130,7 @@ def test_a_step_is_nothing_before_its_time_and_the_law_itself_after(name):
         assert np.array_equal(shift(model, points, (4.9,), size), shift(law, points, (), size))
 
 
-def test_a_swing_has_the_phase_and_size_of_its_two_waves():
+def test_a_swing_has_the_phase_and_size_of_its_sine_and_cosine():
     model = coursed("principal_point", CourseKind.SINUSOID)
     sine, cosine = np.array([0.3, 0.4]) * np.cos(0.7), np.array([0.3, 0.4]) * np.sin(0.7)
     amplitude = np.concatenate([sine, cosine])
@@ -142,7 +145,7 @@ def test_a_swing_has_the_phase_and_size_of_its_two_waves():
     assert moved[0] == pytest.approx(np.array([0.3, 0.4]) * np.sin(2 * np.pi * 1.3 * 2.0 + 0.7))
 
 
-def test_the_way_is_the_cameras_and_not_that_of_the_wall_it_sees():
+def test_a_course_over_distance_uses_the_cameras_distance_not_that_of_the_wall_it_sees():
     points = ring_points(plain_probe(), BORE, 40)
     ahead = np.sum(points.xyz_c * points.along_c, axis=1)
     points = replace(points, distance_mm=75.0 + ahead)
@@ -150,7 +153,7 @@ def test_the_way_is_the_cameras_and_not_that_of_the_wall_it_sees():
     assert model.sheet_shift_mm(points, (150.0,), np.array([0.2])) == pytest.approx(0.1)
 
 
-def test_the_library_has_every_movable_law_with_every_course_and_no_product_twice():
+def test_the_library_has_every_movable_law_with_every_course_and_no_combination_twice():
     every = with_courses(LIBRARY)
     assert len({m.name for m in every.values()}) == len(every)
     assert {m.kind for m in every.values()} >= set(SEARCHED)
@@ -160,7 +163,7 @@ def test_the_library_has_every_movable_law_with_every_course_and_no_product_twic
     assert not any(m.law == "laser_tilt" for m in left.values())
 
 
-def test_statements_and_equations_tell_the_course_and_columns_its_slope():
+def test_sentences_and_equations_state_the_course_and_columns_its_derivative():
     points = ring_points(plain_probe(), BORE, 24)
     for model in with_courses(LIBRARY).values():
         if not isinstance(model, Coursed):
@@ -188,15 +191,15 @@ def test_a_prior_draws_an_effect_with_its_course():
 
 
 @pytest.mark.parametrize(("name", "per_s"), [("baseline_drift", "0.0128 mm"), ("focal_drift", "1.2766%")])
-def test_a_drift_slower_than_its_run_is_told_by_its_growth_at_first(name, per_s):
-    """Its size in the end, .66 ± 1.06 mm after a growth of .1, stood alone in the sentence."""
+def test_a_drift_slower_than_its_run_is_described_by_its_initial_growth(name, per_s):
+    """Formerly the sentence gave only its size in the end, .66 ± 1.06 mm after a growth of .1 mm."""
     told = LIBRARY[name].statement((51.2,), np.array([-0.66]))
     assert f"shorter, by {per_s} in the first second" in told
     assert "-" not in told
     assert "end" not in told
 
 
-def test_a_law_that_settles_under_no_name_of_its_own_is_told_by_its_growth_at_first():
+def test_an_exponential_law_without_a_separate_name_is_described_by_its_initial_growth():
     settles = Coursed(LIBRARY["laser_tilt"], (), CourseKind.EXPONENTIAL)
     told = settles.statement((51.2,), np.array([0.0, -10.0]))
     assert "tilted by 0.193°" in told
@@ -225,7 +228,7 @@ def test_a_law_that_settles_under_no_name_of_its_own_is_told_by_its_growth_at_fi
         ("baseline", (), 0.0013, ""),
     ],
 )
-def test_what_a_drift_comes_to_is_told_with_its_sigma_where_it_is_known(name, shape, sigma, words):
+def test_the_end_of_a_drift_is_stated_with_its_sigma_where_it_is_known(name, shape, sigma, words):
     term = Term(with_courses(LIBRARY)[name], shape, np.array([-0.301]))
     told = _in_the_end(Sized(term, np.array([[sigma**2]])), duration_s=8.0)
     assert told.startswith(" In the end, the ") is bool(words)
@@ -233,8 +236,8 @@ def test_what_a_drift_comes_to_is_told_with_its_sigma_where_it_is_known(name, sh
     assert bool(told) is bool(words)
 
 
-def test_what_a_tilt_with_a_free_time_constant_comes_to_is_told_in_its_own_two_components():
-    """The time constant is fitted as one amplitude more; taken for a third component it ended the program."""
+def test_the_end_of_a_tilt_with_a_free_time_constant_is_stated_by_its_two_components():
+    """The fitted time constant is one more amplitude; taken for a third component it ended the program."""
     model = with_courses(LIBRARY)["laser_tilt, exponential"]
     term = Term(model, (3.5,), np.array([3.0, 4.0, 0.1]), bounds=(1.0, 20.0))
     told = _in_the_end(Sized(term, np.diag([1e-4, 1e-4, 1e-4])), duration_s=8.0)
@@ -250,8 +253,8 @@ def test_what_a_tilt_with_a_free_time_constant_comes_to_is_told_in_its_own_two_c
         ("laser_cone, exponential", "lean 0.002° more forward"),
     ],
 )
-def test_a_drift_of_ten_minutes_is_not_told_as_nothing(name, words):
-    """A baseline that grew by .02 mm in ten minutes got longer "by 0.0000 mm in the first second"."""
+def test_the_growth_of_a_drift_over_ten_minutes_is_not_stated_as_zero(name, words):
+    """A baseline that grew by .02 mm in ten minutes was longer "by 0.0000 mm in the first second"."""
     model = with_courses(LIBRARY)[name]
     size = np.array([0.02, 0.0])[: len(model.amplitudes)]
     assert words in model.statement((600.0,), size)
@@ -267,7 +270,7 @@ def test_a_drift_of_ten_minutes_is_not_told_as_nothing(name, words):
         ("laser_tilt, speed", ("camera", "speed")),
     ],
 )
-def test_a_pattern_in_a_course_behaves_as_the_course_does(like, goes_with):
+def test_a_generic_pattern_follows_its_course(like, goes_with):
     model = with_courses(LIBRARY)[like]
     harmonic = effect(model.law).harmonic
     for pattern in patterns_in_course(model, harmonic):

@@ -17,7 +17,7 @@ SLIM = {
 
 
 @pytest.mark.parametrize("cells", SLIM.values(), ids=SLIM)
-def test_a_region_one_cell_wide_has_an_outline_about_its_cells(cells: list[str]) -> None:
+def test_the_outline_of_a_region_one_cell_wide_runs_around_its_cells(cells: list[str]) -> None:
     mask = np.pad(np.array([[c == "#" for c in row] for row in cells], np.uint8), 1)
     polygon = _polygon(mask).astype(np.float32)
     assert len(polygon) >= 3
@@ -26,6 +26,6 @@ def test_a_region_one_cell_wide_has_an_outline_about_its_cells(cells: list[str])
         assert cv2.pointPolygonTest(polygon, (float(column), float(row)), False) >= 0
 
 
-def test_a_wide_region_keeps_the_outline_through_its_outer_cells() -> None:
+def test_the_outline_of_a_wide_region_runs_through_its_outer_cells() -> None:
     mask = np.pad(np.ones((4, 6), np.uint8), 1)
     np.testing.assert_array_equal(sorted(map(tuple, _polygon(mask))), [(1, 1), (1, 4), (6, 1), (6, 4)])

@@ -1,7 +1,7 @@
 """Defects drawn at random on noisy walls, and walls without any.
 
-Noise 0.03 mm correlated over about 1 mm, natural roughness 0.02 mm, rings shifted by 0.02 mm, a slow taper,
-an oval and an off-centre residual: what the error budget leaves in an accumulated wall.
+Noise of 0.03 mm correlated over about 1 mm, natural roughness of 0.02 mm, rings shifted by 0.02 mm, a slow
+taper, an oval and an off-centre residual: the errors that the error budget predicts for an accumulated wall.
 """
 
 import numpy as np
@@ -51,7 +51,7 @@ def search(wall, thickness=None, **parameters):
 
 
 def one(kind, azimuth=1.0, seed=0, **changes):
-    """Find a single defect on a wall and return (drawn, found defects)."""
+    """Search a wall with a single defect and return (drawn, found defects)."""
     rng = np.random.default_rng(seed)
     drawn = DrawnDefect(kind, 80.0, azimuth, **changes)
     return drawn, search(noisy(rng, relief(drawn, DISTANCE, AZIMUTH, RADIUS, rng))).items
@@ -63,7 +63,7 @@ def test_nothing_is_found_on_a_clean_wall(seed):
     assert search(noisy(rng, roughness(rng))).items == ()
 
 
-def test_drawn_defects_are_all_found_with_true_depth_and_sigma():
+def test_all_drawn_defects_are_found_with_true_depth_and_sigma():
     errors, scores, found, right = [], [], 0, 0
     for seed in range(5):
         rng = np.random.default_rng(seed)
@@ -90,7 +90,7 @@ def test_drawn_defects_are_all_found_with_true_depth_and_sigma():
     assert 0.45 < np.sqrt(np.mean(np.square(scores))) < 1.6
 
 
-def test_a_weld_is_one_finding_all_round_with_a_pit_beside_it_apart():
+def test_a_weld_is_one_finding_all_round_and_a_pit_beside_it_is_another():
     rng = np.random.default_rng(4)
     weld = DrawnDefect("weld", 60.0, 0.0, 6.0, 0.0, -0.8)
     pit = DrawnDefect("pit", 75.0, 2.0, 6.0, 6.0, 0.8)
@@ -99,15 +99,15 @@ def test_a_weld_is_one_finding_all_round_with_a_pit_beside_it_apart():
     assert (first.kind, first.clock_from, first.clock_to) == ("weld", 0.0, 12.0)
     assert first.depth_mm == pytest.approx(-0.8, abs=0.1)
     assert (second.kind, second.pof_class) == ("pit", "pinhole")
-    # one dent was told as ± 0.029 in its sentence and in defects.json, as ± 0.030 in the report's table
+    # Formerly one dent had ± 0.029 in its sentence and in defects.json, and ± 0.030 in the report's table.
     for told in (first, second):
         assert told.depth_sigma_mm == round(told.depth_sigma_mm, 4)
         assert notation.depth(told.depth_mm, told.depth_sigma_mm) in told.statement
 
 
 @pytest.mark.parametrize("step_mm", [-8.0, 3.0])
-def test_a_step_of_the_bore_is_no_bead_and_no_groove(step_mm):
-    """In a gauge's run steps of 8.8 and 7 mm were a weld and a gouge, both at .98."""
+def test_a_step_of_the_bore_is_neither_a_bead_nor_a_groove(step_mm):
+    """Formerly steps of 8.8 and 7 mm in a gauge run were a weld and a gouge, both at .98."""
     step = step_mm / (1 + np.exp(-(DISTANCE - 60) / 1.0))[:, None]
     found = search(noisy(np.random.default_rng(5), step))
     assert not any(d.clock_to == 12.0 for d in found.items)
@@ -116,8 +116,8 @@ def test_a_step_of_the_bore_is_no_bead_and_no_groove(step_mm):
     assert all(d.probability == d.confidence == 0 for d in steps)
 
 
-def test_a_groove_all_round_is_no_pit():
-    """The gap of a joint, 70 times as long as wide, was called a pit: no kind is as long."""
+def test_a_groove_all_round_is_not_a_pit():
+    """The gap of a joint, 70 times as long as wide, was called a pit; no kind of pit is so long."""
     rng = np.random.default_rng(3)
     groove = relief(DrawnDefect("weld", 60.0, 0.0, 4.0, 0.0, 1.5), DISTANCE, AZIMUTH, RADIUS, rng)
     (found,) = search(noisy(rng, groove)).items
@@ -129,7 +129,7 @@ def test_a_groove_all_round_is_no_pit():
 @pytest.mark.parametrize(
     ("azimuth_deg", "hours"), [(-90.0, 0.0), (180.0, 9.0), (-179.9, 9.0), (0.0, 3.0), (-100.0, 11.667)]
 )
-def test_clock_over_the_seam_and_over_twelve(azimuth_deg, hours):
+def test_clock_positions_are_right_across_the_seam_and_twelve(azimuth_deg, hours):
     drawn, items = one("dent", np.radians(azimuth_deg), length_mm=30.0, width_mm=25.0, depth_mm=-1.0)
     (item,) = items
     span = (item.clock_to - item.clock_from) % 12
@@ -163,7 +163,7 @@ def test_wall_loss_needs_a_thickness_and_metal_that_is_lost():
     assert np.isnan(search(wall).items[0].wall_loss_percent)
 
 
-def test_unseen_parts_are_neither_defects_nor_in_the_way():
+def test_unmeasured_parts_are_not_defects_and_do_not_hide_any():
     rng = np.random.default_rng(6)
     pit = DrawnDefect("pit", 80.0, 1.0, 8.0, 8.0, 1.0)
     wall = noisy(rng, relief(pit, DISTANCE, AZIMUTH, RADIUS, rng))
@@ -174,13 +174,13 @@ def test_unseen_parts_are_neither_defects_nor_in_the_way():
     assert item.kind == "pit"
 
 
-def test_same_input_same_defects():
+def test_the_same_input_gives_the_same_defects():
     a, b = (one("corrosion", length_mm=25.0, width_mm=25.0, depth_mm=0.8)[1][0] for _ in range(2))
     assert a.depth_mm == b.depth_mm
     assert a.depth_sigma_mm == b.depth_sigma_mm
 
 
-def test_a_smallest_depth_is_obeyed():
+def test_the_limit_of_depth_is_obeyed():
     rng = np.random.default_rng(1)
     pit = DrawnDefect("pit", 80.0, 1.0, 8.0, 8.0, 0.6)
     wall = noisy(rng, relief(pit, DISTANCE, AZIMUTH, RADIUS, rng))
@@ -188,7 +188,7 @@ def test_a_smallest_depth_is_obeyed():
     assert search(wall, min_depth_mm=0.8).items == ()
 
 
-def test_too_little_wall_is_unusable():
+def test_too_small_a_wall_is_refused():
     wall = wall_of(DISTANCE[:2], AZIMUTH[:8], np.full((2, 8), 30.0))
     with pytest.raises(UnusableError, match="16 cells"):
         search(wall)

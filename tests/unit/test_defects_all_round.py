@@ -1,4 +1,4 @@
-"""Beads with glints on them, and steps of the bore, by the median round the pipe."""
+"""Beads with glints on them, and steps of the bore, measured by the median round the pipe."""
 
 from dataclasses import fields, replace
 
@@ -30,7 +30,7 @@ def uneven(rng, share):
 
 
 def glints(rng, count):
-    """Return by how much (S, A) so many glints on every ring displace the line, up to 3 mm to either side."""
+    """Return the shifts (S, A) of the line by so many glints on every ring, up to 3 mm to either side."""
     out = np.zeros(SHAPE)
     for row in range(SHAPE[0]):
         for column in rng.integers(0, SHAPE[1], count):
@@ -45,14 +45,14 @@ def searched(radius_mm):
 
 
 def drawn_bead(rng, share):
-    """Return by how much (S, A) a drawn bead or groove changes the radius."""
+    """Return the change of radius (S, A) by a drawn bead or groove."""
     depth = rng.choice([-1, 1]) * rng.uniform(0.4, 1.5)
     drawn = DrawnDefect("weld", MIDDLE, 0.0, rng.uniform(4, 8), 0.0, depth)
     return relief(drawn, DISTANCE, AZIMUTH, RADIUS, rng) * uneven(rng, share)
 
 
 def measured(radius_mm):
-    """Return the depth of what goes all round a wall, of which no other finding is looked for."""
+    """Return the depth of what goes all round a wall; other findings are not searched."""
     wall = wall_of(DISTANCE, AZIMUTH, radius_mm, NOISE_MM)
     shape = smooth_shape_removed(wall.radius_map, DefectParameters())
     all_mm = shape.rows(shape.welds[0]).all_mm
@@ -67,8 +67,8 @@ def measured(radius_mm):
 
 
 @pytest.mark.parametrize(("glints_per_ring", "share"), [(0, 0.02), (0, 0.15), (3, 0.1)])
-def test_a_bead_with_glints_on_it_has_its_own_depth(glints_per_ring, share):
-    """Its depth was a glint's: 4.2 ± 0.2 mm for 0.9."""
+def test_a_bead_with_glints_on_it_has_the_right_depth(glints_per_ring, share):
+    """Formerly its depth was that of a glint: 4.2 ± 0.2 mm for 0.9."""
     for seed in range(4):
         rng = np.random.default_rng(seed)
         bead = drawn_bead(rng, share)
@@ -81,8 +81,8 @@ def test_a_bead_with_glints_on_it_has_its_own_depth(glints_per_ring, share):
         assert told.sigma_mm < max(0.12 * abs(true), 0.06)
 
 
-def test_a_bead_with_a_glint_on_it_is_found_as_a_bead_and_the_glint_apart():
-    """A bead of 0.9 mm with a glint of 2 mm was a step, at 0, between bores of one width."""
+def test_a_bead_with_a_glint_on_it_is_found_as_a_bead_and_the_glint_separately():
+    """A bead of 0.9 mm with a glint of 2 mm was reported as a step, of 0, between bores of one width."""
     rng = np.random.default_rng(5)
     drawn = DrawnDefect("weld", MIDDLE, 0.0, 6.0, 0.0, -0.9)
     radius = RADIUS + relief(drawn, DISTANCE, AZIMUTH, RADIUS, rng) + smooth_noise(rng, SHAPE, NOISE_MM, 1.5)
@@ -95,7 +95,7 @@ def test_a_bead_with_a_glint_on_it_is_found_as_a_bead_and_the_glint_apart():
 
 
 @pytest.mark.parametrize("step_mm", [-8.0, 0.6])
-def test_a_step_with_a_glint_on_it_is_no_bead(step_mm):
+def test_a_step_with_a_glint_on_it_is_not_a_bead(step_mm):
     rng = np.random.default_rng(3)
     step = step_mm / (1 + np.exp(-(DISTANCE - MIDDLE) / 1.0))[:, None]
     radius = RADIUS + step + smooth_noise(rng, SHAPE, NOISE_MM, 1.5)
@@ -114,8 +114,11 @@ def test_a_bead_between_bores_of_two_widths_is_a_bead():
     assert [d for d in found.items if d.kind == "weld" and d.probability > 0.9]
 
 
-def test_the_chance_of_a_bead_is_as_sure_as_the_bore_beside_it():
-    """A bead stands out alike of both sides, a step of one; half of it is as likely the one as the other."""
+def test_the_probability_of_a_bead_depends_on_how_well_the_bore_beside_it_is_known():
+    """A bead has equal height above both sides, a step above one.
+
+    With half the height both are equally likely.
+    """
     assert Bore(np.array([1.0, 1.0]), 0.05).chance_of_bead(0.2) == 1.0
     assert Bore(np.array([1.0, 0.0]), 0.05).chance_of_bead(0.2) < 0.001
     assert Bore(np.array([0.9, 0.3]), 0.05).chance_of_bead(0.2) == 0.5
@@ -124,7 +127,7 @@ def test_the_chance_of_a_bead_is_as_sure_as_the_bore_beside_it():
     assert Bore(np.array([0.05, np.nan]), 0.01).chance_of_bead(0.2) < 0.01
 
 
-def test_the_scatter_of_the_bore_beside_is_found_beside_the_foot_of_a_step():
+def test_the_scatter_of_the_bore_is_estimated_outside_the_foot_of_a_step():
     rng = np.random.default_rng(5)
     errors = rng.normal(0, 0.05, SHAPE[0])[:, None]
     step = -3.0 / (1 + np.exp(-(DISTANCE - 62) / 1.0))[:, None]
@@ -142,8 +145,8 @@ def profiles(rng):
     yield uneven(rng, rng.uniform(0.02, 0.15))
 
 
-def test_the_depth_of_a_bead_is_within_its_sigma_whatever_its_height_does_round_the_pipe():
-    """The crest of a bead of two arcs was told as 1.75 ± .24 mm for 1.2, that of a sine as twice its own."""
+def test_the_depth_of_a_bead_is_within_its_sigma_for_any_profile_round_the_pipe():
+    """A crest of 1.2 mm of two arcs was 1.75 ± .24 mm, that of a sine twice its height."""
     off = []
     for seed in range(3):
         rng = np.random.default_rng(seed)
@@ -157,8 +160,8 @@ def test_the_depth_of_a_bead_is_within_its_sigma_whatever_its_height_does_round_
     assert np.mean(np.abs(off) < 1.96) > 0.9
 
 
-def test_a_step_where_the_view_begins_is_no_bead():
-    """One 3 mm behind the start was a weld of -1.01 ± .04 mm at .98: what is not seen counted as bore."""
+def test_a_step_at_the_start_of_the_measured_wall_is_not_a_bead():
+    """One 3 mm behind the start was a weld of -1.01 ± .04 mm at .98: unmeasured wall counted as bore."""
     rng = np.random.default_rng(3)
     step = -1.0 / (1 + np.exp(-(DISTANCE - 3) / 0.7))[:, None]
     found = searched(RADIUS + step + smooth_noise(rng, SHAPE, NOISE_MM, 1.5))
@@ -167,8 +170,8 @@ def test_a_step_where_the_view_begins_is_no_bead():
 
 
 @pytest.mark.parametrize("rings_mm", [1.0, 3.0, 5.0])
-def test_the_scatter_of_rings_is_told_however_far_apart_they_are(rings_mm):
-    """Rows of the map between rings 5 mm apart scattered by .006 mm where the rings err by .05."""
+def test_the_scatter_of_rings_is_estimated_rightly_however_far_apart_they_are(rings_mm):
+    """Rows of the map between rings 5 mm apart scattered by .006 mm, while the rings err by .05."""
     rng = np.random.default_rng(6)
     apart = np.arange(0, 600, rings_mm)
     rings = wall_of(apart, AZIMUTH, RADIUS + rng.normal(0, 0.05, (len(apart), 1)) + np.zeros((1, SHAPE[1])))
@@ -181,8 +184,8 @@ def test_the_scatter_of_rings_is_told_however_far_apart_they_are(rings_mm):
     assert bore.sigma_mm >= wall.rings_mm
 
 
-def test_a_helical_groove_between_bores_of_one_width_is_no_step():
-    """Of one turn, no circle of which is deep by half, it was "a step, with a probability of .98"."""
+def test_a_helical_groove_between_bores_of_one_width_is_not_a_step():
+    """With one turn, no circle of it is deep on one half, and it was "a step, with a probability of .98"."""
     rng = np.random.default_rng(5)
     off = DISTANCE[:, None] - MIDDLE - 20 * AZIMUTH / np.pi
     found = searched(RADIUS + 0.8 * np.exp(-((off / 2) ** 2)) + smooth_noise(rng, SHAPE, NOISE_MM, 1.5))
@@ -190,8 +193,8 @@ def test_a_helical_groove_between_bores_of_one_width_is_no_step():
     assert not any("step" in d.statement for d in found.unconfirmed)
 
 
-def test_a_circle_of_a_bead_that_is_hardly_seen_does_not_make_its_depth():
-    """The circle with the largest median counted, even one of which a glint was all that was seen."""
+def test_a_hardly_measured_circle_of_a_bead_does_not_set_its_depth():
+    """The circle with the largest median counted, even one of which only a glint was measured."""
     rng = np.random.default_rng(7)
     drawn = DrawnDefect("weld", MIDDLE, 0.0, 6.0, 0.0, -0.9)
     radius = RADIUS + relief(drawn, DISTANCE, AZIMUTH, RADIUS, rng) + smooth_noise(rng, SHAPE, NOISE_MM, 1.5)

@@ -1,4 +1,4 @@
-"""Depths by few points: a bell, nothing that stands out, nothing at all, or wall that scatters more."""
+"""Depths from few points: a bell, nothing that stands out, no point at all, or wall with larger scatter."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def relief() -> Relief:
 def points(height_mm: float, rows_apart: float = 0.5, skew: float = 0.0) -> DeviationPoints:
     """Return a point every half column about the middle of the map, on a bell 2 mm wide, with noise.
 
-    Askew its half widths are 3 mm along and 0.8 mm around.
+    Askew, its half widths are 3 mm along and 0.8 mm around.
     """
     random = np.random.default_rng(0)
     row, column = (g.ravel() for g in np.meshgrid(np.arange(10, 30, rows_apart), np.arange(345, 375, 0.5)))
@@ -40,7 +40,7 @@ def points(height_mm: float, rows_apart: float = 0.5, skew: float = 0.0) -> Devi
 
 
 def noise(shared: bool = False) -> Noise:
-    """Return noise of 0.01 mm, other in every cell or shared by all."""
+    """Return noise of 0.01 mm, independent in every cell or shared by all."""
     random = np.random.default_rng(3)
     wall = np.full((_ROWS, _COLUMNS), 0.01) if shared else 0.01 * random.standard_normal((_ROWS, _COLUMNS))
     return Noise(CleanWall(wall, np.ones(wall.shape, bool), 1.0), 1.0, relief().cell_mm, 50, random)
@@ -53,8 +53,8 @@ def test_the_height_of_a_bell_is_found() -> None:
 
 
 @pytest.mark.parametrize("skew", [1.0, -1.0])
-def test_a_ridge_that_lies_askew_keeps_its_height_between_rings(skew: float) -> None:
-    """Rings 2.5 mm apart: a bell along and around the pipe was told to be twice as high."""
+def test_an_oblique_ridge_keeps_its_height_between_rings(skew: float) -> None:
+    """With rings 2.5 mm apart, a bell along and around the pipe was reported as twice as high."""
     region = Region(12, 346, np.ones((16, 28), bool), 1.0)
     found = fit_bell(relief(), region, points(1.0, 5.0, skew), noise())
     assert found is not None
@@ -63,7 +63,7 @@ def test_a_ridge_that_lies_askew_keeps_its_height_between_rings(skew: float) -> 
     assert found.height_mm == pytest.approx(true, abs=0.03)
 
 
-def test_noise_that_points_share_counts_in_a_height() -> None:
+def test_noise_that_points_share_is_part_of_the_sigma_of_a_height() -> None:
     region = Region(14, 350, np.ones((12, 20), bool), 1.0)
     apart, shared = (fit_bell(relief(), region, points(1.0), noise(which)) for which in (False, True))
     assert apart is not None
@@ -76,10 +76,10 @@ def test_where_no_point_stands_out_there_is_no_bell() -> None:
     below = replace(sunk, deviation_mm=sunk.deviation_mm - 0.5)
     region = Region(14, 350, np.ones((12, 20), bool), 1.0)
     assert fit_bell(relief(), region, below, noise()) is None
-    assert fit_bell(relief(), region, sunk, noise()) is not None, "the control: noise alone does stand out"
+    assert fit_bell(relief(), region, sunk, noise()) is not None, "control: noise alone does stand out"
 
 
-def test_a_find_between_rings_without_any_surface_is_not_measured() -> None:
+def test_a_finding_between_rings_without_any_points_is_not_measured() -> None:
     cloud = PointCloud(*[np.zeros((0, 3), np.float32)] * 2, *[np.zeros(0, np.float32)] * 4, np.zeros(0, int))
     unseen = np.full((_ROWS, _COLUMNS), np.nan)
     row = Region(14, 350, np.ones((1, 7), bool), -1.0)
@@ -88,8 +88,11 @@ def test_a_find_between_rings_without_any_surface_is_not_measured() -> None:
     assert is_measured(Surface(relief(), unseen, unseen, unseen, cloud, points(0.0)), row)
 
 
-def test_where_the_map_is_less_sure_noise_adds_more_to_a_depth() -> None:
-    """On rust of coded copies depths of .4 mm were told as .58 ± .06: noise was taken to be as elsewhere."""
+def test_where_the_map_is_noisier_the_sigma_of_a_depth_is_larger() -> None:
+    """On rust in transcoded recordings, depths of .4 mm were .58 ± .06.
+
+    The noise was taken to be as elsewhere.
+    """
     noise = 0.02 * np.random.default_rng(1).standard_normal((_ROWS, _COLUMNS))
     clean = CleanWall(noise, np.ones(noise.shape, bool), 1.0)
     region, dent = Region(10, 300, np.ones((20, 40), bool), 1.0), np.zeros((_ROWS, _COLUMNS))

@@ -1,4 +1,4 @@
-"""Whether the line is brighter at a finding than elsewhere in its ring."""
+"""The test whether the line is brighter at a finding than elsewhere in its ring."""
 
 import numpy as np
 import pytest
@@ -19,7 +19,7 @@ ROWS, COLUMNS = slice(30, 33), slice(100, 112)
 
 
 def bright(radius, amplitude, rows, depth_mm):
-    """Return whether the line (S, A) is bright at a finding on such rows of a wall (S, A)."""
+    """Return whether the line (S, A) counts as bright at a finding on such rows of a wall (S, A)."""
     wall = wall_of(DISTANCE, AZIMUTH, radius, 0.02)
     relief, cloud = smooth_shape_removed(wall.radius_map, DefectParameters()), cloud_along(wall.cloud)
     mask = np.ones((rows.stop - rows.start, 12), bool)
@@ -41,16 +41,16 @@ def bright(radius, amplitude, rows, depth_mm):
 
 
 @pytest.mark.parametrize(("depth_mm", "expected"), [(-1.0, True), (1.0, False)])
-def test_only_what_lies_to_the_finding_s_side_is_asked(depth_mm, expected):
-    """Where the ring lay on the other side all along, the median of nothing was taken."""
+def test_only_the_side_of_the_finding_is_compared(depth_mm, expected):
+    """Where the whole ring lay on the other side, the median of nothing was taken."""
     radius = np.full((len(DISTANCE), len(AZIMUTH)), RADIUS)
     radius[ROWS, COLUMNS] -= 1.0
     assert bright(radius, np.where(radius < RADIUS, 200, 80), ROWS, depth_mm) == expected
 
 
 @pytest.mark.parametrize(("glints", "expected"), [(1, False), (3, False), (5, True), (8, True)])
-def test_a_glint_on_some_rings_of_a_defect_does_not_make_it_one(glints, expected):
-    """A dent of 1.3 mm that eight rings show was doubted, as the line was bright on the one with a glint."""
+def test_a_glint_on_some_rings_of_a_defect_does_not_make_it_a_glint(glints, expected):
+    """A dent of 1.3 mm on eight rings was doubted, since the line was bright on the one with a glint."""
     rows = slice(30, 38)
     radius, amplitude = np.full((len(DISTANCE), len(AZIMUTH)), RADIUS), np.full(SHAPE, 100.0)
     amplitude[rows, COLUMNS] = 90
@@ -60,8 +60,8 @@ def test_a_glint_on_some_rings_of_a_defect_does_not_make_it_one(glints, expected
     assert bright(radius, amplitude, rows, -1.8) == expected
 
 
-def test_a_glint_that_a_codec_hands_on_to_some_rings_is_one_where_it_is_deepest():
-    """Of five rings that show one, three showed it faintly: a pit of 1.1 mm at .98 that was none."""
+def test_a_glint_that_a_codec_repeats_in_later_rings_is_judged_where_it_is_deepest():
+    """Of five rings with the glint three showed it faintly: a false pit of 1.1 mm at .98."""
     rows = slice(30, 35)
     radius, amplitude = np.full(SHAPE, RADIUS), np.full(SHAPE, 100.0)
     radius[rows, COLUMNS] -= 0.6

@@ -1,4 +1,4 @@
-"""A finding needs two rings, or one and the photo; what one ring alone shows is set apart."""
+"""A finding needs two rings, or one and the photo; what a single ring shows is reported separately."""
 
 from dataclasses import fields, replace
 
@@ -27,7 +27,7 @@ PLACE = slice(100, 112)
 
 
 def found(rings, depth_mm=-1.0, photo=False, unsure=False, held=NOTHING_HELD, noise_mm=SIGMA, warned=None):
-    """Return what is found where so many rings (rows of the map) stand off the wall by ``depth_mm``."""
+    """Return the findings where so many rings (rows of the map) depart from the wall by ``depth_mm``."""
     random = np.random.default_rng(5)
     radius = RADIUS + smooth_noise(random, (len(DISTANCE), len(AZIMUTH)), noise_mm, 1.0)
     radius[30 : 30 + rings, PLACE] += depth_mm
@@ -57,8 +57,8 @@ def test_one_ring_and_the_photo_are_a_finding():
 
 
 @pytest.mark.parametrize("depth_mm", [-0.6, 0.8])
-def test_a_glint_on_one_ring_of_a_finding_does_not_make_its_depth(depth_mm):
-    """Corrosion of .4 mm was 1.06 ± .56 mm, as one ring went to 1.6: not known to twice its σ, and missed."""
+def test_a_glint_on_one_ring_of_a_finding_does_not_set_its_depth(depth_mm):
+    """Corrosion of .4 mm was 1.06 ± .56 mm, as one ring read 1.6: less than 2 σ, so the defect was missed."""
     random = np.random.default_rng(5)
     radius = RADIUS + smooth_noise(random, (len(DISTANCE), len(AZIMUTH)), SIGMA, 1.0)
     radius[24:38, 95:125] += depth_mm
@@ -72,8 +72,8 @@ def test_a_glint_on_one_ring_of_a_finding_does_not_make_its_depth(depth_mm):
     assert finding.depth_sigma_mm < 0.3 * abs(depth_mm)
 
 
-def test_what_is_left_out_of_a_surface_comes_not_back_by_the_map():
-    """Between rings far apart the mean of the map stood in, which holds the glint that was left out."""
+def test_points_excluded_from_a_surface_are_not_restored_by_the_map():
+    """Between rings far apart the mean of the map was used, which still contained the excluded glint."""
     place, rows = np.arange(0, 60, 0.5), 120
     radius = np.full((rows, len(AZIMUTH)), RADIUS)
     radius[40:80, 95:125] += 0.6
@@ -89,13 +89,13 @@ def test_what_is_left_out_of_a_surface_comes_not_back_by_the_map():
     assert np.nanmax(shown) < 0.9
 
 
-def test_rings_that_are_not_of_usual_sigma_do_not_speak_for_a_finding():
+def test_rings_with_an_unusual_sigma_do_not_confirm_a_finding():
     told = found(2, unsure=True)
     assert (len(told.items), len(told.unconfirmed)) == (0, 1)
 
 
 def test_rings_of_one_coded_picture_count_as_one() -> None:
-    """A codec showed one block in three rings, a gouge of 6.5 ± .5 mm at .98 that was none."""
+    """A codec showed one block in three rings: a false gouge of 6.5 ± .5 mm at .98."""
     coded = HeldOver(0.8 ** np.arange(17))
     assert len(found(3).items) == 1
     told = found(3, held=coded)
@@ -103,7 +103,7 @@ def test_rings_of_one_coded_picture_count_as_one() -> None:
     assert len(found(3, held=coded, photo=True).items) == 1
 
 
-def test_a_limit_of_detection_far_above_what_is_asked_for_is_told() -> None:
+def test_a_limit_of_detection_far_above_the_demanded_depth_is_reported() -> None:
     quiet: list[str] = []
     noisy: list[str] = []
     found(2, warned=quiet)
@@ -113,8 +113,8 @@ def test_a_limit_of_detection_far_above_what_is_asked_for_is_told() -> None:
     assert [w for w in noisy if f"must be {limit:.2g} mm deep for nine of ten" in w]
 
 
-def test_the_length_from_which_rings_confirm_a_defect_is_told_where_a_codec_repeats_light() -> None:
-    """Nine of ten defects of 3 mm × 3 mm "were found"; none of them is, for seven rings are needed."""
+def test_the_length_from_which_rings_confirm_a_defect_is_reported_where_a_codec_repeats_light() -> None:
+    """Nine of ten defects of 3 mm × 3 mm "were found"; in fact none was, for seven rings are needed."""
     quiet: list[str] = []
     told: list[str] = []
     found(2, warned=quiet)
@@ -125,7 +125,7 @@ def test_the_length_from_which_rings_confirm_a_defect_is_told_where_a_codec_repe
 
 
 def found_beside_hidden_wall(top, hidden, depth_mm=-1.0, width=8):
-    """Return what is found where 20 rings show a ridge, highest at column ``top``, and others are hidden."""
+    """Return the findings where 20 rings show a ridge, highest at column ``top``, and others are hidden."""
     random = np.random.default_rng(6)
     radius = RADIUS + smooth_noise(random, (len(DISTANCE), len(AZIMUTH)), SIGMA, 1.0)
     column = np.arange(len(AZIMUTH))
@@ -138,7 +138,7 @@ def found_beside_hidden_wall(top, hidden, depth_mm=-1.0, width=8):
     return find_defects(recording, wall, grey_texture(wall), DefectParameters(), quiet_context())
 
 
-def test_what_is_deepest_where_the_line_ends_is_unconfirmed():
+def test_a_finding_that_is_deepest_where_the_line_ends_is_unconfirmed():
     ends = found_beside_hidden_wall(100, slice(101, 140))
     assert (len(ends.items), len(ends.unconfirmed)) == (0, 1)
     assert "ceases to be seen" in ends.unconfirmed[0].statement
@@ -148,7 +148,7 @@ def test_what_is_deepest_where_the_line_ends_is_unconfirmed():
 @pytest.mark.parametrize(
     "hidden", [slice(105, 140), slice(100, 102)], ids=["past its top", "of a part of it, by its own flank"]
 )
-def test_a_ridge_whose_top_is_seen_stays_a_finding_beside_hidden_wall(hidden):
+def test_a_ridge_whose_top_is_measured_stays_a_finding_beside_hidden_wall(hidden):
     told = found_beside_hidden_wall(100, hidden)
     assert (len(told.items), len(told.unconfirmed)) == (1, 0)
 
@@ -169,7 +169,7 @@ SPOTS = [(row, column) for row in (6, 14, 22, 30, 38, 46) for column in (60, 240
 
 
 @pytest.mark.parametrize("bright", [0, 1, 10])
-def test_findings_at_which_the_line_is_bright_are_doubted_when_more_are_so_than_by_chance(bright):
+def test_findings_on_a_bright_line_are_doubted_if_there_are_more_than_by_chance(bright):
     random = np.random.default_rng(8)
     radius = RADIUS + smooth_noise(random, (len(DISTANCE), len(AZIMUTH)), SIGMA, 1.0)
     for row, column in SPOTS:
@@ -185,7 +185,7 @@ def test_findings_at_which_the_line_is_bright_are_doubted_when_more_are_so_than_
 
 
 def tail_of(radius):
-    """Return the tail of a wall's noise, and its score."""
+    """Return the tail of the distribution of a wall's noise, and its score."""
     wall = wall_of(DISTANCE, AZIMUTH, RADIUS + radius, SIGMA)
     relief = smooth_shape_removed(wall.radius_map, DefectParameters())
     context = quiet_context()
@@ -194,8 +194,8 @@ def tail_of(radius):
 
 
 @pytest.mark.parametrize("heavy", [False, True])
-def test_the_tail_of_the_noise_tells_how_many_high_peaks_such_walls_show(heavy):
-    """Within a factor of two of what is to be expected, which counting tells to its own square root."""
+def test_the_tail_of_the_noise_predicts_the_number_of_high_peaks(heavy):
+    """The prediction is within a factor of two of the count, whose own error is its square root."""
     random, told, counted = np.random.default_rng(4), 0.0, 0
     for _ in range(12):
         noise = smooth_noise(random, (len(DISTANCE), len(AZIMUTH)), SIGMA, 1.0)
@@ -211,8 +211,8 @@ def test_the_tail_of_the_noise_tells_how_many_high_peaks_such_walls_show(heavy):
 
 
 @pytest.mark.parametrize(("power", "scale"), [(2, 1.0), (2, 3.0), (1, 0.6)])
-def test_the_tail_is_told_by_what_lies_below_the_threshold(power, scale):
-    """Above it peaks become findings: a tail counted from what is left stated a quarter of such peaks."""
+def test_the_tail_is_estimated_from_peaks_below_the_threshold(power, scale):
+    """Peaks above it become findings: a tail counted from the remaining ones gave a quarter of such peaks."""
     excess = scale * np.random.default_rng(7).exponential(size=4000)
     peaks = (power * excess + NoiseTail.FROM**power) ** (1 / power)
     told, counted = tail_of_peaks(peaks[peaks < 4.8], 4.8).above(5.2), np.sum(peaks > 5.2)
@@ -231,7 +231,7 @@ def probability(of, among, tail=None, widths=None):
     return here.chance_against_clutter(of) * chance_of_depth(told, 0.2)
 
 
-def test_two_rings_among_many_single_ones_are_rather_false_and_many_rings_stay_sure():
+def test_two_rings_among_many_unconfirmed_ones_are_probably_false_and_many_rings_stay_sure():
     quiet, hard = [evidence(8)] * 4 + [evidence(2)], [evidence(8)] * 4 + [evidence(2)] + [evidence(1)] * 300
     assert probability(evidence(2), quiet) > 0.9 > 0.5 > probability(evidence(2), hard, widths=[0.3] * 305)
     assert probability(evidence(8), hard, widths=[0.3] * 305) > 0.9
@@ -244,7 +244,7 @@ def test_a_finding_no_higher_than_the_noise_of_its_recording_is_doubted():
     assert probability(evidence(5, 30.0), several, heavy) > 0.95
 
 
-def test_the_photo_counts_for_a_finding_and_a_little_against_it():
+def test_the_photo_raises_the_probability_of_a_finding_or_lowers_it_a_little():
     several, heavy = [evidence(5)] * 4, NoiseTail(200.0, (Law(2, 2.4),))
 
     def told(score, photo):
@@ -256,7 +256,7 @@ def test_the_photo_counts_for_a_finding_and_a_little_against_it():
     assert told(9.0, False) > 0.97
 
 
-def test_where_the_photo_is_unknown_it_counts_neither_way():
+def test_an_unknown_photo_changes_no_probability():
     wall = wall_of(DISTANCE, AZIMUTH, np.full((len(DISTANCE), len(AZIMUTH)), RADIUS), SIGMA)
     relief = smooth_shape_removed(wall.radius_map, DefectParameters()).rows(slice(0, len(DISTANCE)))
     place, unseen = Region(30, 100, np.ones((4, 12), bool), 1.0), grey_texture(wall)
@@ -266,7 +266,7 @@ def test_where_the_photo_is_unknown_it_counts_neither_way():
     assert photo_stands_out(grey_texture(wall), relief, replace(place, all_round=True)) is None
 
 
-def test_one_ring_is_not_deeper_than_its_neighbours_allow():
+def test_the_depth_on_one_ring_is_limited_by_its_neighbours():
     alone = found(1, 9.0).unconfirmed[0]
     assert abs(alone.depth_mm) < 2.0
     assert found(3, 0.9).items[0].depth_mm == pytest.approx(0.9, abs=0.1)
@@ -279,7 +279,7 @@ def test_a_depth_within_twice_its_sigma_is_not_counted():
 
 
 @pytest.mark.parametrize(("rings", "counted"), [(1, 0), (6, 1)])
-def test_what_goes_all_round_needs_two_rings_as_well(rings, counted):
+def test_a_finding_all_round_needs_two_rings_as_well(rings, counted):
     random = np.random.default_rng(5)
     radius = RADIUS + smooth_noise(random, (len(DISTANCE), len(AZIMUTH)), SIGMA, 1.0)
     radius[30 : 30 + rings] -= 1.0

@@ -1,4 +1,4 @@
-"""Dark lines of the wall's photo: cracks drawn on drawn patterns, and patterns without any."""
+"""Dark lines in the wall's photo: cracks drawn on simulated textures, and textures without any."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _AROUND = round(2 * np.pi * _RADIUS_MM / _PX_MM)
 
 
 def a_wall(seed: int = 0, dents_mm: float = 0.0, length_mm: float = 90.0):
-    """Return a wall with noise of .03 mm and, where asked for, a pit at 45 mm."""
+    """Return a wall with noise of .03 mm and, on request, a pit at 45 mm."""
     rng, distance = np.random.default_rng(seed), np.arange(0, length_mm, 0.5)
     noise = smooth_noise(rng, (len(distance), len(_AZIMUTH)), 0.03, 2.0)
     off = ((distance[:, None] - 45) / 6) ** 2 + (_RADIUS_MM * (_AZIMUTH - 0.5) / 6) ** 2
@@ -36,7 +36,7 @@ def map_of(wall):
 
 
 def picture(seed: int, rows: int = 600, fine: float = 3.0) -> np.ndarray:
-    """Return a mottled wall (rows, A), grey: patches of 5 mm and of .6 mm, and noise."""
+    """Return a mottled grey picture (rows, A): patches of 5 mm and of .6 mm, and noise."""
     rng = np.random.default_rng(seed)
     patches = 0.25 * smooth_noise(rng, (rows, _AROUND), 1.0, 33.0)
     grains = 0.12 * smooth_noise(rng, (rows, _AROUND), 1.0, 4.0)
@@ -51,7 +51,7 @@ def drawn(
     times: float = 0.55,
     wave_mm: float = 0.8,
 ) -> None:
-    """Draw a wavy line of 18 mm and .3 mm width, so many times as bright, beyond the seam if need be."""
+    """Draw a wavy line 18 mm long and .3 mm wide, ``times`` as bright; it may cross the seam."""
     t = np.linspace(-9, 9, 60)
     side = wave_mm * np.sin(t)
     c, s = np.cos(np.radians(turn_deg)), np.sin(np.radians(turn_deg))
@@ -71,12 +71,12 @@ def photo(grey: np.ndarray) -> WallTexture:
 
 
 def found_in(texture: WallTexture, length_mm: float = 90.0) -> list[Region]:
-    """Return the dark lines of a photo of a wall so long."""
+    """Return the dark lines in the photo of a wall of this length."""
     return dark_lines(texture, map_of(a_wall(length_mm=length_mm)), Scratch())
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_a_wall_without_a_crack_has_none(seed: int) -> None:
+def test_a_wall_without_a_crack_has_no_dark_line(seed: int) -> None:
     assert found_in(photo(picture(seed))) == []
 
 
@@ -93,7 +93,7 @@ def test_a_crack_is_found_once_where_it_is(azimuth_rad: float, turn_deg: float) 
     assert size == pytest.approx(18.0, abs=2.5)
 
 
-def test_a_bright_line_is_no_crack() -> None:
+def test_a_bright_line_is_not_a_crack() -> None:
     grey = picture(3)
     drawn(grey, 45.0, 0.5, 20.0, times=1.6)
     assert found_in(photo(grey)) == []
@@ -106,17 +106,17 @@ def test_a_wall_full_of_streaks_has_no_crack() -> None:
     assert found_in(photo(grey)) == []
 
 
-def test_the_edge_of_what_was_photographed_is_no_line() -> None:
+def test_the_edge_of_the_photographed_wall_is_not_a_line() -> None:
     texture = photo(picture(4))
     texture.bgra[200:400, 300:600] = 0
     assert found_in(texture) == []
 
 
-def test_a_photo_of_one_grey_has_no_line() -> None:
+def test_a_uniformly_grey_photo_has_no_line() -> None:
     assert found_in(photo(np.full((600, _AROUND), 128.0))) == []
 
 
-def test_a_crack_over_a_cut_of_a_long_photo_is_one_where_it_is() -> None:
+def test_a_crack_across_a_cut_of_a_long_photo_is_found_once_at_its_place() -> None:
     grey = picture(6, 2300)
     drawn(grey, 150.0, 0.5, 0.0)  # rows of the photo are cut at 1000 and 2000
     drawn(grey, 299.0, 0.5, 0.0)
@@ -124,20 +124,20 @@ def test_a_crack_over_a_cut_of_a_long_photo_is_one_where_it_is() -> None:
     assert [0.5 * (k.row + k.mask.shape[0] / 2) for k in found] == pytest.approx([150.0, 299.0], abs=1.5)
 
 
-def test_a_seam_along_a_long_photo_is_one() -> None:
+def test_a_seam_along_a_long_photo_is_one_line() -> None:
     grey = picture(6, 2300)
     grey[:, 700:702] *= 0.55
     (seam,) = found_in(photo(grey), 345.0)
     assert 0.5 * seam.mask.shape[0] == pytest.approx(345.0, abs=10.0)
 
 
-def test_what_the_photo_shows_beyond_the_map_is_left_out() -> None:
+def test_lines_of_the_photo_beyond_the_map_are_ignored() -> None:
     grey = picture(6, 1200)
     drawn(grey, 140.0, 0.5, 0.0)
     assert found_in(photo(grey)) == []
 
 
-def test_only_a_line_beside_a_finding_is_a_part_of_it() -> None:
+def test_only_a_line_next_to_a_finding_is_part_of_it() -> None:
     wall = map_of(a_wall())
     line = Region(100, -5, np.ones((1, 20), bool), 1.0)
     assert lies_beside(line, Region(98, 718, np.ones((2, 12), bool), 1.0), wall)
@@ -147,14 +147,14 @@ def test_only_a_line_beside_a_finding_is_a_part_of_it() -> None:
 
 @pytest.mark.parametrize("by_chance", [0.05, 0.01])
 @pytest.mark.parametrize("power", [2.0, 4.0, 8.0])
-def test_the_limit_of_a_pattern_is_passed_no_more_often_than_stated(by_chance: float, power: float) -> None:
+def test_the_limit_of_a_texture_is_exceeded_no_more_often_than_stated(by_chance: float, power: float) -> None:
     rng = np.random.default_rng(0)
     weights = np.sort(rng.pareto(power, (8000, 400)) + 1)[:, ::-1]
     passed = np.mean([w[0] > limit_of_weight(w, by_chance) for w in weights])
     assert 0.4 * by_chance < passed < 1.1 * by_chance
 
 
-def test_cracks_hardly_move_the_limit_and_few_lines_tell_none() -> None:
+def test_cracks_hardly_change_the_limit_and_few_lines_give_none() -> None:
     rng = np.random.default_rng(0)
     weights = np.sort(rng.pareto(4.0, (300, 400)) + 1)[:, ::-1]
     cracks = np.full(3, 1e3)
@@ -170,7 +170,7 @@ def searched(grey: np.ndarray, dents_mm: float = 0.0):
     )
 
 
-def test_a_crack_that_rings_do_not_show_is_listed_and_not_counted() -> None:
+def test_a_crack_that_no_ring_shows_is_listed_but_not_counted() -> None:
     grey = picture(3)
     drawn(grey, 45.0, 0.5, 0.0)
     found = searched(grey)
@@ -194,7 +194,7 @@ def test_a_short_straight_crack_keeps_its_code() -> None:
 
 
 @pytest.mark.parametrize("along", [True, False])
-def test_a_joint_or_a_seam_gets_no_code_of_a_crack(along: bool) -> None:
+def test_a_joint_or_a_seam_does_not_get_the_code_of_a_crack(along: bool) -> None:
     grey = picture(3)
     grey[(slice(None), slice(700, 702)) if along else slice(299, 302)] *= 0.5
     (line,) = searched(grey).unconfirmed

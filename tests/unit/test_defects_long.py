@@ -1,4 +1,4 @@
-"""A long wall in stretches: what is found does not depend on the cuts, nor the memory on the length."""
+"""A long wall is searched in stretches: findings do not depend on the cuts, nor the memory on the length."""
 
 import tracemalloc
 from dataclasses import replace
@@ -36,10 +36,10 @@ def search(wall, folder=None, texture=None):
     return find_defects(recording, wall, texture, PARAMETERS, context)
 
 
-def test_the_same_is_found_wherever_the_cuts_lie(monkeypatch):
+def test_the_findings_do_not_depend_on_the_cuts(monkeypatch):
     drawn = (
-        DrawnDefect("pit", 50.0, 3.14, 8.0, 8.0, 1.0),  # over cut and seam
-        DrawnDefect("weld", 100.0, 0.0, 8.0, 0.0, -0.8),  # over a cut
+        DrawnDefect("pit", 50.0, 3.14, 8.0, 8.0, 1.0),  # across cut and seam
+        DrawnDefect("weld", 100.0, 0.0, 8.0, 0.0, -0.8),  # across a cut
         DrawnDefect("gouge", 250.0, 1.0, 220.0, 6.0, 0.6),  # longer than most stretches and their overlap
         DrawnDefect("dent", 380.0, -2.0, 30.0, 25.0, -1.0),
     )
@@ -57,7 +57,7 @@ def test_the_same_is_found_wherever_the_cuts_lie(monkeypatch):
         assert cut.smallest_depth_mm == pytest.approx(whole.smallest_depth_mm, rel=1e-9)
 
 
-def test_it_does_matter_that_stretches_overlap(monkeypatch):
+def test_without_overlap_of_stretches_the_findings_change(monkeypatch):
     drawn = DrawnDefect("dent", 50.0, 1.0, 30.0, 25.0, -0.3)
     wall = smooth_shape_removed(long_wall((drawn,), 100.0).radius_map, PARAMETERS)
     whole = detect(wall, 0.05, Scratch(), lambda done, total: None)
@@ -69,17 +69,17 @@ def test_it_does_matter_that_stretches_overlap(monkeypatch):
         assert np.array_equal(cut.inward, whole.inward) == overlapping
 
 
-def test_a_sample_of_a_long_wall_stands_for_all_of_it(monkeypatch):
+def test_a_sample_of_a_long_wall_represents_all_of_it(monkeypatch):
     drawn = (DrawnDefect("pit", 80.0, 1.0, 8.0, 8.0, 0.6), DrawnDefect("dent", 300.0, 2.0, 30.0, 25.0, -1.0))
     wall = long_wall(drawn)
-    wall.radius_map.radius_mm[400:560] = np.nan  # a part that nobody saw is no sample
+    wall.radius_map.radius_mm[400:560] = np.nan  # unmeasured parts are no sample
     whole = search(wall)
     monkeypatch.setattr(along, "_SAMPLED_ROWS", 320)
     sampled = search(wall)
     assert [d.kind for d in sampled.items] == [d.kind for d in whole.items] == ["pit", "dent"]
     for mine, its in zip(sampled.items, whole.items, strict=True):
         assert mine.depth_mm == pytest.approx(its.depth_mm, abs=its.depth_sigma_mm)
-    assert sampled.smallest_depth_mm != whole.smallest_depth_mm  # or nothing was sampled
+    assert sampled.smallest_depth_mm != whole.smallest_depth_mm  # otherwise nothing was sampled
     assert sampled.smallest_depth_mm == pytest.approx(whole.smallest_depth_mm, rel=0.05)
 
 
@@ -97,13 +97,13 @@ def test_memory_does_not_grow_with_length(monkeypatch, tmp_path):
         tracemalloc.stop()
         return peak
 
-    most(200.0)  # what libraries load only once
+    most(200.0)  # loaded once by libraries
     short, long = most(300.0), most(1200.0)
     one_map_of_singles = 4 * COLUMNS * 2 * (1200 - 300)
     assert long - short < 0.5 * one_map_of_singles
 
 
-def test_a_coarse_map_shows_what_is_larger_than_its_cells():
+def test_a_coarse_map_shows_features_larger_than_its_cells():
     drawn = (DrawnDefect("dent", 200.0, 1.0, 60.0, 50.0, -1.5), DrawnDefect("pit", 401.0, 2.0, 3.0, 3.0, 0.8))
     found = search(long_wall(drawn, 800.0, 4.0)).items
     assert found[0].kind == "dent"
@@ -111,23 +111,23 @@ def test_a_coarse_map_shows_what_is_larger_than_its_cells():
     assert all(abs(d.distance_from_mm - 401.0) < 10 for d in found[1:])
 
 
-def test_what_is_longer_than_a_part_is_given_in_parts(monkeypatch):
+def test_a_finding_longer_than_a_part_is_given_in_parts(monkeypatch):
     monkeypatch.setattr(segment, "_LONGEST_ROWS", 200)
     (first, *others) = search(long_wall((DrawnDefect("gouge", 200.0, 1.0, 240.0, 6.0, 0.6),))).items
-    assert first.length_mm == pytest.approx(100.0, abs=3.0)  # its rim, joined to it, is a few rows wide
+    assert first.length_mm == pytest.approx(100.0, abs=3.0)  # the rim, joined to it, is a few rows wide
     assert len(others) == 2
     assert others[-1].distance_to_mm - first.distance_from_mm == pytest.approx(240.0, abs=10.0)
 
 
 @pytest.mark.parametrize("rows", [1, 2, 7, 40])
-def test_patches_are_those_of_the_whole_map_closed_around(monkeypatch, rows):
+def test_patches_equal_those_of_the_whole_map_closed_around(monkeypatch, rows):
     monkeypatch.setattr(along, "_ROWS", rows)
     mask = np.random.default_rng(rows).random((60, 30)) < 0.25
     patches = segment._patches(mask, (1.0, 1.0), 0.0, Scratch())
     there = np.concatenate([patches.of(slice(k, k + 9)) for k in range(0, 60, 9)])
     assert np.array_equal(there >= 0, mask)
     middle, _ = label(np.concatenate([mask] * 3, 1), grow._EIGHT)
-    # of three turns side by side, two cells belong together where any of their copies do
+    # of three copies side by side, two cells belong together where any of their copies do
     copies = [middle[:, k * 30 : (k + 1) * 30] for k in range(3)]
     for number in range(len(patches.extent)):
         cells = there == number
@@ -141,7 +141,7 @@ def test_patches_are_those_of_the_whole_map_closed_around(monkeypatch, rows):
 
 
 def _periodic_count(mask):
-    """Count patches by flooding."""
+    """Count patches by flood fill."""
     left, count = mask.copy(), 0
     while left.any():
         count += 1

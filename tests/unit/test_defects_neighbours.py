@@ -1,4 +1,4 @@
-"""A pit in a wider patch keeps its depth, and what one ring alone shows is told as a lower bound."""
+"""A pit in a wider patch keeps its depth; what one ring alone shows is reported as a lower bound."""
 
 from types import SimpleNamespace
 
@@ -39,8 +39,11 @@ def patch_with_pit(step_mm, patch_mm, pit_mm, wide_mm, seed, shift=(0.0, 0.0)):
     ("step_mm", "patch_mm", "pit_mm", "wide_mm"),
     [(0.5, 0.5, 1.5, 4.0), (0.5, 0.8, 2.0, 4.0), (1.0, 0.6, 1.8, 3.0), (0.5, 0.47, 2.0, 3.45)],
 )
-def test_a_pit_that_many_rings_show_in_a_wider_patch_has_its_depth(step_mm, patch_mm, pit_mm, wide_mm):
-    """1.95 mm was told as 0.78 ± 0.25: a pit narrower than a fifth of the patch was in no ring's top."""
+def test_a_pit_on_many_rings_in_a_wider_patch_has_the_right_depth(step_mm, patch_mm, pit_mm, wide_mm):
+    """1.95 mm was reported as 0.78 ± 0.25.
+
+    A pit narrower than a fifth of the patch did not count in any ring.
+    """
     finding, true = patch_with_pit(step_mm, patch_mm, pit_mm, wide_mm, seed=5)
     assert abs(finding.depth_mm - true) < 1.96 * finding.depth_sigma_mm
     assert finding.depth_sigma_mm < 0.2 * true
@@ -50,28 +53,28 @@ def test_a_pit_that_many_rings_show_in_a_wider_patch_has_its_depth(step_mm, patc
 @pytest.mark.parametrize(
     ("step_mm", "wide_mm", "pit_mm"), [(1.0, 1.8, 1.7), (0.5, 1.2, 1.7), (1.0, 1.8, 3.2)]
 )
-def test_a_pit_that_one_ring_shows_is_within_the_depth_told(step_mm, wide_mm, pit_mm):
-    """2.2 mm was told as 0.63 ± 0.03: it may as well be a glint, and the corrosion stays confirmed."""
+def test_the_range_of_a_pit_on_one_ring_includes_its_depth(step_mm, wide_mm, pit_mm):
+    """2.2 mm was 0.63 ± 0.03; the pit may be a glint, but the corrosion around it stays confirmed."""
     finding, true = patch_with_pit(step_mm, 0.6, pit_mm, wide_mm, seed=5)
     assert abs(finding.depth_mm - true) < 1.96 * finding.depth_sigma_mm
 
 
-def test_of_a_narrow_finding_single_rings_about_its_peak_are_no_witnesses():
-    """Glints 0.9 mm wide counted as witnessed by rings whose noise departs by half as much within 1 mm."""
+def test_single_rings_beside_the_peak_of_a_narrow_finding_do_not_confirm_it():
+    """Glints 0.9 mm wide were confirmed by rings whose noise reached half as much within 1 mm."""
     cells = SimpleNamespace(relief=SimpleNamespace(cell_mm=(0.5, 0.45)))
     narrow = SimpleNamespace(mask=np.ones((4, 2), bool))
     assert not frames_at_peak(Depth(-0.22, 0.07, 0.0, (1, 1)), narrow, cells).size
 
 
-def test_what_single_rings_show_is_told_without_a_sign():
-    """A deposit's depth is negative: "single rings show up to -2.30 mm" was the sentence."""
+def test_the_depth_on_single_rings_is_written_without_a_sign():
+    """A deposit's depth is negative: the sentence was "single rings show up to -2.30 mm"."""
     deposit = Found(None, None, None, None, 1.0, contradicted_mm=-2.3)
     assert "show up to 2.30 mm" in deposit._at_least()
     assert not deposit.flattened
 
 
 def fine_mean(patch_mm, pit_mm, wide_mm):
-    """Return the largest mean over a millimetre of a pit in a patch, which lies anywhere between rings."""
+    """Return the largest mean over a millimetre of a pit in a patch; it may lie between rings."""
     x = np.arange(-4, 4, 0.05)
     off = np.hypot(x[:, None], x[None]) / (wide_mm / 2)
     return float(uniform_filter(patch_mm + pit_mm * np.sqrt(np.maximum(1 - off**2, 0)), 20).max())
@@ -81,18 +84,19 @@ def fine_mean(patch_mm, pit_mm, wide_mm):
     ("step_mm", "pit_mm", "wide_mm", "shift"),
     [(1.0, 1.9, 2.1, (0.5, 0.0)), (1.0, 1.6, 2.0, (0.5, 1.0)), (0.5, 1.6, 1.3, (0.25, 0.0))],
 )
-def test_a_pit_that_two_rings_show_has_a_depth_as_sure_as_what_lies_between_them(
-    step_mm, pit_mm, wide_mm, shift
-):
-    """2.43 mm was told as 2.11 ± 0.08: no bell is fitted in a wide patch, and its top lies between rings."""
+def test_the_sigma_of_a_pit_on_two_rings_includes_what_may_lie_between_them(step_mm, pit_mm, wide_mm, shift):
+    """2.43 mm was 2.11 ± 0.08.
+
+    No bell is fitted in a wide patch, and the deepest place lies between rings.
+    """
     finding, _ = patch_with_pit(step_mm, 0.6, pit_mm, wide_mm, 5, shift)
     assert abs(finding.depth_mm - fine_mean(0.6, pit_mm, wide_mm)) < 1.96 * finding.depth_sigma_mm
     assert finding.depth_sigma_mm < 0.35 * finding.depth_mm
 
 
 @pytest.mark.parametrize(("sigma_mm", "vague"), [(0.3, False), (5.0, True)])
-def test_one_rings_glint_neither_makes_a_depth_vague_nor_excuses_one_that_is(sigma_mm, vague):
-    """A deep ring that others contradict had made a finding of any σ certain enough to be confirmed."""
+def test_a_glint_on_one_ring_neither_widens_a_depth_nor_confirms_an_uncertain_one(sigma_mm, vague):
+    """A deep ring that others contradict had confirmed a finding, however large its σ was."""
     defect = SimpleNamespace(depth_mm=0.6, depth_sigma_mm=float(np.hypot(sigma_mm, 2.6)))
     found = Found(None, defect, None, None, 1.0, contradicted_mm=3.2, sigma_without_them_mm=sigma_mm)
     assert found.vague is vague

@@ -1,4 +1,4 @@
-"""Lit pictures from other places tell a groove on the wall from a drop that moved the line."""
+"""Lit pictures from several positions distinguish a groove in the wall from a drop that moved the line."""
 
 from types import SimpleNamespace
 
@@ -23,12 +23,12 @@ PAINT = smooth_noise(np.random.default_rng(2), (600, 1440), 30.0, 1.5)
 
 
 def groove(s, psi, depth_mm):
-    """Return the change of radius at places: 16 mm along the pipe, 4 mm wide."""
+    """Return the change of radius by the groove: 16 mm along the pipe, 4 mm wide."""
     return depth_mm * np.exp(-((((s - 53) / 8) ** 2) ** 2) - (RADIUS * psi / 2) ** 2)
 
 
 def picture(camera_s, depth_mm):
-    """Return what a fisheye on the axis sees of the painted wall with its groove."""
+    """Return the picture of the painted wall with its groove for a fisheye camera on the axis."""
     u, v = np.meshgrid(np.arange(2 * HALF), np.arange(2 * HALF))
     psi, theta = np.arctan2(v - HALF, u - HALF), np.maximum(np.hypot(u - HALF, v - HALF), 1) / FOCAL
     s = camera_s + RADIUS / np.tan(np.minimum(theta, 1.5))
@@ -46,7 +46,7 @@ def project(xyz_c):
 
 
 def pictures(depth_mm):
-    """Return the lit pictures of a wall with a groove so deep."""
+    """Return the lit pictures of a wall with a groove of this depth."""
     count = len(CAMERA_S)
     T_pc = np.tile(np.eye(4), (count, 1, 1))
     T_pc[:, 2, 3] = CAMERA_S
@@ -65,7 +65,7 @@ def pictures(depth_mm):
 
 
 @pytest.mark.parametrize("depth_mm", [0.5, -0.5, 1.2])
-def test_pictures_contradict_a_groove_that_a_drop_made_and_no_groove_on_the_wall(depth_mm):
+def test_pictures_contradict_the_groove_made_by_a_drop_but_not_one_in_the_wall(depth_mm):
     random = np.random.default_rng(1)
     s, psi = np.meshgrid(DISTANCE, AZIMUTH, indexing="ij")
     radius = RADIUS + groove(s, psi, depth_mm) + smooth_noise(random, s.shape, 0.02, 1.0)
@@ -76,7 +76,7 @@ def test_pictures_contradict_a_groove_that_a_drop_made_and_no_groove_on_the_wall
     assert pictures(0.0).contradict(GROOVE, rows)
 
 
-def test_pictures_are_not_asked_of_a_short_finding():
+def test_pictures_are_not_used_for_a_short_finding():
     rows = SimpleNamespace(cell_mm=(0.5, 0.35))
     short = Region(90, 355, np.ones((10, 11), bool), 1.0)
     assert not pictures(0.0).contradict(short, rows)
@@ -86,8 +86,11 @@ def test_pictures_are_not_asked_of_a_short_finding():
     ("depth_mm", "row", "struck"),
     [(-35.0, 60, True), (-20.0, 60, False), (35.0, 60, False), (-35.0, 150, False)],
 )
-def test_the_probe_did_not_drive_through_what_stands_nearer_than_its_lamps(depth_mm, row, struck):
-    """A reflection was a deposit of 21 mm in a pipe of 25 mm radius; ahead of the probe one may be."""
+def test_a_deposit_that_the_probe_would_have_hit_is_not_real(depth_mm, row, struck):
+    """A reflection was a deposit of 21 mm in a pipe of 25 mm radius.
+
+    Only ahead of the probe one may exist.
+    """
     radius = RADIUS + smooth_noise(np.random.default_rng(1), (len(DISTANCE), len(AZIMUTH)), 0.02, 1.0)
     relief = smooth_shape_removed(wall_of(DISTANCE, AZIMUTH, radius).radius_map, DefectParameters())
     rows, region = relief.rows(slice(0, len(DISTANCE))), Region(row, 700, np.ones((8, 40), bool), -1.0)

@@ -1,4 +1,4 @@
-"""The roughness of a region's surface, beyond what the noise of its own place makes."""
+"""The roughness of a region's surface beyond the noise at its place."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ def relief(surface_mm: np.ndarray, noise_mm: np.ndarray) -> Relief:
 
 
 @pytest.mark.parametrize("rough_mm", [0.0, 0.3])
-def test_noise_of_a_place_is_no_roughness_of_it(rough_mm: float) -> None:
-    """Noise is four times as large in the region as elsewhere, and must be taken as it is there."""
+def test_the_noise_at_a_place_is_not_counted_as_its_roughness(rough_mm: float) -> None:
+    """The noise is four times as large in the region as elsewhere, and must be estimated in the region."""
     random = np.random.default_rng(4)
     noise_mm = np.full((ROWS, COLUMNS), 0.04)
     noise_mm[20:60, 100:140] = 0.16

@@ -1,4 +1,4 @@
-"""A noise filter shows each ring with a part of those before it: σ of a depth holds what that took off."""
+"""A noise filter mixes each ring with those before it: the σ of a depth must include what is lost by that."""
 
 from __future__ import annotations
 
@@ -32,14 +32,14 @@ NOWHERE, EVERY_HALF_MM = np.empty(0), np.full(20, 0.5)
 
 
 def cloud_of(places_mm: Float) -> PointCloud:
-    """Return a point of the wall for each ring, which were taken in this order."""
+    """Return a point of the wall for each ring, taken in this order."""
     n, flat = len(places_mm), np.zeros((len(places_mm), 3))
     psi = np.zeros(n)
     return PointCloud(flat, flat, np.full(n, 0.03), np.full(n, RADIUS), places_mm, psi, np.arange(n))
 
 
 def found_on(wall_mm: np.ndarray, held: HeldOver, also_at: Float = NOWHERE) -> Defect:
-    """Return the one finding on a noisy wall that departs so far from its bore, with more rings there."""
+    """Return the one finding on a noisy wall with this departure from its bore, with extra rings there."""
     noise = smooth_noise(np.random.default_rng(1), wall_mm.shape, 0.02, 2.0)
     wall = replace(wall_of(DISTANCE, AZIMUTH, RADIUS + wall_mm + noise, 0.02), held=held)
     more = cloud_of(also_at)
@@ -55,7 +55,7 @@ def found_on(wall_mm: np.ndarray, held: HeldOver, also_at: Float = NOWHERE) -> D
 
 @pytest.mark.parametrize(("kind", "depth_mm"), [("pit", 1.0), ("weld", -0.9)])
 def test_the_true_depth_lies_within_twice_the_sigma_of_a_flattened_one(kind: str, depth_mm: float) -> None:
-    """Of a pit of 1.12 mm, behind a filter that mixes pictures, .78 ± .05 mm was told."""
+    """Formerly a pit of 1.12 mm behind a filter that mixes pictures was .78 ± .05 mm."""
     drawn = DrawnDefect(kind, 40.0, 1.0, 7.0, 7.0, depth_mm)
     true = relief(drawn, DISTANCE, AZIMUTH, RADIUS, np.random.default_rng(0))
     filtered = lfilter([1 - HELD], [1, -HELD], true, axis=0)
@@ -67,7 +67,7 @@ def test_the_true_depth_lies_within_twice_the_sigma_of_a_flattened_one(kind: str
     assert told.depth_sigma_mm < 0.5 * abs(depth_mm)
 
 
-def test_rings_that_share_as_much_as_usual_widen_nothing() -> None:
+def test_rings_with_the_usual_correlation_do_not_widen_sigma() -> None:
     drawn = DrawnDefect("pit", 40.0, 1.0, 7.0, 7.0, 1.0)
     true = relief(drawn, DISTANCE, AZIMUTH, RADIUS, np.random.default_rng(0))
     usual, none = found_on(true, HeldOver(0.16 ** np.arange(5))), found_on(true, NOTHING_HELD)
@@ -77,9 +77,9 @@ def test_rings_that_share_as_much_as_usual_widen_nothing() -> None:
 def told_sigma(
     seen_mm: Float, held: HeldOver, ways_mm: Float = EVERY_HALF_MM, finding: slice = slice(None)
 ) -> float:
-    """Return the σ that a depth of ± .03 mm gets, of which ``seen_mm`` (H,) is seen every .5 mm.
+    """Return σ of a depth of ± .03 mm that is measured as ``seen_mm`` (H,) every .5 mm.
 
-    Its ``finding`` is what stands out of the wall. So far (F,) the probe went from ring to ring.
+    ``finding`` selects the part above the wall; ``ways_mm`` (F,) are the distances from ring to ring.
     """
     first, last, _ = finding.indices(len(seen_mm))
     region = Region(first, 0, np.ones((last - first, 1), bool), 1.0)
@@ -95,10 +95,10 @@ def told_sigma(
 @pytest.mark.parametrize("backwards", [False, True])
 @pytest.mark.parametrize("share", [0.6, 0.8, 0.9, 0.95])
 @pytest.mark.parametrize("bell_mm", [0.5, 1.0, 1.5, 2.5, 5.0])
-def test_sigma_holds_what_bells_of_any_size_lost_to_filters_of_any_strength(
+def test_sigma_includes_what_bells_of_any_size_lost_to_filters_of_any_strength(
     bell_mm: float, share: float, backwards: bool
 ) -> None:
-    """No more than a third was held: of 1 mm, .37 ± .13 and .35 ± .12 mm were told of narrow ones."""
+    """Formerly at most a third was included: narrow ones of 1 mm were .37 ± .13 and .35 ± .12 mm."""
     bell = np.exp(-0.5 * (np.arange(-200, 201) * 0.5 / bell_mm) ** 2)
     seen = lfilter([1 - share], [1, -share], bell)[:: -1 if backwards else 1]
     height = float(seen.max())
@@ -109,16 +109,19 @@ def test_sigma_holds_what_bells_of_any_size_lost_to_filters_of_any_strength(
 
 
 @pytest.mark.parametrize("bell_mm", [1.0, 1.7])
-def test_what_falls_off_on_both_sides_was_not_held_over_long_ways(bell_mm: float) -> None:
-    """Rings were alike by .33, which hardly fell off: of a bead of .92 mm, 1.03 ± 5.58 mm was told at .98."""
+def test_a_finding_that_falls_off_on_both_sides_was_not_smeared_over_long_distances(bell_mm: float) -> None:
+    """Rings were correlated by .33, hardly falling with distance.
+
+    A bead of .92 mm was 1.03 ± 5.58 mm at .98.
+    """
     bell = np.exp(-0.5 * (np.arange(-50, 51) * 0.5 / bell_mm) ** 2)
     likeness = np.r_[1.0, 0.33 * 0.98 ** np.arange(16)]
     assert HeldOver(likeness).handed_on > 0.9
     assert told_sigma(bell[bell > 0.2], HeldOver(likeness)) < 0.6
 
 
-def test_cells_below_the_wall_at_both_ends_do_not_tell_that_nothing_was_held_over() -> None:
-    """One such cell at either end, as a rim leaves, and no part was held over: σ was that of noise alone."""
+def test_cells_below_the_wall_at_both_ends_do_not_hide_a_smear() -> None:
+    """One such cell at either end, as a rim leaves, and σ was that of noise alone."""
     bell = np.exp(-0.5 * (np.arange(-200, 201) * 0.5 / 2.0) ** 2)
     seen = lfilter([0.1], [1, -0.9], bell)
     found = seen[seen > 0.2 * seen.max()]
@@ -127,14 +130,14 @@ def test_cells_below_the_wall_at_both_ends_do_not_tell_that_nothing_was_held_ove
 
 
 def rimmed_pit(across_mm: float, rim: float) -> Float:
-    """Return a pit of 1 mm with a rim on both sides, of ``rim`` times its depth, every .5 mm."""
+    """Return a pit of 1 mm with a rim of ``rim`` times its depth on both sides, every .5 mm."""
     x = np.arange(-100, 100.25, 0.5) / across_mm
     pit = np.exp(-0.5 * x**2) - rim * np.exp(-0.5 * ((np.abs(x) - 2.2) / 0.7) ** 2)
     return np.asarray(pit / pit.max())
 
 
 def standing_out(seen_mm: Float) -> slice:
-    """Return the cells about the deepest that are more than a fifth as deep."""
+    """Return the cells about the deepest one that are more than a fifth as deep."""
     top = int(seen_mm.argmax())
     low = np.flatnonzero(seen_mm < 0.2 * seen_mm[top])
     return slice(int(low[low < top].max()) + 1, int(low[low > top].min()))
@@ -143,8 +146,8 @@ def standing_out(seen_mm: Float) -> slice:
 @pytest.mark.parametrize("across_mm", [1.0, 2.0, 3.0])
 @pytest.mark.parametrize("rim", [0.1, 0.3, 0.5])
 @pytest.mark.parametrize("share", [0.6, 0.8, 0.9, 0.95])
-def test_sigma_holds_what_a_pit_with_a_rim_lost(across_mm: float, rim: float, share: float) -> None:
-    """The rim's steeper flanks told of little held over: up to seven σ were lost."""
+def test_sigma_includes_what_a_pit_with_a_rim_lost(across_mm: float, rim: float, share: float) -> None:
+    """The rim's steeper flanks seemed to show little smear: up to seven σ were lost."""
     seen = lfilter([1 - share], [1, -share], rimmed_pit(across_mm, rim))
     lost = 1 - float(seen.max())
     sigma = told_sigma(seen, HeldOver(share ** np.arange(12)), finding=standing_out(seen))
@@ -153,15 +156,15 @@ def test_sigma_holds_what_a_pit_with_a_rim_lost(across_mm: float, rim: float, sh
 
 
 @pytest.mark.parametrize("rim", [0.3, 0.5])
-def test_a_sharp_pit_with_a_rim_was_not_held_over_long_ways(rim: float) -> None:
-    """As its bell would be the narrowest one, ± 18 and ± 24 mm could be told of it."""
+def test_a_sharp_pit_with_a_rim_was_not_smeared_over_long_distances(rim: float) -> None:
+    """Its bell was taken as the narrowest one, which gave ± 18 and ± 24 mm."""
     seen = rimmed_pit(2.0, rim)
     likeness = HeldOver(np.r_[1.0, 0.33 * 0.98 ** np.arange(16)])
     assert told_sigma(seen, likeness, finding=standing_out(seen)) < 1.5
 
 
-def test_a_wide_patch_tells_by_all_its_columns_how_fast_it_falls_off() -> None:
-    """Of corrosion of .43 mm, 17 mm wide on a rough wall, .60 ± 2.92 mm was told."""
+def test_all_columns_of_a_wide_patch_show_how_fast_it_falls_off() -> None:
+    """Corrosion of .43 mm, 17 mm wide on a rough wall, was .60 ± 2.92 mm."""
     drawn = DrawnDefect("pit", 40.0, 1.0, 8.0, 17.0, 0.6)
     true = relief(drawn, DISTANCE, AZIMUTH, RADIUS, np.random.default_rng(0))
     rough = smooth_noise(np.random.default_rng(2), true.shape, 0.06, 1.0)
@@ -172,10 +175,10 @@ def test_a_wide_patch_tells_by_all_its_columns_how_fast_it_falls_off() -> None:
 @pytest.mark.parametrize("unseen", ["steep flank", "every second cell", "up to the end of the wall"])
 @pytest.mark.parametrize("share", [0.6, 0.8, 0.9, 0.95])
 @pytest.mark.parametrize("bell_mm", [0.5, 1.0, 2.0])
-def test_sigma_holds_what_was_lost_where_the_steep_flank_is_unseen(
+def test_sigma_includes_the_loss_where_the_steep_flank_is_unmeasured(
     bell_mm: float, share: float, unseen: str
 ) -> None:
-    """The slope was taken from what was seen: a loss of .78 was told as .46 of what is left."""
+    """The slope was taken from the measured part: a loss of .78 was estimated as .46 of what remains."""
     bell = np.exp(-0.5 * (np.arange(-100, 101) * 0.5 / bell_mm) ** 2)
     seen = np.asarray(lfilter([1 - share], [1, -share], bell))
     height, top = float(seen.max()), int(seen.argmax())
@@ -191,7 +194,7 @@ def test_sigma_holds_what_was_lost_where_the_steep_flank_is_unseen(
 STANDS = np.full(400, 79.0) + 1e-6 * np.arange(400)
 
 
-def test_a_probe_that_stands_for_most_of_a_run_flattens_no_less_where_it_moves() -> None:
+def test_a_probe_that_stands_for_most_of_a_run_smears_no_less_where_it_moves() -> None:
     """The median distance of its rings is 0: σ was not widened, or divided by 0."""
     drawn = DrawnDefect("pit", 40.0, 1.0, 7.0, 7.0, 1.0)
     true = relief(drawn, DISTANCE, AZIMUTH, RADIUS, np.random.default_rng(0))
@@ -206,7 +209,7 @@ def test_a_probe_that_stands_for_most_of_a_run_flattens_no_less_where_it_moves()
     [DISTANCE, np.r_[DISTANCE, STANDS], np.r_[DISTANCE, DISTANCE[::-1] + 0.1], np.r_[STANDS, DISTANCE]],
     ids=["goes on", "stands then", "goes back", "stands first"],
 )
-def test_the_way_from_ring_to_ring_is_that_in_order_of_time(places_mm: Float) -> None:
+def test_distances_from_ring_to_ring_are_in_order_of_time(places_mm: Float) -> None:
     ways = cloud_along(cloud_of(places_mm)).ways_mm()
     bell = np.exp(-0.5 * (np.arange(-50, 51) * 0.5) ** 2)
     sigma = told_sigma(bell, HeldOver(HELD ** np.arange(12)), ways)
@@ -214,8 +217,8 @@ def test_the_way_from_ring_to_ring_is_that_in_order_of_time(places_mm: Float) ->
 
 
 @pytest.mark.parametrize("passes", [2, 3, 8])
-def test_a_probe_that_goes_to_and_fro_does_not_stand(passes: int) -> None:
-    """Its rings lie between each other: those near another one were taken for ones of a probe that stands."""
+def test_a_probe_that_goes_back_and_forth_does_not_stand(passes: int) -> None:
+    """Rings of its passes lie between each other, and near ones were taken for those of a standing probe."""
     shift = np.random.default_rng(0).uniform(0, 0.5, passes)
     way = np.arange(0, 80, 0.5)
     places = np.concatenate([way[:: 1 - 2 * (k % 2)] + shift[k] for k in range(passes)])
@@ -223,17 +226,17 @@ def test_a_probe_that_goes_to_and_fro_does_not_stand(passes: int) -> None:
     assert cloud_along(cloud_of(places)).ring_spacing_mm() == pytest.approx(expected, rel=0.05)
 
 
-def test_rings_that_are_missing_make_no_long_way() -> None:
+def test_missing_rings_do_not_make_long_distances() -> None:
     ways = cloud_along(replace(cloud_of(DISTANCE[[0, 1, 2, 90]]), frame=np.array([0, 2, 4, 180]))).ways_mm()
     assert ways[[2, 4, 180]] == pytest.approx([0.5, 0.5, 0.0])
     assert not cloud_along(cloud_of(DISTANCE[:1])).ways_mm().any()
 
 
 @pytest.mark.parametrize("flattened", [True, False])
-def test_a_finding_whose_depth_may_be_flattened_by_as_much_is_told_as_at_least_so_deep(
+def test_a_finding_that_may_be_much_flattened_is_reported_with_a_lower_bound(
     flattened: bool,
 ) -> None:
-    """It was confirmed at .98 with .40 ± .44 mm and not a word."""
+    """It was confirmed at .98 with .40 ± .44 mm and no further word."""
     drawn = DrawnDefect("pit", 40.0, 1.0, 3.0, 7.0, 1.0)
     true = relief(drawn, DISTANCE, AZIMUTH, RADIUS, np.random.default_rng(0))
     share = 0.9 if flattened else 0.0
@@ -244,8 +247,11 @@ def test_a_finding_whose_depth_may_be_flattened_by_as_much_is_told_as_at_least_s
     assert ("This depth is a lower bound" in told.statement) == flattened
 
 
-def test_the_lower_bound_of_what_goes_all_round_is_no_glint_s() -> None:
-    """Of a bead of .92 mm with a glint on it, at least 1.94 mm to ± .21 was told; then nothing was."""
+def test_the_lower_bound_of_a_bead_is_not_that_of_a_glint() -> None:
+    """A bead of .92 mm with a glint on it had at least 1.94 mm at ± .21.
+
+    After a first mend it had no bound.
+    """
     drawn = DrawnDefect("weld", 40.0, 1.0, 3.0, 7.0, -1.0)
     true = relief(drawn, DISTANCE, AZIMUTH, RADIUS, np.random.default_rng(0))
     seen = lfilter([0.1], [1, -0.9], true, axis=0)
@@ -263,8 +269,8 @@ def test_the_lower_bound_of_what_goes_all_round_is_no_glint_s() -> None:
     assert abs(told.depth_mm) < 1.0
 
 
-def test_a_depth_that_may_be_several_times_what_is_seen_is_not_confirmed() -> None:
-    """At the end of the wall a deposit of 12 ± 60 mm was confirmed at .98."""
+def test_a_depth_that_may_be_several_times_the_measured_one_is_not_confirmed() -> None:
+    """A deposit of 12 ± 60 mm at the end of the wall was confirmed at .98."""
     drawn = DrawnDefect("pit", 40.0, 1.0, 3.0, 9.0, 4.0)
     true = relief(drawn, DISTANCE, AZIMUTH, RADIUS, np.random.default_rng(0))
     seen = lfilter([0.05], [1, -0.95], true, axis=0)
