@@ -20,6 +20,7 @@ from stages.diagnose.gauge.sets import PATTERNS, Member
 from stages.diagnose.gauge.unknown_laws import Unknown
 from stages.diagnose.result import Confirmation, FitQuality, Location, Value, Verdict
 
+NAMES = "laser_cone", "baseline", "dome_axial", "principal_point", "housing_glass"
 AGREES, DIFFERS = Confirmation("1", "1", True), Confirmation("1", "2", False)
 
 
@@ -74,19 +75,36 @@ def test_patterns_that_are_unlikely_each_leave_a_name_unexplained_unless_other_n
     assert answer.unknown_rivals(seen)[:1] == ("image outward: a θ^1",) * (verdict is Verdict.UNEXPLAINED)
 
 
-def hypotheses(fitted, weighed):
+def hypotheses(fitted, weighed, laws=25):
     """Return verdicts on sets of effects and of patterns, by name and by number, each with a probability."""
-    models = {name: (LIBRARY[name], ()) for name in ("laser_cone", "baseline")} | dict(enumerate(PATTERNS))
+    models = {name: (LIBRARY[name], ()) for name in NAMES} | dict(enumerate(PATTERNS))
     judged = []
     for of, _ in fitted:
         terms = tuple(Term(*models[k], np.zeros(len(models[k][0].amplitudes))) for k in of)
         judged.append(Judged(cast(Any, SimpleNamespace(terms=terms)), cast(Any, None), (), 0.0, 0.0, 0.0))
     unfitted = tuple(Unfitted(tuple(Member(*models[k], 0.0) for k in of), (), 0.0, p) for of, p in weighed)
     chance = np.array([p for _, p in fitted])
-    return Verdicts((), tuple(judged), chance, 1.0, cast(Any, None), unfitted)
+    return Verdicts((), tuple(judged), chance, 1.0, cast(Any, None), unfitted, laws)
 
 
 CONE = ("laser_cone",)
+
+
+@pytest.mark.parametrize(
+    ("beside", "class_"),
+    [
+        # As likely beside the cone as without any run, or less: one in 25 laws.
+        (0.03, {"laser_cone", "principal_point"}),
+        # The run speaks for it, though it is less likely than the cone alone.
+        (0.3, {"laser_cone", "principal_point", "baseline"}),
+    ],
+)
+def test_a_class_leaves_out_laws_that_join_others_without_explaining_more(beside, class_):
+    """A tilt that went with distance gave a class of 24 names: all that could not be excluded beside it."""
+    weighed = [((*CONE, "baseline"), beside), ((*CONE, "dome_axial"), 0.02), (("principal_point",), 0.06)]
+    rest = [((*CONE, "housing_glass"), 0.005), ((*CONE, 3), 0.01)]
+    alone = 1 - sum(p for _, p in (*weighed, *rest))
+    assert set(hypotheses([(CONE, alone)], [*weighed, *rest]).likely_laws(0.99)) == class_
 
 
 @pytest.mark.parametrize(

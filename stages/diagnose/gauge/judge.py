@@ -91,6 +91,8 @@ class Verdicts:
         The empirical formula, whether it is the likeliest or not.
     unfitted : tuple of Unfitted
         Sets of effects and patterns that were weighed but not fitted.
+    laws : int
+        Number of laws, which are equally likely beforehand.
     """
 
     regimes: tuple[Regime, ...]
@@ -99,6 +101,7 @@ class Verdicts:
     adequacy: float
     formula: Judged
     unfitted: tuple[Unfitted, ...] = ()
+    laws: int = 1
 
     def chance_of(self, term: Term) -> float:
         """Return the probability that a term's law is among the causes, with whatever course."""
@@ -110,12 +113,26 @@ class Verdicts:
         return min(both / max(self.chance_of(term), 1e-300), 1.0)
 
     def likely_laws(self, sure: float) -> tuple[str, ...]:
-        """Return the laws of the likeliest hypotheses that together reach the probability ``sure``."""
-        each = sorted(self._each(), key=lambda one: -one[0])
-        chance = np.array([p for p, *_ in each])
-        before = np.cumsum(chance) - chance
-        likely = (causes for (_, causes, *_), so_far in zip(each, before, strict=True) if so_far < sure)
-        return tuple(dict.fromkeys(law for causes in likely for law, _ in sorted(causes)))
+        """Return the laws of the likeliest causes that together reach the probability ``sure``.
+
+        Causes that merely join others, without explaining the run better, are not among them: where one law
+        suffices, every other may stand beside it with a probability that it also has without any run.
+        """
+        chance = dict[frozenset[Cause], float]()
+        for p, causes, *_ in self._each():
+            chance[frozenset(causes)] = chance.get(frozenset(causes), 0.0) + p
+        each = sorted(chance, key=lambda causes: -chance[causes])
+        before = np.cumsum([chance[causes] for causes in each]) - [chance[causes] for causes in each]
+        likely = (causes for causes, so_far in zip(each, before, strict=True) if so_far < sure)
+        of_each = (sorted(causes) for causes in likely if not self._joins(causes, chance))
+        return tuple(dict.fromkeys(law for causes in of_each for law, _ in causes))
+
+    def _joins(self, causes: frozenset[Cause], chance: Mapping[frozenset[Cause], float]) -> bool:
+        """Return whether fewer of these causes explain the run as well."""
+        return any(
+            fewer and fewer < causes and p >= chance[causes] * self.laws ** (len(causes) - len(fewer))
+            for fewer, p in chance.items()
+        )
 
     def instead_of(self, term: Term) -> Instead:
         """Return the hypotheses without a term's law that explain the run otherwise."""
@@ -183,13 +200,13 @@ def judge(
     unfitted = tuple(sorted(each, key=lambda u: -u.probability))
     of_formula = _of(judged, formula)
     ranked = (replace(best, evidence=evidence(run, best.fit, ())[0]), *ranked[1:])
-    return Verdicts(regimes, ranked, chance[:count], left, of_formula, unfitted)
+    return Verdicts(regimes, ranked, chance[:count], left, of_formula, unfitted, laws)
 
 
 def _of(judged: Sequence[Judged], formula: Fit) -> Judged:
     """Return the formula's hypothesis."""
-    patterns = [t.model.name for t in formula.terms]
-    return next((j for j in judged if [t.model.name for t in j.fit.terms] == patterns), judged[0])
+    names = [t.model.name for t in formula.terms]
+    return next((j for j in judged if [t.model.name for t in j.fit.terms] == names), judged[0])
 
 
 def _ranked(run: GaugeRun, judged: Sequence[Judged], formula: Fit) -> tuple[tuple[Judged, ...], Bool]:
