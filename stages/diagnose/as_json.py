@@ -14,8 +14,8 @@ _FORMAT = 1
 
 
 def to_json(found: Diagnosis) -> dict[str, object]:
-    """Return the contents of diagnosis.json: all of the diagnosis except pictures."""
-    told = {k: v for k, v in _fields(found).items() if not k.endswith("_picture")}
+    """Return the contents of diagnosis.json: all of the diagnosis except what only the page shows."""
+    told = {k: v for k, v in _fields(found).items() if k != "causes" and not k.endswith("_picture")}
     return {
         "format": _FORMAT,
         **told,

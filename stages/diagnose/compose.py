@@ -8,19 +8,20 @@ from dataclasses import dataclass, replace
 from pipeline.instrument.probe import Probe
 from pipeline.physics.catalogue import effect
 from pipeline.physics.effect import Channel, FixedTo
+from stages.diagnose.causes import NONE, Causes
 from stages.diagnose.channels import Seen
 from stages.diagnose.claims import Claim, claims_of, stretch
 from stages.diagnose.gauge import answer as of_gauge
+from stages.diagnose.gauge.causes import causes_of
 from stages.diagnose.gauge.examine import Examined
+from stages.diagnose.record_next import AGAIN, record_next
 from stages.diagnose.result import (
-    AGAIN,
     Diagnosis,
     EffectFound,
     Location,
     Remainder,
     Verdict,
     classes_of,
-    record_next,
 )
 from stages.diagnose.travel.events import SLIP
 
@@ -56,6 +57,7 @@ def composed(
     asked = said.members if said.members else [e.name for e in said.effects]
     nameless = _IN_PROFILE if of_profile else of_travel[0].location if of_travel else None
     location = _location(examined, every, asked) or nameless
+    causes = causes_of(examined) if said.members and examined is not None else NONE
     words = _identifiable(said, examined, any(c.may_have_other_course for c in known))
     identifiable = " ".join(s for s in (words, *of_profile, *(u.sentence for u in of_travel)) if s)
     partly = said.verdict is Verdict.PARTLY
@@ -70,7 +72,8 @@ def composed(
         members=() if partly else said.members,
         identifiable=identifiable,
         fit=examined.quality if examined is not None else None,
-        record_next=_next(said, asked),
+        record_next=_next(said, asked, causes),
+        causes=causes,
         feasibility=examined.feasibility if examined is not None else (),
         candidates=of_gauge.candidates(examined) if examined is not None else (),
         shortcomings=(
@@ -188,11 +191,11 @@ def _of_rest(examined: Examined | None, rings: Verdict) -> Location | None:
     return examined.location if repeats and examined is not None else None
 
 
-def _next(said: _Said, asked: Sequence[str]) -> str:
+def _next(said: _Said, asked: Sequence[str], causes: Causes) -> str:
     """Return what to record so that the answer becomes a name."""
     if said.verdict is Verdict.UNEXPLAINED or (said.verdict is Verdict.PARTLY and not said.members):
         return AGAIN
-    return record_next(asked) if said.verdict in (Verdict.CLASS, Verdict.PARTLY) and asked else ""
+    return record_next(asked, causes) if said.verdict in (Verdict.CLASS, Verdict.PARTLY) and asked else ""
 
 
 def _identifiable(said: _Said, examined: Examined | None, other_encoder_course: bool) -> str:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
 from pipeline.arrays import Float, Int
 from pipeline.physics.catalogue import CLASSES, EFFECTS, effect
+from stages.diagnose.causes import NONE, Causes
+from stages.diagnose.record_next import record_next
 
 
 def class_of(name: str) -> tuple[str, ...]:
@@ -27,36 +28,6 @@ def classes_of(names: Sequence[str]) -> tuple[str, ...]:
     """Return the members of the classes of all these effects, in the catalogue's order."""
     members = {member for name in names for member in class_of(name)}
     return tuple(name for name in EFFECTS if name in members)
-
-
-def record_next(names: Sequence[str]) -> str:
-    """Return a sentence on what to record to distinguish these effects, or to confirm a single one."""
-    wanted = _without_repeats([part for name in names for part in _recordings(effect(name).told_apart_by)])
-    if not wanted:
-        return ""
-    purpose = f"confirm {_words(names)}" if len(names) == 1 else f"tell {_words(names)} apart"
-    return f"To {purpose}, record: {'; '.join(wanted)}."
-
-
-def _recordings(told_apart_by: str) -> list[str]:
-    parts = re.split(r"[,;]\s*(?![^()]*\))", told_apart_by)
-    return [part.removeprefix("or ").strip() for part in parts if part.strip()]
-
-
-def _without_repeats(parts: Sequence[str]) -> list[str]:
-    """Return each part once, without those that another part contains at its start."""
-    return [p for p in dict.fromkeys(parts) if not any(other.startswith(f"{p} ") for other in parts)]
-
-
-def _words(names: Sequence[str]) -> str:
-    *leading, last = names
-    return f"{', '.join(leading)} and {last}" if leading else last
-
-
-AGAIN = (
-    "To see what the pattern depends on, record the gauge run again: with probe or gauge rolled by 90°, at "
-    "another speed, and after warming up."
-)
 
 
 class Verdict(StrEnum):
@@ -252,6 +223,8 @@ class Diagnosis:
         The combination that is determined, or the empirical formula.
     feasibility, candidates, shortcomings, pictures
         For the report.
+    causes : Causes
+        How likely each cause of the class is, by rings and fiducials of the gauge run; for the report.
     """
 
     recording: str
@@ -272,6 +245,7 @@ class Diagnosis:
     notes: tuple[str, ...] = field(default=())
     remainder: Remainder | None = None
     reading_picture: ReadingPicture | None = None
+    causes: Causes = NONE
 
     def not_knowing(self, names: Collection[str]) -> Diagnosis:
         """Return the diagnosis with some effects treated as unknown: without them in any class."""
@@ -285,5 +259,5 @@ class Diagnosis:
         return replace(
             self, verdict=Verdict.UNEXPLAINED if nameless else self.verdict,
             members=members, remainder=left,
-            record_next=record_next(members) if self.members else self.record_next,
+            record_next=record_next(members, self.causes) if self.members else self.record_next,
         )  # fmt: skip

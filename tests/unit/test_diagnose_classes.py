@@ -3,7 +3,8 @@
 import pytest
 
 from pipeline.physics.catalogue import CLASSES, EFFECTS
-from stages.diagnose.result import Diagnosis, Verdict, class_of, classes_of, record_next
+from stages.diagnose.record_next import record_next
+from stages.diagnose.result import Diagnosis, Verdict, class_of, classes_of
 
 
 @pytest.mark.parametrize("name", EFFECTS)

@@ -11,6 +11,7 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
 from pipeline.api.diagnosis.apply import GeometryChange, consequence
+from pipeline.api.diagnosis.causes import class_shown
 from pipeline.arrays import Float
 from pipeline.files.disk import replace_text
 from pipeline.files.json_yaml import json_number
@@ -60,7 +61,7 @@ def write_page(found: Diagnosis, shown: Shown, folder: Path) -> None:
     """
     change = shown.change
     text = page_template("diagnose").render(
-        d=to_json(found), headline=headline(found), change=change,
+        d=to_json(found), possible=class_shown(found), headline=headline(found), change=change,
         sizes=[sizes(e) for e in found.effects],
         consequence=consequence(change) if change is not None else size_of_mismatch(found),
         hours=_by_hour(change) if change is not None else (), pictures=_pictures(found, shown),

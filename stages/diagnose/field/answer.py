@@ -18,8 +18,8 @@ from stages.diagnose.field.evidence import FieldEvidence, travels
 from stages.diagnose.field.unexplained import why_unexplained
 from stages.diagnose.gauge.scan import Scored
 from stages.diagnose.inference import DETECTED, INSTRUMENT, Evidence, Stated, places_of, score, stated_belief
+from stages.diagnose.record_next import AGAIN, record_next
 from stages.diagnose.result import (
-    AGAIN,
     Confirmation,
     Diagnosis,
     EffectFound,
@@ -27,7 +27,6 @@ from stages.diagnose.result import (
     Value,
     Verdict,
     classes_of,
-    record_next,
 )
 
 # Effects that explain almost as much as the best one are in its class: laws err by a few per cent, and the

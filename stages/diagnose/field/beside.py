@@ -5,23 +5,35 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from stages.diagnose.result import AGAIN, Diagnosis, EffectFound, Remainder, Verdict, record_next
+from stages.diagnose.record_next import AGAIN, record_next
+from stages.diagnose.result import Diagnosis, EffectFound, Remainder, Verdict
 
 
 def beside(found: Diagnosis, certain: Sequence[EffectFound], members: Sequence[str]) -> Diagnosis:
     """Return the answer with one more class: a remainder beside what is certain, or the answer itself."""
     before = found.remainder
     every = union(members, before.members if before is not None else found.members)
+    found = replace(found, record_next=record_next(every, found.causes))
     if not certain:
         return replace(
-            found, verdict=Verdict.CLASS, members=every, remainder=None, record_next=record_next(every)
+            found,
+            verdict=Verdict.CLASS,
+            members=every,
+            remainder=None,
+            record_next=record_next(every, found.causes),
         )
     # What is unexplained stays so: a class does not contain it.
     is_nameless = before is not None and before.verdict is Verdict.UNEXPLAINED
     left = Remainder(
         Verdict.UNEXPLAINED if is_nameless else Verdict.CLASS, None, every, before.formula if before else ""
     )
-    return replace(found, verdict=Verdict.PARTLY, members=(), remainder=left, record_next=record_next(every))
+    return replace(
+        found,
+        verdict=Verdict.PARTLY,
+        members=(),
+        remainder=left,
+        record_next=record_next(every, found.causes),
+    )
 
 
 def nameless(found: Diagnosis) -> Diagnosis:

@@ -1,0 +1,78 @@
+"""The class of a diagnosis as the page shows it: likely causes with their courses, the others summed up."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from stages.diagnose.causes import Cause, CourseShare
+from stages.diagnose.result import Diagnosis
+
+# What is less likely than the accepted probability of a wrong name is summed up.
+_SHOWN = 0.01
+_OUTSIDE = "A cause that the library does not have, or measurements that do not agree with each other"
+_OTHERS = "Any other effect of the library, alone or beside one of these"
+
+
+@dataclass(frozen=True)
+class CauseShown:
+    """A possible cause: its name with its probability, and what it would be, once for each likely course."""
+
+    name: str
+    courses: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class ClassShown:
+    """The possible causes, the likeliest first, and sentences on those that have no line of their own."""
+
+    causes: tuple[CauseShown, ...]
+    rest: tuple[str, ...] = ()
+
+    @property
+    def weighed(self) -> bool:
+        """Whether the causes have probabilities and say what they would be."""
+        return any(c.courses for c in self.causes)
+
+
+def class_shown(found: Diagnosis) -> ClassShown:
+    """Return the class, or the class that remains beside what is certain, for the page.
+
+    Names of which rings and fiducials of a gauge run say nothing stand without a probability.
+    """
+    left = found.remainder
+    members = found.members if left is None else left.members
+    each = {name: found.causes.of(name) for name in members}
+    shown = [c for c in each.values() if c is not None and c.probability >= _SHOWN]
+    shown.sort(key=lambda c: -c.probability)
+    untold = tuple(CauseShown(_in_words(name)) for name, cause in each.items() if cause is None)
+    certain = {e.name for e in found.effects} if left is not None else set()
+    hidden = [c for c in found.causes.laws if c not in shown and c.name not in certain]
+    others = min(sum(c.probability for c in hidden), 1.0)
+    rest = ((_OUTSIDE, found.causes.outside), (_OTHERS, others))
+    sentences = tuple(f"{words}: {_percent(p)}." for words, p in rest if shown and p >= _SHOWN / 10)
+    return ClassShown((*map(_line, shown), *untold), sentences)
+
+
+def _line(cause: Cause) -> CauseShown:
+    name = f"{_in_words(cause.name)}, {_percent(cause.probability)}"
+    likely = [c for c in cause.courses if c.probability >= _SHOWN]
+    if len(likely) < 2:
+        return CauseShown(name, tuple(c.statement for c in likely))
+    return CauseShown(
+        f"{name}; how its size changes over the run is not certain", tuple(map(_course, likely))
+    )
+
+
+def _course(course: CourseShare) -> str:
+    return f"{_percent(course.probability)} of that: {course.statement}"
+
+
+def _in_words(name: str) -> str:
+    return name.replace("_", " ")
+
+
+def _percent(probability: float) -> str:
+    """Return a probability in per cent, never rounded to none or to certainty."""
+    if probability < _SHOWN:
+        return "less than 1 %"
+    return f"{100 * probability:.0f} %" if probability < 0.995 else "more than 99 %"

@@ -1,0 +1,55 @@
+"""The possible causes of a class, each with its probability and the ways in which its size may change."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class CourseShare:
+    """A course that a cause may have: its kind, its probability for this cause, and the cause in words."""
+
+    kind: str
+    probability: float
+    statement: str
+
+
+@dataclass(frozen=True)
+class Cause:
+    """A law that may be the cause, with whatever course.
+
+    Attributes
+    ----------
+    name : str
+    probability : float
+        That it is the cause or one of several.
+    courses : tuple of CourseShare
+        The likeliest first.
+    """
+
+    name: str
+    probability: float
+    courses: tuple[CourseShare, ...] = ()
+
+
+@dataclass(frozen=True)
+class Causes:
+    """All laws that rings and fiducials of a gauge run were asked about and leave possible.
+
+    Attributes
+    ----------
+    laws : tuple of Cause
+        The likeliest first; probabilities add up to more than 1 where several act at once.
+    outside : float
+        Probability that a cause which is none of them has a part in it.
+    """
+
+    laws: tuple[Cause, ...] = ()
+    outside: float = 0.0
+
+    def of(self, name: str) -> Cause | None:
+        """Return what is known of a law; None if it was not asked about or is not possible."""
+        return next((c for c in self.laws if c.name == name), None)
+
+
+NONE = Causes()

@@ -1,0 +1,74 @@
+"""How likely each law is the cause of what a gauge run's rings and fiducials show, and with which course."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from pipeline.arrays import Float
+from stages.diagnose.causes import NONE, Cause, Causes, CourseShare
+from stages.diagnose.effects.base import EffectModel, Shape
+from stages.diagnose.effects.nameless import Nameless
+from stages.diagnose.gauge.answer import chances
+from stages.diagnose.gauge.examine import Examined
+from stages.diagnose.gauge.judge import Verdicts
+
+_Sized = tuple[EffectModel, Shape, Float]
+
+
+def causes_of(examined: Examined) -> Causes:
+    """Return all laws that were asked about, with the probability that each is a cause.
+
+    What makes a name of the likeliest hypothesis doubtful (see `chances`) is taken off its law: causes that
+    the run cannot distinguish from it are at least as likely as it, and the rest is outside the library.
+    """
+    best, verdicts = examined.best, examined.verdicts
+    if best is None or verdicts is None:
+        return NONE
+    chance, courses = _weighed(verdicts)
+    lost_outside = 0.0
+    for term, doubted, alike in zip(best.library_terms, chances(examined), examined.unsplit, strict=False):
+        lost, law = verdicts.chance_of(term) - doubted, term.model.law
+        chance[law] -= lost
+        for name in alike:
+            chance[name] = max(chance.get(name, 0.0), doubted)
+        lost_outside = max(lost_outside, lost - len(alike) * doubted)
+    every = dict.fromkeys((*chance, *(f.name for f in examined.feasibility)))
+    laws = (Cause(law, min(max(chance.get(law, 0.0), 0.0), 1.0), courses.get(law, ())) for law in every)
+    outside = min(lost_outside + _with_patterns(verdicts), 1.0)
+    return Causes(tuple(sorted(laws, key=lambda c: -c.probability)), outside)
+
+
+def _weighed(verdicts: Verdicts) -> tuple[dict[str, float], dict[str, tuple[CourseShare, ...]]]:
+    """Return for each law the probability of all sets with it, and its courses, the likeliest first.
+
+    The words for a course are those of the likeliest set with it.
+    """
+    chance, of_course = dict[str, float](), dict[tuple[str, str], list[tuple[float, str]]]()
+    for p, members in _sets(verdicts):
+        for law in {model.law for model, *_ in members}:
+            chance[law] = chance.get(law, 0.0) + p
+        for model, shape, amplitude in members:
+            one = (p, model.statement(shape, amplitude))
+            of_course.setdefault((model.law, str(model.kind)), []).append(one)
+    shares = [
+        (law, CourseShare(kind, sum(p for p, _ in each) / chance[law], max(each)[1]))
+        for (law, kind), each in of_course.items()
+    ]
+    shares.sort(key=lambda pair: -pair[1].probability)
+    return chance, {law: tuple(c for name, c in shares if name == law) for law in chance}
+
+
+def _with_patterns(verdicts: Verdicts) -> float:
+    """Return the probability of all sets that need a pattern without a cause."""
+    each = zip(verdicts.probability, verdicts.judged, strict=True)
+    fitted = sum(float(p) for p, j in each if len(j.fit.terms) > len(j.library_terms))
+    return fitted + sum(u.probability for u in verdicts.unfitted if any(m.nameless for m in u.members))
+
+
+def _sets(verdicts: Verdicts) -> Iterator[tuple[float, list[_Sized]]]:
+    """Yield the probability of each set, fitted or not, and its effects."""
+    for p, j in zip(verdicts.probability, verdicts.judged, strict=True):
+        yield float(p), [(t.model, t.shape, t.amplitude) for t in j.library_terms]
+    for u in verdicts.unfitted:
+        each = zip(u.members, u.amplitudes, strict=True)
+        yield u.probability, [(m.model, m.shape, a) for m, a in each if not isinstance(m.model, Nameless)]
