@@ -1,4 +1,4 @@
-"""How what two measurements say of an effect is written, with its σ."""
+"""How the estimates of an effect by two measurements are written, with their σ."""
 
 from __future__ import annotations
 
@@ -12,8 +12,11 @@ from stages.diagnose.effects.library import LIBRARY
 
 
 @pytest.mark.parametrize("direction_deg", [25.0, 180.0])
-def test_size_and_direction_have_each_their_own_sigma(direction_deg: float) -> None:
-    """Against draws of the amplitudes: a direction errs by σ over size, and 180° is no edge."""
+def test_size_and_direction_each_have_the_right_sigma(direction_deg: float) -> None:
+    """Compared with draws of the amplitudes.
+
+    The error of a direction is σ over size, and 180° is not a limit.
+    """
     tilt = LIBRARY["laser_tilt"]
     at = np.radians(direction_deg)
     amplitude = 0.006 * np.array([np.cos(at), np.sin(at)])

@@ -1,4 +1,4 @@
-"""What a correction changes: radius by clock position, depths of defects, and the sentence about it."""
+"""The effect of a correction on radius by clock position and depths of defects, and its sentence."""
 
 import json
 from dataclasses import replace
@@ -28,7 +28,7 @@ def run(folder, radius, depths):
     return folder
 
 
-def test_the_radius_change_lies_at_its_clock_and_the_deepest_change_is_told(tmp_path):
+def test_the_radius_change_is_at_its_clock_position_and_the_largest_change_of_depth_is_reported(tmp_path):
     plain = np.full((len(DISTANCE), len(AZIMUTH)), 50.0)
     wider = plain + 0.2 * np.cos(AZIMUTH)
     wider[10, :5] = np.nan
@@ -42,7 +42,7 @@ def test_the_radius_change_lies_at_its_clock_and_the_deepest_change_is_told(tmp_
     assert consequence(change).startswith("Wall loss at 3 o'clock, 22 mm, was understated by 0.21 mm")
 
 
-def test_rows_of_two_runs_are_compared_with_the_nearest_one(tmp_path):
+def test_maps_of_two_runs_are_compared_at_the_nearest_rows(tmp_path):
     rising = np.repeat(50.0 + DISTANCE[:, None], len(AZIMUTH), 1)
     before, after = run(tmp_path / "a", rising, []), run(tmp_path / "b", rising, [])
     map_of_after = dict(np.load(after / "radius_map.npz"))
@@ -51,7 +51,7 @@ def test_rows_of_two_runs_are_compared_with_the_nearest_one(tmp_path):
     assert np.nanmean(geometry_change(before, after).mean_mm) == pytest.approx(0.0, abs=1e-3)
 
 
-def test_without_defects_the_radius_is_told_and_nothing_is_told_of_nothing():
+def test_without_defects_the_change_of_radius_is_reported_and_without_change_nothing():
     at_four = np.where(np.arange(12) == 4, -0.12, 0.0)
     assert "radius was overstated by 0.12 mm at 4 o'clock" in consequence(
         GeometryChange(at_four, at_four, 0.03, ())
@@ -74,7 +74,7 @@ def recording(time_s, distance_mm):
     return Recording("r", "inspection", None, frames, encoder, PipeFacts(50.0), 30.0, None, None, "key")
 
 
-def test_readings_are_put_right():
+def test_encoder_readings_are_corrected():
     time_s = np.arange(0.0, 8.0, 0.01)
     true = 20 * time_s + 3 * np.sin(time_s)
     late = np.interp(time_s - 0.05, time_s, true, left=0.0)
@@ -90,7 +90,7 @@ def test_readings_are_put_right():
     assert mended[inside] == pytest.approx(true[inside], abs=0.05)
 
 
-def test_pictures_late_by_half_an_exposure_and_late_readings_are_put_right_together():
+def test_pictures_late_by_half_an_exposure_and_late_readings_are_corrected_together():
     def way(time_s):
         return 20 * time_s + 3 * np.sin(time_s)
 
@@ -101,13 +101,13 @@ def test_pictures_late_by_half_an_exposure_and_late_readings_are_put_right_toget
         assert encoder_effects(effects) == effects
         mended = with_true_readings(read, effects).encoder.distance_mm
         assert mended[20:-20] == pytest.approx(way(time_s)[20:-20], abs=0.02)
-    # Of an exposure that no encoder shows to make pictures late nothing is put right.
+    # If no encoder shows that an exposure makes pictures late, nothing is corrected.
     read = recording(time_s, way(time_s))
     mended = with_true_readings(read, (found("motion_blur", exposure_s=0.06),)).encoder.distance_mm
     assert mended == pytest.approx(way(time_s), abs=1e-9)
 
 
-def test_residuals_fall_into_the_cells_where_they_lie():
+def test_residuals_are_binned_where_they_lie():
     azimuth = azimuths_rad()
     none = np.zeros((AZIMUTHS, 2))
     rings = RingResidual(
@@ -122,8 +122,8 @@ def test_residuals_fall_into_the_cells_where_they_lie():
     assert rings.rms_px == pytest.approx(np.sqrt(2), rel=0.02)
 
 
-def test_residuals_without_a_usable_ring_make_an_empty_picture_and_azimuths_wrap() -> None:
-    """SciPy's binning ended a diagnosis whose lit and ring frames do not overlap with an error."""
+def test_residuals_without_a_usable_ring_give_an_empty_picture_and_azimuths_wrap() -> None:
+    """When lit and ring frames did not overlap, an error of SciPy's binning ended the diagnosis."""
     azimuth, ones = np.array([1.0, 1.0, 1.0 + 2 * np.pi]), np.ones(3)
     rings = RingResidual(
         "field", np.array([7, 7, 7]), azimuth, azimuth, 3.1 * ones, np.zeros((3, 2)), np.arange(3.0), ones,

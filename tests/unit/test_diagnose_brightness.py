@@ -1,4 +1,4 @@
-"""What the brightness of the lit wall tells of the lens, and what it cannot, since LEDs differ."""
+"""What the brightness of the lit wall shows of the lens, and what it cannot show, since LEDs differ."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ SIZE, FRAMES = (640, 480), 24
 
 
 class Lit:
-    """A lit wall that falls off as cos^k θ as against the stated lights, with noise."""
+    """A lit wall whose light falls as cos^k θ relative to the stated lights, with noise."""
 
     image_size = SIZE
 
@@ -52,14 +52,14 @@ def found(falloff: float) -> tuple[bool, float]:
     return told.found, told.sizes[0].value if told.sizes else np.nan
 
 
-def test_lights_that_shine_more_evenly_than_lamberts_law_are_no_error_of_the_lens() -> None:
-    """LEDs that shine alike to all sides made a sound probe a class of five names."""
+def test_lights_wider_than_lamberts_law_are_not_an_error_of_the_lens() -> None:
+    """LEDs that shine equally to all sides made a sound probe a class of five names."""
     is_found, falloff = found(-0.8)
     assert falloff == pytest.approx(-0.8, abs=0.15)
     assert not is_found
 
 
-def test_a_lens_that_darkens_its_edge_more_than_any_light_does_is_found() -> None:
+def test_a_lens_that_darkens_its_edge_more_than_any_light_can_is_found() -> None:
     is_found, falloff = found(4.0)
     assert falloff == pytest.approx(4.0, abs=0.2)
     assert is_found

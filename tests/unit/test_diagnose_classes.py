@@ -1,4 +1,4 @@
-"""Classes of effects that one kind of recording cannot split, and what to record next."""
+"""Classes of effects that one kind of recording cannot distinguish, and what to record next."""
 
 import pytest
 
@@ -13,7 +13,7 @@ def test_an_effect_is_in_its_own_class(name):
     assert set(class_of(name)) in ({name}, *map(set, CLASSES))
 
 
-def test_classes_join_in_the_catalogues_order():
+def test_members_of_joined_classes_are_in_the_order_of_the_catalogue():
     joined = classes_of(["principal_point", "laser_cone"])
     assert set(joined) == {*CLASSES[0], *CLASSES[2]}
     assert list(joined) == [name for name in EFFECTS if name in joined]
@@ -30,7 +30,7 @@ def test_what_to_record_next_names_each_recording_once():
     )
 
 
-def test_an_effect_that_is_not_known_is_in_no_class():
+def test_an_unknown_effect_is_in_no_class():
     pair = ("laser_cone", "focal_scale")
     both = Diagnosis("", "", Verdict.CLASS, 0.0, members=pair)
     left = both.not_knowing(("focal_scale",))

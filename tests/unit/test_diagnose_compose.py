@@ -1,4 +1,4 @@
-"""Channels come to one answer: a name needs a second prediction that agrees, and a name that is known."""
+"""Channels are combined into one answer: a name needs agreement of a second, independent estimate."""
 
 from __future__ import annotations
 
@@ -25,21 +25,21 @@ from tests.travel_cases import seen as sight
 from tests.unit.wall_points import Bore, plain_probe, ring_points
 
 
-def test_what_one_recording_shows_once_is_a_class(real_probe: Probe) -> None:
+def test_one_estimate_in_one_recording_gives_a_class(real_probe: Probe) -> None:
     found = of_gauge(real_probe, estimates=(SCALE,))
     assert found.verdict is Verdict.CLASS
     assert "encoder_scale" in found.members
     assert found.effects[0].probability < 0.95
 
 
-def test_what_two_parts_of_one_recording_show_alike_is_named(real_probe: Probe) -> None:
+def test_two_agreeing_parts_of_one_recording_give_a_name(real_probe: Probe) -> None:
     found = of_gauge(real_probe, estimates=(replace(SCALE, agreements=(AGREES,)),))
     assert found.verdict is Verdict.NAMED
     assert found.effects[0].confirmed_by == (AGREES.confirmation,)
     assert 0.95 < found.effects[0].probability < 0.99
 
 
-def test_what_leaves_more_than_noise_or_may_go_otherwise_is_not_named(real_probe: Probe) -> None:
+def test_an_effect_with_a_residual_or_another_possible_course_is_not_named(real_probe: Probe) -> None:
     sure = replace(SCALE, agreements=(AGREES,))
     unsure = of_gauge(real_probe, estimates=(replace(sure, other_courses=0.2),))
     assert unsure.verdict is Verdict.CLASS
@@ -52,14 +52,14 @@ def test_what_leaves_more_than_noise_or_may_go_otherwise_is_not_named(real_probe
     assert found.effects[0].probability < 0.9
 
 
-def test_parts_that_contradict_each_other_take_the_name_away(real_probe: Probe) -> None:
+def test_parts_that_contradict_each_other_give_no_name(real_probe: Probe) -> None:
     found = of_gauge(real_probe, estimates=(replace(PLAY, agreements=(AGREES, DIFFERS)),))
     assert found.verdict is Verdict.CLASS
     assert set(found.members) == {"encoder_backlash", "time_offset"}
     assert found.effects[0].probability < 1e-6
 
 
-def test_what_both_recordings_show_alike_is_named(real_probe: Probe) -> None:
+def test_agreeing_estimates_in_both_recordings_give_a_name(real_probe: Probe) -> None:
     both = (seen(source, estimates=(SCALE,)) for source in ("field", "gauge"))
     found = answer(real_probe, *both)
     assert found.verdict is Verdict.NAMED
@@ -69,14 +69,14 @@ def test_what_both_recordings_show_alike_is_named(real_probe: Probe) -> None:
 
 
 @pytest.mark.parametrize("other", [-0.02, 0.03])
-def test_another_size_in_the_other_recording_is_no_confirmation(real_probe: Probe, other: float) -> None:
+def test_another_size_in_the_other_recording_does_not_confirm(real_probe: Probe, other: float) -> None:
     there = replace(SCALE, value=other)
     found = answer(real_probe, seen("field", estimates=(there,)), seen("gauge", estimates=(SCALE,)))
     assert found.verdict is Verdict.CLASS
     assert found.effects[0].probability < 0.1
 
 
-def test_an_effect_that_the_other_recording_would_show_and_does_not_is_not_named(real_probe: Probe) -> None:
+def test_an_effect_that_the_other_recording_should_show_but_does_not_is_not_named(real_probe: Probe) -> None:
     sure = replace(PLAY, agreements=(AGREES,))
     none = replace(PLAY, value=0.01, p_value=0.7)
     found = answer(real_probe, seen("field", estimates=(none,)), seen("gauge", estimates=(sure,)))
@@ -95,7 +95,7 @@ def test_a_rival_that_one_recording_excludes_is_excluded(real_probe: Probe) -> N
     assert both.verdict is Verdict.NAMED
 
 
-def test_a_slip_is_named_only_when_the_reading_alone_shows_it_too(real_probe: Probe) -> None:
+def test_a_slip_is_named_only_if_the_encoder_reading_alone_shows_it_too(real_probe: Probe) -> None:
     alone = of_gauge(real_probe, slips=(SLIP,))
     assert alone.verdict is Verdict.CLASS
     assert alone.members == ("encoder_slip",)
@@ -103,7 +103,7 @@ def test_a_slip_is_named_only_when_the_reading_alone_shows_it_too(real_probe: Pr
     assert again.verdict is Verdict.NAMED
 
 
-def test_what_is_sure_is_named_though_something_else_remains(real_probe: Probe) -> None:
+def test_a_sure_effect_is_named_though_a_residual_remains(real_probe: Probe) -> None:
     sure = replace(PLAY, agreements=(AGREES,))
     found = of_gauge(real_probe, estimates=(sure, SCALE))
     assert found.verdict is Verdict.PARTLY
@@ -117,7 +117,7 @@ def test_what_is_sure_is_named_though_something_else_remains(real_probe: Probe) 
     assert "encoder_scale" in found.record_next
 
 
-def test_what_is_sure_is_named_beside_what_the_library_lacks(real_probe: Probe) -> None:
+def test_a_sure_effect_is_named_beside_one_missing_from_the_library(real_probe: Probe) -> None:
     sure = replace(PLAY, agreements=(AGREES,))
     found = answer(real_probe, None, seen("gauge", estimates=(sure, SCALE)), "encoder_scale")
     assert found.verdict is Verdict.PARTLY
@@ -126,7 +126,7 @@ def test_what_is_sure_is_named_beside_what_the_library_lacks(real_probe: Probe) 
     assert found.remainder.members == ()
 
 
-def test_a_slip_of_the_gauge_run_is_not_the_inspections(real_probe: Probe) -> None:
+def test_a_slip_in_the_gauge_run_is_not_one_of_the_inspection(real_probe: Probe) -> None:
     sure = replace(SLIP, agreements=(AGREES,))
     of_both = answer(
         real_probe,
@@ -143,7 +143,7 @@ def test_a_slip_of_another_recording_confirms_nothing(real_probe: Probe) -> None
     assert found.verdict is Verdict.CLASS
 
 
-def test_what_the_library_lacks_is_seen_but_not_named(real_probe: Probe) -> None:
+def test_an_effect_missing_from_the_library_is_found_but_not_named(real_probe: Probe) -> None:
     both = (seen(source, estimates=(SCALE,)) for source in ("field", "gauge"))
     found = answer(real_probe, *both, "encoder_scale")
     assert found.verdict is Verdict.UNEXPLAINED
@@ -152,13 +152,13 @@ def test_what_the_library_lacks_is_seen_but_not_named(real_probe: Probe) -> None
     assert (found.location.channel, found.location.fixed_to) == ("motion", "pipe")
 
 
-def test_what_is_within_the_stated_uncertainty_is_nothing(real_probe: Probe) -> None:
+def test_a_deviation_within_the_stated_uncertainty_is_not_a_finding(real_probe: Probe) -> None:
     found = of_gauge(real_probe, estimates=(replace(SCALE, p_value=0.2),))
     assert found.verdict is Verdict.NOT_IDENTIFIABLE
     assert found.effects == ()
 
 
-def test_what_goes_with_speed_as_well_as_with_turning_back_is_not_placed_in_time(real_probe: Probe) -> None:
+def test_a_course_that_fits_speed_and_reversals_equally_is_not_placed_in_time(real_probe: Probe) -> None:
     doubted = replace(PLAY, alike=(("time_offset", 0.99),), agreements=(AGREES,))
     found = of_gauge(real_probe, estimates=(doubted,))
     assert found.verdict is Verdict.CLASS
@@ -189,11 +189,11 @@ def geometry(detectable_mrad: float, *suspected: str) -> Any:
         (None, False),
     ],
 )
-def test_a_sheet_that_would_be_seen_rocking_is_excluded(of: Any, excluded: bool) -> None:
+def test_a_rocking_sheet_that_rings_would_show_is_excluded(of: Any, excluded: bool) -> None:
     assert rocking_excluded(SWING, replace(seen("gauge"), geometry=cast(Any, of))) is excluded
 
 
-def test_a_swing_that_a_rocking_sheet_may_make_is_a_class(real_probe: Probe) -> None:
+def test_a_swing_that_a_rocking_sheet_may_also_cause_is_a_class(real_probe: Probe) -> None:
     found = of_gauge(real_probe, lines=(SWING,))
     assert found.verdict is Verdict.CLASS
     assert set(found.members) == {"probe_vibration", "laser_rocking"}
@@ -209,7 +209,7 @@ def test_a_swing_that_a_rocking_sheet_may_make_is_a_class(real_probe: Probe) -> 
         (("a pattern",), True, Verdict.UNEXPLAINED),
     ],
 )
-def test_what_touches_rings_without_a_pattern_is_the_doing_of_what_motion_shows(
+def test_ring_residuals_without_a_pattern_are_attributed_to_the_effect_found_in_motion(
     names: tuple[str, ...], claimed: bool, verdict: Verdict
 ) -> None:
     best = SimpleNamespace(named=False, names=names, library_terms=())
@@ -219,10 +219,13 @@ def test_what_touches_rings_without_a_pattern_is_the_doing_of_what_motion_shows(
 
 
 @pytest.mark.parametrize("slipped_in", ["field", "gauge"])
-def test_what_repeats_in_the_gauge_run_is_told_beside_a_slip_of_either_recording(
+def test_a_repeated_residual_in_the_gauge_run_is_reported_beside_a_slip_in_either_recording(
     real_probe: Probe, slipped_in: str
 ) -> None:
-    """A slip of the inspection's encoder was named, and .28 px in the gauge run, noise .13, was not told."""
+    """A slip of the inspection was named.
+
+    A residual of .28 px in the gauge run, noise .13, was not reported.
+    """
     searched = cast(Any, SimpleNamespace(by_chance=0.5))
     where = Location("ring", "camera", None)
     quality = FitQuality("px", 0.31, 0.3, 0.29, 0.284, 0.126)
@@ -242,7 +245,7 @@ def test_what_repeats_in_the_gauge_run_is_told_beside_a_slip_of_either_recording
 
 
 @pytest.mark.parametrize(("width_px", "verdict"), [(1.5, Verdict.NAMED), (9.0, Verdict.CLASS)])
-def test_a_name_needs_pictures_on_which_names_were_counted(
+def test_a_name_needs_pictures_of_a_kind_on_which_names_were_validated(
     real_probe: Probe, width_px: float, verdict: Verdict
 ) -> None:
     size = (Size("skewness", "", 1.0, 0.1),)
@@ -254,8 +257,8 @@ def test_a_name_needs_pictures_on_which_names_were_counted(
     assert bool(light.uncovered) is (verdict is Verdict.CLASS)
 
 
-def test_what_image_formation_may_show_in_the_line_is_not_told_as_improbable(real_probe: Probe) -> None:
-    """A sound probe was consistent, and "chance alone would show as much with probability 9e-8"."""
+def test_evidence_of_image_formation_in_the_line_is_not_reported_as_improbable(real_probe: Probe) -> None:
+    """A sound probe was consistent, but "chance alone would show as much with probability 9e-8"."""
     faint = finding("line_skew", 5.6, 3e-8, (Size("skewness", "", 0.1, 0.02),), "It is skewed.")
     clear = replace(faint, z=20.0)
     told = []
@@ -266,7 +269,7 @@ def test_what_image_formation_may_show_in_the_line_is_not_told_as_improbable(rea
 
 
 def rings_of_a_class(monkeypatch: pytest.MonkeyPatch, moved_px: float) -> Examined:
-    """Return rings that a drift, of a class of two names, moves by ``moved_px``."""
+    """Return rings that a drift, from a class of two names, moves by ``moved_px``."""
     monkeypatch.setattr(of_rings, "ring_shift_alone_px", lambda fit, term: term.shift_px)
     monkeypatch.setattr(of_rings, "verdict_of", lambda examined: Verdict.CLASS)
     drift = EffectFound("baseline_drift", 0.5, {}, "The baseline gets longer.", "", ())
@@ -283,7 +286,7 @@ def rings_of_a_class(monkeypatch: pytest.MonkeyPatch, moved_px: float) -> Examin
 
 
 def searched_rings() -> Any:
-    """Return rings of a 4 inch bore, 6 px for each mm of the sheet, 1.7 px wide."""
+    """Return rings of a 4 inch bore with a line 1.7 px wide; one mm of the sheet is 6 px."""
     rings = ring_points(plain_probe(), Bore(50.8), 40)
     return SimpleNamespace(
         run=SimpleNamespace(width_px=np.full(9, 1.7)),
@@ -301,10 +304,10 @@ def light(source: str, name: str, *size: Size) -> ProfileEvidence:
     ("moved_px", "sd_mm", "verdict"),
     [(0.07, 0.03, Verdict.NAMED), (0.3, 0.03, Verdict.PARTLY), (0.07, 0.002, Verdict.PARTLY)],
 )
-def test_rings_that_move_by_less_than_the_light_of_a_named_effect_is_known_to_are_no_remainder(
+def test_residuals_smaller_than_the_uncertainty_of_a_named_light_effect_are_not_reported(
     real_probe: Probe, monkeypatch: pytest.MonkeyPatch, moved_px: float, sd_mm: float, verdict: Verdict
 ) -> None:
-    """A line beside which a wall glows was "partly", with a class of 13 names for a drift of .07 px."""
+    """Beside a line with glowing wall, .07 px of drift gave the verdict "partly" and a class of 13 names."""
     rings = rings_of_a_class(monkeypatch, moved_px)
     glow = light("gauge", "subsurface", Size("transport_mm", "mm", 0.3, sd_mm))
     found = answer(real_probe, None, replace(seen("gauge"), profile=glow, geometry=rings))
@@ -325,17 +328,20 @@ def test_rings_that_move_by_less_than_the_light_of_a_named_effect_is_known_to_ar
         ("ghost_ring", (Size("relative", "", 0.02, 0.01),)),
     ],
 )
-def test_light_that_cannot_move_the_line_so_far_hides_nothing(
+def test_light_that_cannot_move_the_line_so_far_excuses_no_residual(
     real_probe: Probe, monkeypatch: pytest.MonkeyPatch, name: str, size: tuple[Size, ...]
 ) -> None:
-    """Each hid .05 px or more: its size was known to 20 %, so it was let move the line by .2 widths."""
+    """Each excused .05 px or more.
+
+    With its size known to 20 %, it was assumed to move the line by .2 widths.
+    """
     rings, seen_light = rings_of_a_class(monkeypatch, 0.05), light("gauge", name, *size)
     found = answer(real_probe, None, replace(seen("gauge"), profile=seen_light, geometry=rings))
     assert found.remainder is not None
     assert {"laser_cone", "baseline_drift"} <= set(found.remainder.members)
 
 
-def test_light_of_the_inspection_alone_hides_nothing_in_the_gauge_run(
+def test_light_in_the_inspection_alone_excuses_no_residual_of_the_gauge_run(
     real_probe: Probe, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     rings = rings_of_a_class(monkeypatch, 0.07)
@@ -355,7 +361,7 @@ def test_light_of_the_inspection_alone_hides_nothing_in_the_gauge_run(
         ("saturation", (Size("exposure_gain", "", 3.0, 2.0),), Verdict.PARTLY),
     ],
 )
-def test_what_repeats_is_light_only_where_the_light_moves_the_line_so_far(
+def test_a_repeated_residual_is_due_to_light_only_where_the_light_can_move_the_line_so_far(
     real_probe: Probe, name: str, size: tuple[Size, ...], verdict: Verdict
 ) -> None:
     """A claim without a size excused a whole width of the line: 1.4 px, with noise of .1 px."""

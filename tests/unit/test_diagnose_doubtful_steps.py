@@ -1,4 +1,7 @@
-"""A slip that may be stray pictures, and what is left of the encoder: told, and never named."""
+"""A slip that misplaced pictures may also explain, and residuals of the encoder.
+
+Reported, but never named.
+"""
 
 from __future__ import annotations
 
@@ -23,7 +26,9 @@ LEFT = LeftOver(1.36, (90, 119), (6.0, 7.93), 1e-20, 30, False)
 MAY_SLIP = replace(LEFT, where=(117, 119), stray=3, by_slip=True)
 
 
-def test_a_step_that_may_be_stray_pictures_is_told_as_both_and_never_named(real_probe: Probe) -> None:
+def test_a_step_that_misplaced_pictures_may_explain_is_reported_as_both_and_never_named(
+    real_probe: Probe,
+) -> None:
     found = of_gauge(real_probe, doubtful=(replace(DOUBTFUL, agreements=(AGREES,)),))
     assert found.verdict is Verdict.CLASS
     assert found.members == ("encoder_slip",)
@@ -35,13 +40,13 @@ def test_a_step_that_may_be_stray_pictures_is_told_as_both_and_never_named(real_
     assert found.global_p <= 1e-20
 
 
-def test_a_doubtful_step_that_chance_may_make_is_not_told(real_probe: Probe) -> None:
+def test_a_doubtful_step_that_may_be_chance_is_not_reported(real_probe: Probe) -> None:
     found = of_gauge(real_probe, doubtful=(replace(DOUBTFUL, p_value=1e-4),))
     assert found.members == ()
     assert found.identifiable == ""
 
 
-def test_doubtful_steps_of_two_recordings_are_both_told_and_bear_nothing_out(real_probe: Probe) -> None:
+def test_doubtful_steps_in_two_recordings_are_both_reported_and_confirm_nothing(real_probe: Probe) -> None:
     there = replace(DOUBTFUL, time_s=2.5, gain_mm=-1.0)
     found = answer(real_probe, seen("field", doubtful=(there,)), seen("gauge", doubtful=(DOUBTFUL,)))
     assert found.verdict is Verdict.CLASS
@@ -51,7 +56,7 @@ def test_doubtful_steps_of_two_recordings_are_both_told_and_bear_nothing_out(rea
 
 
 def test_several_doubtful_steps_of_one_recording_may_have_another_cause(real_probe: Probe) -> None:
-    """A delay that nobody knows looks like two of opposite sign where the probe turns."""
+    """A delay missing from the library looks like two steps of opposite sign where the probe turns back."""
     back = replace(DOUBTFUL, time_s=2.5, gain_mm=-2.0)
     found = of_gauge(real_probe, doubtful=(DOUBTFUL, back))
     assert found.verdict is Verdict.UNEXPLAINED
@@ -60,7 +65,7 @@ def test_several_doubtful_steps_of_one_recording_may_have_another_cause(real_pro
     assert "gains -2.00 mm" in found.identifiable
 
 
-def test_a_doubtful_step_beside_what_no_effect_explains_is_no_class_of_slips(real_probe: Probe) -> None:
+def test_a_doubtful_step_beside_an_unexplained_residual_is_not_a_class_of_slips(real_probe: Probe) -> None:
     found = of_gauge(real_probe, doubtful=(DOUBTFUL,), unexplained=LEFT)
     assert found.verdict is Verdict.UNEXPLAINED
     assert found.members == ()
@@ -71,7 +76,7 @@ def test_a_doubtful_step_beside_what_no_effect_explains_is_no_class_of_slips(rea
 
 
 def test_beside_a_doubtful_slip_a_scale_keeps_its_size_but_no_sure_name(real_probe: Probe) -> None:
-    """Three pictures at the end, placed wrongly, may be a slip; the encoder's scale is 2 % off."""
+    """Three misplaced pictures at the end may be a slip; the encoder's scale is 2 % off."""
     way, encoder = sight(np.random.default_rng(10), drift_mm=0.001), read(scale=0.02)
     distance_mm = way.distance_mm.copy()
     distance_mm[-3:] += 1.0
@@ -91,8 +96,8 @@ def test_beside_a_doubtful_slip_a_scale_keeps_its_size_but_no_sure_name(real_pro
     assert 0.3 < of_it.probability < 0.55
 
 
-def test_beside_a_doubtful_step_a_name_is_unsure_and_a_slip_of_its_own_stays(real_probe: Probe) -> None:
-    """The step is a column of the fit: what stray pictures may have done is one doubt more, and no misfit."""
+def test_beside_a_doubtful_step_a_name_is_unsure_and_a_sure_slip_is_kept(real_probe: Probe) -> None:
+    """The step is a column of the fit: the effect of misplaced pictures is one more doubt, not a bad fit."""
     elsewhere = replace(DOUBTFUL, time_s=6.0, place=90)
     sure = replace(SCALE, agreements=(AGREES,))
     both = {"doubtful": (DOUBTFUL, elsewhere)}
@@ -110,7 +115,7 @@ def test_beside_a_doubtful_step_a_name_is_unsure_and_a_slip_of_its_own_stays(rea
 
 
 @pytest.mark.parametrize("source", ["field", "gauge"])
-def test_what_no_effect_of_an_encoder_explains_has_no_name_and_takes_sure_ones_away(
+def test_a_residual_that_no_encoder_effect_explains_gets_no_name_and_makes_names_unsure(
     real_probe: Probe, source: str
 ) -> None:
     sure = (replace(SCALE, agreements=(AGREES,)),)
@@ -129,7 +134,7 @@ def test_what_no_effect_of_an_encoder_explains_has_no_name_and_takes_sure_ones_a
     assert "+1.36 mm in a way" in beside.identifiable
 
 
-def test_what_is_left_and_may_be_a_slip_is_a_class_for_who_knows_slips(real_probe: Probe) -> None:
+def test_a_residual_that_may_be_a_slip_is_a_class_if_the_library_has_slips(real_probe: Probe) -> None:
     found = of_gauge(real_probe, unexplained=MAY_SLIP)
     assert found.verdict is Verdict.CLASS
     assert found.members == ("encoder_slip",)
@@ -138,7 +143,7 @@ def test_what_is_left_and_may_be_a_slip_is_a_class_for_who_knows_slips(real_prob
     assert unknown.verdict is Verdict.UNEXPLAINED
 
 
-def test_steps_and_what_is_told_to_be_left_make_a_fit_no_noise_of_themselves() -> None:
+def test_fitted_steps_and_a_reported_residual_do_not_count_again_as_noise() -> None:
     nothing = TravelEvidence("gauge", (), (), (), (), None, ())
     assert (nothing.fits_p, nothing.least_p) == (1.0, 1.0)
     for shown in ({"unexplained": LEFT}, {"doubtful": (DOUBTFUL,)}, {"slips": (SLIP,)}):

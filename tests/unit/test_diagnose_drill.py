@@ -1,4 +1,4 @@
-"""Scores of diagnoses: each rate counts what it says, and broken files are refused."""
+"""Scores of diagnoses: each rate counts what its name says, and broken files are refused."""
 
 import json
 from collections.abc import Iterable
@@ -62,13 +62,13 @@ def test_a_finding_where_nothing_is_hidden_is_a_false_alarm():
     assert result.misnamed.count == 1
 
 
-def test_not_identifiable_is_neither_an_alarm_nor_a_detection():
+def test_not_identifiable_is_neither_a_false_alarm_nor_a_detection():
     said = Answer(verdict="not_identifiable")
     assert score([Trial("a", (), said), Trial("b", (TILT,), said)]).false_alarms.count == 0
     assert score([Trial("b", (TILT,), said)]).detected.count == 0
 
 
-def test_exact_names_classes_and_wrong_names_are_counted_apart():
+def test_exact_names_classes_and_wrong_names_are_counted_separately():
     trials = [
         Trial("a", (TILT,), named("laser_tilt")),
         Trial("b", (TILT,), classed("laser_tilt", "principal_point")),
@@ -82,7 +82,7 @@ def test_exact_names_classes_and_wrong_names_are_counted_apart():
     assert result.fixed_to_right.count == 4
 
 
-def test_half_a_pair_is_no_pair():
+def test_one_of_two_concealed_effects_does_not_count_as_both():
     trials = [
         Trial("a", (TILT, CONE), named("laser_tilt")),
         Trial("b", (TILT, CONE), named("laser_tilt", "laser_cone")),
@@ -90,7 +90,7 @@ def test_half_a_pair_is_no_pair():
     assert score(trials).pairs_named.count == 1
 
 
-def test_an_unknown_effect_is_owned_as_unknown_or_as_one_of_its_likes():
+def test_for_an_effect_left_out_unexplained_or_a_class_of_similar_ones_is_right():
     trials = [
         Trial("a", (TILT,), UNEXPLAINED, ("laser_tilt",)),
         Trial("b", (TILT,), classed("principal_point", "sensor_tilt"), ("laser_tilt",)),
@@ -101,25 +101,25 @@ def test_an_unknown_effect_is_owned_as_unknown_or_as_one_of_its_likes():
     assert result.named_exactly.of == 0
 
 
-def test_an_unknown_effect_that_no_oracle_sees_is_not_asked_about():
+def test_an_effect_left_out_that_no_oracle_could_detect_does_not_count():
     trials = [Trial("a", (TILT,), CONSISTENT, ("laser_tilt",), oracle_snr=snr) for snr in (3.0, 9.0, None)]
     assert score(trials).unknown_owned.of == 2
 
 
-def test_an_unknown_effect_that_no_oracle_sees_is_a_wrong_name_all_the_same():
+def test_a_name_for_an_effect_left_out_that_no_oracle_could_detect_is_wrong():
     trials = [Trial("a", (TILT,), named("baseline"), ("laser_tilt",), oracle_snr=snr) for snr in (3.0, 9.0)]
     result = score(trials)
     assert (result.misnamed.count, result.unknown_misnamed.count, result.unknown_misnamed.of) == (2, 2, 2)
 
 
-def test_sizes_are_judged_in_their_own_sigma():
+def test_sizes_are_compared_in_units_of_their_stated_sigma():
     close, far = named("laser_tilt", value=0.61), named("laser_tilt", value=0.65)
     result = score([Trial("a", (TILT,), close), Trial("b", (TILT,), far)])
     assert result.size_in_95.count == 1
     assert result.size_bias_sigma.value == pytest.approx(3.0)
 
 
-def test_probabilities_are_held_against_how_often_they_are_right():
+def test_probabilities_are_compared_with_how_often_they_are_right():
     trials = [Trial("a", (TILT,), named("laser_tilt", probability=0.9))] * 9
     trials += [Trial("b", (TILT,), named("baseline", probability=0.9))]
     [(mean, share)] = calibration(trials)
@@ -127,12 +127,12 @@ def test_probabilities_are_held_against_how_often_they_are_right():
     assert share.share == pytest.approx(0.9)
 
 
-def test_confusion_tells_names_from_verdicts():
+def test_the_confusion_table_separates_names_from_verdicts():
     table = confusion([Trial("a", (TILT,), UNEXPLAINED), Trial("b", (), CONSISTENT)])
     assert table == {("laser_tilt", "(unexplained)"): 1, ("nothing", "(consistent)"): 1}
 
 
-def test_what_is_removed_is_counted_above_the_noise_floor():
+def test_the_removed_part_is_counted_above_the_noise_floor():
     fit = Fit(rms_before=1, rms_after=0.1, heldout_before=0.5, heldout_after=0.1, noise_floor=0.1)
     assert heldout_removed(Answer(verdict="named", fit=fit)) == pytest.approx(1.0)
     nothing = Fit(rms_before=0.1, rms_after=0.1, heldout_before=0.1, heldout_after=0.1, noise_floor=0.1)
@@ -174,7 +174,7 @@ def feasible(answer, detectable, left=1.0):
     return answer.model_copy(update={"feasibility": (Feasibility.model_validate(entry),)})
 
 
-def test_detection_is_asked_where_an_oracle_would_be_sure():
+def test_detection_is_counted_only_where_an_oracle_would_be_sure():
     trials = [
         Trial("a", (TILT,), CONSISTENT, oracle_snr=7.9),
         Trial("b", (TILT,), CONSISTENT, oracle_snr=8.0),
@@ -186,13 +186,13 @@ def test_detection_is_asked_where_an_oracle_would_be_sure():
     assert (result.detected_any.count, result.detected_any.of) == (1, 4)
 
 
-def test_without_an_oracle_the_feasibility_of_the_answer_tells_the_snr():
+def test_without_an_oracle_the_snr_is_taken_from_the_feasibility_of_the_answer():
     assert Trial("a", (TILT,), feasible(CONSISTENT, 0.3)).snr == pytest.approx(10.0)
     assert Trial("a", (TILT, CONE), feasible(CONSISTENT, 0.3)).snr is None
     assert Trial("a", (TILT,), feasible(CONSISTENT, None)).snr is None
 
 
-def test_identifiable_is_what_stands_out_with_its_closest_rival_free():
+def test_identifiable_effects_stand_out_even_with_their_closest_rival_free():
     assert Trial("a", (TILT,), feasible(CONSISTENT, 0.3, left=0.26)).identifiable
     assert not Trial("a", (TILT,), feasible(CONSISTENT, 0.3, left=0.24)).identifiable
     assert not Trial("a", (), feasible(CONSISTENT, 0.3)).identifiable
@@ -200,7 +200,7 @@ def test_identifiable_is_what_stands_out_with_its_closest_rival_free():
     assert score(told).named_identifiable.of == 1
 
 
-def test_with_answers_of_other_cases_every_score_collapses():
+def test_with_the_answers_of_other_cases_every_score_is_bad():
     feasibility = (
         Feasibility(name="laser_tilt", detectable=0.1),
         Feasibility(name="laser_cone", detectable=0.01),
@@ -214,13 +214,13 @@ def test_with_answers_of_other_cases_every_score_collapses():
     assert swapped.contained.count == 0
 
 
-def test_a_location_counts_when_channel_anchor_and_time_are_all_right():
+def test_a_location_counts_if_channel_anchor_and_time_are_all_right():
     wrong = named("laser_tilt").model_copy(update={"location": LASER.model_copy(update={"time": "drift"})})
     result = score([Trial("a", (TILT,), named("laser_tilt")), Trial("b", (TILT,), wrong)])
     assert (result.located.count, result.channel_right.count, result.time_right.count) == (1, 2, 1)
 
 
-def test_the_table_has_every_figure_of_the_demand_once_and_names_its_count():
+def test_the_table_has_every_demanded_figure_once_with_its_count():
     rows = {row.name: row for row in figures([Trial("a", (TILT,), named("laser_tilt"), oracle_snr=20.0)])}
     assert {
         "false_alarms", "detected", "located", "named_identifiable", "contained", "misnamed", "pairs_named",
@@ -230,7 +230,7 @@ def test_the_table_has_every_figure_of_the_demand_once_and_names_its_count():
     assert rows["false_alarms"].text.startswith("False alarms where nothing is hidden: none to count")
 
 
-def test_what_is_sure_counts_as_named_and_what_is_left_as_a_class():
+def test_partly_counts_sure_effects_as_named_and_the_remainder_as_a_class():
     tilt = NamedEffect(name="laser_tilt", probability=0.99)
     left = Remainder.model_validate({"verdict": "class", "class": ["focal_scale", "laser_cone"]})
     partly = Answer(verdict="partly", effects=(tilt,), remainder=left)
@@ -242,7 +242,7 @@ def test_what_is_sure_counts_as_named_and_what_is_left_as_a_class():
     assert score([Trial("c", (), partly)]).false_alarms.count == 1
 
 
-def test_an_effect_on_pictures_alone_is_scored_without_a_channel():
+def test_an_effect_on_pictures_only_is_scored_without_a_channel():
     flicker = Trial("a", (Concealed(name="light_flicker", values=(0.1,)),), Answer(verdict="unexplained"))
     assert (score([flicker]).located.of, score([flicker]).contained.count) == (0, 0)
     named = replace(
@@ -252,7 +252,7 @@ def test_an_effect_on_pictures_alone_is_scored_without_a_channel():
     assert score([named]).size_in_95.of == 0
 
 
-def test_sizes_of_a_law_that_comes_twice_are_compared_with_their_own():
+def test_sizes_of_a_law_that_occurs_twice_are_compared_with_the_right_ones():
     def waves(amplitude, order):
         return Concealed(name="sheet_waviness", values=(amplitude, order, 0.0))
 
@@ -263,11 +263,11 @@ def test_sizes_of_a_law_that_comes_twice_are_compared_with_their_own():
     answer = Answer(verdict="named", effects=(told(0.52, 3), told(2.01, 2)))
     trial = Trial("a", (waves(2.0, 2), waves(0.5, 3), TILT), answer)
     assert sorted(size_errors(trial)) == pytest.approx([0.1, 0.2])
-    # A size is compared with one truth only, however near it is to that of a second.
+    # Each size is compared with one truth only, however near it is to a second.
     one = Trial("b", (waves(2.0, 3), waves(0.5, 3)), Answer(verdict="named", effects=(told(0.5, 3),) * 2))
     assert sorted(map(abs, size_errors(one))) == pytest.approx([0.0, 15.0])
     assert (one.exact, one.misnamed) == (True, False)
-    # Waves of another order, or once too often, are a wrong name, though the law is concealed.
+    # Waves of another order, or one too many, are a wrong name, though the law is concealed.
     for wrong in ((told(0.5, 3), told(2.0, 4)), (told(0.5, 3), told(0.5, 3))):
         trial = Trial("c", (waves(2.0, 2), waves(0.5, 3)), Answer(verdict="named", effects=wrong))
         assert (trial.exact, trial.misnamed) == (False, True)

@@ -1,4 +1,4 @@
-"""The library: what it covers, what each effect leaves alone, linearity, words."""
+"""The library of effects: coverage, quantities that an effect must not change, linearity, sentences."""
 
 from dataclasses import replace
 
@@ -25,7 +25,7 @@ from stages.diagnose.effects.library import (
 from stages.diagnose.effects.nameless import GENERIC, STEADY, Moves, PatternInCourse
 from tests.unit.wall_points import Bore, plain_probe, ring_points, texture_points
 
-# What a position or reading effect leaves alone.
+# What an effect on positions or readings must not change.
 LEAVES_TEXTURE = {
     "laser_tilt", "laser_cone", "baseline", "beam_decentre", "sheet_waviness", "laser_rocking",
     "baseline_drift", "pixel_locking", "albedo_bias", "subsurface", "line_skew", "vignetting",
@@ -70,7 +70,7 @@ EVERY = [*LIBRARY.values(), *GENERIC]
 NAMES = [m.name for m in EVERY]
 
 
-def test_every_effect_of_the_catalogue_is_predicted_or_said_not_to_be():
+def test_every_effect_of_the_catalogue_is_predicted_or_listed_as_not_predictable():
     assert set(LIBRARY) | set(NOT_PREDICTED) == set(EFFECTS)
     assert not set(LIBRARY) & set(NOT_PREDICTED)
 
@@ -80,7 +80,7 @@ def test_names_are_unique():
 
 
 @pytest.mark.parametrize("name", LIBRARY)
-def test_each_effect_moves_what_it_should_and_leaves_the_rest_alone(name):
+def test_each_effect_moves_what_it_should_and_nothing_else(name):
     model = LIBRARY[name]
     size, shape = size_of(model), shape_of(model)
     ring = np.abs(ring_shift_px(model, line(), shape, size)).max()
@@ -92,7 +92,7 @@ def test_each_effect_moves_what_it_should_and_leaves_the_rest_alone(name):
 
 
 @pytest.mark.parametrize("model", EVERY, ids=NAMES)
-def test_no_amplitude_is_no_effect(model):
+def test_amplitude_zero_has_no_effect(model):
     shape, none = shape_of(model), np.zeros(len(model.amplitudes))
     assert np.abs(ring_shift_px(model, line(), shape, none)).max() < 1e-9
     assert np.abs(texture_shift_px(model, texture(), shape, none)).max() < 1e-9
@@ -116,7 +116,7 @@ def test_reading_columns_are_the_derivative_of_the_reading(name):
     small = size_of(model, 1e-2)
     found = reading_columns(model, travel(), shape_of(model)) @ small
     expected = model.reading_shift_mm(travel(), shape_of(model), small)
-    # Play is taken up over the play's own length, so that frames just after a reversal are not linear in it.
+    # Play is taken up over its own length, so that frames just after a reversal are not linear in it.
     assert np.median(np.abs(found - expected)) < 0.01 * np.abs(expected).max()
 
 
@@ -131,7 +131,7 @@ def test_amplitudes_add_like_vectors(name):
 
 
 @pytest.mark.parametrize("name", LIBRARY)
-def test_quantities_are_those_of_the_catalogue_within_its_range_and_in_the_words(name):
+def test_quantities_are_those_of_the_catalogue_within_its_range_and_appear_in_the_sentence(name):
     model = LIBRARY[name]
     shape, size = shape_of(model), size_of(model)
     found = model.quantities(shape, size)
@@ -142,7 +142,7 @@ def test_quantities_are_those_of_the_catalogue_within_its_range_and_in_the_words
     assert all(quantity in model.equation(shape, size) for quantity in found)
 
 
-def test_a_negative_size_is_told_by_the_other_word():
+def test_a_negative_size_gets_the_opposite_word():
     short = LIBRARY["encoder_scale"].statement((), np.array([-0.0125]))
     assert short == "The encoder reads 1.250% too little of every distance."
     assert "too much" in LIBRARY["encoder_scale"].statement((), np.array([0.0125]))
@@ -177,7 +177,7 @@ def test_the_direction_is_that_of_a_crest(name, shape, amplitude, direction):
     assert moved[crest] == pytest.approx(moved.max(), rel=1e-3)
 
 
-def test_rocking_is_told_by_its_longer_axis():
+def test_rocking_is_described_by_its_longer_axis():
     along = np.array([np.cos(0.5), np.sin(0.5)])
     amplitude = np.concatenate([3.0 * along, 4.0 * along])
     found = LIBRARY["laser_rocking"].quantities((5.3,), amplitude)
@@ -186,27 +186,27 @@ def test_rocking_is_told_by_its_longer_axis():
     assert found["frequency_hz"] == 5.3
 
 
-def test_rocking_frequencies_reach_half_the_frame_rate_no_farther_apart_than_the_recording_resolves():
+def test_rocking_frequencies_reach_half_the_frame_rate_in_steps_that_the_recording_resolves():
     frequencies = np.array(LIBRARY["laser_rocking"].shapes(8.0, 30.0))[:, 0]
     assert frequencies[0] <= 1 / 8.0
     assert frequencies[-1] == pytest.approx(15.0, abs=1 / 16)
     assert np.diff(frequencies).max() <= 0.5 / 8.0 + 1e-9
 
 
-def test_drifts_start_at_nothing_and_end_at_their_size():
+def test_drifts_start_at_zero_and_end_at_their_size():
     model = LIBRARY["baseline_drift"]
     points = replace(line(3), time_s=np.array([0.0, 2.0, 1e4]))
     course = model.sheet_shift_mm(points, (2.0,), np.array([0.1]))
     assert course == pytest.approx([0.0, 0.1 * (1 - np.exp(-1)), 0.1])
 
 
-def test_a_rolling_shutter_shows_lower_rows_later():
+def test_with_a_rolling_shutter_lower_rows_are_later():
     points = texture()
     shift = LIBRARY["rolling_shutter"].image_shift_px(points, (), np.array([0.02]))
     assert shift[:, 0] == pytest.approx(0.02 * (points.uv[:, 1] - 599.5) / 1200 * 30.0)
 
 
-def test_the_encoder_slips_lags_and_waits_at_a_reversal():
+def test_encoder_slip_delay_and_play_change_the_reading_as_defined():
     log = travel()
     slip = LIBRARY["encoder_slip"].reading_shift_mm(log, (4.0,), np.array([3.0]))
     assert set(slip[log.time_s <= 4.0]) == {0.0}
@@ -221,19 +221,19 @@ def test_the_encoder_slips_lags_and_waits_at_a_reversal():
     assert np.ptp(reading[waiting]) == pytest.approx(0.0, abs=1e-9)
 
 
-def test_nothing_is_predicted_from_what_is_not_known_of_the_wall():
+def test_without_known_wall_nothing_is_predicted():
     points = ring_points(known_probe(), BORE)
     assert not ring_shift_px(LIBRARY["albedo_bias"], points, (), np.array([0.09])).any()
 
 
-def test_ovality_stays_with_the_pipe_while_the_camera_rolls():
+def test_ovality_stays_with_the_pipe_when_the_camera_rolls():
     points = line()
     rolled = replace(points, wall_azimuth_rad=points.azimuth_rad + 0.7)
     shift = LIBRARY["ovality"].wall_shift_mm(rolled, (), np.array([0.1, 0.0]))
     assert shift == pytest.approx(0.1 * np.cos(2 * (points.azimuth_rad + 0.7)))
 
 
-def test_the_library_without_some_knows_the_others():
+def test_a_reduced_library_has_the_remaining_effects():
     fewer = without(["laser_tilt", "ghost_ring"])
     assert set(LIBRARY) - set(fewer) == {"laser_tilt"}
     with pytest.raises(InputError):
@@ -246,7 +246,7 @@ def test_a_skewed_line_moves_rings_as_a_longer_baseline_does():
     assert skewed == pytest.approx(-points.probe.laser.line_sigma_mm * longer)
 
 
-def test_vignetting_draws_the_line_inward_by_its_variance():
+def test_vignetting_moves_the_line_inward_in_proportion_to_its_variance():
     points = ring_points(plain_probe(), Bore(50.8))
     sigma_px = 0.15 * 50.8 / (22.0**2 + 50.8**2) * 360.0
     shift = LIBRARY["vignetting"].line_shift_px(points, (), np.array([2.0]))
@@ -254,14 +254,14 @@ def test_vignetting_draws_the_line_inward_by_its_variance():
 
 
 def generic_columns(points, wanted, of_line):
-    """Columns of the generic terms of the line or of the image, constant and linear in time."""
+    """Return columns of the generic terms of the line or of the image, constant and linear in time."""
     terms = [term for term in GENERIC if (term.moves is Moves.LINE) is of_line]
     growing = [(PatternInCourse(term, CourseKind.RAMP), (10.0,)) for term in terms]
     each = [*((term, STEADY) for term in terms), *growing]
     return np.concatenate([wanted(model, points, shape) for model, shape in each], axis=-1)
 
 
-def test_the_generic_basis_mimics_a_tilted_sheet_and_not_all_there_is():
+def test_generic_terms_can_mimic_a_tilted_sheet_but_not_everything():
     rings = [
         ring_points(plain_probe(), Bore(r), 90, time_s=t) for r, t in ((35.0, 1.0), (42.0, 4.0), (50.8, 9.0))
     ]
@@ -278,7 +278,7 @@ def test_the_generic_basis_mimics_a_tilted_sheet_and_not_all_there_is():
 
 
 @pytest.mark.parametrize("name", ["principal_point", "focal_scale", "radial_distortion", "sensor_tilt"])
-def test_the_generic_basis_mimics_a_wrong_lens_on_texture(name):
+def test_generic_terms_can_mimic_a_wrong_lens_on_texture(name):
     walls = [texture_points(plain_probe(), Bore(42.0), ahead) for ahead in (10.0, 25.0, 45.0, 80.0)]
     basis = np.concatenate([generic_columns(wall, texture_columns, of_line=False) for wall in walls]).reshape(
         -1, 144

@@ -1,8 +1,8 @@
-"""Predictions against whole instruments: each line found by bisection with the true camera, glass and sheet.
+"""Predictions against exact instruments: each line found by bisection with the true camera, glass and sheet.
 
-The bore is off-centre and yawed as in a gauge run. What is allowed is what `ring_shift_px` leaves out: third
-order, and second order of shifts across the radius that change along the ring. True instruments are made of a
-true sheet, or of sight lines: where the ray of a pixel starts and heads in the end.
+The bore is off-centre and yawed as in a gauge run. The allowed errors are those that `ring_shift_px`
+neglects: third order, and second order of shifts across the radius that change along the ring. True
+instruments consist of a true sheet, or of true sight lines: start and final direction of the ray of a pixel.
 """
 
 from dataclasses import replace
@@ -62,7 +62,7 @@ def camera(focal=(FOCAL_PX, FOCAL_PX), centre=CENTRE, k1=0.0):
 
 
 def decentred(px, py):
-    """Brown's decentring inverted by fixed point."""
+    """Apply Brown's decentring, inverted by fixed-point iteration."""
 
     def sight(uv):
         found = (uv - np.array(CENTRE)) / FOCAL_PX
@@ -87,7 +87,7 @@ def moving_pupil(shift_mm):
 
 
 def tubes(*walls):
-    """Rays through cylinders (axis, radius, index before over after, where the axis passes) in turn."""
+    """Refract rays in turn at cylinders (axis, radius, index before over after, offset of the axis)."""
 
     def sight(uv):
         place, ray = plain(uv)
@@ -99,7 +99,7 @@ def tubes(*walls):
 
 
 def dome(*centre):
-    """A dome whose radii multiply to 14² and whose glass is 2 mm thick."""
+    """Return sight lines through a dome whose radii multiply to 14² and whose glass is 2 mm thick."""
 
     def sight(uv):
         place, ray = through_sphere(*plain(uv), np.array(centre), 13.036, 1 / GLASS)
@@ -109,7 +109,10 @@ def dome(*centre):
 
 
 def leaning(tilt_deg, toward_deg):
-    """Axis of a tube whose outward normal leans forward toward an azimuth: it leans away from there."""
+    """Return the axis of a tube whose outward normal leans forward toward an azimuth.
+
+    The axis leans away from it.
+    """
     return np.array([*xy(-np.tan(np.radians(tilt_deg)), toward_deg), 1.0])
 
 
@@ -150,7 +153,7 @@ def outward_shift(triangulate, bore, points):
 
 @pytest.mark.parametrize("bore", BORES.values(), ids=list(BORES))
 @pytest.mark.parametrize("name", SHEETS)
-def test_the_ring_of_another_sheet_is_found_where_it_is_predicted(name, bore):
+def test_the_ring_of_another_sheet_is_where_it_is_predicted(name, bore):
     shape, amplitude, triangulate, allowed = SHEETS[name]
     points = ring_points(plain_probe(), bore)
     exact = outward_shift(triangulate, bore, points)
@@ -162,7 +165,7 @@ def test_the_ring_of_another_sheet_is_found_where_it_is_predicted(name, bore):
 
 @pytest.mark.parametrize("bore", BORES.values(), ids=list(BORES))
 @pytest.mark.parametrize("name", SIGHTS)
-def test_the_ring_through_another_camera_or_window_is_found_where_it_is_predicted(name, bore):
+def test_the_ring_through_another_camera_or_window_is_where_it_is_predicted(name, bore):
     amplitude, sight, allowed = SIGHTS[name]
     points = ring_points(plain_probe(), bore)
     exact = outward_shift(on_plane(sight), bore, points)
@@ -172,13 +175,13 @@ def test_the_ring_through_another_camera_or_window_is_found_where_it_is_predicte
 
 @pytest.mark.parametrize("distance_mm", [15.0, 40.0, 90.0])
 @pytest.mark.parametrize("name", SIGHTS)
-def test_texture_through_another_camera_or_window_is_found_where_it_is_predicted(name, distance_mm):
+def test_texture_through_another_camera_or_window_is_where_it_is_predicted(name, distance_mm):
     amplitude, sight, _ = SIGHTS[name]
     points = texture_points(plain_probe(), Bore(50.8), distance_mm)
     shift = texture_shift_px(LIBRARY[name], points, (), np.array(amplitude))
     missed = on_plane(sight, distance_mm)(points.uv + shift) - points.xyz_c
     per_px = np.hypot(50.8, distance_mm) / FOCAL_PX
-    # The thin dome leaves out half a per cent of its own shift.
+    # The thin dome neglects half a per cent of its own shift.
     allowed = 8e-3 if name.startswith("dome") else 1e-6
     assert np.abs(shift).max() > 50 * allowed
     assert np.linalg.norm(missed, axis=1).max() < 3 * allowed * per_px
@@ -203,7 +206,7 @@ def test_a_faulty_tube_shifts_the_ring_against_the_straight_one_as_predicted(nam
     points = ring_points(plain_probe(), bore)
     faulty, straight = (outward_shift(on_plane(tube), bore, points) for tube in (sight, STRAIGHT))
     predicted = ring_shift_px(LIBRARY[name], points, shape, np.array(amplitude))
-    # The prediction starts from rays without glass, which 2 mm of it bend by a few per cent.
+    # The prediction starts from rays without glass, which 2 mm of glass refract by a few per cent.
     assert predicted == pytest.approx(faulty - straight, abs=0.06 * np.abs(faulty - straight).max())
 
 
@@ -213,7 +216,7 @@ def test_a_faulty_tube_shifts_texture_along_and_around_as_predicted(name):
     points = texture_points(plain_probe(), Bore(50.8), 40.0)
     shift = texture_shift_px(LIBRARY[name], points, shape, np.array(amplitude))
     moved, still = on_plane(sight, 40.0)(points.uv), on_plane(STRAIGHT, 40.0)(points.uv)
-    # What a pixel sees moves by the opposite of what the image of a point does.
+    # The wall point that a pixel sees moves by the opposite of the image of a fixed point.
     by_point = plain_probe().camera.project_jacobian(still).by_point
     expected = -np.einsum("mij,mj->mi", by_point, moved - still)
     assert shift == pytest.approx(expected, abs=0.04 * np.abs(expected).max())
@@ -231,8 +234,8 @@ def test_a_tilted_tube_displaces_the_laser_as_predicted():
     assert predicted[np.argmin(np.abs(points.azimuth_rad - np.radians(40)))] > 0.01
 
 
-def test_a_tilted_sensor_goes_with_the_angle_however_a_lens_maps_it():
-    """The simulator let it go with the image radius, so that it came out 4 to 8 % too small."""
+def test_a_tilted_sensor_acts_on_the_angle_whatever_the_projection_of_the_lens():
+    """In the simulator it acted on the image radius, so that it was 4 to 8 % too small."""
     model = KannalaBrandt((1600, 1200), (365.0, 365.0), (800.5, 598.0), (-0.0115, 0.0015, -0.00085, 0.0))
     camera, p = TrueCamera(model, decentring=(1e-3, 5e-4)), np.array([1e-3, 5e-4])
     theta, psi = np.linspace(0.2, 1.4, 60), np.linspace(0.0, 9.0, 60)

@@ -25,7 +25,7 @@ def displacement(i):
 
 
 def glass_loss(r):
-    """1 − tan i′/tan i of a tube met at tan i = l/r."""
+    """Return 1 − tan i′/tan i of a tube at tan i = l/r."""
     i = np.arctan2(L, r)
     return 1 - np.tan(np.arcsin(np.sin(i) / GLASS)) / np.tan(i)
 
@@ -68,7 +68,7 @@ CASES = {
 
 
 def radius_error(name, shape, amplitude, radius_mm):
-    """(360,) apparent − true radius in mm, and the azimuths."""
+    """Return apparent − true radius (360,) in mm, and the azimuths."""
     model = LIBRARY[name]
     points = ring_points(plain_probe(), Bore(radius_mm))
     full = np.array([*amplitude, *np.zeros(len(model.amplitudes) - len(amplitude))])
@@ -78,7 +78,7 @@ def radius_error(name, shape, amplitude, radius_mm):
 
 
 def harmonic_part(error, azimuth, order):
-    """Cosine part of one harmonic, and the rms of all else."""
+    """Return the cosine part of one harmonic, and the rms of all else."""
     wave = np.cos(order * azimuth)
     part = np.mean(error * wave) * (2 if order else 1)
     return part, np.std(error - part * wave)
@@ -90,7 +90,7 @@ def test_the_radius_error_follows_the_closed_form_law(name, radius_mm):
     shape, amplitude, law = CASES[name]
     error, azimuth = radius_error(name, shape, amplitude, radius_mm)
     part, rest = harmonic_part(error, azimuth, EFFECTS[name].harmonic or 0)
-    # The cosine of the rocking's amplitudes is zero at 5 s and 0.05 Hz: the sine is one.
+    # At 5 s and 0.05 Hz the cosine of the rocking is zero and the sine is one.
     assert part == pytest.approx(law(radius_mm, amplitude[0]), rel=2e-3)
     assert rest < 1e-3 * abs(part)
 
@@ -115,12 +115,12 @@ def test_a_typical_size_costs_what_the_catalogue_says(name):
     shape = CASES[name][0]
     error, azimuth = radius_error(name, shape, [effect.quantities[0].typical], 50.8)
     part, _ = harmonic_part(error, azimuth, effect.harmonic or 0)
-    # The catalogue gives magnitudes for most (signs are tested above), rounded to a micrometre,
+    # The catalogue mostly gives magnitudes (signs are tested above), rounded to a micrometre,
     # to first order: 2 mm of glass and 0.5 mm of pupil shift are no longer small.
     assert abs(part) == pytest.approx(abs(effect.typical_mm), rel=0.04, abs=6e-4)
 
 
-def test_a_large_tilt_costs_more_on_the_side_where_the_denominator_is_smaller():
+def test_a_large_tilt_has_a_larger_error_on_the_side_where_the_denominator_is_smaller():
     error, azimuth = radius_error("laser_tilt", (), [0.6], 50.8)
     lean = (50.8 / L) * np.tan(np.radians(0.6)) * np.cos(azimuth)
     assert error == pytest.approx(-50.8 * lean / (1 + lean), abs=1e-6)
@@ -128,7 +128,7 @@ def test_a_large_tilt_costs_more_on_the_side_where_the_denominator_is_smaller():
     assert np.abs(error[np.argmin(np.abs(azimuth))]) == pytest.approx(1.20, abs=0.005)
 
 
-def test_water_around_a_sealed_probe_follows_snells_law_not_the_first_order():
+def test_water_around_a_sealed_probe_follows_the_exact_snells_law_not_first_order():
     error, _ = radius_error("outside_index", (), [0.333], 50.8)
     rise = np.linspace(0.01, 3.0, 300001)
     outside = np.tan(np.arcsin(np.sin(np.arctan(rise)) / 1.333))
@@ -138,7 +138,7 @@ def test_water_around_a_sealed_probe_follows_snells_law_not_the_first_order():
     assert abs(error.mean() - first_order) > 1.0
 
 
-def test_a_tilted_tube_that_the_laser_crosses_too_costs_less_than_one_before_the_camera_alone():
+def test_a_tilted_tube_before_camera_and_laser_has_a_smaller_effect_than_one_before_the_camera_alone():
     camera_alone, azimuth = radius_error("tube_tilt", (0.0,), [0.1], 50.8)
     both, _ = radius_error("tube_tilt", (1.0,), [0.1], 50.8)
     sheet_side = -(50.8 / L) * 2.0 * np.radians(0.1) * (1 - 1 / GLASS)

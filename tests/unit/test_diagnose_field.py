@@ -1,4 +1,4 @@
-"""A field alone gives a class, never a name; against the gauge it bears out or contradicts."""
+"""An inspection alone gives a class, never a name; beside a gauge run it confirms or contradicts."""
 
 from dataclasses import dataclass, replace
 from types import SimpleNamespace
@@ -46,7 +46,7 @@ SIGMA = 0.1
 
 
 def field_with(signal):
-    """Evidence of one diameter: tilt and principal point make the same pattern, a cone makes another."""
+    """Evidence of one diameter: tilt and principal point have the same pattern, a cone has another."""
     names = ("laser_tilt", "principal_point", "laser_cone")
     patterns = np.concatenate([2.0 * WAVE, 0.4 * WAVE, 2.0 * CONE], 1)
     columns = [Column(n, a.name) for n in names for a in LIBRARY[n].amplitudes]
@@ -57,7 +57,7 @@ def field_with(signal):
     return FieldEvidence(None, whole)
 
 
-def test_the_scale_of_the_way_is_no_surer_than_the_place_of_the_line():
+def test_the_scale_of_distance_is_no_surer_than_the_place_of_the_line():
     probe = stated_probe()
     radius_mm, baseline_mm = 50.8, probe.laser.baseline_mm
     xyz_c = np.stack([radius_mm * np.cos(AZIMUTH), radius_mm * np.sin(AZIMUTH), baseline_mm + 0 * AZIMUTH], 1)
@@ -71,7 +71,7 @@ def test_the_scale_of_the_way_is_no_surer_than_the_place_of_the_line():
     assert scale_by_line(SimpleNamespace(uv=np.zeros((0, 2)))) == 0.0
 
 
-def test_noise_shows_nothing():
+def test_noise_gives_no_finding():
     random = np.random.default_rng(0)
     for _ in range(30):
         answer = field_answer(field_with(SIGMA * random.standard_normal(400)), LIBRARY, NOTHING_STATED)
@@ -79,7 +79,7 @@ def test_noise_shows_nothing():
         assert answer.global_p > 1e-3
 
 
-def test_a_tilt_is_a_class_with_its_sizes_and_a_gauge_run_is_asked_for():
+def test_a_tilt_is_a_class_with_its_sizes_and_a_gauge_run_is_recommended():
     noise = SIGMA * np.random.default_rng(1).standard_normal(400)
     field = field_with(2.0 * WAVE @ [0.3, 0.4] + noise)
     answer = field_answer(field, LIBRARY, NOTHING_STATED)
@@ -99,7 +99,7 @@ def test_a_tilt_is_a_class_with_its_sizes_and_a_gauge_run_is_asked_for():
 
 
 def field_with_way(tilt, read_short):
-    """Evidence of a way between pictures and encoder, which a baseline changes as well, and of a tilt."""
+    """Evidence of a difference between pictures and encoder, which a baseline also causes, and of a tilt."""
     way, no_ring, no_way = np.linspace(0.0, 200.0, 100), np.zeros((400, 1)), np.zeros((100, 2))
     of_encoder, of_baseline = np.r_[no_ring, way[:, None]], np.r_[no_ring, -0.02 * way[:, None]]
     patterns = np.concatenate([of_encoder, of_baseline, np.r_[2.0 * WAVE, no_way]], axis=1)
@@ -113,7 +113,7 @@ def field_with_way(tilt, read_short):
 
 
 def seen_with_way(tilt, read_short):
-    """An inspection whose own way says so much of the encoder, by a sheet where it is stated to be."""
+    """An inspection whose scale against the encoder is so far off, with the sheet where it is stated."""
     own = SimpleNamespace(value=read_short, size_sigma=0.001)
     travel = SimpleNamespace(estimate=lambda name: own if name == "encoder_scale" else None)
     return SimpleNamespace(field=field_with_way(tilt, read_short), travel=travel)
@@ -125,7 +125,7 @@ def shown_by(seen, known):
     return field_answer(field, LIBRARY, believed).shown
 
 
-def test_an_encoder_that_is_known_to_count_short_is_not_taken_for_a_baseline():
+def test_an_encoder_known_to_count_short_is_not_taken_for_a_baseline():
     short = Value(-0.012, 0.0007)
     assert [s.model.name for s in shown_by(seen_with_way(0.0, -0.012), None)] == ["baseline"]
     assert shown_by(seen_with_way(0.0, -0.012), short) == ()
@@ -134,11 +134,11 @@ def test_an_encoder_that_is_known_to_count_short_is_not_taken_for_a_baseline():
     assert np.linalg.norm(tilted.score.amplitude) == pytest.approx(0.5, rel=0.05)
 
 
-def test_an_encoder_that_counted_short_in_the_gauge_run_alone_says_nothing_of_the_inspection():
+def test_an_encoder_that_counted_short_in_the_gauge_run_says_nothing_of_the_inspection():
     assert shown_by(seen_with_way(0.0, 0.0), Value(-0.012, 0.0007)) == ()
 
 
-def test_only_a_name_that_is_sure_makes_an_encoder_known():
+def test_only_a_sure_name_makes_an_encoder_error_known():
     effect = EffectFound("encoder_scale", 0.99, {"relative": Value(-0.012, 0.0007)}, "It counts short.", "")
     sure = Diagnosis("field", "gauge", Verdict.NAMED, 1e-9, effects=(effect,))
     assert _scale_named(sure) == effect.parameters["relative"]
@@ -146,11 +146,11 @@ def test_only_a_name_that_is_sure_makes_an_encoder_known():
 
 
 def with_this_encoder(known, monkeypatch):
-    """Return for which encoder's share what a tilted inspection shows was doubted."""
+    """Return the encoder error with which the effects of a tilted inspection were tested for doubt."""
     shares, seen = [], seen_with_way(0.5, -0.012)
     monkeypatch.setattr(answer, "why_unexplained", lambda field, cause: shares.append(field.encoder_scale))
     monkeypatch.setattr(answer, "location_in_field", lambda field, shown: None)
-    # Whose run it is makes no difference: nobody asks it.
+    # Which recording it is makes no difference, since it is not looked at.
     seen.field = replace(seen.field, run=SimpleNamespace())
     effect = EffectFound("encoder_scale", 0.99, {"relative": known}, "It counts short.", "")
     found = Diagnosis("field", "gauge", Verdict.NAMED, 1e-9, effects=(effect,))
@@ -158,14 +158,14 @@ def with_this_encoder(known, monkeypatch):
     return shares
 
 
-def test_what_an_inspection_shows_is_doubted_beside_an_encoder_that_is_known(monkeypatch):
+def test_effects_in_an_inspection_are_tested_with_the_known_encoder_error(monkeypatch):
     (share,) = with_this_encoder(Value(-0.012, 0.0007), monkeypatch)
     assert share == pytest.approx(-0.012 / (1 - 0.012))
     assert with_this_encoder(Value(0.03, 0.0007), monkeypatch) == [0.0]
 
 
-def test_rings_are_held_against_texture_with_the_encoder_as_it_is_known(monkeypatch):
-    """The step back to the stated instrument leads to the encoder's share, not to a right encoder."""
+def test_rings_are_compared_with_texture_with_the_known_encoder_error(monkeypatch):
+    """The step back to the stated instrument leads to the encoder's known error, not to a right encoder."""
     asked, row = [], Rows(np.zeros((1, 1), np.int64), np.zeros((1, 1, 7)), np.zeros((1, 3)), *np.ones((2, 1)))
     names = (Column(INSTRUMENT, "cx"), ENCODER_SCALE, Column("laser_cone", "cone_deg"))
     system = FieldSystem((row,), cast(Any, None), names, np.array([0.3, 0.0, 0.0]), np.ones(3))
@@ -188,7 +188,7 @@ def met(agrees):
 
 
 @pytest.mark.parametrize(("agrees", "verdict"), [(True, Verdict.NAMED), (False, Verdict.CLASS)])
-def test_the_field_bears_a_name_out_or_takes_it_back(agrees, verdict):
+def test_the_field_confirms_a_name_or_removes_it(agrees, verdict):
     tilt = EffectFound("laser_tilt", 0.99, {"tilt_deg": Value(0.6, 0.01)}, "A tilt.", "")
     named = Diagnosis("field", "gauge", Verdict.NAMED, 1e-9, effects=(tilt,))
     found = _met(named, {"laser_tilt": met(agrees)})
@@ -197,7 +197,7 @@ def test_the_field_bears_a_name_out_or_takes_it_back(agrees, verdict):
     assert bool(found.record_next) is not agrees
 
 
-def test_a_field_that_cannot_tell_says_so_and_changes_no_verdict():
+def test_a_field_that_cannot_show_an_effect_says_so_and_changes_no_verdict():
     index = EffectFound("outside_index", 0.99, {}, "", "")
     named = Diagnosis("field", "gauge", Verdict.NAMED, 1e-9, effects=(index,))
     found = _met(named, {"outside_index": None})
@@ -205,7 +205,7 @@ def test_a_field_that_cannot_tell_says_so_and_changes_no_verdict():
     assert "too little of outside_index" in found.shortcomings[0]
 
 
-def test_an_inspection_that_was_not_asked_about_a_swing_does_not_show_too_little_of_it(monkeypatch):
+def test_no_shortcoming_is_reported_for_a_swing_that_was_not_searched_in_the_inspection(monkeypatch):
     rocking = Term(LIBRARY["laser_rocking"], (1.2,), np.ones(4))
     glass = Term(LIBRARY["outside_index"], (), np.ones(1))
     best = SimpleNamespace(fit=SimpleNamespace(terms=(rocking, glass)))
@@ -230,8 +230,8 @@ def evidence_of(model, shape, size):
 @pytest.mark.parametrize(
     ("name", "shape", "told"), [("baseline", (), True), ("baseline_drift", (4.0,), False)]
 )
-def test_an_inspection_contradicts_what_stays_and_no_drift_of_the_gauge_run(name, shape, told):
-    """A probe that is warm from the gauge run does not drift again in the inspection that follows."""
+def test_an_inspection_contradicts_constant_effects_but_no_drift_of_the_gauge_run(name, shape, told):
+    """A probe that has warmed up in the gauge run does not drift again in the inspection that follows."""
     model, size = LIBRARY[name], 0.2
     fitted = SimpleNamespace(terms=(Term(model, shape, np.array([size])),))
     best = SimpleNamespace(fit=fitted, evidence=evidence_of(model, shape, size))
@@ -251,13 +251,13 @@ def seen_in_the_field(law, size):
     return Scored(LIBRARY[law], (), Score(amplitude, covariance, 400.0, 1e-80, 400.0), 1)
 
 
-def test_the_gauge_refutes_what_is_fixed_to_the_probe_and_acts_in_every_recording(sound_gauge):
+def test_the_gauge_refutes_effects_that_act_in_every_recording(sound_gauge):
     shown = [seen_in_the_field(*each) for each in (("focal_scale", 0.03), ("dome_axial", 8.0))]
     stated = stated_belief(sound_gauge.searched.nothing.state.stated)
     assert not_refuted(shown, sound_gauge, stated) == ()
 
 
-def test_the_gauge_has_no_say_in_what_acts_in_a_pipe_or_is_too_small_for_it(sound_gauge):
+def test_the_gauge_does_not_refute_effects_of_a_pipe_or_ones_too_small_for_it(sound_gauge):
     shown = tuple(
         seen_in_the_field(*each)
         for each in (("outside_index", 3e-3), ("focal_scale", 1e-4), ("focal_drift", 0.03))
@@ -276,10 +276,10 @@ def test_the_gauge_has_no_say_in_what_acts_in_a_pipe_or_is_too_small_for_it(soun
         (0.39, np.nan, False),
     ],
 )
-def test_what_the_likeliest_cause_leaves_most_of_is_not_explained(
+def test_a_residual_that_the_likeliest_cause_hardly_reduces_is_unexplained(
     before_px, after_px, unexplained, monkeypatch
 ):
-    """Rows of the sensor that waver were called a wavy sheet, a square pixel or an oval pipe."""
+    """Unstable rows of the sensor were called a wavy sheet, a pixel aspect or an oval pipe."""
     residual, shares = {0: before_px, 1: after_px}, []
 
     def against_texture(run, terms, encoder_share):
@@ -301,10 +301,8 @@ def test_what_the_likeliest_cause_leaves_most_of_is_not_explained(
 
 
 @pytest.mark.parametrize(("repeats", "verdict"), [(True, Verdict.UNEXPLAINED), (False, Verdict.CLASS)])
-def test_a_gauge_run_with_something_unexplained_gets_no_class_from_the_inspection(
-    repeats, verdict, monkeypatch
-):
-    """It was a class of the inspection's, and "the gauge run shows none of it"."""
+def test_with_an_unexplained_gauge_run_the_inspection_gives_no_class(repeats, verdict, monkeypatch):
+    """A class of the inspection was reported, with the words "the gauge run shows none of it"."""
     monkeypatch.setattr(answer, "why_unexplained", lambda field, cause: "")
     monkeypatch.setattr(answer, "not_refuted", lambda shown, gauge, stated: shown)
     monkeypatch.setattr(answer, "location_in_field", lambda field, shown: None)
@@ -323,7 +321,7 @@ def test_a_gauge_run_with_something_unexplained_gets_no_class_from_the_inspectio
     assert (found.location == where) is repeats
 
 
-def test_what_the_gauge_refutes_is_unexplained_and_says_what_it_looks_like():
+def test_an_effect_that_the_gauge_refutes_is_unexplained_and_the_text_says_what_it_looks_like():
     noise = SIGMA * np.random.default_rng(1).standard_normal(400)
     field = field_with(2.0 * WAVE @ [0.3, 0.4] + noise)
     answer = field_answer(field, LIBRARY, NOTHING_STATED)
@@ -337,8 +335,8 @@ def test_what_the_gauge_refutes_is_unexplained_and_says_what_it_looks_like():
     assert not any("came or went" in note for note in found.notes)
 
 
-def test_a_bin_of_a_ring_off_the_centre_runs_across_pixels():
-    """A wave in the fraction of a pixel is the smaller the farther a bin runs; gauge and inspection alike."""
+def test_a_bin_of_an_off_centre_ring_extends_over_several_pixels():
+    """Pixel locking is the smaller the farther a bin extends, in gauge run and inspection."""
     bins, azimuth = 72, -np.pi + 2 * np.pi * np.arange(1440) / 1440
     radius = (300 + 20 * np.cos(azimuth))[None].astype(np.float32)
     validity = np.full(radius.shape, RingValidity.VALID, np.uint8)
@@ -352,7 +350,7 @@ def test_a_bin_of_a_ring_off_the_centre_runs_across_pixels():
 
 
 def field_with_step(at_s, size):
-    """An inspection of 12 s whose sheet tilts at a time, looked at in 40 places of each picture."""
+    """An inspection of 12 s whose sheet tilts at a time, measured at 40 places of each picture."""
     time, azimuth = np.repeat(np.linspace(0.0, 12.0, 120), 40), np.tile(AZIMUTH[::10], 120)
     wave = 2.0 * np.stack([np.cos(azimuth), np.sin(azimuth)], 1)
     noise = SIGMA * np.random.default_rng(3).standard_normal(len(time))
@@ -369,7 +367,7 @@ def field_with_step(at_s, size):
 
 
 @pytest.mark.parametrize(("size", "told"), [(0.3, True), (0.0, False), (-0.3, False), (0.6, False)])
-def test_a_step_of_the_gauge_run_is_borne_out_by_the_same_step_at_another_time_and_by_no_other(size, told):
+def test_a_step_of_the_gauge_run_is_confirmed_only_by_the_same_step_whatever_its_time(size, told):
     tilt = Coursed(LIBRARY["laser_tilt"], (), CourseKind.STEP)
     term = Term(tilt, (2.6,), np.array([0.3, 0.0]))
     found = met_of(term, 0.01**2 * np.eye(2), field_with_step(7.1, size), NOTHING_STATED)
@@ -380,12 +378,12 @@ def test_a_step_of_the_gauge_run_is_borne_out_by_the_same_step_at_another_time_a
 
 @dataclass(frozen=True)
 class Judged:
-    """What of a gauge run's examination counts here."""
+    """The parts of a gauge run's examination that count here."""
 
     confirmed: tuple[tuple[Confirmation, ...], ...]
 
 
-def test_what_the_field_bears_out_counts_for_the_gauge_and_what_it_contradicts_does_not():
+def test_agreement_of_the_field_counts_for_the_gauges_sets_and_contradiction_against_them():
     gauge = Seen("gauge", Judged(((), (met(True),))), None, None, ())
     assert borne_out(gauge, (met(True), met(False))).geometry.confirmed == ((met(True),), (met(True),))
     assert borne_out(gauge, (None, None)).geometry == gauge.geometry

@@ -1,4 +1,4 @@
-"""Hypotheses about a gauge run are ranked by how well they fit, not by what their lens makes of the noise."""
+"""Hypotheses about a gauge run are ranked by their fit in the image, independent of the lens."""
 
 from dataclasses import replace
 
@@ -22,7 +22,7 @@ def run() -> tuple[GaugeRun, Unknowns]:
 
 
 def told_of_noise(measured: GaugeRun, start: Unknowns, larger: float) -> Float:
-    """Return how residuals change where the same rings, through a lens so much larger, lie a bit outward."""
+    """Return by how much the cost changes when residuals move outward, with a lens so much larger."""
     focal = np.zeros(len(start.instrument))
     focal[:2] = larger * np.array(start.stated.camera.focal_px)
     state, centre = replace(start, instrument=focal), start.stated.camera.centre_px
@@ -33,16 +33,16 @@ def told_of_noise(measured: GaugeRun, start: Unknowns, larger: float) -> Float:
     return np.asarray(after.residual[ring] - before.residual[ring])
 
 
-def test_noise_of_the_image_counts_alike_whatever_the_lens_makes_of_it(
+def test_image_noise_has_the_same_weight_whatever_the_lens(
     run: tuple[GaugeRun, Unknowns],
 ) -> None:
     stated = told_of_noise(*run, larger=0.0)
     assert np.median(stated) == pytest.approx(NOISE_PX, rel=0.05)
-    # By millimetres it would be 2 % less.
+    # In millimetres it would be 2 % less.
     assert told_of_noise(*run, larger=0.02) == pytest.approx(stated, rel=1e-3)
 
 
-def test_what_no_camera_sees_has_no_weight_and_does_not_sharpen_the_rest(
+def test_points_outside_the_view_have_no_weight_and_do_not_sharpen_the_rest(
     run: tuple[GaugeRun, Unknowns],
 ) -> None:
     measured, start = run

@@ -33,7 +33,7 @@ TILT, CONE = LIBRARY["laser_tilt"], LIBRARY["laser_cone"]
 def equations(random: np.random.Generator, rows: int = 200) -> Equations:
     by_global = random.normal(size=(rows, GLOBALS))
     kind = random.integers(0, 2, rows)
-    # One global that one kind of measurement does not depend on.
+    # One global parameter that one kind of measurement does not depend on.
     by_global[kind == 1, 0] = 0.0
     return Equations(
         random.integers(0, FRAMES, rows), random.normal(size=(rows, 6)), by_global,
@@ -67,7 +67,7 @@ def dense(e: Equations, m: Rows) -> tuple[np.ndarray, np.ndarray]:
     )
 
 
-def test_eliminating_poses_and_globals_is_dense_least_squares():
+def test_eliminating_poses_and_globals_agrees_with_dense_least_squares():
     random = np.random.default_rng(1)
     e, m = equations(random), motion(random)
     reduced = eliminate_poses(e, m, FRAMES)
@@ -85,7 +85,7 @@ def test_eliminating_poses_and_globals_is_dense_least_squares():
     assert misfit == pytest.approx(rest @ rest, rel=1e-8)
 
 
-def test_edges_that_few_measurements_see_are_eliminated_as_dense_globals_are():
+def test_fiducial_edges_that_few_measurements_see_are_eliminated_like_dense_globals():
     random = np.random.default_rng(8)
     dense_rows, m = equations(random), motion(random)
     seen = dense_rows.kind == 0
@@ -105,7 +105,7 @@ def test_edges_that_few_measurements_see_are_eliminated_as_dense_globals_are():
         assert sparse == pytest.approx(full, rel=1e-9)
 
 
-def test_a_part_with_frames_unseen_can_still_be_eliminated():
+def test_a_part_in_which_some_frames_are_not_seen_can_be_eliminated():
     random = np.random.default_rng(2)
     e, m = equations(random), motion(random)
     frames = np.arange(FRAMES) < 2
@@ -122,7 +122,7 @@ def evidence_of(
     return Evidence(columns, a, design.T @ measured, inflation * a, float(measured @ measured), surely)
 
 
-def test_the_surprise_is_the_marginal_likelihood():
+def test_the_evidence_of_a_set_is_its_marginal_likelihood():
     random = np.random.default_rng(3)
     design, measured = random.normal(size=(40, 3)), random.normal(size=40)
     columns = (Column(INSTRUMENT, "fx"), Column("laser_cone", "a"), Column("baseline", "b"))
@@ -143,7 +143,7 @@ def cone_and_sheet() -> tuple[tuple[Column, ...], Stated]:
     return columns, Stated(("cone",), np.array([[0.01**-2]]))
 
 
-def test_what_lies_within_the_stated_uncertainty_is_no_discovery():
+def test_a_deviation_within_the_stated_uncertainty_is_no_discovery():
     columns, stated = cone_and_sheet()
     one = np.random.default_rng(4).normal(size=(500, 1))
     design = 1e3 * np.concatenate([one, one], 1)
@@ -159,7 +159,7 @@ def test_what_lies_within_the_stated_uncertainty_is_no_discovery():
     assert p_value(0.1) < 1e-8
 
 
-def test_neighbours_that_err_alike_widen_the_data_but_not_the_stated():
+def test_correlated_neighbours_widen_the_errors_of_data_but_not_the_stated_ones():
     columns, stated = cone_and_sheet()
     one = np.random.default_rng(5).normal(size=(500, 1))
     design = 1e3 * np.concatenate([one, one], 1)
@@ -168,7 +168,7 @@ def test_neighbours_that_err_alike_widen_the_data_but_not_the_stated():
     )
     assert plain is not None
     assert alike is not None
-    # The data know this to 1e-4; the stated uncertainty of 0.01 is all that counts.
+    # The data determine this to 1e-4; only the stated uncertainty of 0.01 counts.
     assert alike.covariance == pytest.approx(plain.covariance, rel=1e-2)
 
 
@@ -186,7 +186,7 @@ def test_scores_of_noise_are_uniform():
     assert stats.kstest(p_values, "uniform").pvalue > 1e-3
 
 
-def test_deflated_evidence_counts_measurements_that_err_alike_once():
+def test_deflated_evidence_counts_correlated_measurements_once():
     columns, stated = cone_and_sheet()
     random = np.random.default_rng(7)
     design, noise = random.normal(size=(50, 2)), random.normal(size=50)
@@ -198,7 +198,7 @@ def test_deflated_evidence_counts_measurements_that_err_alike_once():
     )
 
 
-def test_collinear_effects_are_not_told_apart_and_different_ones_are():
+def test_collinear_effects_are_not_distinguished_and_different_ones_are():
     stated = Stated((), np.zeros((0, 0)))
     columns = (Column("a", ""), Column("b", ""), Column("c", ""))
     a, c = np.random.default_rng(8).normal(size=(2, 1000))
@@ -209,7 +209,7 @@ def test_collinear_effects_are_not_told_apart_and_different_ones_are():
 
 
 @pytest.mark.parametrize(("hidden", "low", "high"), [(0.0, 1e-3, 1.0), (4.0, 0.0, 1e-6)])
-def test_what_is_left_is_noise_or_is_not(hidden, low, high):
+def test_a_residual_is_recognised_as_noise_or_not(hidden, low, high):
     random = np.random.default_rng(9)
     columns = tuple(Column(m.name, a.name, s) for m, s in VOCABULARY for a in m.amplitudes)
     design = random.normal(size=(2000, len(columns)))
@@ -222,8 +222,8 @@ def test_what_is_left_is_noise_or_is_not(hidden, low, high):
     ("noise", "growing", "low", "high"),
     [(0.01, 0.0, 0.0, NAMELESS / 20), (10.0, 0.0, NAMELESS / 2, NAMELESS), (0.1, 0.5, 1.0, np.inf)],
 )
-def test_a_name_is_as_unsure_as_its_growth_with_the_radius(noise, growing, low, high):
-    """A cone of size 1 that grows as it should, one too faint to tell how, and one that grows otherwise."""
+def test_a_name_is_less_sure_if_its_growth_with_the_radius_is_unsure(noise, growing, low, high):
+    """A cone of size 1 that grows rightly, one too faint to show its growth, and one that grows otherwise."""
     random = np.random.default_rng(10)
     off = random.uniform(-0.5, 0.5, 200)
     one = Term(CONE, (), np.ones(1))
@@ -235,8 +235,8 @@ def test_a_name_is_as_unsure_as_its_growth_with_the_radius(noise, growing, low, 
     assert low <= odds <= high
 
 
-def test_a_name_stands_for_as_many_unknown_laws_as_there_are_known_ones_of_its_kind():
-    """A law that drifts is of the kind of those that drift: of others one in six, as each has six courses."""
+def test_each_known_law_of_a_kind_makes_an_unknown_one_of_that_kind_more_likely():
+    """A drifting law belongs to the drifting ones; others count one sixth, as each has six courses."""
     names = ("focal_scale", "dome_axial", "focal_drift", "baseline", "baseline_drift", "pixel_locking")
     every = with_courses({n: LIBRARY[n] for n in names})
     alike = {n: known_alike(LIBRARY[n], every) for n in (*names[1:], "focal_scale")}
@@ -250,8 +250,11 @@ def test_a_name_stands_for_as_many_unknown_laws_as_there_are_known_ones_of_its_k
     ("power", "pattern", "noise", "low", "high"),
     [(1, "same", 1.0, 0.1, np.inf), (6, "same", 0.01, 0.0, 0.01), (1, "another", 1.0, 0.0, 0.05)],
 )
-def test_two_names_that_one_unknown_law_may_make_up_for_are_unsure(power, pattern, noise, low, high):
-    """A cone, and a baseline that grows with the radius, or as no smooth law does, or of another harmonic."""
+def test_two_names_that_one_unknown_law_can_replace_are_unsure(power, pattern, noise, low, high):
+    """A cone and a baseline.
+
+    The second grows with the radius, or as no smooth law does, or has another harmonic.
+    """
     random = np.random.default_rng(11)
     off = random.uniform(-0.5, 0.5, 400)
     both = [Term(LIBRARY[name], (), np.ones(1)) for name in ("laser_cone", "baseline")]
@@ -272,8 +275,8 @@ def test_two_names_that_one_unknown_law_may_make_up_for_are_unsure(power, patter
 @pytest.mark.parametrize(
     ("turned_deg", "low", "high"), [(0.0, 0.1, np.inf), (180.0, 0.1, np.inf), (60.0, 0.0, 0.01)]
 )
-def test_two_names_along_one_direction_may_be_one_unknown_law(turned_deg, low, high):
-    """A tilted sheet and a decentred beam toward one side, opposite ones, and one turned away."""
+def test_two_names_with_a_common_direction_may_be_one_unknown_law(turned_deg, low, high):
+    """A tilted sheet and a decentred beam in the same, in the opposite and in another direction."""
     random, turn = np.random.default_rng(13), np.radians(turned_deg)
     sizes = (np.array([0.3, 0.0]), 0.3 * np.array([np.cos(turn), np.sin(turn)]))
     both = [Term(LIBRARY[n], (), a) for n, a in zip(("laser_tilt", "beam_decentre"), sizes, strict=True)]
@@ -293,8 +296,8 @@ def test_two_names_along_one_direction_may_be_one_unknown_law(turned_deg, low, h
     assert all(low <= one <= high for one in odds)
 
 
-def test_a_wave_beside_a_pixel_that_is_not_square_is_no_law_between_them():
-    """Which way pixels are not square is no choice, so that the two have no direction in common."""
+def test_a_wave_and_a_pixel_aspect_are_not_one_unknown_law():
+    """The direction of a pixel aspect is fixed, so that a common direction is no evidence."""
     random = np.random.default_rng(13)
     wave, pixel = LIBRARY["sheet_waviness"], LIBRARY["pixel_aspect"]
     both = [Term(wave, (2.0,), np.array([-1.1, -2.4])), Term(pixel, (), np.array([-0.1]))]
@@ -309,7 +312,7 @@ def test_a_wave_beside_a_pixel_that_is_not_square_is_no_law_between_them():
     assert max(odds) < 0.01
 
 
-def test_a_score_that_few_cells_hold_is_less_surprising():
+def test_a_score_that_comes_from_few_cells_is_less_significant():
     random = np.random.default_rng(12)
     of = evidence_of(random.normal(size=(500, 1)), random.normal(size=500), (Column("a", ""),))
     of = replace(of, right=6.0 * np.sqrt(np.diag(of.information)))

@@ -1,4 +1,4 @@
-"""What the judge of a gauge run's hypotheses looks at, and how often."""
+"""Which hypotheses about a gauge run are weighed, and how often."""
 
 from collections import Counter
 from types import SimpleNamespace
@@ -18,7 +18,7 @@ def hypothesis(name: str, deviance: float) -> Any:
     ("likelier", "with_pattern", "ranked_as"),
     [
         ([], 1.0, ["tilt", "tilt and pattern", "nothing"]),
-        # By its equations tilt and cone had seemed likelier; fitted, it is not.
+        # By linearised equations tilt and cone seemed likelier; after the fit they are not.
         (["tilt and cone"], 1.0, ["tilt", "tilt and pattern", "tilt and cone", "nothing"]),
         (["tilt and cone"], -20.0, ["tilt and pattern", "tilt", "tilt and cone", "nothing"]),
         # Two such sets left no round for patterns.
@@ -29,7 +29,7 @@ def hypothesis(name: str, deviance: float) -> Any:
         ),
     ],
 )
-def test_patterns_are_weighed_once_beside_each_likeliest_also_where_a_likelier_set_loses(
+def test_patterns_are_weighed_once_beside_each_likeliest_set_even_where_a_likelier_set_loses(
     monkeypatch: pytest.MonkeyPatch, likelier: list[str], with_pattern: float, ranked_as: list[str]
 ) -> None:
     asked: Counter[str] = Counter()

@@ -1,4 +1,4 @@
-"""Pictures exposed for longer are late: the line's width tells them from late readings, or none does."""
+"""Longer exposures make pictures late: the line's width separates that from late readings, or cannot."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from tests.travel_cases import seen as sight
 
 @pytest.fixture(scope="module")
 def thirty_a_second() -> TravelFit:
-    """Any fit of pictures from 1/30 s to 1/30 s."""
+    """Return a fit of pictures that follow each other by 1/30 s; its contents do not matter."""
     return fitted(sight(np.random.default_rng(8), every=6), read(), (), None)
 
 
@@ -37,7 +37,7 @@ def late(
     source: str, fit: TravelFit, delay_s: float | None, width_ms: tuple[float, float] | None,
     agreements: tuple[Agreement, ...] = (AGREES,), sigma_s: float = 2e-4,
 ) -> Seen:  # fmt: skip
-    """Return a recording whose readings seem late, and whose line widens with its speed."""
+    """Return a recording whose readings seem late, and whose line widens with the probe's speed."""
     estimates: tuple[TravelEstimate, ...] = ()
     if delay_s is not None:
         p = 1e-12 if abs(delay_s) > 5e-3 else 0.8
@@ -63,15 +63,16 @@ def sizes(found: Diagnosis) -> dict[str, float]:
     [
         (0.008, (0.0, 1.0), {"time_offset": 0.008}),
         (0.008, (16.0, 1.0), {"motion_blur": 0.016}),
-        # What half of the exposure does not make is the encoder's own.
+        # The delay beyond half of the exposure is the encoder's own.
         (0.018, (16.0, 1.0), {"motion_blur": 0.016, "time_offset": 0.010}),
         (-0.010, (16.0, 1.0), {"motion_blur": 0.016, "time_offset": -0.018}),
-        # Readings that come early, and exposures longer than from picture to picture, are no exposures.
+        # Early readings, and exposures longer than the time between pictures, are not explained by an
+        # exposure.
         (-0.008, None, {"time_offset": -0.008}),
         (0.05, None, {"time_offset": 0.05}),
     ],
 )
-def test_pictures_that_are_late_by_half_an_exposure_are_told_from_late_readings(
+def test_pictures_late_by_half_an_exposure_are_distinguished_from_late_readings(
     real_probe: Probe, thirty_a_second: TravelFit, delay_s: float, width_ms: tuple[float, float] | None,
     named: dict[str, float],
 ) -> None:  # fmt: skip
@@ -82,7 +83,7 @@ def test_pictures_that_are_late_by_half_an_exposure_are_told_from_late_readings(
 
 
 @pytest.mark.parametrize("width_ms", [None, (16.0, 9.0)])
-def test_late_pictures_and_late_readings_are_a_class_where_the_width_does_not_tell(
+def test_late_pictures_and_late_readings_are_a_class_where_the_width_does_not_decide(
     real_probe: Probe, thirty_a_second: TravelFit, width_ms: tuple[float, float] | None
 ) -> None:
     found = answer(real_probe, None, late("gauge", thirty_a_second, 0.008, width_ms))
@@ -98,7 +99,7 @@ def test_late_pictures_and_late_readings_are_a_class_where_the_width_does_not_te
     ("width_ms", "named"),
     [((16.0, 1.0), {"motion_blur": 0.016, "time_offset": 0.007}), ((0.0, 1.0), {"time_offset": 0.015})],
 )
-def test_the_width_in_one_recording_tells_of_the_delay_in_the_other(
+def test_the_width_in_one_recording_is_used_for_the_delay_in_the_other(
     real_probe: Probe, thirty_a_second: TravelFit, width_ms: tuple[float, float], named: dict[str, float]
 ) -> None:
     field = late("field", thirty_a_second, 0.015, None)
@@ -107,24 +108,27 @@ def test_the_width_in_one_recording_tells_of_the_delay_in_the_other(
     assert sizes(found) == pytest.approx(named)
 
 
-def test_a_width_that_no_exposure_has_time_for_is_no_sure_exposure_and_moves_no_delay(
+def test_an_exposure_longer_than_the_time_between_pictures_is_unsure_and_changes_no_delay(
     real_probe: Probe, thirty_a_second: TravelFit
 ) -> None:
-    """60 ms of 33 were named, and half of it was taken off a delay of 8 ms: -22 ms, as surely."""
+    """60 ms of 33 were named, and half of it was subtracted from a delay of 8 ms: -22 ms, stated as sure."""
     found = answer(real_probe, None, late("gauge", thirty_a_second, 0.008, (60.0, 5.0)))
     assert sizes(found).get("time_offset", 0.008) == pytest.approx(0.008)
     assert all(e.probability < 0.6 for e in found.effects if e.name == "motion_blur")
     alone = answer(real_probe, None, late("gauge", thirty_a_second, None, (60.0, 5.0)))
     assert alone.verdict is Verdict.CLASS
-    assert "encoder" not in alone.identifiable, "the encoder showed nothing"
+    assert "encoder" not in alone.identifiable, "without an encoder the delay would be unknown"
     assert "no picture has time: the next begins after 33.3 ms" in alone.identifiable
 
 
 @pytest.mark.parametrize(("delay_s", "late_s"), [(0.0, 0.0), (0.0004, 0.0), (0.008, 0.008), (0.0085, 0.008)])
-def test_of_an_exposure_only_so_much_is_put_right_as_the_encoder_shows(
+def test_an_exposure_is_corrected_only_as_far_as_the_encoder_shows_it(
     real_probe: Probe, thirty_a_second: TravelFit, delay_s: float, late_s: float
 ) -> None:
-    """Stamps of the middle of 16 ms: -8 ms of "own delay" had been named, or all readings put 8 ms off."""
+    """Stamps of the middle of 16 ms.
+
+    An "own delay" of -8 ms was named, or all readings were shifted by it.
+    """
     found = answer(real_probe, None, late("gauge", thirty_a_second, delay_s, (16.0, 1.0)))
     assert sizes(found) == pytest.approx({"motion_blur": 0.016})
     assert found.effects[0].parameters["late_s"].value == pytest.approx(late_s)
@@ -137,25 +141,26 @@ def test_of_an_exposure_only_so_much_is_put_right_as_the_encoder_shows(
     assert true.distance_mm - encoder.distance_mm == pytest.approx(20 * late_s, abs=1e-6)
 
 
-def test_the_encoders_own_delay_holds_what_the_width_leaves_open(
+def test_sigma_of_the_encoders_own_delay_includes_the_uncertainty_of_the_width(
     real_probe: Probe, thirty_a_second: TravelFit
 ) -> None:
     named = answer(real_probe, None, late("gauge", thirty_a_second, 0.018, (16.0, 2.0)))
     (own,) = (e for e in named.effects if e.name == "time_offset")
-    # Stamps of any time from the exposure's begin to its middle leave 10 to 18 ms: 3⁻½ × 8 ms about 10.
+    # Stamps at any time between the start of the exposure and its middle leave 10 to 18 ms: 3⁻½ × 8 ms about
+    # 10.
     assert own.parameters["delay_s"].sd == pytest.approx(np.sqrt(0.2**2 + 1 + 1 + 8**2 / 3) * 1e-3)
     within = answer(real_probe, None, late("gauge", thirty_a_second, 0.012, (16.0, 2.0)))
     assert sizes(within) == pytest.approx({"motion_blur": 0.016})
-    # An exposure that the halves of the frames do not bear out leaves the delay open.
+    # An exposure that the two halves of the frames do not confirm leaves the delay open.
     open_ = answer(real_probe, None, late("gauge", thirty_a_second, 0.018, (16.0, 2.0), (DIFFERS,)))
     assert open_.verdict is Verdict.CLASS
     assert set(open_.members) == {"time_offset", "motion_blur"}
 
 
-def test_an_exposure_leaves_no_more_of_the_time_to_the_next_picture_than_is_not_stated(
+def test_an_exposure_needs_time_between_pictures_beyond_the_stated_one(
     real_probe: Probe, thirty_a_second: TravelFit
 ) -> None:
-    """33 ms from picture to picture, 28 ms of which a longer exposure would take."""
+    """Of 33 ms from picture to picture, a longer exposure would take 28 ms."""
     recording = late("gauge", thirty_a_second, 0.014, None)
     assert answer(real_probe, None, recording).verdict is Verdict.CLASS
     long = replace(real_probe, shutter=replace(real_probe.shutter, exposure_s=0.015))
@@ -164,17 +169,17 @@ def test_an_exposure_leaves_no_more_of_the_time_to_the_next_picture_than_is_not_
 
 
 @pytest.mark.parametrize(("delay_s", "verdict"), [(0.018, Verdict.CLASS), (0.022, Verdict.NAMED)])
-def test_an_exposure_is_a_rival_unless_it_is_surely_longer_than_the_time_to_the_next_picture(
+def test_an_exposure_is_excluded_only_if_it_is_surely_longer_than_the_time_between_pictures(
     real_probe: Probe, thirty_a_second: TravelFit, delay_s: float, verdict: Verdict
 ) -> None:
-    """Of 33 ms from picture to picture, 36 ± 2 ms (1.7 σ too long) was ruled out, and 44 ± 2 ms is."""
+    """With 33 ms between pictures, 36 ± 2 ms (1.7 σ too long) was excluded; only 44 ± 2 ms must be."""
     assert answer(real_probe, None, late("gauge", thirty_a_second, delay_s, None)).verdict is verdict
 
 
-def test_a_class_says_that_none_of_it_may_be_right_where_something_else_fits_as_well(
+def test_a_class_says_that_all_of_it_may_be_wrong_where_something_else_fits_as_well(
     real_probe: Probe, thirty_a_second: TravelFit
 ) -> None:
-    """A play that was left out looked like a delay or an exposure, and no word was said of anything else."""
+    """Play, left out of the library, looked like a delay or an exposure; no other cause was mentioned."""
     recording = late("gauge", thirty_a_second, 0.008, None)
     assert "in another way" not in answer(real_probe, None, recording).identifiable
     assert recording.travel is not None
@@ -192,8 +197,8 @@ def sizes_told(estimate: TravelEstimate) -> list[float]:
     return [float(t.split("delay_s ")[1].split()[0]) for t in told]
 
 
-def test_what_confirms_the_encoders_own_delay_speaks_of_it_and_not_of_the_whole(real_probe: Probe) -> None:
-    """Halves that agree on the whole delay confirmed what was left of it, and were told under its size."""
+def test_confirmations_of_the_encoders_own_delay_quote_it_and_not_the_whole_delay(real_probe: Probe) -> None:
+    """Halves that agreed on the whole delay were quoted as confirmations of the remaining one."""
     fit = with_events(sight(np.random.default_rng(8)), read(delay_s=0.018))
     (whole,) = (e for e in _estimates("gauge", fit, 0.002, 0.05) if e.effect == "time_offset")
     recording = late("gauge", fit, 0.018, (16.0, 1.0))
@@ -208,10 +213,10 @@ def test_what_confirms_the_encoders_own_delay_speaks_of_it_and_not_of_the_whole(
     assert sizes_told(estimate) == pytest.approx([s - 0.008 for s in sizes_told(whole)], abs=2e-4)
 
 
-def test_without_an_encoder_nothing_is_told_of_how_late_an_exposure_makes_pictures(
+def test_without_an_encoder_nothing_is_said_of_how_late_an_exposure_makes_pictures(
     real_probe: Probe, thirty_a_second: TravelFit
 ) -> None:
-    """It had been 0 ± .5 ms, "as the encoder shows"."""
+    """Formerly 0 ± .5 ms, "as the encoder shows"."""
     size = {"exposure_s": Value(0.016, 0.001)}
     assert how_late(size, (None, None), own_delay=False) == (size, "")
     unknown = late("gauge", thirty_a_second, 0.0, None, sigma_s=np.inf)
@@ -220,14 +225,14 @@ def test_without_an_encoder_nothing_is_told_of_how_late_an_exposure_makes_pictur
     assert "late_s" not in found.effects[0].parameters
 
 
-def test_how_late_pictures_are_is_as_unsure_as_the_encoder_tells_it(thirty_a_second: TravelFit) -> None:
-    """An encoder known to 10 ms had shown 0 ± .5 ms, and hidden the 8 ± 1 ms of the other recording."""
+def test_sigma_of_late_pictures_includes_that_of_the_encoder(thirty_a_second: TravelFit) -> None:
+    """An encoder known to 10 ms gave 0 ± .5 ms, and hid the 8 ± 1 ms of the other recording."""
     size = {"exposure_s": Value(0.020, 0.001)}
     unsure = late("field", thirty_a_second, 0.004, None, sigma_s=0.010)
     shown = how_late(size, (unsure, None), own_delay=False)[0]["late_s"]
     assert (shown.value, shown.sd) == pytest.approx((0.0, np.hypot(0.010, 0.001)))
     sure = late("gauge", thirty_a_second, 0.008, None)
-    # Later than half of the exposure, pictures are so late by no more than that: as unsure as either.
+    # If later than half of the exposure, pictures are late by at most that half: both uncertainties count.
     for exposure_sd, sd in ((0.001, np.hypot(0.0002, 0.001)), (0.004, 0.002)):
         size = {"exposure_s": Value(0.015, exposure_sd)}
         shown = how_late(size, (sure,), own_delay=False)[0]["late_s"]
@@ -239,16 +244,16 @@ def test_how_late_pictures_are_is_as_unsure_as_the_encoder_tells_it(thirty_a_sec
 
 
 @pytest.mark.parametrize("delay_s", [0.0055, 0.0075])
-def test_a_delay_that_stamps_between_begin_and_middle_make_is_not_the_encoders(
+def test_a_delay_explained_by_stamps_between_start_and_middle_is_not_the_encoders(
     real_probe: Probe, thirty_a_second: TravelFit, delay_s: float
 ) -> None:
-    """Of 5.5 ms found beside 30 ms of exposure, −9.5 ms had been an encoder that is early."""
+    """Of 5.5 ms found beside 30 ms of exposure, −9.5 ms were reported as an encoder that is early."""
     found = answer(real_probe, None, late("gauge", thirty_a_second, delay_s, (30.0, 0.5)))
     assert sizes(found) == pytest.approx({"motion_blur": 0.030})
     assert found.effects[0].parameters["late_s"].value == pytest.approx(delay_s)
 
 
-def test_beside_an_encoders_own_delay_half_of_the_exposure_is_put_right_as_well(
+def test_beside_an_encoders_own_delay_half_of_the_exposure_is_corrected_as_well(
     real_probe: Probe, thirty_a_second: TravelFit
 ) -> None:
     found = answer(real_probe, None, late("gauge", thirty_a_second, 0.018, (16.0, 1.0)))
@@ -261,10 +266,13 @@ def test_beside_an_encoders_own_delay_half_of_the_exposure_is_put_right_as_well(
 @pytest.mark.parametrize(
     ("delay_s", "sigma_s", "of_gauge_s"), [(0.0, 2e-4, 0.018), (0.007, 2e-3, 0.018), (0.0, 2.4e-3, 0.014)]
 )
-def test_what_stamps_are_of_explains_no_difference_between_two_recordings(
+def test_the_meaning_of_stamps_does_not_explain_a_difference_between_two_recordings(
     real_probe: Probe, thirty_a_second: TravelFit, delay_s: float, sigma_s: float, of_gauge_s: float
 ) -> None:
-    """10 ± 4.8 ms beside 0 ± 1 were alike: named, and a sound inspection's readings were moved by 18 ms."""
+    """10 ± 4.8 ms beside 0 ± 1 ms counted as equal.
+
+    Named, and a sound inspection's readings were moved by 18 ms.
+    """
     field = late("field", thirty_a_second, delay_s, (16.0, 1.0), sigma_s=sigma_s)
     assert field.travel is not None
     of_field = (replace(field.travel.estimates[0], p_value=0.8),)
@@ -275,7 +283,7 @@ def test_what_stamps_are_of_explains_no_difference_between_two_recordings(
     assert found.effects[0].parameters["late_s"].value == 0.0
 
 
-def test_recordings_that_share_an_own_delay_bear_it_out_by_the_whole(
+def test_recordings_with_a_common_own_delay_confirm_it_by_the_whole_delay(
     real_probe: Probe, thirty_a_second: TravelFit
 ) -> None:
     both = [late(source, thirty_a_second, 0.018, (16.0, 1.0)) for source in ("field", "gauge")]
@@ -288,10 +296,10 @@ def test_recordings_that_share_an_own_delay_bear_it_out_by_the_whole(
     assert "whole delay_s 0.018" in told.measured
 
 
-def test_what_an_encoder_is_later_than_half_the_exposure_is_in_its_uncertainty_and_said(
+def test_a_delay_beyond_half_the_exposure_widens_its_uncertainty_and_is_mentioned(
     real_probe: Probe, thirty_a_second: TravelFit
 ) -> None:
-    """13 ± 1 ms beside 8 that the width allows were 8.0 ± 1.0, "as the encoder shows"."""
+    """13 ± 1 ms, of which the width allows 8, were stated as 8.0 ± 1.0, "as the encoder shows"."""
     found = answer(real_probe, late("field", thirty_a_second, 0.013, (16.0, 1.0)), None)
     (exposure,) = found.effects
     late_s = exposure.parameters["late_s"]

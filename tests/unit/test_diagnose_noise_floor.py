@@ -1,4 +1,4 @@
-"""The noise floor of a gauge run is what other pictures do not repeat, at least what is stated of edges."""
+"""The noise floor of a gauge run is the noise that pictures do not repeat, at least that stated of edges."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -20,7 +20,7 @@ PICTURES, EDGES, RINGS = 24, 160, 8
 def floor_px(
     stated_px: float, noise_px: float, left_px: float, pictures: int = PICTURES, rings: int = RINGS
 ) -> float:
-    """Return the floor of fiducials whose instrument is off by up to ``left_px``; rings hardly count.
+    """Return the floor of fiducials with an instrument off by up to ``left_px``; rings hardly count.
 
     A ring of each of the last pictures has a noise of 0.3 px.
     """
@@ -48,15 +48,15 @@ def floor_px(
 
 
 @pytest.mark.parametrize("left_px", [0.0, 0.4])
-def test_it_is_the_fiducials_own_noise_whatever_the_instrument_is_off_by(left_px: float) -> None:
+def test_the_floor_is_the_fiducials_noise_however_wrong_the_instrument_is(left_px: float) -> None:
     assert floor_px(0.041, 0.09, left_px) == pytest.approx(0.09, rel=0.05)
 
 
-def test_it_is_no_less_than_what_is_stated_of_fiducials() -> None:
+def test_the_floor_is_at_least_the_noise_stated_of_fiducials() -> None:
     assert floor_px(0.12, 0.09, 0.0) == pytest.approx(0.12, rel=1e-6)
 
 
-def test_a_kind_that_nothing_repeats_has_no_say_in_it() -> None:
+def test_measurements_that_nothing_repeats_do_not_count() -> None:
     assert floor_px(0.04, 0.09, 0.0, rings=1) == pytest.approx(0.09, rel=0.05)
     for pictures in (0, 1):
         assert floor_px(0.04, 0.09, 0.0, pictures, rings=900) == pytest.approx(0.3, rel=0.1)
@@ -64,22 +64,22 @@ def test_a_kind_that_nothing_repeats_has_no_say_in_it() -> None:
 
 
 @pytest.mark.parametrize("count", [0, 1])
-def test_fewer_than_two_edges_repeat_nothing(count: int) -> None:
+def test_fewer_than_two_edges_give_no_repetition(count: int) -> None:
     edges = SimpleNamespace(
         uv=np.zeros((count, 2)), normal=np.ones((count, 2)), frame=np.zeros(count, np.int64)
     )
     assert [len(of_pair) for of_pair in _in_other_pictures(cast(Any, edges))] == [0, 0]
 
 
-def test_edges_that_the_camera_sees_nowhere_are_in_no_pair() -> None:
-    """They had ended the diagnosis as a fault of the program."""
+def test_edges_outside_the_view_form_no_pair() -> None:
+    """Formerly they ended the diagnosis with a program error."""
     uv = np.array([[np.nan, np.nan], [5.0, 5.0], [300.0, 5.0], [5.0, 6.0]])
     edges = SimpleNamespace(uv=uv, normal=np.ones((4, 2)), frame=np.arange(4))
     first, second = _in_other_pictures(cast(Any, edges))
     assert list(zip(first.tolist(), second.tolist(), strict=True)) == [(1, 3), (3, 1)]
 
 
-def test_where_the_noise_is_not_known_it_is_not_known_that_an_explanation_fits() -> None:
+def test_with_unknown_noise_an_explanation_is_not_said_to_fit() -> None:
     for floor, fits in ((0.09, True), (0.05, False), (np.nan, False)):
         quality = FitQuality("px", 1.0, 0.09, 1.0, 0.1, floor)
         assert _fits(cast(Any, SimpleNamespace(quality=quality))) is fits
@@ -90,11 +90,10 @@ def test_where_the_noise_is_not_known_it_is_not_known_that_an_explanation_fits()
 def of_rings(
     noise_px: float, left_px: float, louder_at_ends: float = 1.0, of_last_px: float = 0.0
 ) -> RingResidual:
-    """Return an inspection's rings, the instrument off by up to ``left_px`` alike in all of them.
+    """Return an inspection's rings; the instrument is off by the same up to ``left_px`` in all of them.
 
-    In the last five it is off by ``of_last_px`` more.
-
-    The first and the last five are ``louder_at_ends``, as where texture has not yet placed the camera well.
+    In the last five it is off by ``of_last_px`` more. The noise of the first and the last five is
+    ``louder_at_ends`` times as large, as where texture has not yet placed the camera well.
     """
     random = np.random.default_rng(6)
     frame, azimuth = (g.ravel() for g in np.mgrid[:40, -180:180:5])
@@ -108,34 +107,34 @@ def of_rings(
 
 
 @pytest.mark.parametrize("left_px", [0.0, 0.4])
-def test_an_inspections_floor_is_what_its_rings_do_not_repeat(left_px: float) -> None:
+def test_an_inspections_floor_is_the_noise_that_its_rings_do_not_repeat(left_px: float) -> None:
     seen = of_rings(0.07, left_px)
     assert seen.floor_px == pytest.approx(0.07, rel=0.05)
     assert (seen.rms_px > 0.2) == (left_px > 0)
 
 
-def test_rings_near_the_ends_count_as_much_in_the_floor_as_in_what_is_left() -> None:
+def test_rings_near_the_ends_have_the_same_weight_in_floor_and_residual() -> None:
     seen = of_rings(0.07, 0.0, louder_at_ends=4.0)
     assert seen.floor_px == pytest.approx(seen.rms_px, rel=0.03)
 
 
-def test_what_all_rings_repeat_takes_no_part_of_louder_ends_out_of_the_floor() -> None:
-    """Beside .2 px in all rings, the ends' part had been 10 % too small."""
+def test_a_common_error_of_all_rings_does_not_lower_the_share_of_noisy_ends() -> None:
+    """Beside .2 px in all rings, the share of the ends was 10 % too small."""
     alone, beside = (of_rings(0.07, left_px, louder_at_ends=4.0) for left_px in (0.0, 0.2))
     assert beside.floor_px == pytest.approx(alone.rms_px, rel=0.03)
 
 
 def test_an_effect_at_one_end_alone_hardly_raises_the_floor() -> None:
-    """It had been told as noise of .102 px, beside which nothing showed."""
+    """It was reported as noise of .102 px, beside which nothing stood out."""
     assert of_rings(0.07, 0.0, of_last_px=0.3).floor_px == pytest.approx(0.07, rel=0.15)
 
 
 @pytest.mark.parametrize("frames", [2, 3, 4, 6])
-def test_few_rings_of_an_inspection_tell_a_floor(frames: int) -> None:
+def test_few_rings_of_an_inspection_give_a_floor(frames: int) -> None:
     seen = of_rings(0.07, 0.4)
     assert replace(seen, usable=seen.frame < frames).floor_px == pytest.approx(0.07, rel=0.2)
 
 
-def test_one_ring_of_an_inspection_tells_no_floor() -> None:
+def test_one_ring_of_an_inspection_gives_no_floor() -> None:
     seen = of_rings(0.07, 0.0)
     assert np.isnan(replace(seen, usable=seen.frame == 7).floor_px)

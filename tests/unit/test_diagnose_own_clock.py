@@ -1,4 +1,4 @@
-"""What comes at times of one recording is treated alike under every name that a library has for it."""
+"""Effects tied to times of one recording are treated equally under each of their names in the library."""
 
 from types import SimpleNamespace
 
@@ -21,19 +21,19 @@ SAME_SWING = LIBRARY["laser_rocking"], Coursed(LIBRARY["laser_tilt"], (), Course
 @pytest.mark.parametrize(
     "model", [*SAME_DRIFT, *SAME_SWING, Coursed(LIBRARY["focal_scale"], (), CourseKind.STEP)]
 )
-def test_a_drift_and_a_swing_are_of_their_own_recording_under_every_name(model):
+def test_a_drift_and_a_swing_belong_to_their_own_recording_under_every_name(model):
     assert of_own_clock(model)
 
 
 @pytest.mark.parametrize("kind", [CourseKind.SPEED, CourseKind.REVERSAL, CourseKind.DISTANCE])
-def test_what_goes_with_the_motion_is_not(kind):
+def test_effects_tied_to_the_motion_do_not_belong_to_one_recording(kind):
     assert not of_own_clock(Coursed(LIBRARY["baseline"], (), kind))
     assert not of_own_clock(LIBRARY["baseline"])
 
 
 @pytest.mark.parametrize("model", SAME_DRIFT)
-def test_how_well_a_drift_fits_is_told_by_its_own_gauge_run(model, monkeypatch):
-    """The inspection need not drift again: with the gauge's drift taken out, its rings would fit worse."""
+def test_the_fit_of_a_drift_is_judged_by_its_own_gauge_run(model, monkeypatch):
+    """The inspection need not drift again: with the gauge's drift removed, its rings would fit worse."""
     own = ("gauge before", "gauge after")
     monkeypatch.setattr(module, "rings_against_fiducials", lambda *args: own)
     monkeypatch.setattr(module, "_in_field", lambda *args: pytest.fail("asked of the inspection"))
@@ -50,8 +50,8 @@ def test_how_well_a_drift_fits_is_told_by_its_own_gauge_run(model, monkeypatch):
 @pytest.mark.parametrize(
     ("model", "blocks"), [*((m, True) for m in SAME_DRIFT), (LIBRARY["baseline"], False)]
 )
-def test_a_drift_is_held_out_in_blocks_by_turns_under_both_its_names(model, blocks, monkeypatch):
-    """How far a drift has come by the end is not to be told from what came before."""
+def test_a_drift_is_held_out_in_alternating_blocks_under_both_its_names(model, blocks, monkeypatch):
+    """How far a drift has come at the end does not follow from what came before."""
     held_out = []
     monkeypatch.setattr(heldout, "repeatability_px", lambda *args: 0.1)
     monkeypatch.setattr(heldout, "evidence", lambda *args, **more: ["all", "first", "second"])

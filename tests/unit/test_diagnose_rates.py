@@ -1,4 +1,4 @@
-"""How fast the wall passes the camera, by poses of frames that are far apart in time."""
+"""The speed at which the wall passes the camera, from poses of frames that are far apart in time."""
 
 from types import SimpleNamespace
 from typing import Any
@@ -19,7 +19,7 @@ from stages.diagnose.gauge.run import Term
 
 
 def swaying(time_s: np.ndarray) -> np.ndarray:
-    """Return poses (N, 4, 4) that go on, sway across and roll."""
+    """Return poses (N, 4, 4) that move on, sway sideways and roll."""
     T = np.tile(np.eye(4), (len(time_s), 1, 1))
     T[:, :3, 3] = np.stack(
         [1.5 * np.sin(3.5 * time_s), np.cos(2.0 * time_s), 20 * time_s + 2 * np.sin(time_s)], 1
@@ -30,7 +30,7 @@ def swaying(time_s: np.ndarray) -> np.ndarray:
 
 
 def passing_exactly(time_s: np.ndarray, xyz_c: np.ndarray) -> np.ndarray:
-    """Return d/dt of wall points' places in C by a step in time so short that its error is nothing."""
+    """Return d/dt of wall points' places in C by a step in time so short that its error is negligible."""
     step = 1e-4
     T, before, after = (swaying(time_s + s) for s in (0.0, -step, step))
     xyz_p = np.einsum("nij,nj->ni", T[:, :3, :3], xyz_c) + T[:, :3, 3]
@@ -66,7 +66,7 @@ def of_gauge(value: np.ndarray, time_s: np.ndarray) -> np.ndarray:
     return rates(value, time_s, smoothed(time_s))
 
 
-# Rates of a gauge run and of an inspection, and what they are to be no worse than.
+# Rates of a gauge run and of an inspection, and the errors that they must not exceed.
 EACH = pytest.mark.parametrize(
     ("found", "usual"), [(of_gauge, smoothed_differences), (as_adjusted, differences)]
 )
@@ -79,10 +79,10 @@ def kept(found: np.ndarray, true: np.ndarray) -> float:
 
 @EACH
 @pytest.mark.parametrize(("rate_hz", "up_to_hz"), [(10.0, 1.0), (30.0, 5.0), (60.0, 5.0)])
-def test_rates_lose_no_more_of_a_sway_than_differences(
+def test_rates_lose_no_more_of_a_sway_than_differences_do(
     found: Any, usual: Any, rate_hz: float, up_to_hz: float
 ) -> None:
-    """A spline had kept half of a sway of 3 Hz: a rolling shutter told by it was twice too large."""
+    """A spline kept half of a sway of 3 Hz: a rolling shutter estimated from it was twice too large."""
     time_s = np.arange(12 * rate_hz) / rate_hz
     for sway_hz in np.linspace(0.5, up_to_hz, 7):
         turn = 2 * np.pi * sway_hz * time_s[:, None]
@@ -92,7 +92,7 @@ def test_rates_lose_no_more_of_a_sway_than_differences(
 
 @pytest.mark.parametrize(("rate_hz", "sway_hz"), [(10.0, 0.6), (10.0, 1.0), (10.0, 1.5), (30.0, 3.0)])
 def test_rates_of_an_inspection_keep_a_sway(rate_hz: float, sway_hz: float) -> None:
-    """Differences made a rolling shutter 16 % too large at 1.5 Hz and 10 frames/s, and no σ held it."""
+    """Differences made a rolling shutter 16 % too large at 1.5 Hz and 10 frames/s, beyond any σ."""
     time_s = np.arange(12 * rate_hz) / rate_hz
     turn = 2 * np.pi * sway_hz * time_s[:, None]
     found = as_adjusted(np.sin(turn) / (2 * np.pi * sway_hz), time_s)
@@ -103,7 +103,7 @@ def test_rates_of_an_inspection_keep_a_sway(rate_hz: float, sway_hz: float) -> N
     ("found", "usual", "most"), [(of_gauge, smoothed_differences, 1.1), (as_adjusted, differences, 1.4)]
 )
 @pytest.mark.parametrize("rate_hz", [5.0, 10.0, 30.0, 60.0])
-def test_a_slow_sway_is_told_as_well_as_by_differences_beside_noise_of_poses(
+def test_a_slow_sway_is_estimated_as_well_as_by_differences_with_noise_of_poses(
     found: Any, usual: Any, most: float, rate_hz: float
 ) -> None:
     time_s = np.arange(600) / rate_hz
@@ -115,7 +115,7 @@ def test_a_slow_sway_is_told_as_well_as_by_differences_beside_noise_of_poses(
 
 
 @pytest.mark.parametrize("rate_hz", [3.0, 5.0, 10.0, 30.0])
-def test_noise_of_poses_makes_no_more_than_a_tenth_of_a_mm_a_second(rate_hz: float) -> None:
+def test_noise_of_poses_gives_at_most_a_tenth_of_a_mm_a_second(rate_hz: float) -> None:
     time_s = np.arange(600) / rate_hz
     still = np.random.default_rng(2).normal(0, 0.01, (600, 3))
     assert np.std(of_gauge(still, time_s)) < min(0.01 * rate_hz, 0.1)
@@ -130,7 +130,7 @@ def test_a_probe_that_speeds_up_has_its_true_speed_also_at_both_ends(found: Any,
 
 
 @pytest.mark.parametrize("apart_s", [0.002, 0.01])
-def test_of_frames_in_close_pairs_rates_are_those_of_even_ones(apart_s: float) -> None:
+def test_rates_of_frames_in_close_pairs_equal_those_of_even_ones(apart_s: float) -> None:
     pair_s = np.arange(180) / 15
     time_s = np.sort(np.concatenate([pair_s, pair_s + apart_s]))
     way = np.sin(2 * np.pi * time_s[:, None])
@@ -141,13 +141,13 @@ def test_of_frames_in_close_pairs_rates_are_those_of_even_ones(apart_s: float) -
 
 
 @pytest.mark.parametrize("count", [1, 2, 4])
-def test_of_few_frames_the_rate_is_that_of_their_polynomial(count: int) -> None:
+def test_the_rate_of_few_frames_is_that_of_their_polynomial(count: int) -> None:
     time_s = np.arange(count) / 10
     expected = np.full(count, 3.0 if count > 1 else 0)
     assert of_gauge(3 * time_s[:, None], time_s)[:, 0] == pytest.approx(expected)
 
 
-def test_poses_that_are_not_known_or_share_a_time_end_no_diagnosis() -> None:
+def test_unknown_poses_or_equal_times_end_no_diagnosis() -> None:
     time_s = np.arange(40) / 10
     T = swaying(time_s)
     T[7, :3, 3] = np.nan
@@ -159,7 +159,7 @@ def test_poses_that_are_not_known_or_share_a_time_end_no_diagnosis() -> None:
 
 @pytest.mark.parametrize("stop_s", [2.0, 3.5])
 def test_a_probe_that_stops_does_not_go_back(stop_s: float) -> None:
-    """Smoothed rates of a sudden stop go back a little, of which the sign had made a reversal."""
+    """Smoothed rates of a sudden stop went back a little, whose sign was taken for a reversal."""
     time_s = np.arange(120) / 30
     T = np.tile(np.eye(4), (120, 1, 1))
     T[:, 2, 3] = 20 * np.minimum(time_s, stop_s)
@@ -172,7 +172,7 @@ def test_a_probe_that_stops_does_not_go_back(stop_s: float) -> None:
 
 
 def signs(z_mm: np.ndarray, time_s: np.ndarray) -> np.ndarray:
-    """Return the factor of a reversal for a probe at such places."""
+    """Return the sign of the motion, as used for reversals, for a probe at such places."""
     T = np.tile(np.eye(4), (len(time_s), 1, 1))
     T[:, 2, 3] = z_mm
     speed = Moving.of(T, time_s).speed_mm_s
@@ -182,20 +182,20 @@ def signs(z_mm: np.ndarray, time_s: np.ndarray) -> np.ndarray:
 
 
 @pytest.mark.parametrize(("forward", "back"), [(20.0, 250.0), (4.0, 45.0)])
-def test_a_probe_that_is_withdrawn_quickly_went_forward_before(forward: float, back: float) -> None:
+def test_a_probe_that_is_withdrawn_quickly_moved_forward_before(forward: float, back: float) -> None:
     time_s = np.arange(600) / 30
     found = signs(np.cumsum(np.where(time_s < 15, forward, -back)) / 30, time_s)
     assert np.mean(found[:430] == 1) == 1
     assert np.mean(found[470:] == -1) == 1
 
 
-def test_a_jump_of_the_poses_makes_no_probe_stand() -> None:
+def test_a_jump_of_the_poses_does_not_count_as_a_standstill() -> None:
     time_s = np.arange(600) / 30
     found = signs(20 * time_s + 30 * (time_s > 10), time_s)
     assert np.mean(found == 1) > 0.95
 
 
-def test_a_probe_that_stands_for_long_goes_neither_way() -> None:
+def test_a_probe_that_stands_for_long_has_no_direction() -> None:
     time_s = np.arange(600) / 30
     noise = np.random.default_rng(2).normal(0, 0.01, 600)
     found = signs(20 * np.minimum(time_s, 8) + noise, time_s)
@@ -203,10 +203,10 @@ def test_a_probe_that_stands_for_long_goes_neither_way() -> None:
 
 
 @pytest.mark.parametrize(("sway_hz", "most"), [(0.6, 0.02), (2.0, 0.05), (3.0, 0.2), (5.3, 0.8)])
-def test_a_rolling_shutter_is_as_unsure_as_the_motion_that_is_lost(
+def test_sigma_of_a_rolling_shutter_includes_the_motion_lost_in_rates(
     real_probe: Probe, sway_hz: float, most: float
 ) -> None:
-    """Told by a sway of 3 Hz, 16 ms had been 31 ± .2 ms: now they are 18 ± 2 ms."""
+    """Estimated from a sway of 3 Hz, 16 ms were 31 ± .2 ms: now they are 18 ± 2 ms."""
     time_s = np.arange(300) / 30
     random = np.random.default_rng(3)
     T = np.tile(np.eye(4), (300, 1, 1))

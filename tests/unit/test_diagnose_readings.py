@@ -1,4 +1,4 @@
-"""For an effect of the encoder the answer holds the reading against the pictures, not the rings."""
+"""For an effect of the encoder the answer compares readings with pictures, and not rings."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def found(*names: str) -> Diagnosis:
     return Diagnosis("", "", Verdict.NAMED, 0.0, effects=effects, fit=RINGS, ring_picture=picture)
 
 
-def test_a_wrong_scale_is_shown_in_the_recording_in_which_it_shows():
+def test_a_wrong_scale_is_drawn_for_the_recording_that_shows_it():
     sound, wrong = recording(), recording(scale=0.02)
     for order in ((sound, wrong), (wrong, None), (None, wrong)):
         told = with_readings(found("encoder_scale"), order)
@@ -43,7 +43,7 @@ def test_a_wrong_scale_is_shown_in_the_recording_in_which_it_shows():
 
 
 @pytest.mark.parametrize("names", [(), ("laser_tilt",), ("laser_tilt", "encoder_scale")])
-def test_what_moves_rings_is_shown_in_rings(names):
+def test_an_effect_on_rings_is_drawn_with_rings(names):
     told = with_readings(found(*names), (recording(),))
     assert told.fit is RINGS
     assert told.reading_picture is None

@@ -1,4 +1,4 @@
-"""The page of a diagnosis: every verdict renders, numbers that are missing are shown as missing."""
+"""The page of a diagnosis: every verdict has a page, and missing numbers are marked as missing."""
 
 from dataclasses import replace
 
@@ -50,7 +50,7 @@ SHOWN = Shown(
 )  # fmt: skip
 
 
-def test_a_named_effect_is_told_with_its_confirmations_and_pictures(tmp_path):
+def test_a_named_effect_is_reported_with_its_confirmations_and_pictures(tmp_path):
     write_page(WHOLE, SHOWN, tmp_path)
     page = (tmp_path / "diagnosis.html").read_text()
     assert headline(WHOLE) == "Left out: laser tilt"
@@ -62,7 +62,7 @@ def test_a_named_effect_is_told_with_its_confirmations_and_pictures(tmp_path):
     assert page.count("not known") == 2, "the noise floor, above and in the table"
 
 
-def test_the_first_lines_give_the_size_with_its_sigma_and_what_it_means_for_the_pipe(tmp_path):
+def test_the_first_lines_give_the_size_with_its_sigma_and_the_consequence_for_the_pipe(tmp_path):
     write_page(WHOLE, Shown(), tmp_path)
     page = (tmp_path / "diagnosis.html").read_text()
     assert "angle by which the sheet leans forward: 0.600 ± 0.010 deg" in page
@@ -70,21 +70,21 @@ def test_the_first_lines_give_the_size_with_its_sigma_and_what_it_means_for_the_
     assert "after correction for the effects found, 0.001 mm remain" in page
 
 
-def test_causes_of_a_class_that_say_the_same_are_said_once(tmp_path):
+def test_causes_of_a_class_with_the_same_sentence_are_listed_once(tmp_path):
     found = replace(WHOLE, verdict=Verdict.CLASS, effects=(TILT, TILT), identifiable=TILT.statement)
     write_page(found, Shown(), tmp_path)
     assert (tmp_path / "diagnosis.html").read_text().count(TILT.statement) == 1
 
 
-def test_the_likeliest_of_a_class_is_no_statement_of_fact(tmp_path):
-    """A tilt of probability .4 among 24 causes stood in bold as what is."""
+def test_the_likeliest_cause_of_a_class_is_not_stated_as_a_fact(tmp_path):
+    """A tilt with probability .4 among 24 causes was in bold like a fact."""
     perhaps = replace(TILT, probability=0.404)
     found = replace(WHOLE, verdict=Verdict.CLASS, effects=(perhaps,), identifiable=TILT.statement)
     write_page(found, Shown(), tmp_path)
     assert f"Perhaps (40 %): {TILT.statement}" in (tmp_path / "diagnosis.html").read_text()
 
 
-def test_the_frame_shown_is_the_one_that_departs_most_and_has_most_of_a_ring():
+def test_the_frame_shown_has_the_largest_residual_and_most_of_its_ring():
     frame = np.repeat([3, 5, 7, 9], [24, 22, 6, 24])
     residual = np.select([frame == 5, frame == 7], [0.2, 0.9], 0.01)
     residual[0] = 5.0  # a single bad bin
@@ -93,7 +93,7 @@ def test_the_frame_shown_is_the_one_that_departs_most_and_has_most_of_a_ring():
     assert worst_frame(seen) == 5
 
 
-def test_a_place_that_was_not_measured_is_said_to_be_not_measured(tmp_path):
+def test_an_unmeasured_place_is_called_not_measured(tmp_path):
     found = replace(WHOLE, location=Location("profile", None, None))
     write_page(found, Shown(), tmp_path)
     assert (tmp_path / "diagnosis.html").read_text().count("not measured") == 4
@@ -108,7 +108,7 @@ def test_every_other_verdict_has_its_page(tmp_path, verdict):
     assert "nan" not in page
 
 
-def test_every_size_of_a_slip_is_told_in_words() -> None:
+def test_every_size_of_a_slip_is_stated_in_words() -> None:
     numbers = {"slip_mm": Value(-3.3, 0.06), "time_s": Value(4.2, 0.02), "duration_s": Value(0.29, 0.02)}
     told = sizes(EffectFound("encoder_slip", 0.98, numbers, "", ""))
     assert told[-1] == "duration: 0.290 ± 0.020 s"

@@ -1,4 +1,4 @@
-"""Variance of scores by errors that neighbours share, across cells of wall and where poses take them up."""
+"""The variance of scores from errors that neighbours share, across cells of wall and without poses."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ _DRAWS, _POINTS = 60, 6000
 
 
 def drawn_scores(correlated: float) -> tuple[Float, Float, Float]:
-    """Return the scores (D, K) of draws, their variance by cells, and what is beyond."""
+    """Return the scores (D, K) of draws, their variance by cells, and the part between cells."""
     random = np.random.default_rng(0)
     wall = np.stack([random.uniform(0, 130, _POINTS), random.uniform(-80, 80, _POINTS)], -1)
     follow = np.stack([np.cos(wall[:, 1] / 25), np.cos(wall[:, 0] / 20 + 1)])
     weight, scores, cells, beyond = np.full(_POINTS, 4.0), [], [], []
     for _ in range(_DRAWS):
-        # Straight between independent nodes half a cell apart, as print and stains are within some mm.
+        # Linear between independent nodes half a cell apart, as print and stains are within some mm.
         nodes = random.normal(0, correlated, (64, 64))
         shared = map_coordinates(nodes, wall.T / (WALL_CELL_MM / 2), order=1, mode="grid-wrap")
         error = shared + random.normal(0, 0.5, _POINTS)
@@ -36,9 +36,9 @@ def drawn_scores(correlated: float) -> tuple[Float, Float, Float]:
     return np.array(scores), np.mean(cells, 0), np.mean(beyond, 0)
 
 
-def test_scores_spread_as_cells_and_what_passes_between_them_say():
+def test_the_spread_of_scores_is_the_part_of_cells_and_the_part_between_them():
     scores, cells, beyond = drawn_scores(correlated=1.0)
-    # 60 draws tell a variance to 18 %.
+    # 60 draws determine a variance to 18 %.
     assert cells + beyond == pytest.approx(scores.var(0), rel=0.4)
     # Cells alone miss a third.
     assert np.all(beyond > 0.3 * cells)
@@ -54,11 +54,11 @@ def test_no_rings_add_nothing():
     assert beyond_cells(np.zeros((3, 0)), none, np.zeros((3, 0)), np.zeros((0, 2))) == pytest.approx(0)
 
 
-def test_what_poses_take_up_of_shared_errors_is_not_missed():
+def test_shared_errors_that_poses_absorb_are_not_missed():
     random = np.random.default_rng(1)
     frames, cells, points, draws, together = 60, 16, 7, 100, 5
     frame = np.repeat(np.arange(frames), cells * points)
-    # Five frames each see the same cells, which err alike in all of them.
+    # Five frames each see the same cells, whose errors are equal in all of them.
     cell = cells * (frame // together) + np.tile(np.repeat(np.arange(cells), points), frames)
     by_cell = random.normal(size=(cell.max() + 1, 7))[cell]
     wall = np.stack([40.0 * (cell // cells), 40.0 * (cell % cells)], -1)
@@ -82,7 +82,7 @@ def test_what_poses_take_up_of_shared_errors_is_not_missed():
         scores.append(reduced.right[0] / np.sqrt(reduced.information[0, 0]))
         told.append(inflation[0] ** 2)
     expected = together * points + 0.3**2
-    # 100 draws tell a variance to 14 %.
+    # 100 draws determine a variance to 14 %.
     assert np.var(scores) == pytest.approx(expected, rel=0.35)
-    # Six of sixteen cells' errors are in the poses: without them it would be 0.7 of that.
+    # Six of sixteen cells' errors are absorbed by the poses: without that part it would be 0.7 of that.
     assert np.mean(told) == pytest.approx(expected, rel=0.15)

@@ -39,9 +39,9 @@ def evidence_of(design: np.ndarray, measured: np.ndarray, columns: tuple[Column,
 
 
 def drawn(true: dict[int, float], like: float = 0.0) -> tuple[Sets, np.ndarray, np.ndarray]:
-    """Return sets of four, of which the amplitudes ``true`` are there, with rows and measurements.
+    """Return sets of four with rows and measurements, of which the amplitudes ``true`` are present.
 
-    The pattern is the cone but for a share ``1 - like`` of its rows' noise.
+    The pattern equals the cone except for a share ``1 - like`` of noise in its rows.
     """
     random = np.random.default_rng(5)
     sigma = PRIOR_PLAUSIBLE * np.array([m.amplitudes[0].plausible for m, _ in EFFECTS])
@@ -54,7 +54,7 @@ def drawn(true: dict[int, float], like: float = 0.0) -> tuple[Sets, np.ndarray, 
     return Sets.of(of, members, STATED, 1.0), design * np.array([1.0, *sigma]), np.asarray(measured)
 
 
-def test_the_surprise_of_a_set_is_its_marginal_likelihood_and_its_chance_beforehand():
+def test_the_evidence_of_a_set_is_its_marginal_likelihood_and_its_prior():
     sets, rows, measured = drawn({0: 0.5})
 
     def exact(chosen: frozenset[int], nameless: bool) -> float:
@@ -68,19 +68,19 @@ def test_the_surprise_of_a_set_is_its_marginal_likelihood_and_its_chance_beforeh
         assert sets.deviance(chosen) == pytest.approx(exact(chosen, nameless) - nothing, abs=1e-6)
 
 
-def test_what_is_there_is_reached_from_a_wrong_set_and_its_amplitudes_are_told():
+def test_the_true_set_is_reached_from_a_wrong_one_with_the_right_amplitudes():
     sets, _, _ = drawn({0: 0.6, 1: -0.7})
     met = sets.likely([frozenset({2, 3})], 3)
     best = min(met, key=met.__getitem__)
     assert best == {0, 1}
     told = [a[0] / (PRIOR_PLAUSIBLE * m.amplitudes[0].plausible)
             for m, a in zip((CONE, BASELINE), sets.amplitudes(best), strict=True)]  # fmt: skip
-    # 300 rows of noise 1 tell an amplitude to 0.06.
+    # 300 rows of noise 1 determine an amplitude to 0.06.
     assert told == pytest.approx([0.6, -0.7], abs=0.25)
     assert max(map(len, met)) == 3
 
 
-def test_sets_met_by_adding_a_member_have_their_own_surprise():
+def test_sets_reached_by_adding_a_member_have_their_own_evidence():
     """Two effects and two patterns without a cause: the first pattern alone makes a set less likely."""
     four, _, _ = drawn({0: 0.6})
     other = next(t for t in GENERIC if t.name == "generic_line_0_1")
@@ -92,24 +92,24 @@ def test_sets_met_by_adding_a_member_have_their_own_surprise():
 
 
 @pytest.mark.parametrize(("like", "left"), [(0.99, 3), (0.8, 4)])
-def test_a_pattern_that_describes_an_effect_is_no_rival_of_it(like, left):
+def test_a_pattern_that_describes_an_effect_is_not_its_rival(like, left):
     sets, _, _ = drawn({0: 1.0}, like)
     assert len(sets.without_describing_patterns(frozenset({0})).members) == left
 
 
-def test_differences_are_believed_no_further_than_the_scores_of_what_was_found_spread():
+def test_differences_are_believed_only_as_far_as_the_spread_of_the_scores_found():
     of = evidence_of(np.eye(5), np.zeros(5), columns_of(EFFECTS))
     assert believed(of, 2.0) == pytest.approx(3.0)
     assert believed(replace(of, score_covariance=9.0 * of.information), 2.0) == pytest.approx(9.0)
 
 
-def test_a_name_is_a_law_and_an_order_whatever_the_course():
+def test_a_name_is_a_law_and_an_order_whatever_its_course():
     waves = LIBRARY["sheet_waviness"]
     assert cause_of(waves, (2.0,)) != cause_of(waves, (3.0,))
     assert cause_of(CONE, ()) == ("laser_cone", ())
 
 
-def test_waves_of_every_order_may_be_in_a_set_whichever_was_the_best_alone():
+def test_waves_of_every_order_may_be_in_a_set_whichever_was_best_alone():
     waves = LIBRARY["sheet_waviness"]
     run, found = SimpleNamespace(time_s=np.arange(10.0)), SimpleNamespace(terms=())
     scores = [SimpleNamespace(model=waves, shape=(3.0,)), SimpleNamespace(model=CONE, shape=())]
@@ -122,7 +122,7 @@ SETTLING = Coursed(CONE, (), CourseKind.EXPONENTIAL)
 
 
 def members_beside(model: EffectModel, shape: Shape) -> tuple[Member, ...]:
-    """Return what may be in the place of one effect that was found in a run of 10 s."""
+    """Return the candidates beside one effect that was found in a run of 10 s."""
     run = SimpleNamespace(time_s=np.arange(10.0))
     found = SimpleNamespace(terms=(Term(model, shape, np.full(len(model.amplitudes), 0.5)),))
     return members_of(cast(Any, run), cast(Any, found), (), 30)
@@ -134,7 +134,7 @@ def as_found(members: tuple[Member, ...]) -> list[PatternInCourse]:
     return [m for m in models if isinstance(m, PatternInCourse) and m.like is not None]
 
 
-def test_what_settles_has_patterns_of_what_it_does_not_move_beside_it_that_settle_as_well():
+def test_beside_an_exponential_effect_patterns_of_the_other_kind_with_its_course_are_candidates():
     """A focal length that changed as no law of the library does was called a cone at .996."""
     members = members_beside(SETTLING, (12.6,))
     beside = as_found(members)
@@ -154,7 +154,7 @@ def test_what_settles_has_patterns_of_what_it_does_not_move_beside_it_that_settl
     assert outward.formula((12.6,)) == "(image outward: a θ^1) × (1 − exp(−t / 12.6 s))"
 
 
-def test_such_a_pattern_is_as_likely_beside_its_effect_as_a_steady_one_beside_a_steady_effect():
+def test_such_a_pattern_has_the_prior_of_a_steady_one_beside_a_steady_effect():
     def beside(name: str, model: EffectModel, shape: Shape) -> float:
         before = {m.model.name: m.prior_deviance for m in members_beside(model, shape)}
         return before[name] - before[model.name]
@@ -163,7 +163,7 @@ def test_such_a_pattern_is_as_likely_beside_its_effect_as_a_steady_one_beside_a_
     assert settles == pytest.approx(beside("generic_outward_0_1", CONE, ()))
 
 
-def test_what_stays_has_no_more_patterns_and_a_swing_has_sine_and_cosine_of_each():
+def test_a_constant_effect_adds_no_patterns_and_a_swing_adds_sine_and_cosine_of_each():
     assert as_found(members_beside(CONE, ())) == []
     beside = as_found(members_beside(LIBRARY["laser_rocking"], (0.7,)))
     assert {len(p.amplitudes) for p in beside if p.name.startswith("generic_outward_1_2")} == {4}
@@ -173,7 +173,7 @@ def test_what_stays_has_no_more_patterns_and_a_swing_has_sine_and_cosine_of_each
     assert beside[0].quantities((0.7,), np.array([3.0, 0.0, 0.0, 4.0])) == {"amplitude": 5.0}
 
 
-def test_a_free_profile_holds_every_power_of_its_harmonic():
+def test_a_free_profile_contains_every_power_of_its_harmonic():
     names = {model.name: len(model.amplitudes) for model, _ in FREE_PROFILES}
     assert names["generic_line_0_any"] == 4
     assert names["generic_outward_1_any"] == 8

@@ -1,4 +1,4 @@
-"""Sizes of effects: shapes set free, laws that are not exact, scores that no large effect may widen."""
+"""Sizes of effects: free shapes, inexact laws, and scores whose spread a large effect must not widen."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -30,7 +30,7 @@ def points_of_a_bore() -> ImagePoints:
     return ring_points(plain_probe(), Bore(50.8), 90, 1.3)
 
 
-def test_a_free_shape_is_the_effect_at_that_shape():
+def test_an_effect_with_a_free_shape_equals_the_effect_at_that_shape():
     points = points_of_a_bore()
     free = Term(DRIFT, (3.0,), np.array([0.002, 0.6]), (0.5, 40.0))
     assert len(free.amplitudes) == 2
@@ -42,7 +42,7 @@ def test_a_free_shape_is_the_effect_at_that_shape():
     assert replace(free, amplitude=np.array([0.002]), bounds=None).at(np.array([0.002]))[0] == (3.0,)
 
 
-def test_a_law_that_grows_otherwise_has_another_exponent_at_the_reference_and_the_same_pattern():
+def test_a_law_with_another_growth_has_another_exponent_at_the_reference_and_the_same_pattern():
     reference, size = 50.0, np.array([0.2, 0.1])
     other = OtherGrowth("other", TILT, (), size, of_line=True, reference=reference)
     near, far = (ring_points(plain_probe(), Bore(r), 90, 1.3) for r in (reference, 1.01 * reference))
@@ -60,8 +60,8 @@ def test_a_law_that_grows_otherwise_has_another_exponent_at_the_reference_and_th
         ("laser_rocking", (0.5,), [0.6, 0.0, 0.0, 0.8]),
     ],
 )
-def test_a_course_that_wanders_is_as_large_as_what_it_is_held_against(name, shape, size):
-    """Of a drift so slow that little is reached, the little counts; a swing goes along its longer axis."""
+def test_the_size_of_a_course_is_that_within_the_run(name, shape, size):
+    """For a slow drift it is the part reached in the run; for a swing it is the longer axis."""
     random, run_s = np.random.default_rng(2), 8.0
     points = ring_points(plain_probe(), Bore(50.8), 2000, 1.3)
     points = replace(points, time_s=random.uniform(0, run_s, len(points.uv)))
@@ -76,11 +76,11 @@ def test_a_course_that_wanders_is_as_large_as_what_it_is_held_against(name, shap
 
     waves = [mean_square(other, (), wave) for wave in np.eye(len(other.amplitudes))[1:]]
     longer = {"laser_rocking": np.array([0, 0, 0, 0.8])}.get(name, term.amplitude)
-    # Eight waves hold all but 7 % of the course.
+    # Eight waves contain all but 7 % of the course.
     assert sum(waves) == pytest.approx(0.93 * mean_square(term.model, shape, longer), rel=0.05)
 
 
-def test_a_time_constant_carries_the_uncertainty_of_its_shape():
+def test_sigma_of_a_time_constant_includes_that_of_its_shape():
     free = Term(DRIFT, (3.0,), np.array([0.002, 0.0]), (0.5, 40.0))
     found = quantities(Sized(free, np.diag([1e-5, 0.2]) ** 2))
     assert found["time_s"].value == 3.0
@@ -88,7 +88,7 @@ def test_a_time_constant_carries_the_uncertainty_of_its_shape():
     assert found["relative"].sd == pytest.approx(1e-5, rel=0.15)
 
 
-def test_scores_of_a_large_effect_are_not_widened_by_the_effect_itself():
+def test_the_spread_of_scores_is_not_widened_by_a_large_effect_itself():
     random = np.random.default_rng(3)
     e = replace(equations(random, 3000), by_pose=np.zeros((3000, 6)))
     # The effect is strong in some cells and absent in others, as a swing is from frame to frame.
@@ -108,14 +108,14 @@ def test_scores_of_a_large_effect_are_not_widened_by_the_effect_itself():
     alone, degrees = score_inflation(e, reduced, left, none, np.full(GLOBALS, -1), fast)
     explained, _ = score_inflation(e, reduced, left, none, np.array([-1, -1, 0, -1, -1]), fast[1:, 1:])
     assert alone[2] > 5
-    # Half of the cells hold all of it.
+    # Half of the cells contain all of it.
     assert degrees[2] == pytest.approx(len(np.unique(e.cell)) / 2, rel=0.2)
     assert explained[2] == pytest.approx(1.0, abs=0.5)
     assert explained[[0, 1, 3, 4]] == pytest.approx(alone[[0, 1, 3, 4]])
 
 
 @pytest.mark.parametrize("swing", SWINGS, ids=lambda s: s.name)
-def test_a_swing_repeats_after_its_period_and_is_nothing_off_the_line(swing):
+def test_a_swing_repeats_after_its_period_and_is_zero_away_from_the_line(swing):
     points = points_of_a_bore()
     amplitude = np.linspace(0.1, 0.2, len(swing.amplitudes))
     here = swing.wall_shift_mm(points, (4.0,), amplitude)
@@ -127,7 +127,7 @@ def test_a_swing_repeats_after_its_period_and_is_nothing_off_the_line(swing):
     assert not swing.wall_shift_mm(replace(points, on_line=False), (4.0,), amplitude).any()
 
 
-def test_a_fit_whose_shapes_are_choices_stays_as_it_is_and_others_get_one_more_amplitude():
+def test_a_fit_with_discrete_shapes_stays_and_one_with_a_continuous_shape_gets_one_more_amplitude():
     found = Fit(SimpleNamespace(time_s=np.linspace(0, 8, 81)), None, (Term(TILT, (), np.zeros(2)),), 1.0)
     assert freed(found.run, found) is found
     drifting = replace(found, terms=(*found.terms, Term(DRIFT, (3.0,), np.array([0.002]))))
@@ -137,7 +137,7 @@ def test_a_fit_whose_shapes_are_choices_stays_as_it_is_and_others_get_one_more_a
 
 
 @pytest.mark.parametrize("spread", [-0.5, 0.5, 1.0])
-def test_rings_that_are_left_when_fiducials_are_taken_out_have_no_less_than_independent_errors(spread):
+def test_after_fiducials_are_removed_rings_have_at_least_independent_errors(spread):
     columns = tuple(Column(TILT.name, a.name) for a in TILT.amplitudes)
     information = 4.0 * np.eye(2)
     of = Evidence(columns, information, information @ [1.0, 2.0], spread * information, 0.0, np.ones(2))
@@ -148,7 +148,7 @@ def test_rings_that_are_left_when_fiducials_are_taken_out_have_no_less_than_inde
     assert np.diag(found.covariance) == pytest.approx(0.25, rel=0.01)
 
 
-def test_a_fit_is_not_kept_for_what_far_steps_of_its_poses_only_promised(monkeypatch):
+def test_a_fit_whose_predicted_gain_needs_large_pose_steps_is_not_kept(monkeypatch):
     cost = {"promised": 1.0, "worse": 3.0, "settled": 2.0, "best": 0.5}
     reduced = SimpleNamespace(information=np.eye(1), right=np.array([3.0]))
 
@@ -167,7 +167,7 @@ def test_a_fit_is_not_kept_for_what_far_steps_of_its_poses_only_promised(monkeyp
     assert fitting.fit(cast(Any, None), cast(Any, "promised"), ()).state == "best"
 
 
-def test_the_numbers_of_a_formula_stand_under_its_letters_with_units() -> None:
+def test_the_numbers_below_a_formula_have_its_letters_and_units() -> None:
     """The page said "amplitude = 0.47983, frequency_hz = 0.15075 mm" below a formula in a and f."""
     rocking = next(s for s in SWINGS if s.harmonic == 1)
     told = rocking.equation((0.1512,), np.array([0.3, 0.0, 0.4, 0.0]))

@@ -1,4 +1,4 @@
-"""What a gauge run must show for a name, and for an event to be borne out."""
+"""The conditions for a name in a gauge run, and for the confirmation of an event."""
 
 from types import SimpleNamespace
 from typing import Any, cast
@@ -62,10 +62,10 @@ def examined(
 
 
 @pytest.mark.parametrize(("chance", "verdict"), [(0.986, Verdict.UNEXPLAINED), (0.6, Verdict.CLASS)])
-def test_patterns_that_are_unlikely_each_leave_a_name_unexplained_unless_other_names_are_likelier(
+def test_patterns_that_are_each_unlikely_make_a_name_unexplained_unless_other_names_are_likelier(
     chance, verdict, monkeypatch
 ):
-    """A focal length that drifted as no law does was a class of the cone and of what might come beside it."""
+    """A focal length that drifted as no law does was a class of the cone and its companions."""
     monkeypatch.setattr(answer, "shift_px", lambda fit, term: term.shift_px)
     seen = examined(unsplit=())
     seen.verdicts.chance_of = lambda term: chance
@@ -110,9 +110,9 @@ def test_a_class_leaves_out_laws_that_join_others_without_explaining_more(beside
 @pytest.mark.parametrize(
     ("fitted", "weighed", "nameless", "named", "doubts"),
     [
-        # Another name that needs two patterns is a name.
+        # Another name that needs two patterns counts as a name.
         ([(CONE, 0.6)], [(("baseline", 0, 1), 0.4)], 0.0, 0.4, 0),
-        # A formula that was fitted is of patterns, and no effect at all is neither.
+        # A fitted formula counts as patterns; the set without any effect is neither.
         ([(CONE, 0.51), ((0,), 0.3)], [((k,), 0.0095) for k in range(1, 21)], 0.49, 0.0, 21),
         ([(CONE, 0.51), ((), 0.3), (("baseline",), 0.1)], [((1,), 0.09)], 0.09, 0.1, 1),
         # Sets of two patterns count once.
@@ -127,7 +127,7 @@ def test_a_class_leaves_out_laws_that_join_others_without_explaining_more(beside
     ],
 )
 def test_each_set_counts_once_with_the_patterns_or_with_other_names(fitted, weighed, nameless, named, doubts):
-    """Two patterns beside another name of .4 made .8 of patterns, and −.4 of names."""
+    """Two patterns beside another name of .4 counted as .8 of patterns, and −.4 of names."""
     verdicts = hypotheses(fitted, weighed)
     instead = verdicts.instead_of(verdicts.judged[0].fit.terms[0])
     assert instead.nameless == pytest.approx(nameless)
@@ -136,7 +136,7 @@ def test_each_set_counts_once_with_the_patterns_or_with_other_names(fitted, weig
     assert len(answer.unknown_rivals(seen)) == doubts
 
 
-def test_the_pattern_that_is_the_likelier_beside_any_name_comes_first():
+def test_the_pattern_that_is_likelier_summed_over_all_names_comes_first():
     seen = examined((1.0, 1.0))
     each = iter([{"a": 0.3, "b": 0.2}, {"a": 0.02, "b": 0.2}])
     seen.verdicts.instead_of = lambda term: Instead(next(each), 0.3, 0.0)
@@ -152,18 +152,20 @@ def test_the_pattern_that_is_the_likelier_beside_any_name_comes_first():
         (np.nan, 0.126, Verdict.CONSISTENT),
     ],
 )
-def test_what_repeats_on_other_wall_is_not_consistent_though_nothing_was_found(heldout_px, floor_px, verdict):
-    """Rows that wavered left .28 px in a gauge run alone, where noise made .13: "consistent"."""
+def test_a_residual_that_repeats_elsewhere_is_not_consistent_though_no_effect_was_found(
+    heldout_px, floor_px, verdict
+):
+    """Unstable sensor rows left .28 px in a gauge run alone, where noise was .13 px: "consistent"."""
     run = SimpleNamespace(width_px=np.full(9, 1.7))
     searched = cast(Any, SimpleNamespace(by_chance=0.5, run=run))
     quality = FitQuality("px", 0.31, 0.3, 0.29, heldout_px, floor_px)
     seen = Examined(searched, None, (), (), quality=quality)
     assert answer.verdict_of(seen) is verdict
-    # Chance is no rarer than sound runs show: none of 15 passed the limit.
+    # 15 sound runs, none of which passed the limit, cannot show a smaller probability by chance.
     assert (seen.global_p == pytest.approx(1 / 16)) is (verdict is Verdict.UNEXPLAINED)
     assert bool(seen.shortcomings) is bool(np.isnan([heldout_px, floor_px]).any())
     assert ("0.28 px" in answer.formula(seen)) is (verdict is Verdict.UNEXPLAINED)
-    # A second line may do so if it is high enough to pull the line that far, but nothing that disturbs poses.
+    # A second line may cause it if it is bright enough to pull the line that far; effects on poses may not.
     by_motion, faint, high = (
         cast(Any, SimpleNamespace(
             name=name, sure=True, location=Location(channel, None, None),
@@ -210,8 +212,8 @@ def test_a_name_needs_probability_adequacy_separation_and_a_second_prediction(se
 
 
 @pytest.mark.parametrize(("sizes", "possible"), [((-0.1, 0.01), True), ((-0.1, -0.01), False), ((), True)])
-def test_a_hypothesis_is_possible_only_where_all_its_sizes_are(sizes, possible):
-    # No exposure is shorter than none; a baseline may be off either way.
+def test_a_hypothesis_is_possible_only_if_all_its_sizes_are(sizes, possible):
+    # No exposure is shorter than zero; a baseline may be off either way.
     baseline, blur = LIBRARY["baseline"], LIBRARY["motion_blur"]
     each = zip((baseline, blur), sizes, strict=False)
     terms = tuple(Term(m, (), np.full(len(m.amplitudes), size)) for m, size in each)
@@ -222,7 +224,7 @@ def test_a_hypothesis_is_possible_only_where_all_its_sizes_are(sizes, possible):
 @pytest.mark.parametrize(
     ("step_s", "turns_s", "again"), [(3.0, 9.0, False), (3.0, 6.0, True), (0.0, 6.0, False)]
 )
-def test_a_step_is_borne_out_only_where_the_probe_comes_back_to_the_wall_before_it(step_s, turns_s, again):
+def test_a_step_is_confirmed_only_if_the_probe_returns_to_the_wall_before_it(step_s, turns_s, again):
     time_s = np.arange(100) / 10
     T_pc = np.tile(np.eye(4), (100, 1, 1))
     T_pc[:, 2, 3] = 20 * (turns_s - np.abs(time_s - turns_s))
@@ -231,7 +233,7 @@ def test_a_step_is_borne_out_only_where_the_probe_comes_back_to_the_wall_before_
 
 
 @pytest.mark.parametrize(("exposure_s", "possible"), [(0.01, True), (-0.01, False)])
-def test_an_exposure_shorter_than_none_is_no_explanation(exposure_s, possible):
+def test_an_exposure_shorter_than_zero_is_no_explanation(exposure_s, possible):
     sizes = (np.array([exposure_s]), np.array([0.3, -0.2]))
     members = tuple(Member(LIBRARY[name], (), 0.0) for name in ("motion_blur", "laser_tilt"))
     assert Unfitted(members, sizes, 0.0, 0.0).possible is possible
@@ -241,7 +243,7 @@ def test_an_exposure_shorter_than_none_is_no_explanation(exposure_s, possible):
     ("told", "ambiguous", "words"),
     [(True, False, "each other."), (False, True, "or the pipe"), (False,) * 2 + ("",)],
 )
-def test_rings_that_jump_in_an_inspection_are_told_as_a_knock_where_they_may_be_one(told, ambiguous, words):
+def test_a_jump_of_rings_in_an_inspection_is_reported_as_a_knock_where_it_may_be_one(told, ambiguous, words):
     warned: list[str] = []
     jump = SimpleNamespace(frame=140, jump_mm=np.array([0.2, -0.2, 0.01]))
     knock = SimpleNamespace(certain=told, ambiguous=ambiguous, jump=jump, time_s=4.67)
@@ -250,7 +252,7 @@ def test_rings_that_jump_in_an_inspection_are_told_as_a_knock_where_they_may_be_
     assert all("at 4.67 s (frame 140)" in w and "0.28 mm" in w and words in w for w in warned)
 
 
-def test_a_gauge_run_too_short_to_be_asked_what_repeats_says_so(monkeypatch):
+def test_a_gauge_run_too_short_to_check_for_repetition_says_so(monkeypatch):
     short = FitQuality("px", 0.3, 0.3, np.nan, np.nan, 0.1)
     found = SimpleNamespace(state=None)
     searched = cast(Any, SimpleNamespace(by_chance=0.5, found=found))
@@ -270,8 +272,8 @@ def test_a_gauge_run_too_short_to_be_asked_what_repeats_says_so(monkeypatch):
     assert "too short" in told
 
 
-def test_what_could_not_be_examined_is_told_and_not_only_written_on_the_page():
-    """The verdict stood alone on the terminal: "not_identifiable", of a gauge run that was never examined."""
+def test_the_reason_why_a_run_could_not_be_examined_is_printed_too():
+    """The terminal showed only the verdict "not_identifiable" of a gauge run that was never examined."""
     warned: list[str] = []
     given = {"parameters": SimpleNamespace(without=()), "context": SimpleNamespace(warn=warned.append)}
     frames = SimpleNamespace(applied_to=lambda recording: recording)

@@ -1,4 +1,7 @@
-"""The line's width over the image's scale: what a blurred edge of the picture may do, and what it may not."""
+"""The line's width over the image scale.
+
+How it may change by blur at the picture's edge, and how it may not.
+"""
 
 from __future__ import annotations
 
@@ -40,12 +43,12 @@ def seen(edge_blur: float, gamma: float) -> tuple[bool, float]:
 
 
 @pytest.mark.parametrize("edge_blur", [0.0, 1.0, 3.0])
-def test_a_lens_that_is_less_sharp_at_its_edge_is_no_error_of_response_or_line(edge_blur: float) -> None:
+def test_a_lens_that_is_less_sharp_at_its_edge_is_not_an_error_of_response_or_line(edge_blur: float) -> None:
     """Such a lens made a sound probe a class of gamma and albedo bias at p = 6e-10."""
     assert not seen(edge_blur, 1.0)[0]
 
 
-def test_a_response_that_no_blur_at_the_edge_explains_is_found() -> None:
+def test_a_response_that_no_blur_at_the_edge_can_explain_is_found() -> None:
     found, exponent = seen(0.0, 0.45)
     assert found
     assert exponent == pytest.approx(0.45, abs=0.05)

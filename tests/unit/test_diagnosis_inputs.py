@@ -1,4 +1,4 @@
-"""What a diagnosis is given: a gauge run of another probe is left out, and its user is told."""
+"""Inputs of a diagnosis: a gauge run of another probe is left out, and the user is warned."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def copied(folder: Path, baseline_mm: float) -> Path:
 
 
 def test_a_gauge_run_of_another_probe_is_left_out_with_a_warning(tmp_path: Path) -> None:
-    """It stood on the page alone: the terminal said "consistent", as though the gauge run bore that out."""
+    """It was only on the page: the terminal said "consistent", as though the gauge run confirmed that."""
     inputs = open_inputs(SAMPLE, copied(tmp_path / "gauge", 99.0), None)
     assert inputs.gauge is None
     said = str(inputs.record()["reader_warnings"])
@@ -31,7 +31,7 @@ def test_a_gauge_run_of_another_probe_is_left_out_with_a_warning(tmp_path: Path)
     assert "baseline_mm 99 against" in said
 
 
-def test_a_gauge_run_of_the_same_probe_is_kept_and_nothing_is_said() -> None:
+def test_a_gauge_run_of_the_same_probe_is_kept_without_a_message() -> None:
     inputs = open_inputs(SAMPLE, SAMPLE, None)
     assert inputs.gauge is not None
     assert inputs.record()["reader_warnings"] == []

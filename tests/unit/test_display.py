@@ -1,4 +1,4 @@
-"""What the terminal shows of a run: one bar for the whole, nothing unknown, warnings kept."""
+"""What the terminal shows of a run: one bar for the whole, nothing unknown, and warnings that stay."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ def console(out):
 
 
 def shown(display):
-    """Return the bars as they stand."""
+    """Return the bars as they are shown."""
     paper = Console(file=StringIO(), width=100, color_system=None)
     paper.print(display._progress.get_renderable())
     return paper.file.getvalue()
 
 
-def test_the_bar_of_the_whole_stands_above_those_of_the_stages(console):
+def test_the_bar_of_the_whole_is_above_those_of_the_stages(console):
     with ProgressDisplay(console) as display:
         display.planned(4)
         display.started("rings")
@@ -42,7 +42,7 @@ def test_the_bar_of_the_whole_stands_above_those_of_the_stages(console):
 
 
 @pytest.mark.parametrize("total", [None, 0])
-def test_what_is_not_known_is_not_shown(console, total):
+def test_unknown_numbers_are_not_shown(console, total):
     with ProgressDisplay(console) as display:
         display.planned(4)
         display.started("rings")
@@ -54,7 +54,7 @@ def test_what_is_not_known_is_not_shown(console, total):
     assert "working" in text
 
 
-def test_before_the_first_stage_and_after_the_last_something_moves(console):
+def test_before_the_first_stage_and_after_the_last_there_is_a_moving_bar(console):
     with ProgressDisplay(console) as display:
         assert "starting" in shown(display)
         display.planned(1)
@@ -64,7 +64,7 @@ def test_before_the_first_stage_and_after_the_last_something_moves(console):
 
 
 @pytest.mark.parametrize("state", [State.UNUSABLE, State.CANCELLED])
-def test_what_ends_early_is_called_stopped_and_its_warnings_are_kept(console, out, state):
+def test_a_run_that_ends_early_is_called_stopped_and_its_warnings_stay(console, out, state):
     with ProgressDisplay(console) as display:
         display.planned(2)
         display.ended(StageOutcome("rings", "1", "", state, 1.0, (Number(WARNING, "10 of 160 frames"),)))
@@ -74,7 +74,7 @@ def test_what_ends_early_is_called_stopped_and_its_warnings_are_kept(console, ou
 
 
 @pytest.mark.parametrize("at_once", [True, False])
-def test_a_warning_is_printed_by_the_display_or_left_to_its_caller(console, out, at_once):
+def test_a_warning_is_printed_by_the_display_or_left_to_the_caller(console, out, at_once):
     with ProgressDisplay(console, warn_at_once=at_once) as display:
         display.planned(2)
         display.ended(StageOutcome("rings", "1", "", State.COMPLETED, 1.0, (Number(WARNING, "10 of 160"),)))

@@ -1,4 +1,4 @@
-"""Closed-form laws held against traced and rendered rings: what holds, what does not, and what was mended."""
+"""Closed-form laws compared with traced and rendered rings, and replacements of the wrong ones."""
 
 import math
 from dataclasses import replace
@@ -21,7 +21,7 @@ def checks() -> list[Check]:
     return [check for source in sources for check in source()]
 
 
-def test_laws_hold_but_for_those_known_to_be_wrong(checks: list[Check]) -> None:
+def test_laws_hold_except_those_known_to_be_wrong(checks: list[Check]) -> None:
     wrong = {(c.name, c.law) for c in checks if not c.agrees}
     assert wrong == {
         ("tube_tilt", "change of d(i)/sin θ; sheet side −(r/l) t χ (1 − 1/n) cos(ψ − ψ₀)"),
@@ -32,7 +32,7 @@ def test_laws_hold_but_for_those_known_to_be_wrong(checks: list[Check]) -> None:
     }
 
 
-def test_what_is_put_in_the_place_of_a_wrong_law_holds(checks: list[Check]) -> None:
+def test_the_replacements_of_wrong_laws_hold(checks: list[Check]) -> None:
     for check in checks:
         assert check.agrees or check.mended_agrees, check
         assert check.agrees or check.mended
@@ -54,7 +54,7 @@ def test_the_traced_ring_of_the_plain_instrument_is_read_without_error() -> None
 
 
 @pytest.mark.parametrize("name", ["laser_tilt", "focal_scale", "dome_lateral", "tube_wedge"])
-def test_a_law_of_another_effect_is_not_confirmed(name: str) -> None:
+def test_the_law_of_another_effect_is_not_confirmed(name: str) -> None:
     honest = radius_check(typical_switch(name))
     assert honest.agrees
     assert not replace(honest, computed=honest.computed + 0.05 * abs(honest.computed)).agrees
@@ -67,7 +67,7 @@ def test_a_law_of_another_effect_is_not_confirmed(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", ["laser_cone", "focal_scale", "pupil_shift", "baseline", "dome_axial"])
-def test_what_a_law_leaves_out_is_of_second_order(name: str) -> None:
+def test_the_error_of_a_law_is_of_second_order(name: str) -> None:
     """Half the size leaves a quarter of the difference from the law."""
     typical = EFFECTS[name].quantities[0].typical
     left = []

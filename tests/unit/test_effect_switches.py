@@ -1,4 +1,4 @@
-"""Effects as switches: what their text means, and that each changes what it should and nothing else."""
+"""Effects as switches: the meaning of their text, and that each changes what it should and nothing else."""
 
 from dataclasses import fields, is_dataclass, replace
 from inspect import signature
@@ -21,7 +21,7 @@ from pipeline.simulator.effects.switch import (
 )
 from pipeline.simulator.laws import bench_truth
 
-# What each effect may touch; a change that acts with time is "changes".
+# What each effect may change; a change that acts with time is in "changes".
 TOUCHES = {
     "laser_tilt": {"instrument.laser.sheet.tilt_x", "instrument.laser.sheet.tilt_y"},
     "laser_cone": {"instrument.laser.sheet.cone_rad"},
@@ -88,7 +88,7 @@ TOUCHES = {
 
 
 def changed(before: object, after: object, path: str = "") -> set[str]:
-    """Dotted names of all leaves in which two dataclasses differ."""
+    """Return the dotted names of all fields in which two dataclasses differ."""
     if is_dataclass(before) and type(before) is type(after):
         names = [f.name for f in fields(before)]
         parts = (changed(getattr(before, n), getattr(after, n), f"{path}.{n}") for n in names)
@@ -121,7 +121,7 @@ def test_an_effect_changes_what_it_should_and_nothing_else(name: str) -> None:
     assert changed(plain, switch_on(plain, [typical_switch(name)])) == TOUCHES[name]
 
 
-def test_an_exposure_that_does_not_end_before_the_next_frame_is_refused() -> None:
+def test_an_exposure_that_ends_after_the_start_of_the_next_frame_is_refused() -> None:
     plain = bench_truth(50.8)
     own, frame_s = plain.stated.shutter.exposure_s, 1 / plain.frame_rate
     longest = switch_on(plain, [Switch("motion_blur", (frame_s - own - 1e-6,))])
@@ -130,7 +130,7 @@ def test_an_exposure_that_does_not_end_before_the_next_frame_is_refused() -> Non
         switch_on(plain, [Switch("motion_blur", (frame_s - own + 1e-3,))])
 
 
-# Effects whose zero is an absent one, not a surface, a wave or a setting that acts as nothing.
+# Effects for which zero means absent, not a surface, a wave or a setting that does nothing.
 NOTHING_AT_ZERO = (
     "laser_tilt", "laser_cone", "baseline", "beam_decentre", "laser_rocking", "principal_point",
     "focal_scale", "radial_distortion", "sensor_tilt", "pixel_aspect", "pupil_shift", "baseline_drift",
@@ -142,7 +142,7 @@ NOTHING_AT_ZERO = (
 
 
 @pytest.mark.parametrize("name", NOTHING_AT_ZERO)
-def test_an_effect_of_size_zero_leaves_everything_as_it_is_at_any_time(name: str) -> None:
+def test_an_effect_of_size_zero_changes_nothing_at_any_time(name: str) -> None:
     sizes = [q.typical for q in EFFECTS[name].quantities]
     plain = bench_truth(50.8)
     truth = switch_on(plain, [Switch(name, (0.0, *sizes[1:]))])
@@ -162,7 +162,7 @@ def test_a_switch_reads_back_from_a_scene_file(switch: Switch) -> None:
 
 
 @given(st.text(max_size=30))
-def test_any_other_text_is_refused_as_an_input(text: str) -> None:
+def test_any_other_text_is_refused_as_bad_input(text: str) -> None:
     for start in ("", "laser_tilt=", "sheet_waviness=0.3"):
         try:
             switch = parse_switch(start + text)
@@ -203,7 +203,7 @@ def test_texts_of_the_documentation(text: str, values: tuple[float, ...]) -> Non
         "sheet_waviness=0.3x9", "ghost_ring=2", "encoder_slip=3/-4s",
     ],
 )  # fmt: skip
-def test_a_wrong_text_is_refused_with_what_is_expected(text: str) -> None:
+def test_a_wrong_text_is_refused_and_the_error_says_what_is_expected(text: str) -> None:
     with pytest.raises(InputError) as caught:
         parse_switch(text)
     name = text.partition("=")[0]
@@ -212,7 +212,7 @@ def test_a_wrong_text_is_refused_with_what_is_expected(text: str) -> None:
         assert f"{quantity.low:g} to {quantity.high:g}" in str(caught.value)
 
 
-def test_wrong_scene_files_are_refused_with_their_place() -> None:
+def test_wrong_scene_files_are_refused_with_the_place_of_the_error() -> None:
     wrong: tuple[object, ...] = (
         ["laser_tilt"],
         {"laser_tilt": 0.6},
@@ -225,16 +225,16 @@ def test_wrong_scene_files_are_refused_with_their_place() -> None:
             switches_from_mapping(effects, "scene.yaml")
 
 
-def test_no_effect_twice() -> None:
+def test_an_effect_may_not_be_given_twice() -> None:
     with pytest.raises(InputError, match="twice"):
         parse_switches(["laser_tilt=0.6@40", "laser_tilt=0.1@10"])
 
 
-def test_truth_lists_name_and_values() -> None:
+def test_the_truth_lists_names_and_values() -> None:
     assert parse_switch("laser_tilt=0.6@40").truth == ["laser_tilt", [0.6, 40.0]]
 
 
-def test_effects_combine_whatever_their_order() -> None:
+def test_effects_combine_in_any_order() -> None:
     texts = ["outside_index=0.333", "laser_tilt=0.6@40", "housing_glass=2", "baseline=0.1", "dome_axial=0.5"]
     plain = bench_truth(50.8)
     one, other = (switch_on(plain, parse_switches(t)) for t in (texts, texts[::-1]))
@@ -249,7 +249,7 @@ def test_a_drift_starts_at_the_first_frame_and_ends_at_its_size() -> None:
     np.testing.assert_allclose(grown, [0, 0, 0.05 * (1 - np.exp(-1)), 0.05], atol=1e-12)
 
 
-def test_rocking_returns_after_a_period_and_turns_over_at_half() -> None:
+def test_rocking_returns_after_a_period_and_is_opposite_after_half() -> None:
     truth = switch_on(bench_truth(50.8), parse_switches(["laser_rocking=1@40/5Hz"]))
     tilt = [truth.instrument_at(t).laser.sheet.tilt_x for t in (0.0, 0.05, 0.15, 0.25)]
     crest = np.tan(1e-3) * np.cos(np.radians(40))
@@ -263,7 +263,7 @@ def test_encoder_effects_need_an_encoder() -> None:
             switch_on(without, [typical_switch(name)])
 
 
-def test_saturation_sets_the_peak_whatever_it_was() -> None:
+def test_saturation_sets_the_peak_whatever_it_was_before() -> None:
     for also in ([], ["line_skew=0.8"], ["albedo_bias=0.3"]):
         truth = switch_on(bench_truth(38.1), parse_switches(["saturation=1.6", *also]))
         assert line_peak(truth) == pytest.approx(1.6)

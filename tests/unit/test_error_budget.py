@@ -1,4 +1,4 @@
-"""The error budget: laws, sums, Monte Carlo, and the designer's questions."""
+"""The error budget: laws, sums, Monte Carlo, and the questions of a designer."""
 
 import math
 from dataclasses import replace
@@ -31,7 +31,7 @@ EVERYTHING = {
 
 
 @pytest.mark.parametrize(("diameter", "offset"), [(4 * INCH, (0.0, 0.0)), (2 * INCH, (5.0, -3.0))])
-def test_analytic_jacobians_are_those_of_the_exact_chain(diameter, offset):
+def test_analytic_jacobians_agree_with_the_exact_chain(diameter, offset):
     tilted = PROBE.laser.with_parameters(
         np.array([22.0, 0.004, -0.003, 0.002, 0.05, -0.04, 1e-3, 0, 0, 5e-4, 0, 0])
     )
@@ -75,14 +75,14 @@ TYPICAL = [
 
 
 @pytest.mark.parametrize(("name", "size", "expected_mm", "rounding"), TYPICAL)
-def test_every_effect_costs_what_its_law_says(name, size, expected_mm, rounding):
+def test_every_effect_has_the_radius_error_of_its_law(name, size, expected_mm, rounding):
     covariance = PROBE.covariance
     if name == "radial_distortion":
         covariance = np.where(np.eye(len(covariance)) > 0, covariance, 0.0)
     budget = error_budget(RingScan(replace(PROBE, covariance=covariance), 4 * INCH), {name: size})
     worst = budget.row(name).worst(Pose.KNOWN)
     if name == "sheet_waviness":
-        # six coefficients of 0.3 mrad, of which cos² + sin² leave three harmonics
+        # six coefficients of 0.3 mrad, which cos² + sin² reduce to three harmonics
         worst /= math.sqrt(3)
     assert worst == pytest.approx(expected_mm, rel=rounding)
 
@@ -97,7 +97,7 @@ def test_tolerances_for_20_um_are_those_of_the_scales(inches, tilt_deg, baseline
     assert found["laser_tilt"].shared < found["laser_tilt"].alone
 
 
-def test_the_papers_tolerance_for_a_tenth_of_a_millimetre():
+def test_the_tolerance_for_a_tenth_of_a_millimetre_is_that_of_the_paper():
     scan = RingScan(typical_probe(22.5), 4 * INCH)
     found = {t.name: t for t in tolerances(error_budget(scan), 0.1)}
     assert found["laser_tilt"].alone == pytest.approx(0.05, abs=2e-4)
@@ -117,7 +117,7 @@ def test_monte_carlo_agrees_within_two_percent_for_every_row_and_the_sum(diamete
         for row in budget.rows:
             got, expected = drawn.rows[row.source.name][pose], row.sigma_mm[pose]
             if row.level(pose) < 0.05 * row.level(Pose.KNOWN):
-                # a fitted centre takes the whole first order: only the second is left
+                # a fitted centre removes the whole first order: only the second is left
                 assert got.max() < 0.05 * row.level(Pose.KNOWN), row.source.name
                 continue
             np.testing.assert_allclose(
@@ -151,7 +151,7 @@ def test_correlations_count_in_the_sum():
     assert drawn.total[Pose.KNOWN].mean() == pytest.approx(budget.total_mm(None, Pose.KNOWN).mean(), rel=0.02)
 
 
-def test_a_given_sigma_keeps_the_correlations():
+def test_a_given_sigma_keeps_the_stated_correlations():
     covariance = PROBE.covariance.copy()
     names = PROBE.parameter_names
     i, j = names.index("baseline_mm"), names.index("cone_rad")
@@ -163,7 +163,7 @@ def test_a_given_sigma_keeps_the_correlations():
     assert got[i, j] / (0.1 * math.sqrt(got[j, j])) == pytest.approx(0.5)
 
 
-def test_a_fitted_centre_takes_tilt_and_principal_point_of_a_centred_probe_only():
+def test_a_fitted_centre_absorbs_tilt_and_principal_point_of_a_centred_probe_only():
     centred = error_budget(RingScan(PROBE, 4 * INCH))
     beside = error_budget(RingScan(PROBE, 4 * INCH, (10.0, 0.0)))
     for name in ("laser_tilt", "principal_point"):
@@ -190,7 +190,7 @@ def test_nothing_uncertain_gives_no_error():
     assert tolerances(budget, 0.1) == ()
 
 
-def test_stated_rows_together_are_the_probes_own_covariance():
+def test_stated_rows_together_equal_the_probes_own_covariance():
     off = {"beam_decentre": 0.0, "sheet_waviness": 0.0, "focal_drift": 0.0, "baseline_drift": 0.0,
            "centre_drift": 0.0, "pixel_aspect": 0.0, "sensor_tilt": 0.0, "pupil_shift": 0.0}  # fmt: skip
     scan = RingScan(PROBE, 3 * INCH, (2.0, 1.0))
@@ -200,7 +200,7 @@ def test_stated_rows_together_are_the_probes_own_covariance():
     np.testing.assert_allclose(np.sqrt(variance), total)
 
 
-def test_image_noise_is_the_bound_that_a_matched_fit_reaches():
+def test_image_noise_is_the_bound_that_a_matched_fit_attains():
     photometry = LinePhotometry(amplitude_grey=100.0, noise_grey=3.0, blur_px=0.9)
     thin = replace(PROBE, laser=replace(PROBE.laser, line_sigma_mm=1e-6))
     bound = line_sigma_px(RingScan(thin, 4 * INCH), photometry)["image_noise"][0]
@@ -211,12 +211,12 @@ def test_image_noise_is_the_bound_that_a_matched_fit_reaches():
     assert found.std() == pytest.approx(bound, rel=0.03)
 
 
-def test_dominant_rows_fall_and_sum_to_one():
+def test_dominant_rows_are_sorted_and_sum_to_one():
     ordered = dominant_rows(error_budget(RingScan(PROBE, 4 * INCH)))
     shares = [share for _, share in ordered]
     assert shares == sorted(shares, reverse=True)
     assert math.fsum(shares) == pytest.approx(1.0)
-    # 1e-3 in k1 costs 0.219 mm, more than anything else typical at 4 inch
+    # 1e-3 in k1 changes the radius by 0.219 mm, more than anything else typical at 4 inch
     assert ordered[0][0].source.name == "radial_distortion"
 
 
@@ -237,7 +237,7 @@ def test_best_baseline_lies_inside_the_study_for_2_inch_and_grows_with_diameter(
         ({"diameter_mm": 101.6, "offset_mm": (60.0, 0.0)}, "offset_mm"),
     ],
 )
-def test_scans_that_cannot_be_are_refused_by_name(scan, named):
+def test_impossible_scans_are_refused_with_their_name(scan, named):
     with pytest.raises(InputError, match=named):
         RingScan(PROBE, **scan)
 
@@ -248,7 +248,7 @@ def test_a_ring_partly_outside_the_image_is_refused():
         RingScan(replace(PROBE, camera=low), 101.6)
 
 
-def test_unknown_sources_and_bad_sigmas_are_refused_by_name():
+def test_unknown_sources_and_bad_sigmas_are_refused_with_their_name():
     scan = RingScan(PROBE, 101.6)
     with pytest.raises(InputError, match="laser_tlt"):
         error_budget(scan, {"laser_tlt": 0.1})

@@ -1,4 +1,4 @@
-"""The files of a run folder hold what the artefacts held, under the agreed names."""
+"""The exported files of a run folder contain the data of the artefacts, under the agreed names."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def test_rings(tmp_path: Path, random: np.random.Generator, frames: int) -> None
     assert group.attrs["validity_codes"]["valid"] == 0
 
 
-def test_rings_are_the_same_bytes_again(tmp_path: Path, random: np.random.Generator) -> None:
+def test_rings_are_written_with_the_same_bytes_again(tmp_path: Path, random: np.random.Generator) -> None:
     rings = rings_of(random, 70)
     files = []
     for name in ("a", "b"):
@@ -80,7 +80,7 @@ def test_rings_are_the_same_bytes_again(tmp_path: Path, random: np.random.Genera
 
 @pytest.mark.parametrize("start_s", [0.0, 1764210000.123456])
 def test_trajectory(tmp_path: Path, random: np.random.Generator, start_s: float) -> None:
-    """Of times since 1970, as in bags, all rows of a recording had the same one."""
+    """With times since 1970, as in bags, all rows of a recording were given the same time."""
     count = 20
     rotation = rotation_from_vector(random.normal(0, 0.5, (count, 3)))
     T_pc = from_parts(rotation, random.normal(0, 100, (count, 3)))
@@ -148,7 +148,7 @@ def test_centreline(tmp_path: Path) -> None:
     assert lines[0][-1] == lines[1][0]
     np.testing.assert_allclose(lines[0][-1], [0, 0, 1.0], atol=1e-3)
     drawing = (tmp_path / "centreline.dxf").read_text().split("\n")
-    assert len(drawing) % 2 == 1, "a code and a value by turns, and the last line's end"
+    assert len(drawing) % 2 == 1, "a code and a value in turn, and the end of the last line"
     codes, values = drawing[:-1:2], drawing[1::2]
     assert values.count("POLYLINE") == values.count("SEQEND") == 3
     drawn = [float(v) for c, v in zip(codes, values, strict=True) if c == "30"]

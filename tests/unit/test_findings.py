@@ -1,4 +1,4 @@
-"""What is told of all findings together."""
+"""What is reported of all findings together."""
 
 from dataclasses import replace
 
@@ -20,14 +20,14 @@ PIT = Defect(
     ("depth_mm", "sigma_mm", "is_it"),
     [(-1.0, 0.3, True), (1.0, 0.3, True), (32.9, 46.7, False), (-0.7, 0.01, False)],
 )
-def test_the_deepest_is_one_whose_depth_is_known(depth_mm: float, sigma_mm: float, is_it: bool) -> None:
+def test_the_deepest_finding_is_one_with_a_known_depth(depth_mm: float, sigma_mm: float, is_it: bool) -> None:
     other = replace(PIT, id=2, depth_mm=depth_mm, depth_sigma_mm=sigma_mm)
     deepest = Defects((PIT, other), 0.05, 0.3).deepest
     assert deepest is not None
     assert deepest.id == (2 if is_it else 1)
 
 
-def test_none_is_deepest_where_no_depth_is_known() -> None:
+def test_no_finding_is_deepest_where_no_depth_is_known() -> None:
     assert Defects((replace(PIT, depth_sigma_mm=1.0),), 0.05, 0.3).deepest is None
     assert Defects((), 0.05, 0.3).deepest is None
 

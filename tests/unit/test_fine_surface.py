@@ -1,4 +1,4 @@
-"""The local quadratic regression against plain NumPy, and what it is for: a peak keeps its height."""
+"""The local quadratic regression against plain NumPy, and its purpose: a peak keeps its height."""
 
 from dataclasses import replace
 
@@ -15,7 +15,7 @@ RADIUS = 25.0
 
 
 def relief_and_points(radius, unsure=1.0):
-    """Return relief and points, every third of which is ``unsure`` times as unsure as the others."""
+    """Return relief and points; the σ of every third point is ``unsure`` times that of the others."""
     wall = wall_of(DISTANCE, AZIMUTH, radius, 0.02)
     sigma = wall.cloud.sigma_mm.copy()
     sigma[::3] *= unsure
@@ -47,7 +47,7 @@ def reference(relief, points, row, column):
     return found[0] + (found[3] + found[5]) / 12
 
 
-def test_agrees_with_numpy_also_over_the_seam():
+def test_the_regression_agrees_with_numpy_also_across_the_seam():
     radius = RADIUS + np.random.default_rng(0).normal(0, 0.1, (len(DISTANCE), len(AZIMUTH)))
     relief, points = relief_and_points(radius, unsure=2.5)
     assert np.unique(np.round(points.weight, 6)).tolist() == [0.16, 1.0]
@@ -62,5 +62,5 @@ def test_a_peak_keeps_the_height_of_its_millimetre_mean():
     relief, points = relief_and_points(RADIUS + np.exp(-0.5 * q))
     fine = np.linspace(-0.5, 0.5, 101)
     true = np.exp(-0.5 * (fine / 2) ** 2).mean() ** 2
-    # the ridge of 1e-4 and terms of fourth order are all that is left
+    # only the ridge of 1e-4 and terms of fourth order remain
     assert abs(surface_of(relief, points)[40, 180] - true) < 0.005

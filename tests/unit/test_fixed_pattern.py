@@ -1,4 +1,4 @@
-"""Gains of single pixels are found; what a codec leaves in whole blocks is none."""
+"""Gains of single pixels are found; errors of a codec in whole blocks are not taken for them."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ BRIGHT = 2e5
 
 
 def seen(lasting: Float, noise: float = 0.01) -> Any:
-    """Return two halves of the frames: gains (H, W) that last, and others by chance."""
+    """Return two halves of the frames: gains (H, W) that are the same in both, and random others."""
     random = np.random.default_rng(4)
     halves = [lasting + noise * random.standard_normal(lasting.shape) for _ in range(2)]
     square = np.full(lasting.size, BRIGHT)
@@ -24,7 +24,7 @@ def seen(lasting: Float, noise: float = 0.01) -> Any:
 
 
 def of_blocks(size: float) -> Float:
-    """Return what a codec leaves: waves of blocks of 8 px, alike over some of their pixels."""
+    """Return errors of a codec: waves of blocks of 8 px, equal over some of their pixels."""
     random = np.random.default_rng(5)
     wave = np.cos(np.pi * (np.arange(8) + 0.5) / 8)
     fine = np.cos(5 * np.pi * (np.arange(8) + 0.5) / 8)
@@ -40,7 +40,7 @@ def of_blocks(size: float) -> Float:
         (np.zeros(SIZE[::-1]), False),
     ],
 )
-def test_only_what_single_pixels_keep_is_a_fixed_pattern(lasting: Float, is_found: bool) -> None:
+def test_only_constant_gains_of_single_pixels_are_a_fixed_pattern(lasting: Float, is_found: bool) -> None:
     found = pattern_finding(seen(lasting), SIZE)
     assert found.found is is_found
     if is_found:

@@ -25,7 +25,7 @@ def long_photo() -> WallTexture:
     return WallTexture(bgra, 0.0, 0.5, -np.pi, 2 * np.pi / COLUMNS)
 
 
-def test_what_is_shown_is_the_mean_of_what_is_there(long_photo: WallTexture) -> None:
+def test_each_pixel_shows_the_mean_of_its_texels(long_photo: WallTexture) -> None:
     window = Window(0.0, 0.5 * ROWS, TOP_RAD, TOP_RAD + 2 * np.pi, 200, 60)
     shown = seen_through(photo(long_photo), window).astype(float)
     assert shown.shape == (60, 200, 3)
@@ -34,16 +34,18 @@ def test_what_is_shown_is_the_mean_of_what_is_there(long_photo: WallTexture) -> 
     wanted = level.astype(float)
     away = (s < 19500) | (s > 24500)
     assert np.abs(shown[:, away, 0] - wanted[away]).max() < 8
-    assert np.all(shown[:, (s > 20500) & (s < 23500)] == 235), "paper where there is no photo"
+    assert np.all(shown[:, (s > 20500) & (s < 23500)] == 235), "blank where there is no photo"
 
 
-def test_a_near_look_shows_every_row(long_photo: WallTexture) -> None:
+def test_a_close_view_shows_every_row(long_photo: WallTexture) -> None:
     window = Window(100.0, 120.0, TOP_RAD, TOP_RAD + 2 * np.pi, 160, 48)
     shown = seen_through(photo(long_photo), window)
-    assert np.ptp(shown[24, :, 0].astype(int)) > 5, "the stripes"
+    assert np.ptp(shown[24, :, 0].astype(int)) > 5, "the stripes are visible"
 
 
-def test_sheets_hold_every_row_and_say_where_they_lie(long_photo, tmp_path, monkeypatch) -> None:
+def test_sheets_contain_every_row_and_are_labelled_with_their_place(
+    long_photo, tmp_path, monkeypatch
+) -> None:
     monkeypatch.setattr("pipeline.export.pictures._MOST_ROWS", 16000)
     write_unrolled(long_photo, tmp_path)
     place = json.loads((tmp_path / "unrolled.json").read_text())

@@ -1,4 +1,7 @@
-"""The rooms of the program stand on floors: imports lead downwards, and private names stay where they are."""
+"""The rooms of the program are arranged in floors.
+
+Imports lead downwards, and private names stay in their module.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +23,7 @@ ROOT = Path(__file__).resolve().parents[2]
 
 
 def program(folder: Path, **texts: str) -> Path:
-    """Write modules, named with two underscores for each dot, with all the packages they lie in."""
+    """Write modules, named with two underscores for each dot, with all the packages that contain them."""
     for name, text in texts.items():
         file = folder.joinpath(*name.split("__")).with_suffix(".py")
         file.parent.mkdir(parents=True, exist_ok=True)
@@ -34,13 +37,13 @@ def test_imports_lead_downwards() -> None:
     assert against_the_floors(imports_below(ROOT), IMPORTS_STILL_THERE) == []
 
 
-def test_the_architecture_shows_the_same_floors() -> None:
+def test_the_architecture_page_shows_the_same_floors() -> None:
     text = (ROOT / "ARCHITECTURE.md").read_text("utf-8")
     rows = [f"| {name} | {', '.join(f'`{room}`' for room in rooms)} |" for name, rooms in FLOORS]
     assert "\n".join(rows) in text, "bring the table of ARCHITECTURE.md in line with FLOORS"
 
 
-def test_the_architecture_names_files_that_are_there() -> None:
+def test_the_architecture_page_names_existing_files() -> None:
     text = (ROOT / "ARCHITECTURE.md").read_text("utf-8")
     rows = [row for row in text.partition("## Where is")[2].splitlines() if row.startswith("| ")]
     assert len(rows) > 30
@@ -52,7 +55,7 @@ def test_the_architecture_names_files_that_are_there() -> None:
 
 
 def absent(row: str) -> list[str]:
-    """Return the files of a row that are not there; a bare name lies beside or below the one before it."""
+    """Return the files of a row that do not exist; a bare name lies beside or below the one before it."""
     out, before = [], ROOT
     for name in re.findall(r"`([\w/]+(?:\.py|\.ts|/))`", row):
         places = [folder / name for folder in (ROOT, before, before.parent)]
@@ -62,7 +65,7 @@ def absent(row: str) -> list[str]:
     return out
 
 
-def test_private_names_stay_where_they_are() -> None:
+def test_private_names_are_used_only_in_their_module() -> None:
     assert private_names(imports_below(ROOT), PRIVATE_STILL_THERE) == []
 
 
@@ -92,12 +95,12 @@ def test_private_names_stay_where_they_are() -> None:
         ),
     ],
 )
-def test_an_import_upwards_is_told(tmp_path: Path, module: str, text: str, told: str) -> None:
+def test_an_import_upwards_is_reported(tmp_path: Path, module: str, text: str, told: str) -> None:
     (line,) = against_the_floors(imports_below(program(tmp_path, **{module: text})), {})
     assert told in line
 
 
-def test_an_import_downwards_is_not_told(tmp_path: Path) -> None:
+def test_an_import_downwards_is_not_reported(tmp_path: Path) -> None:
     texts = {
         "pipeline__api__job": "import stages.rings\nfrom pipeline.machine.plan import Plan",
         "pipeline__machine__plan": "from pipeline.machine import store\nimport numpy, ast",
@@ -106,7 +109,7 @@ def test_an_import_downwards_is_not_told(tmp_path: Path) -> None:
     assert against_the_floors(imports_below(program(tmp_path, **texts)), {}) == []
 
 
-def test_an_allowance_that_nobody_needs_is_told(tmp_path: Path) -> None:
+def test_an_exception_that_is_no_longer_needed_is_reported(tmp_path: Path) -> None:
     allowed = {("pipeline.files.disk", "pipeline.review.report"): "until it is moved"}
     folder = program(tmp_path, pipeline__files__disk="import pipeline.review.report")
     assert against_the_floors(imports_below(folder), allowed) == []
@@ -124,11 +127,11 @@ def test_an_allowance_that_nobody_needs_is_told(tmp_path: Path) -> None:
         "from pipeline.machine._store import open_secret",
     ],
 )
-def test_a_private_name_of_another_module_is_told(tmp_path: Path, text: str) -> None:
+def test_a_private_name_of_another_module_is_reported(tmp_path: Path, text: str) -> None:
     folder = program(tmp_path, pipeline__machine__plan=text, pipeline__machine__store="_secret = 1")
     assert len(private_names(imports_below(folder), {})) == 1
 
 
-def test_own_private_names_are_not_told(tmp_path: Path) -> None:
+def test_private_names_of_the_same_module_are_not_reported(tmp_path: Path) -> None:
     text = "import numpy as np\nnp._NoValue\ndef f(self):\n    return self._secret + np.__version__"
     assert private_names(imports_below(program(tmp_path, pipeline__machine__plan=text)), {}) == []

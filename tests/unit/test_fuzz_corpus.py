@@ -1,4 +1,4 @@
-"""Every parser takes its good input, and takes or refuses whatever a search for breaking inputs kept."""
+"""Every parser accepts its good input, and accepts or refuses the inputs kept from the search for crashes."""
 
 from __future__ import annotations
 
@@ -17,18 +17,18 @@ KEPT = [(t, f) for t in TARGETS for f in sorted((CORPUS / t.replace(" ", "_")).g
 
 
 @pytest.mark.parametrize("target", TARGETS)
-def test_a_good_input_is_taken(target: str) -> None:
+def test_a_good_input_is_accepted(target: str) -> None:
     TARGETS[target].take(TARGETS[target].seed())
 
 
 @pytest.mark.parametrize(("target", "file"), KEPT, ids=lambda v: getattr(v, "name", v))
-def test_kept_inputs_are_taken_or_refused(target: str, file: Path) -> None:
+def test_kept_inputs_are_accepted_or_refused(target: str, file: Path) -> None:
     with suppress(InputError):
         TARGETS[target].take(file.read_bytes())
 
 
 @pytest.mark.parametrize("target", TARGETS)
-def test_half_of_a_good_input_and_none_are_taken_or_refused(target: str) -> None:
+def test_half_of_a_good_input_and_an_empty_one_are_accepted_or_refused(target: str) -> None:
     good = TARGETS[target].seed()
     for data in (good[: len(good) // 2], b"", b"\0" * 64, good[::-1]):
         with suppress(InputError):

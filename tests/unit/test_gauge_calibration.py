@@ -1,4 +1,4 @@
-"""Gauge calibration on made runs: estimates, derivatives, outvoting, choice of the sheet, refusals."""
+"""Gauge calibration on simulated runs: estimates, derivatives, outliers, choice of the sheet, refusals."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def _where_expected(state: Unknowns, rings: BoreRings) -> BoreRings:
 
 
 @pytest.mark.parametrize("kind", ["edges", "rings"])
-def test_derivatives_are_those_of_finite_differences(run: GaugeRun, kind: str) -> None:
+def test_derivatives_agree_with_finite_differences(run: GaugeRun, kind: str) -> None:
     state, source = _unknowns(run)
     on_bore = _where_expected(state, source.on_bore(state.T_pc, run.stated, USUAL))
 
@@ -79,8 +79,8 @@ def test_derivatives_are_those_of_finite_differences(run: GaugeRun, kind: str) -
         assert np.allclose(slope, rows.by_border[:, unknown], rtol=5e-3, atol=5e-3 * scale)
 
 
-def test_derivatives_of_rings_do_not_hold_the_noise_of_the_measurement(run: GaugeRun) -> None:
-    """Where they do, their product with the residual has a mean, which moved the baseline by 0.5 σ."""
+def test_derivatives_of_rings_do_not_contain_the_noise_of_the_measurement(run: GaugeRun) -> None:
+    """Otherwise their product with the residual has a mean, which moved the baseline by 0.5 σ."""
     state, source = _unknowns(run)
     rings = _where_expected(state, source.on_bore(state.T_pc, run.stated, USUAL))
     noisy = replace(rings, uv=rings.uv + 0.5 * rings.outward)
@@ -89,14 +89,14 @@ def test_derivatives_of_rings_do_not_hold_the_noise_of_the_measurement(run: Gaug
     assert (np.abs(moved - quiet).max(0) <= 3e-4 * largest).all()
 
 
-def test_drawn_probes_are_found_within_their_own_sigma() -> None:
+def test_drawn_probes_are_estimated_within_the_stated_sigma() -> None:
     drawn = [list(in_sigma(r, calibrated(r)).values()) for r in (made_run(seed) for seed in (1, 2, 3))]
-    # 30 correlated numbers: a wrong σ or a bias by its double would show
+    # 30 correlated numbers: a σ wrong by a factor of two, or such a bias, would show
     assert np.mean(np.abs(drawn) < 1.96) > 0.8
     assert 0.3 < np.sqrt(np.mean(np.square(drawn))) < 1.6
 
 
-def test_stated_probe_is_off_and_the_result_says_by_how_much(run: GaugeRun) -> None:
+def test_the_result_says_by_how_much_the_stated_probe_is_off(run: GaugeRun) -> None:
     result = calibrated(run)
     names = result.probe.parameter_names
     k = [names.index(n) for n in ("tilt_x", "tilt_y")]
@@ -108,7 +108,7 @@ def test_stated_probe_is_off_and_the_result_says_by_how_much(run: GaugeRun) -> N
     assert result.encoder[0] == pytest.approx(1.001, abs=4 * result.encoder_sigma[0])
 
 
-def test_decentring_is_taken_in_when_it_is_there(run: GaugeRun) -> None:
+def test_decentring_is_estimated_where_it_exists(run: GaugeRun) -> None:
     laser = replace(run.true.laser, decentre_x_mm=0.15, decentre_y_mm=-0.1)
     true = replace(run.true, laser=laser)
     T_pc = driven_as(run)
@@ -119,7 +119,7 @@ def test_decentring_is_taken_in_when_it_is_there(run: GaugeRun) -> None:
     assert max(map(abs, in_sigma(replace(run, true=true), result).values())) < 4
 
 
-def test_one_wrong_ring_in_five_is_outvoted_and_named(run: GaugeRun) -> None:
+def test_one_wrong_ring_in_five_is_rejected_and_named(run: GaugeRun) -> None:
     wrong = np.arange(2, len(run.rings.frame), 5)
     radius = run.rings.radius_px.copy()
     radius[wrong] += (4 * np.cos(3 * run.rings.azimuth_rad) + 3).astype(np.float32)
@@ -130,7 +130,7 @@ def test_one_wrong_ring_in_five_is_outvoted_and_named(run: GaugeRun) -> None:
     assert max(map(abs, in_sigma(broken, result).values())) < 4
 
 
-def test_fiducial_off_its_place_is_left_out_and_named(run: GaugeRun) -> None:
+def test_a_displaced_fiducial_is_left_out_and_named(run: GaugeRun) -> None:
     moved = run.edges.marker == 12
     edges = replace(run.edges, xyz_p=run.edges.xyz_p + 0.6 * moved[:, None] * np.array([0, 0, 1.0]))
     result = calibrated(replace(run, edges=edges))
@@ -139,7 +139,7 @@ def test_fiducial_off_its_place_is_left_out_and_named(run: GaugeRun) -> None:
 
 
 def _sightings(gauge: Gauge, seen: Gauge | None = None, least: int = 20) -> list[Sighting]:
-    """Return corners of ``seen`` as the stated camera sees them, called by the names of ``gauge``."""
+    """Return corners of ``seen`` as the stated camera sees them, with the names of ``gauge``."""
     seen = seen or gauge
     camera, out = stated_probe().camera, []
     centre = np.array([m.distance_mm for m in gauge.fiducials.markers])
@@ -156,7 +156,7 @@ def _posed(sightings: Sequence[Sighting], gauge: Gauge, run: GaugeRun):  # type:
     return posed_frames(run.recording, sightings, poses)
 
 
-def test_one_swapped_pair_among_fifty_fiducials_is_outvoted(run: GaugeRun) -> None:
+def test_one_swapped_pair_among_fifty_fiducials_is_rejected(run: GaugeRun) -> None:
     markers = list(run.gauge.fiducials.markers)
     markers[3], markers[5] = replace(markers[5], id=3), replace(markers[3], id=5)
     swapped = replace(run.gauge, fiducials=replace(run.gauge.fiducials, markers=tuple(markers)))
@@ -185,12 +185,13 @@ def test_fiducials_of_another_size_are_refused(run: GaugeRun) -> None:
     ("moved_px", "grey", "refused"),
     [(0.75, 255, False), (1.5, 255, True), (-0.75, 255, True), (0.75, 180, True)],
 )
-def test_fiducials_that_overexposed_white_makes_smaller_by_a_pixel_are_not_of_another_size(
+def test_fiducials_that_overexposure_makes_smaller_by_a_pixel_are_not_of_another_size(
     run: GaugeRun, moved_px: float, grey: int, refused: bool
 ) -> None:
-    """Overexposed white made fiducials of 25 px .7 px smaller on each side: "measure 4.75 mm", not 5 mm.
+    """Overexposed white made fiducials of 25 px .7 px smaller on each side.
 
-    Then as much was let pass without overexposure, and larger: 20 % of a fiducial of 10 px.
+    The advice was "measure 4.75 mm", not 5 mm. A first mend accepted as much without overexposure, and larger
+    ones: 20 % of a fiducial of 10 px.
     """
     recording = replace(run.recording, source=Pictures(np.full((1200, 1600), grey, np.uint8)))
     small, smaller = _with_fiducials(run.gauge, size_mm=3.0), []
@@ -203,7 +204,7 @@ def test_fiducials_that_overexposed_white_makes_smaller_by_a_pixel_are_not_of_an
         premises.require_poses(recording, posed, smaller, small, stated_probe().camera, USUAL)
 
 
-def test_mirrored_places_are_refused(run: GaugeRun) -> None:
+def test_mirrored_places_of_fiducials_are_refused(run: GaugeRun) -> None:
     markers = tuple(replace(m, azimuth_deg=-m.azimuth_deg) for m in run.gauge.fiducials.markers)
     mirrored = _with_fiducials(run.gauge, markers=markers)
     sightings = _sightings(mirrored, run.gauge)
@@ -240,7 +241,7 @@ def test_camera_that_stays_on_the_axis_is_refused(run: GaugeRun) -> None:
         premises.require_offset(T_pc, USUAL)
 
 
-def test_inspection_is_no_gauge_run(run: GaugeRun) -> None:
+def test_an_inspection_is_refused_as_a_gauge_run(run: GaugeRun) -> None:
     with pytest.raises(InputError, match="describes no bore"):
         premises.require_gauge(replace(run.recording, pipe=replace(facts(), bore=())))
     twice = replace(facts().fiducials, markers=facts().fiducials.markers[:1] * 2)
@@ -248,14 +249,14 @@ def test_inspection_is_no_gauge_run(run: GaugeRun) -> None:
         premises.require_gauge(replace(run.recording, pipe=replace(facts(), fiducials=twice)))
 
 
-def test_uncertain_radius_is_refused_by_name() -> None:
+def test_a_gauge_with_a_too_uncertain_radius_is_refused_with_its_name() -> None:
     premises.require_determined(0.003, "cx with tilt_x", USUAL)
     with pytest.raises(UnusableError, match="weak direction is cx with tilt_x"):
         premises.require_determined(0.2, "cx with tilt_x", USUAL)
 
 
 class Pictures:
-    """The same picture in every frame."""
+    """A frame source with the same picture in every frame."""
 
     def __init__(self, image: Image) -> None:
         self._image = image
@@ -285,7 +286,7 @@ def _picture(dictionary: int, numbers: Sequence[int]) -> Image:
         (np.full((420, 700), 90, np.uint8), "in only 0 of 30 lit frames$|in only 0 of 30 lit frames\n"),
     ],
 )
-def test_fiducials_that_are_not_seen_are_refused_with_the_likely_cause(
+def test_invisible_fiducials_are_refused_with_the_likely_cause(
     run: GaugeRun, image: Image, said: str
 ) -> None:
     recording: Recording = replace(run.recording, source=Pictures(image))
@@ -302,8 +303,8 @@ def test_fiducials_that_crowd_into_one_place_give_no_pose(spread_px: float) -> N
     assert first_pose(crowded, gauge_of(facts(), facts().fiducials), stated_probe().camera, random) is None
 
 
-def test_pictures_that_no_such_probe_takes_are_told_and_sound_ones_are_not(run: GaugeRun) -> None:
-    """Pixels 2 % too wide gave a cone 125 σ off that was stated as sure as ever, and nothing was said."""
+def test_pictures_that_no_such_probe_can_take_are_reported_and_sound_ones_are_not(run: GaugeRun) -> None:
+    """Pixels 2 % too wide gave a cone 125 σ off with its usual σ, and no message."""
     said: list[str] = []
     context = replace(quiet_context(), warn=said.append)
     warn_of_misfit(calibrated(run), context)

@@ -1,4 +1,4 @@
-"""Distance along a gauge whose pictures are too coarse for the fiducials' borders across it."""
+"""Distance along a gauge whose pictures are too coarse for the borders of fiducials across it."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from stages.calibrate.gauge.adjust import NEAR_SIGMA, adjust
 from tests.gauge_runs import USUAL, made_run, measured_run
 
 
-def test_without_borders_across_the_gauge_the_first_poses_hold_the_distance() -> None:
+def test_without_visible_borders_across_the_gauge_the_first_poses_keep_the_distance() -> None:
     given = measured_run(made_run(1))
     along = np.abs(given.measured.edges.outward_p[:, 2]) < 0.5
     measured = replace(given.measured, edges=given.measured.edges.select(along))

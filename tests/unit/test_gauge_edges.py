@@ -1,4 +1,4 @@
-"""Edges of fiducials in pictures: where they are, how sure that is, and which of them are left out."""
+"""Edges of fiducials in pictures: position, its σ, and which edges are left out."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from tests.gauge_runs import USUAL, facts, stated_probe
 from tests.quiet import quiet_context
 
 
-def test_edge_is_found_where_it_is_and_as_well_as_it_says() -> None:
+def test_an_edge_is_found_at_its_place_with_the_stated_sigma() -> None:
     random = np.random.default_rng(3)
     t = np.broadcast_to(np.linspace(-4, 4, 21), (400, 21)).copy()
     place = random.uniform(-1, 1, 400)
@@ -29,7 +29,7 @@ def test_edge_is_found_where_it_is_and_as_well_as_it_says() -> None:
     error = (found - place)[np.isfinite(found)]
     assert len(error) > 390
     assert abs(error.mean()) < 4 * error.std() / np.sqrt(len(error))
-    # beside noise, σ holds a floor for what blur leaves
+    # besides noise, σ includes a floor for the effect of blur
     noise = np.sqrt(np.nanmedian(sigma) ** 2 - 0.03**2)
     assert 0.8 < error.std() / noise < 1.25
 
@@ -54,12 +54,12 @@ def _black_squares(gauge: Gauge, marker: int, T_pc: Float, white: float, brighte
 
 
 @pytest.mark.parametrize(("white", "brightest"), [(200.0, 235), (450.0, 235), (240.0, 255), (450.0, 255)])
-def test_edge_beside_overexposed_white_is_left_out_as_it_seems_to_lie_further_inside(
+def test_an_edge_beside_overexposed_white_is_left_out_as_it_appears_too_far_inside(
     white: float, brightest: int
 ) -> None:
-    """It lay 0.1 to 0.4 px inside; so a sound probe's baseline was 7 σ off, without a warning.
+    """It lay 0.1 to 0.4 px inside, so that a sound probe's baseline was 7 σ off, without a warning.
 
-    White of 240 was left out of videos of full range, in which it is good.
+    In videos of full range, white of 240 was left out, although it is good there.
     """
     gauge, T_pc = gauge_of(facts(), facts().fiducials), np.eye(4)
     T_pc[2, 3] = -12.0
@@ -82,10 +82,10 @@ def test_edge_beside_overexposed_white_is_left_out_as_it_seems_to_lie_further_in
     ("clipped_at", "brightest", "level"),
     [(235, 500.0, 235), (240, 500.0, 240), (245, 300.0, 245), (255, 500.0, 255), (255, 243.0, 255)],
 )
-def test_pictures_that_are_clipped_below_the_white_of_their_range_are_seen_to_be(
+def test_pictures_clipped_below_the_white_of_their_range_are_recognised(
     clipped_at: int, brightest: float, level: int
 ) -> None:
-    """A camera whose white ends at 240 passed as not overexposed, and its edges moved inward."""
+    """A camera whose white ends at 240 counted as not overexposed, and its edges moved inward."""
     random, along = np.random.default_rng(2), np.linspace(-1.5, 1.5, 300)
     images = [
         np.clip(np.exp(-(along**2)) * brightest + random.normal(0, 1.5, (200, 300)), 0, clipped_at)
@@ -97,7 +97,7 @@ def test_pictures_that_are_clipped_below_the_white_of_their_range_are_seen_to_be
     assert brightest_grey(recording, np.arange(9)) == pytest.approx(level, abs=1)
 
 
-def test_overexposed_edges_are_told() -> None:
+def test_overexposed_edges_are_reported() -> None:
     said: list[str] = []
     context = replace(quiet_context(), warn=said.append)
     premises.warn_of_overexposed(0, 900, context)
@@ -106,13 +106,13 @@ def test_overexposed_edges_are_told() -> None:
     assert "100 of 1000 edges of fiducials are left out" in said[0]
 
 
-def test_no_edge_where_there_is_none_or_where_bright_comes_before_dark() -> None:
+def test_no_edge_is_found_where_there_is_none_or_where_bright_comes_before_dark() -> None:
     t = np.broadcast_to(np.linspace(-4, 4, 21), (2, 21)).copy()
     flat = np.full((1, 21), 60.0) + np.random.default_rng(0).normal(0, 1, (1, 21))
     falling = 60 - 40 * (t[:1] > 0)
     assert np.isnan(fit_steps(t, np.concatenate([flat, falling]))[0]).all()
 
 
-def test_frames_that_cannot_be_read_leave_white_at_the_end_of_the_range() -> None:
+def test_with_unreadable_frames_white_is_the_end_of_the_range() -> None:
     unread = SimpleNamespace(read=lambda frames, planes: iter((int(n), None) for n in frames))
     assert brightest_grey(unread, np.arange(3)) == 255

@@ -6,7 +6,7 @@ from stages.calibrate.gauge.geometry import gauge_of
 from tests.gauge_runs import facts
 
 
-def test_way_to_the_nearest_fiducial_is_that_of_the_plain_formula() -> None:
+def test_the_distance_to_the_nearest_fiducial_agrees_with_the_plain_formula() -> None:
     gauge, random = gauge_of(facts(), facts().fiducials), np.random.default_rng(5)
     s, a = random.uniform(-50, 300, 4000), random.uniform(-np.pi, np.pi, 4000)
     half, nearest = gauge.fiducials.size_mm / 2, np.full(4000, np.inf)

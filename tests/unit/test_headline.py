@@ -1,4 +1,4 @@
-"""The headline numbers of a run, as run.json and the terminal state them."""
+"""The summary numbers of a run, as in run.json and on the terminal."""
 
 from dataclasses import replace
 
@@ -25,25 +25,25 @@ def scale_told(run: Trajectory) -> float:
     return float(told["relative 1 sigma of the distance scale"])
 
 
-def test_the_scale_is_stated_no_surer_than_the_distance_at_the_end() -> None:
+def test_the_scale_is_no_surer_than_the_distance_at_the_end() -> None:
     way = np.linspace(0, 200, 50)
     # the probe is calibrated to 6e-5, but errors that matches of texture share leave 0.1 mm of 200 mm
     assert scale_told(trajectory(way, 6e-5, 0.1)) == pytest.approx(5e-4)
     assert scale_told(trajectory(way, 8e-4, 0.1)) == pytest.approx(8e-4)
 
 
-def test_a_way_there_and_back_is_divided_by_its_farthest_place() -> None:
+def test_the_scale_error_of_a_way_forth_and_back_refers_to_its_farthest_place() -> None:
     way = np.concatenate([np.linspace(0, 200, 50), np.linspace(200, 0, 50)])
     assert scale_told(trajectory(way, 6e-5, 0.1)) == pytest.approx(5e-4)
 
 
-def test_what_is_unknown_at_a_cut_is_no_error_of_the_scale() -> None:
+def test_the_unknown_distance_at_a_cut_is_not_an_error_of_the_scale() -> None:
     """With any cut, σ of the scale was 1."""
     cut = replace(trajectory(np.linspace(0, 200, 50), 6e-5, np.hypot(0.1, 200.0)), cut_sigma_mm=200.0)
     assert scale_told(cut) == pytest.approx(5e-4)
 
 
-def test_a_run_that_stood_or_was_not_adjusted_states_what_calibration_leaves() -> None:
+def test_a_run_that_stood_or_was_not_adjusted_states_the_uncertainty_of_calibration() -> None:
     way = np.linspace(0, 200, 50)
     assert scale_told(trajectory(0 * way, 6e-5, 0.0)) == pytest.approx(6e-5)
     assert scale_told(replace(trajectory(way, 6e-5, 0.1), distance_sigma_mm=float("nan"))) == pytest.approx(

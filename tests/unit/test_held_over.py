@@ -1,4 +1,7 @@
-"""Light that a codec holds over: told by what is finest in the rings, and σ of the wall that goes by it."""
+"""Light that a codec repeats in later pictures.
+
+Detected by the finest structure of rings, and part of the wall's σ.
+"""
 
 from __future__ import annotations
 
@@ -21,7 +24,7 @@ HELD, SAMPLE_MM = 0.7, 0.2
 
 
 def rings_of(held: float, shape: tuple[int, int], seed: int = 1) -> Float:
-    """Return values (F, A) of unit variance, each ``held`` times those of the ring before, and new noise."""
+    """Return values (F, A) of unit variance, each ``held`` times those of the ring before plus new noise."""
     random = np.random.default_rng(seed)
     rings = [random.standard_normal(shape[1])]
     for _ in range(shape[0] - 1):
@@ -30,36 +33,36 @@ def rings_of(held: float, shape: tuple[int, int], seed: int = 1) -> Float:
 
 
 def found_in(held: float, step_mm: float = 1.2) -> HeldOver:
-    """Return what is told of such rings so far apart, on a wall of a wider shape than what is compared."""
+    """Return the result for such rings at such distances, on a wall of wider shapes than those compared."""
     values = rings_of(held, (120, 720))
     wall = 5 * np.sin(np.linspace(0, 8 * np.pi, 720))
     return held_over([values + wall], step_mm * np.arange(120), SAMPLE_MM)
 
 
 @pytest.mark.parametrize("held", [0.0, 0.4, HELD])
-def test_likeness_is_that_of_the_rings(held: float) -> None:
-    # 120 rings of some 400 independent samples: the correlation errs by 0.005, of rings far apart by 0.01
+def test_the_correlation_is_that_of_the_rings(held: float) -> None:
+    # 120 rings of some 400 independent samples: the correlation errs by 0.005, that of distant rings by 0.01
     assert found_in(held).likeness == pytest.approx(held ** np.arange(17), abs=0.03)
 
 
-def test_rings_are_compared_as_far_apart_as_nothing_is_shared() -> None:
+def test_rings_are_compared_up_to_the_distance_at_which_nothing_is_shared() -> None:
     assert found_in(0.0).rings == 1
     assert 0.7 ** found_in(HELD).rings == pytest.approx(0.1, abs=0.04)
 
 
-def test_a_standing_probe_sees_the_same_wall_and_nothing_is_held_over() -> None:
+def test_rings_of_a_standing_probe_are_not_taken_for_repeated_light() -> None:
     assert found_in(0.9, step_mm=0.01).rings == 1
 
 
-def test_missing_samples_and_short_passes_are_no_likeness() -> None:
+def test_missing_samples_and_short_passes_give_no_correlation() -> None:
     values = rings_of(0.0, (30, 720))
     values[:, 100:200] = np.nan
     assert held_over([values], 1.2 * np.arange(30), SAMPLE_MM).likeness[1] < 0.05
     assert held_over([values[:1]], np.zeros(1), SAMPLE_MM).rings == 0
 
 
-def test_a_mean_of_rings_that_share_their_error_is_less_sure() -> None:
-    """The formula is held against drawn rings."""
+def test_a_mean_of_rings_with_shared_errors_is_less_sure() -> None:
+    """The formula is compared with drawn rings."""
     width, apart = 1.5, np.arange(-8, 9)
     weight = np.exp(-0.5 * (apart / width) ** 2) / np.exp(-0.5 * (apart / width) ** 2).sum()
     drawn = rings_of(HELD, (17, 20000))
@@ -68,7 +71,7 @@ def test_a_mean_of_rings_that_share_their_error_is_less_sure() -> None:
 
 
 @pytest.mark.parametrize("held", [0.15, 0.45])
-def test_findings_are_warned_of_where_rings_are_alike(held: float) -> None:
+def test_findings_get_a_warning_where_rings_are_correlated(held: float) -> None:
     told: list[str] = []
     context = SimpleNamespace(report=lambda *_: None, warn=told.append)
     warn_of_held(HeldOver(held ** np.arange(17.0)), cast("Context", context))
@@ -88,8 +91,8 @@ def columns_with(held: float, sigma_mm: float) -> RingColumns:
 
 
 @pytest.mark.parametrize(("held", "told"), [(0.0, True), (HELD, True), (HELD, False)])
-def test_sigma_is_that_of_errors_held_over(held: float, told: bool) -> None:
-    """Stated by the scatter of neighbouring rings it is too small; that they are alike must be told."""
+def test_sigma_is_that_of_repeated_errors(held: float, told: bool) -> None:
+    """Estimated by the scatter of neighbouring rings it is too small; their correlation must be detected."""
     grid = MapGrid(0.5 * np.arange(4, 170), 2 * np.pi / 720 * np.arange(720) - np.pi)
     alike = HeldOver(held ** np.arange(17.0) if told else np.eye(17)[0])
     radius, sigma, *_ = gridded(columns_with(held, 0.05), grid, 0.3, 3.0, alike)
@@ -100,8 +103,11 @@ def test_sigma_is_that_of_errors_held_over(held: float, told: bool) -> None:
         assert stated < 0.75
 
 
-def test_what_rings_share_is_added_alike_and_leaves_a_pit_in_sight() -> None:
-    """Times each cell's own σ it was largest where a pit's flanks scatter: a real pit of 1 mm was hidden."""
+def test_shared_error_is_added_equally_to_all_cells_and_leaves_a_pit_detectable() -> None:
+    """As a factor on each cell's σ it was largest where a pit's flanks scatter.
+
+    A real pit of 1 mm was hidden.
+    """
     columns = columns_with(HELD, 0.05)
     along, around = (columns.distance_mm - 45) / 6, (np.arange(720)[:, None] - 360) / 10
     columns.radius_mm[:] += np.exp(-0.5 * (along**2 + around**2)) * (
@@ -113,15 +119,15 @@ def test_what_rings_share_is_added_alike_and_leaves_a_pit_in_sight() -> None:
         for likeness in (HELD ** np.arange(17.0), np.eye(17)[0])
     )
     pit, wall = (slice(70, 100), slice(350, 370)), (slice(70, 100), slice(0, 200))
-    # or the case would show nothing
+    # otherwise the case would show nothing
     assert np.median(untold[pit]) > 1.5 * np.median(untold[wall])
     added = told**2 - untold**2
     assert np.median(added[pit]) == pytest.approx(np.median(added[wall]), rel=1e-3)
     assert np.median(added[wall]) > np.median(untold[wall]) ** 2
 
 
-def test_rings_that_share_light_count_together() -> None:
-    """Three rings of one coded block confirmed a gouge of 6.5 ± .5 mm at .98 that was none."""
+def test_rings_that_share_light_count_as_fewer() -> None:
+    """Three rings of one coded block confirmed a false gouge of 6.5 ± .5 mm at .98."""
     for count in (1, 2, 3, 20):
         assert HeldOver(np.array([1.0, 0.09, 0.06, 0.0])).independent(count) == count
     coded = HeldOver(0.8 ** np.arange(17))
@@ -132,8 +138,8 @@ def test_rings_that_share_light_count_together() -> None:
 
 @pytest.mark.parametrize("same", [0.0, 0.65])
 @pytest.mark.parametrize("held", [0.0, 0.6, 0.9])
-def test_what_is_the_same_in_all_rings_is_not_handed_on(held: float, same: float) -> None:
-    """Rows of a sensor beside new noise made likeness .29, .29, .29, ...: all was told to be handed on."""
+def test_what_is_the_same_in_all_rings_is_not_repeated_light(held: float, same: float) -> None:
+    """Fixed rows of a sensor beside new noise gave correlations .29, .29, .29, ..., taken for repetition."""
     values = rings_of(held, (120, 720)) + same * np.random.default_rng(2).standard_normal(720)
     found = held_over([values], 1.2 * np.arange(120), SAMPLE_MM)
     assert found.more_than_usual == (held + same > 0)
@@ -141,11 +147,11 @@ def test_what_is_the_same_in_all_rings_is_not_handed_on(held: float, same: float
 
 
 @pytest.mark.parametrize("likeness", [[1.0], [1, 0.25], [1, 1], [1, 0.3, 0.3], [1, 0.21, 0.2], [1, 1, 1, 1]])
-def test_less_than_all_is_handed_on(likeness: list[float]) -> None:
+def test_less_than_everything_is_repeated(likeness: list[float]) -> None:
     assert 0 <= HeldOver(np.array(likeness)).handed_on < 1
 
 
-def test_new_noise_hides_nothing_of_what_is_handed_on() -> None:
+def test_new_noise_hides_nothing_of_the_repeated_light() -> None:
     likeness = np.r_[1.0, 0.4 * 0.8 ** np.arange(16)]
     assert HeldOver(likeness).handed_on == pytest.approx(0.8, abs=0.03)
     # A codec that repeats most of a picture once, and no more.

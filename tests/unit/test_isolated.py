@@ -1,4 +1,4 @@
-"""Calls in a process of their own: values, errors, crashes and endless runs."""
+"""Calls in a separate process: values, errors, crashes and endless runs."""
 
 import os
 import time
@@ -26,16 +26,16 @@ def endless() -> None:
     time.sleep(600)
 
 
-def test_value_comes_back_in_spite_of_chatter() -> None:
+def test_the_value_is_returned_in_spite_of_other_output() -> None:
     np.testing.assert_array_equal(call_isolated(60, doubled, np.arange(5)), 2 * np.arange(5))
 
 
-def test_error_is_raised_here() -> None:
+def test_an_error_is_raised_in_the_caller() -> None:
     with pytest.raises(ValueError, match="not like this"):
         call_isolated(60, refusing)
 
 
-def test_crash_is_told() -> None:
+def test_a_crash_is_reported() -> None:
     with pytest.raises(CrashError, match="dying ended with status"):
         call_isolated(60, dying)
 

@@ -1,4 +1,4 @@
-"""Kernels of a first run compiled by a second process."""
+"""Kernels of a first run are compiled by a second process."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def kernel(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delitem(sys.modules, MODULE, raising=False)
 
 
-def test_every_listed_kernel_is_there_and_takes_so_many_arguments() -> None:
+def test_every_listed_kernel_exists_and_takes_as_many_arguments_as_listed() -> None:
     for module, functions in kernels_of_a_run().items():
         for name, words in functions.items():
             wanted = [type_of(word) for word in words.split("; ")]
@@ -44,12 +44,12 @@ def test_every_listed_kernel_is_there_and_takes_so_many_arguments() -> None:
 
 
 def test_every_listed_kernel_takes_the_types_listed() -> None:
-    """One that does not would end the second process, and what is listed behind it be compiled by the run."""
+    """One that does not would end the second process; the run would have to compile the rest."""
     compile_all(kernels_of_a_run())
 
 
 def test_a_run_starts_without_the_part_of_scipy_that_loads_slowly() -> None:
-    """Both together took a fifth of the time of all imports, for one tail of Student's t and a filter."""
+    """Two parts of SciPy took a fifth of the time of all imports, for a tail of Student's t and a filter."""
     told = "import sys, stages.catalogue, pipeline.export.catalogue, pipeline.cli; print(*sys.modules)"
     loaded = subprocess.run(
         [sys.executable, "-c", told], cwd=PROJECT_ROOT, capture_output=True, text=True, check=True
@@ -66,7 +66,7 @@ def test_types_are_read() -> None:
         type_of("float64[2]")
 
 
-def test_what_was_compiled_is_kept_and_asks_for_no_second_process(
+def test_compiled_kernels_are_kept_and_need_no_second_process(
     kernel: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     started: list[object] = []
@@ -81,7 +81,7 @@ def test_what_was_compiled_is_kept_and_asks_for_no_second_process(
     monkeypatch.setattr(kernels, "compile_all", read.append)
     with compiled_ahead(LISTED):
         assert not started
-    assert read == [LISTED], "kernels that are kept are read ahead"
+    assert read == [LISTED], "kept kernels are read in advance"
 
 
 def test_the_second_process_fills_the_cache(kernel: None, tmp_path: Path) -> None:
