@@ -383,7 +383,7 @@ class Judged:
     confirmed: tuple[tuple[Confirmation, ...], ...]
 
 
-def test_agreement_of_the_field_counts_for_the_gauges_sets_and_contradiction_against_them():
+def test_what_the_field_confirms_counts_for_the_gauge_and_what_it_contradicts_does_not():
     gauge = Seen("gauge", Judged(((), (met(True),))), None, None, ())
     assert borne_out(gauge, (met(True), met(False))).geometry.confirmed == ((met(True),), (met(True),))
     assert borne_out(gauge, (None, None)).geometry == gauge.geometry

@@ -147,7 +147,7 @@ def test_what_is_the_same_in_all_rings_is_not_repeated_light(held: float, same: 
 
 
 @pytest.mark.parametrize("likeness", [[1.0], [1, 0.25], [1, 1], [1, 0.3, 0.3], [1, 0.21, 0.2], [1, 1, 1, 1]])
-def test_less_than_everything_is_repeated(likeness: list[float]) -> None:
+def test_the_repeated_share_of_light_is_below_one(likeness: list[float]) -> None:
     assert 0 <= HeldOver(np.array(likeness)).handed_on < 1
 
 

@@ -1,4 +1,4 @@
-"""Laser planes through points and from rendered boards, against planes and lines that are known."""
+"""Laser planes through points and from rendered boards, compared with known planes and lines."""
 
 import cv2
 import numpy as np
@@ -38,7 +38,7 @@ GREEN = LaserPlaneParameters(wavelength_nm=520.0)
 
 
 def _plane_points(random, pictures=8, per_picture=60, noise_mm=0.03, picture_mm=0.0):
-    """Return lines in z = 50 + 0.2 x − 0.1 y with noise, each line displaced as a whole, and their groups."""
+    """Return lines in z = 50 + 0.2 x − 0.1 y with noise, each displaced as a whole, and their groups."""
     lines = []
     for _ in range(pictures):
         start, direction = random.uniform(-60, 60, 2), random.normal(size=2)
@@ -51,13 +51,13 @@ def _plane_points(random, pictures=8, per_picture=60, noise_mm=0.03, picture_mm=
 TRUE_NORMAL = np.array([-0.2, 0.1, 1.0]) / np.linalg.norm([-0.2, 0.1, 1.0])
 
 
-def test_exact_points_give_their_plane_as_a_sheet():
+def test_exact_points_give_the_sheet_of_their_plane():
     points, group = _plane_points(np.random.default_rng(1), noise_mm=0.0)
     sheet = fit_plane(points, group).sheet(0.15, 520.0)
     assert [sheet.baseline_mm, sheet.tilt_x, sheet.tilt_y] == pytest.approx([50, 0.2, -0.1], abs=1e-9)
 
 
-def test_robust_fit_outvotes_what_lies_off_the_plane():
+def test_the_robust_fit_rejects_points_off_the_plane():
     points, group = _plane_points(np.random.default_rng(2))
     points[::5] += [0.0, 0.0, 7.0]
     assert abs(fit_plane(points, group).sheet(0.15, 520.0).baseline_mm - 50) > 0.5
@@ -68,7 +68,7 @@ def test_robust_fit_outvotes_what_lies_off_the_plane():
 
 
 @pytest.mark.parametrize("picture_mm", [0.0, 0.1])
-def test_covariance_is_that_of_repeated_measurements(picture_mm):
+def test_covariance_agrees_with_repeated_measurements(picture_mm):
     """Squared errors in units of the stated covariance average 3, also when pictures err as a whole."""
     squares = []
     for seed in range(200):
@@ -89,7 +89,7 @@ def test_covariance_without_groups_would_be_too_small():
 
 
 def _drawn(random, poses):
-    """Return points on the sheet as boards of noisy corners place them, and the boards' errors."""
+    """Return points on the sheet computed from boards with noisy corners, and the errors of the boards."""
     points, arms, spread = [], [], []
     for view, T_centre in zip(views_of(CAMERA, poses, random, sigma_px=0.2), poses, strict=True):
         T_true = T_centre @ from_parts(np.eye(3), -grid(9, 6, 20.0).mean(0))
@@ -107,8 +107,8 @@ def _drawn(random, poses):
     return np.concatenate(points), group, BoardErrors(np.concatenate(arms), np.stack(spread))
 
 
-def test_covariance_holds_what_the_boards_poses_err():
-    """Of 60 draws; without the poses the plane is told half as unsure as it is."""
+def test_covariance_includes_the_errors_of_board_poses():
+    """From 60 draws; without the errors of poses σ of the plane is half of what it should be."""
     squares = {True: [], False: []}
     poses = [facing_pose(*pose) for pose in POSES]
     for seed in range(60):
@@ -118,7 +118,7 @@ def test_covariance_holds_what_the_boards_poses_err():
             sheet = plane.sheet(0.15, 520.0)
             error = np.array([sheet.baseline_mm - 90, sheet.tilt_x - 0.21, sheet.tilt_y + 0.13])
             squares[knows].append(error @ np.linalg.solve(plane.sheet_covariance(), error))
-    # Median of χ² with 3 degrees of freedom: 2.37; four boards leave the scatter of their lines unsure.
+    # Median of χ² with 3 degrees of freedom: 2.37; four boards leave the scatter of their lines uncertain.
     assert 1.2 < np.median(squares[True]) < 3.3
     assert np.median(squares[False]) > 4
 
@@ -137,7 +137,7 @@ def test_probe_takes_the_plane_with_its_covariance(tmp_path):
     assert np.count_nonzero(probe.covariance) == 9
 
 
-def test_plane_beside_the_axis_is_no_sheet():
+def test_a_plane_beside_the_axis_is_not_a_sheet():
     plane = LaserPlane(np.array([-0.019, 0.8963, 0.4431]), 16.11, np.zeros((4, 4)), 0.05, 100)
     with pytest.raises(UnusableError, match=r"leans by 63\.\d°"):
         plane.sheet(0.15, 650.0)
@@ -152,7 +152,7 @@ def test_sheet_contains_the_planes_points():
     assert np.abs(met - points).max() < 1e-6
 
 
-def test_peaks_are_where_bells_are_and_absent_where_there_is_none():
+def test_peaks_are_found_at_bells_and_nowhere_else():
     x, random = np.arange(-12.0, 13.0), np.random.default_rng(5)
     centre = random.uniform(-3, 3, 300)
     bells = 80 * np.exp(-0.5 * ((x - centre[:, None]) / 2.3) ** 2) + 20
@@ -174,7 +174,10 @@ def _picture(T_cb, random, line=True):
 
 
 def _line_light(T_cb):
-    """Return the laser's light in every pixel: a Gaussian of the board point's height above the sheet."""
+    """Return the laser's light in every pixel.
+
+    A Gaussian of the height above the sheet of the board's point.
+    """
     uv = np.stack(np.meshgrid(np.arange(640.0), np.arange(480.0)), -1)
     ray = CAMERA.unproject(uv).ray
     point = ray * ((T_cb[:3, 2] @ T_cb[:3, 3]) / (ray @ T_cb[:3, 2]))[..., None]
@@ -201,7 +204,7 @@ def test_laser_plane_from_rendered_boards(pictures):
     assert np.abs(error[1:]).max() < 0.002
 
 
-def test_pictures_without_line_are_named_and_too_few_refused(pictures):
+def test_pictures_without_a_line_are_named_and_too_few_pictures_refused(pictures):
     random = np.random.default_rng(7)
     dark = _picture(facing_pose(*POSES[0]), random, line=False)
     without = LaserPicture(dark, pictures[0].view)
@@ -211,11 +214,11 @@ def test_pictures_without_line_are_named_and_too_few_refused(pictures):
         calibrate_laser_plane([without, *pictures[2:]], CAMERA, GREEN, quiet_context())
 
 
-def test_line_of_another_colour_is_not_taken(pictures):
+def test_a_line_of_another_colour_is_ignored(pictures):
     red = LaserPlaneParameters(wavelength_nm=650.0)
     assert len(line_on_board(pictures[0], CAMERA, red).xyz_c) < red.least_points
 
 
-def test_one_line_seen_again_and_again_leaves_the_plane_open(pictures):
+def test_one_line_seen_many_times_does_not_determine_the_plane(pictures):
     with pytest.raises(UnusableError, match="nearly coincide"):
         calibrate_laser_plane([pictures[0]] * 3, CAMERA, GREEN, quiet_context())

@@ -1,4 +1,4 @@
-"""What is larger, longer or deeper than the README says is refused by name, and what is not is not."""
+"""Inputs beyond the limits that the README states are refused by name, and others are accepted."""
 
 from __future__ import annotations
 
@@ -45,14 +45,14 @@ STATED = {
 
 
 @pytest.mark.parametrize(("what", "limit"), STATED.items())
-def test_the_readme_states_the_limit_that_the_program_has(what: str, limit: str) -> None:
+def test_the_readme_states_the_limits_of_the_program(what: str, limit: str) -> None:
     section = re.split(r"\n#+ ", (PROJECT_ROOT / "README.md").read_text("utf-8").split("## Limits")[1])[0]
     (row,) = [line for line in section.splitlines() if line.startswith(f"| {what}")]
     assert limit in row
 
 
 def hollow(file: Path, size: int) -> Path:
-    """Make a file of a size that takes no room on the disk."""
+    """Make a file of a given size that takes no room on the disk."""
     file.parent.mkdir(parents=True, exist_ok=True)
     file.touch()
     os.truncate(file, size)
@@ -60,7 +60,7 @@ def hollow(file: Path, size: int) -> Path:
 
 
 def bomb(file: Path) -> Path:
-    """Write an archive of some kilobytes that states, in its directory, to unpack to five gigabytes."""
+    """Write an archive of some kilobytes whose directory states that it unpacks to five gigabytes."""
     np.savez_compressed(file, distance_mm=np.zeros(4), azimuth_rad=np.zeros(4), radius_mm=np.zeros((4, 4)))
     content = bytearray(file.read_bytes())
     at = content.rindex(b"PK\x01\x02")
@@ -88,13 +88,13 @@ TOO_LARGE: dict[str, tuple[Callable[[Path], Path], Callable[[Path], object], str
 
 
 @pytest.mark.parametrize("name", TOO_LARGE)
-def test_what_is_too_large_is_refused_unread(tmp_path: Path, name: str) -> None:
+def test_too_large_a_file_is_refused_unread(tmp_path: Path, name: str) -> None:
     make, read, told = TOO_LARGE[name]
     with pytest.raises(InputError, match=told):
         read(make(tmp_path))
 
 
-def test_a_model_whose_head_is_too_large_is_refused(tmp_path: Path) -> None:
+def test_a_model_with_too_large_a_header_is_refused(tmp_path: Path) -> None:
     head = np.array([0x46546C67, 2, 0, 257 * MIB, 0x4E4F534A], "<u4").tobytes()
     (tmp_path / "model.glb").write_bytes(head)
     with pytest.raises(InputError, match="not a binary glTF"):
@@ -106,13 +106,13 @@ DEEP = "[" * 100_000
 
 @pytest.mark.parametrize("target", ["run record", "stored result", "defects", "review request",
                                     "review action", "configuration", "probe.yaml"])  # fmt: skip
-def test_what_is_nested_too_deeply_is_taken_for_damaged(target: str) -> None:
+def test_a_file_nested_too_deeply_counts_as_damaged(target: str) -> None:
     try:
         TARGETS[target].take(DEEP.encode())
     except InputError:
         pass
     else:
-        assert target in ("stored result", "review request"), "these answer None, or were refused within"
+        assert target in ("stored result", "review request"), "these return None, or were refused inside"
 
 
 def test_findings_nested_too_deeply_are_refused() -> None:
@@ -135,7 +135,7 @@ ACTIONS: dict[str, Callable[[int], dict[str, object]]] = {
 @pytest.mark.parametrize(
     ("name", "most"), [("text", 4000), ("points", 2000), ("findings", 50), ("outlines", 20)]
 )
-def test_an_action_is_no_longer_than_stated(name: str, most: int) -> None:
+def test_an_action_longer_than_stated_is_refused(name: str, most: int) -> None:
     action_of(json.dumps(ACTIONS[name](most)))
     with pytest.raises(InputError):
         action_of(json.dumps(ACTIONS[name](most + 1)))
@@ -151,7 +151,7 @@ def test_an_action_is_no_longer_than_stated(name: str, most: int) -> None:
         (PostedPoints, {"tool": "area", "points": [[0, 0]] * 2000}, {"points": [[0, 0]] * 2001}),
     ],
 )  # fmt: skip
-def test_a_request_is_no_longer_than_stated(
+def test_a_request_longer_than_stated_is_refused(
     kind: type, most: dict[str, object], over: dict[str, object]
 ) -> None:
     parsed(kind, json.dumps(most).encode())

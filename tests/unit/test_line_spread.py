@@ -1,4 +1,4 @@
-"""The line's shape gets the name whose shape fits it, and none where no shape fits."""
+"""The shape of the line gets the name of the effect whose shape fits, and none where no shape fits."""
 
 from __future__ import annotations
 
@@ -24,7 +24,10 @@ WIDTH_PX, SCALES = 1.3, (5.5, 6.5, 7.0)
 def cells(
     light: Callable[[Float, float], Float], seed: int = 0, skirt: float = 0.006, noise: float = 2e-3
 ) -> Cells:
-    """Three blocks at three distances to the wall, each of 72 sectors; ``light`` of px and px per mm."""
+    """Return three blocks at three distances to the wall, each of 72 sectors.
+
+    ``light`` of px and px per mm.
+    """
     random = np.random.default_rng(seed)
     block, sector = np.repeat(np.arange(3), 72), np.tile(np.arange(72), 3)
     profile = np.array([light(OFFSET, s) for s in SCALES])[block]
@@ -55,7 +58,7 @@ def halo(x: Float, scale: float) -> Float:
 
 
 def shelf(x: Float, scale: float) -> Float:
-    """A flat step of light on one side, which ends sharply: no shape of the library."""
+    """Return a step of light on one side with a sharp end: no shape of the library."""
     return bell(x) + 0.1 * ((x < 0) & (x > -1.5 * scale))
 
 
@@ -63,7 +66,7 @@ def shelf(x: Float, scale: float) -> Float:
     ("light", "shape", "way_mm"),
     [(tail, Shape.TAIL, 0.25), (copy, Shape.COPY, 0.8), (halo, Shape.HALO, 0.4)],
 )
-def test_a_shape_is_told_from_the_others_and_measured(
+def test_a_shape_is_recognised_and_measured(
     light: Callable[[Float, float], Float], shape: Shape, way_mm: float
 ) -> None:
     (found,) = explanations(line_spread(cells(light)))
@@ -72,7 +75,7 @@ def test_a_shape_is_told_from_the_others_and_measured(
     assert found.left < 0.03
 
 
-def test_a_shape_that_nobody_knows_gets_no_name() -> None:
+def test_an_unknown_shape_gets_no_name() -> None:
     assert explanations(line_spread(cells(shelf))) == ()
 
 
@@ -80,7 +83,7 @@ SHEET_MM, BLUR_PX = 0.2, 0.65
 
 
 def geometry_of(of: Cells) -> LineGeometry:
-    """Return the geometry of frames that all look as their block does; the picture is 600 px high."""
+    """Return the geometry of frames that look like their block; the picture is 600 px high."""
     width, scale = (np.repeat(v.reshape(3, -1), 12, axis=0) for v in (of.width_px, of.px_per_mm))
     ones, azimuth = np.ones_like(width), np.radians(np.arange(0, 360, 5.0))
     return LineGeometry(
@@ -96,7 +99,7 @@ def place(scale: Float | float) -> Float:
 def line_findings(sheet_mm: float, tail_mm: float, edge_blur: float) -> list[Finding]:
     """Return what is found of a sheet of 1 σ ``sheet_mm`` (stated: `SHEET_MM`) with an exponential tail.
 
-    The variance of the blur grows by ``edge_blur`` to the edge of the picture.
+    The variance of the blur grows by ``edge_blur`` towards the edge of the picture.
     """
 
     def light(x: Float, scale: float) -> Float:
@@ -118,10 +121,10 @@ def line_findings(sheet_mm: float, tail_mm: float, edge_blur: float) -> list[Fin
         (SHEET_MM, 0.2, 2.0, "subsurface", 0.2),
     ],
 )
-def test_the_width_without_a_tail_tells_whether_sheet_or_wall_makes_it(
+def test_the_width_without_a_tail_decides_between_sheet_and_wall(
     sheet_mm: float, tail_mm: float, edge_blur: float, name: str, size: float
 ) -> None:
-    """Blur that grows to the edge of the picture had made the width refuse both, and so given both names."""
+    """With blur that grows towards the picture's edge, the width excluded both, and so both were named."""
     (found,) = line_findings(sheet_mm, tail_mm, edge_blur)
     assert (found.effect, found.alike) == (name, ())
     assert found.sizes[0].value == pytest.approx(size, abs=2 * found.sizes[0].sigma)
@@ -134,18 +137,18 @@ def test_the_width_without_a_tail_tells_whether_sheet_or_wall_makes_it(
         (0.9 * SHEET_MM, 0.1, 0.0),
     ],
 )
-def test_a_short_tail_leaves_both_names_where_the_width_is_known_no_better(
+def test_a_short_tail_leaves_both_names_if_the_width_is_not_known_better(
     sheet_mm: float, tail_mm: float, edge_blur: float
 ) -> None:
-    """Growing blur had named the wall for a skewed sheet, and a narrow sheet itself for the wall."""
+    """Growing blur named the wall for a skewed sheet; a narrow sheet was named for light in the wall."""
     found = line_findings(sheet_mm, tail_mm, edge_blur)
     assert [(f.effect, f.alike) for f in found] == [
         ("line_skew", ("subsurface",)), ("subsurface", ("line_skew",)),
     ]  # fmt: skip
 
 
-def test_a_shape_without_a_clear_size_gives_none_and_names_nothing_alone() -> None:
-    """A blurred second line .134 ± .436 mm away had named light in the wall alone, with that size."""
+def test_a_shape_with_an_uncertain_size_gives_no_size_and_no_single_name() -> None:
+    """A blurred second line .134 ± .436 mm away was reported as light in the wall alone, with that size."""
     found = line_findings(SHEET_MM, 0.08, 0.0)
     assert [(f.effect, f.alike, f.sizes) for f in found] == [
         ("line_skew", ("subsurface",), ()), ("subsurface", ("line_skew",), ()),
@@ -153,8 +156,8 @@ def test_a_shape_without_a_clear_size_gives_none_and_names_nothing_alone() -> No
 
 
 @pytest.mark.parametrize("ratio", [0.3, 1.0, 2.0, 3.0])
-def test_the_length_of_a_tail_is_as_sure_as_the_skewness_makes_it(ratio: float) -> None:
-    """A third of the relative error of the skewness holds for short tails only."""
+def test_sigma_of_the_length_of_a_tail_follows_from_that_of_the_skewness(ratio: float) -> None:
+    """A third of the relative error of the skewness is right for short tails only."""
     skewness = []
     for one in (0.98 * ratio, 1.02 * ratio):
         drawn = cells(lambda x, _, t=one: exponnorm.pdf(-x, t, scale=WIDTH_PX), skirt=0.0, noise=0.0)

@@ -1,4 +1,4 @@
-"""The benchmark's long pipes: as long as they are called, and no metre like another."""
+"""The benchmark's long pipes have the requested length, and no two metres are equal."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from tests.benchmarks.bench_long_run import TEMPLATE
 from tests.benchmarks.long_scene import lengthened
 
 
-def test_a_scene_is_made_longer_throughout() -> None:
+def test_all_parts_of_a_scene_are_made_longer() -> None:
     metre = read_scene(TEMPLATE)
     long = lengthened(metre, 4)
     last_s = (long.frames - 1) / long.frame_rate

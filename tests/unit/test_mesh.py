@@ -37,12 +37,12 @@ def plain() -> TexturedMesh:
 
 
 def grid(wall: Wall, pieces: int = 1) -> list[Surface]:
-    """The surface with a vertex at every cell: no cell may be smoothed. Walls without noise need fewer."""
+    """The surface with a vertex at every cell, as no cell may be smoothed. Walls without noise need fewer."""
     return [p.surface for p in fitted_surface(cells_of(wall, 1e-6, 0.0), wall.axis, pieces, 0.0)]
 
 
 def boundary_edges(face: np.ndarray) -> np.ndarray:
-    """Edges (N, 2) that belong to one triangle only; fails where one belongs to more than two."""
+    """Return edges (N, 2) that belong to one triangle only; fail where one belongs to more than two."""
     edge = np.sort(face[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
     found, count = np.unique(edge, axis=0, return_counts=True)
     assert count.max() <= 2
@@ -50,7 +50,7 @@ def boundary_edges(face: np.ndarray) -> np.ndarray:
 
 
 def joined(mesh: TexturedMesh) -> tuple[np.ndarray, np.ndarray]:
-    """Vertices and faces of all tiles, equal positions merged."""
+    """Return vertices and faces of all tiles, with equal positions merged."""
     vertex = np.concatenate([t.vertex_p for t in mesh.tiles])
     starts = np.cumsum([0, *(len(t.vertex_p) for t in mesh.tiles)])
     face = np.concatenate([t.face + s for t, s in zip(mesh.tiles, starts, strict=False)])
@@ -59,7 +59,7 @@ def joined(mesh: TexturedMesh) -> tuple[np.ndarray, np.ndarray]:
 
 
 def radius_seen(mesh: TexturedMesh, wall: Wall, s: np.ndarray, psi: np.ndarray) -> np.ndarray:
-    """Radius of the mesh by rays from the axis; NaN where they leave through a hole.
+    """Return the radius of the mesh by rays from the axis; NaN where they leave through a hole.
 
     The rays pass 0.1 µm beside their aim, since one that meets an edge exactly may slip through.
     """
@@ -74,7 +74,7 @@ def radius_seen(mesh: TexturedMesh, wall: Wall, s: np.ndarray, psi: np.ndarray) 
 
 
 @pytest.mark.parametrize("axis", [straight_axis(-40.0, 120.0), bent_axis(2e-3)])
-def test_grid_reproduces_the_radius_map(axis: PipeAxis) -> None:
+def test_the_full_grid_reproduces_the_radius_map(axis: PipeAxis) -> None:
     wall = small_wall(axis=axis, noise_mm=0.02)
     radius = wall.radius_map.radius_mm
     (surface,) = grid(wall)
@@ -90,7 +90,7 @@ def test_grid_reproduces_the_radius_map(axis: PipeAxis) -> None:
 
 
 @pytest.mark.parametrize("columns", [360, 225])
-def test_grid_is_closed_around_and_faces_inward(columns: int) -> None:
+def test_the_grid_is_closed_around_the_pipe_and_faces_inward(columns: int) -> None:
     wall = small_wall(noise_mm=0.02, columns=columns)
     rows = len(wall.radius_map.radius_mm)
     (surface,) = grid(wall)
@@ -103,7 +103,7 @@ def test_grid_is_closed_around_and_faces_inward(columns: int) -> None:
 
 
 @pytest.mark.parametrize("at", [(10, 20), (11, 20), (11, 21), (8, 16), (13, 0), (10, 359)])
-def test_holes_stay_and_single_missing_cells_leave_triangles(at: tuple[int, int]) -> None:
+def test_holes_remain_and_single_missing_cells_leave_triangles_out(at: tuple[int, int]) -> None:
     wall = small_wall(noise_mm=0.02, hole=(slice(at[0], at[0] + 1), slice(at[1], at[1] + 1)))
     rows, columns = wall.radius_map.radius_mm.shape
     (surface,) = grid(wall)
@@ -125,8 +125,8 @@ def test_pieces_share_their_border_rows(pieces: int, monkeypatch: pytest.MonkeyP
     assert len(surface.vertex_p) == wall.radius_map.radius_mm.size
 
 
-def test_noise_is_averaged_and_pits_are_not() -> None:
-    """Against the drawn wall, which the surface never saw, it is nearer than the cells it is made of."""
+def test_noise_is_averaged_but_pits_are_not() -> None:
+    """The mesh is nearer to the drawn wall, which was not an input, than the cells it is made of."""
     wall = small_wall(noise_mm=0.02)
     at, around, _, width = PIT
     radius_map = wall.radius_map
@@ -138,7 +138,7 @@ def test_noise_is_averaged_and_pits_are_not() -> None:
     assert np.std(found - true) < 0.6 * np.std(cells - true)
     assert np.std((found - true)[near]) < np.std((cells - true)[near])
     assert abs((found - true)[near].mean()) < 0.004
-    # The controls: cuts that cost nothing follow the noise, cuts so dear that none is made lose the pit.
+    # Controls: with free cuts the mesh follows the noise; with cuts too dear to be made it loses the pit.
     noisy = radius_seen(meshed(wall, triangle_cost=0.0), wall, s, psi)
     assert np.std(noisy - true) > 0.9 * np.std(cells - true)
     lost = radius_seen(meshed(wall, triangle_cost=1e6, error_mm=5.0), wall, s, psi)
@@ -152,7 +152,7 @@ def test_decimated_tiles_close_around_the_seam_and_to_each_other(plain: Textured
     assert np.all((ends < 0.01) | (ends > 49.99))
 
 
-def test_decimation_keeps_its_bound(plain: TexturedMesh) -> None:
+def test_decimation_stays_within_its_bound(plain: TexturedMesh) -> None:
     assert plain.triangles < 0.5 * plain.wall_triangles
     assert 0 < plain.decimation_error_mm <= 0.01
     wall = small_wall()
@@ -175,7 +175,7 @@ def test_no_vertex_leaves_the_wall(plain: TexturedMesh) -> None:
         assert np.ptp(tile.vertex_p[tile.face][..., 2], axis=1).max() < 12
 
 
-def test_a_bound_that_cannot_be_kept_leaves_the_grid_alone() -> None:
+def test_where_the_bound_cannot_be_kept_the_grid_stays() -> None:
     (surface,) = grid(small_wall(noise_mm=0.05, length_mm=10.0))
     kept = decimate(surface, 500, 1e-5)
     assert len(kept.surface.face) == len(surface.face)
@@ -189,13 +189,13 @@ def test_pit_depth_survives_noise_and_decimation() -> None:
     at, around, depth, _ = PIT
     s, psi = np.meshgrid(at + np.linspace(-0.5, 0.5, 9), around + np.linspace(-0.5, 0.5, 9) / RADIUS)
     seen = radius_seen(mesh, wall, s, psi).mean()
-    # Nine grid cells of noise 0.02 leave 0.007 mm of the map's own.
+    # Nine grid cells of noise 0.02 leave 0.007 mm of the map's noise.
     true = drawn_radius(s, psi).mean()
     assert depth > 1
     assert abs(seen - true) < 0.015
 
 
-def test_what_was_not_seen_stays_a_hole() -> None:
+def test_unmeasured_wall_stays_a_hole() -> None:
     wall = small_wall(hole=HOLE)
     mesh = meshed(wall)
     psi = wall.radius_map.azimuth_rad
@@ -216,7 +216,7 @@ def test_charts_lie_in_the_atlas_and_never_overlap(surface: str) -> None:
 
 
 def overlap(tile: MeshTile) -> float:
-    """Share of points of the atlas that lie in more than one triangle."""
+    """Return the share of points of the atlas that lie in more than one triangle."""
     flat = np.column_stack([tile.uv, np.zeros(len(tile.uv))]).astype(np.float32)
     scene = open3d().t.geometry.RaycastingScene()
     scene.add_triangles(flat, tile.face.astype(np.uint32))
@@ -227,7 +227,7 @@ def overlap(tile: MeshTile) -> float:
     return float(np.mean(count > 1))
 
 
-def test_photo_and_error_colours_lie_where_they_belong(plain: TexturedMesh) -> None:
+def test_photo_and_error_colours_are_at_their_places(plain: TexturedMesh) -> None:
     wall, photo = small_wall(), smooth_photo()
     overlays = error_colours(wall)
     for tile in plain.tiles:
@@ -249,18 +249,18 @@ def test_photo_and_error_colours_lie_where_they_belong(plain: TexturedMesh) -> N
         assert np.abs(value - 0.2 * np.cos(psi)).max() < 0.01
 
 
-def test_atlases_respect_their_limit() -> None:
+def test_atlases_stay_within_their_size_limit() -> None:
     mesh = meshed(small_wall(length_mm=40.0), texel_mm=0.05, atlas_px=1024)
     assert len(mesh.tiles) > 1
     assert max(max(t.photo_bgr.shape[:2]) for t in mesh.tiles) <= 1024
 
 
-def test_same_wall_same_bytes() -> None:
+def test_the_same_wall_gives_the_same_bytes() -> None:
     wall = small_wall(noise_mm=0.01, length_mm=20.0)
     assert digest(meshed(wall, tile_mm=10.0)) == digest(meshed(wall, tile_mm=10.0))
 
 
-def test_a_wall_of_nothing_is_refused() -> None:
+def test_a_wall_without_measurements_is_refused() -> None:
     wall = small_wall(length_mm=10.0)
     colours = error_colours(wall)
     none = dataclasses.replace(wall.radius_map, radius_mm=np.full_like(wall.radius_map.radius_mm, np.nan))
@@ -274,7 +274,7 @@ def test_a_wall_of_nothing_is_refused() -> None:
         )
 
 
-def test_normals_go_on_from_piece_to_piece() -> None:
+def test_normals_are_continuous_from_piece_to_piece() -> None:
     pieces = grid(small_wall(noise_mm=0.05, hole=HOLE), 3)
     whole = weld(pieces)
     wanted = {tuple(v): n for v, n in zip(whole.vertex_p, vertex_normals(whole), strict=True)}
@@ -283,4 +283,6 @@ def test_normals_go_on_from_piece_to_piece() -> None:
     for surface, normal in found:
         np.testing.assert_allclose(normal, [wanted[tuple(v)] for v in surface.vertex_p], atol=1e-9)
     alone = vertex_normals(found[0][0])
-    assert np.abs(alone - found[0][1]).max() > 1e-3, "the control: a piece alone knows no better"
+    assert np.abs(alone - found[0][1]).max() > 1e-3, (
+        "control: the normals of a single piece differ at the joint"
+    )

@@ -1,4 +1,7 @@
-"""A Poisson surface made in pieces: no gap where they meet, the same surface, also through a branch."""
+"""A Poisson surface made in pieces.
+
+Without gaps at the joints, and equal to that of one piece, also at a branch.
+"""
 
 from dataclasses import replace
 from functools import cache
@@ -38,7 +41,7 @@ def pieces(*cuts):
 
 
 def border_edges(surface):
-    """Return the edges (E, 2) that one triangle alone has; no edge has more than two."""
+    """Return the edges (E, 2) of only one triangle; no edge has more than two."""
     edges = np.sort(surface.face[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
     edges, count = np.unique(edges, axis=0, return_counts=True)
     assert count.max() == 2
@@ -46,7 +49,7 @@ def border_edges(surface):
 
 
 def open_at(surface, z):
-    """Count border edges within 2 mm of a cut, the open end of the branch left out."""
+    """Count border edges within 2 mm of a cut, without the open end of the branch."""
     middle = surface.vertex_p[border_edges(surface)].mean(1)
     return int(((np.abs(middle[:, 2] - z) < 2) & (middle[:, 0] < 37)).sum())
 
@@ -64,7 +67,7 @@ def test_pieces_meet_without_a_gap(cuts):
 
 
 def test_the_model_has_no_gap_where_pieces_meet(monkeypatch):
-    monkeypatch.setattr("stages.mesh.poisson._LARGEST_DEPTH", 6)  # of this cell, for pieces of 40 mm
+    monkeypatch.setattr("stages.mesh.poisson._LARGEST_DEPTH", 6)  # of this cell size, for pieces of 40 mm
     along, axis = drawn()
     wall = Wall(along.cloud, small_wall(length_mm=LENGTH, columns=90).radius_map, axis)
     colours = overlays_of(wall.radius_map, 2 * RADIUS, OverlayParameters())
@@ -81,7 +84,7 @@ def test_the_model_has_no_gap_where_pieces_meet(monkeypatch):
     context = replace(quiet_context(), report=lambda name, value, unit="": numbers.update({name: value}))
     mesh = make_mesh(wall, smooth_photo(length_mm=LENGTH), colours, parameters, context)
     assert numbers["mesh: borders between pieces that do not meet"] == 0
-    assert mesh.triangles < 0.9 * mesh.wall_triangles  # thinned out, and still
+    assert mesh.triangles < 0.9 * mesh.wall_triangles  # decimated, and still without a gap
     tiles = [Surface(t.vertex_p, t.face, np.ones(len(t.vertex_p), bool)) for t in mesh.tiles]
     whole = weld(tiles)
     first, last = float(along.nearest_mm.min()), float(along.farthest_mm.max())
@@ -90,7 +93,7 @@ def test_the_model_has_no_gap_where_pieces_meet(monkeypatch):
     assert [open_at(whole, z) for z in cuts[1:-1]] == [0, 0]
 
 
-def test_pieces_that_are_only_clipped_do_not_meet():
+def test_pieces_that_are_only_clipped_leave_gaps():
     along, _ = drawn()
     halves = []
     for first, last, way in ((0.0, 60.0, -1.0), (60.0, LENGTH, 1.0)):
@@ -100,7 +103,7 @@ def test_pieces_that_are_only_clipped_do_not_meet():
     assert open_at(weld([seen_part(h, REACH) for h in halves]), 60.0) > 50
 
 
-def test_the_surface_is_that_of_one_piece():
+def test_the_surface_equals_that_of_one_piece():
     def misfit(surfaces):
         scene = open3d().t.geometry.RaycastingScene()
         for s in surfaces:
@@ -109,12 +112,13 @@ def test_the_surface_is_that_of_one_piece():
         return np.quantile(far, [0.5, 0.99, 0.9999])
 
     whole, cut = misfit(pieces(0.0, LENGTH)[0]), misfit(pieces(0.0, 60.0, LENGTH)[0])
-    # noise of 0.05 mm is what points lie off either surface; at the branch's edge a quarter of a cell, as
-    # the octrees of the pieces do not share theirs
+    # noise of 0.05 mm is the distance of points from either surface; at the branch's edge a quarter of a
+    # cell, as
+    # the octrees of the pieces differ from that of the whole
     assert np.all(np.abs(cut - whole) < [0.01, 0.05, CELL / 4])
 
 
-def test_triangles_at_a_joint_are_turned_as_all_others():
+def test_triangles_at_a_joint_have_the_orientation_of_all_others():
     surfaces, _ = pieces(0.0, 60.0, LENGTH)
     for s in surfaces:
         a, b, c = np.moveaxis(s.vertex_p[s.face], 1, 0)
@@ -125,7 +129,7 @@ def test_triangles_at_a_joint_are_turned_as_all_others():
         assert np.all(inward[area > 1e-3] > 0)
 
 
-def test_what_only_one_side_has_is_counted_not_bent_to_fit():
+def test_edges_without_a_partner_at_a_joint_are_counted_and_not_moved():
     tube, other = _tube(10.0, 0.0), _tube(10.0, 40.0)
     first, first_cut = clip(tube, 20.0 * UP, -UP)
     second, second_cut = clip(other, 20.0 * UP, UP)
@@ -135,7 +139,7 @@ def test_what_only_one_side_has_is_counted_not_bent_to_fit():
     assert b is second
 
 
-def test_an_unseen_stretch_is_a_hole_between_pieces():
+def test_an_unmeasured_stretch_is_a_hole_between_pieces():
     along, axis = drawn()
     empty = OpenMesh(np.empty((0, 3)), np.empty(0), np.empty((0, 3), np.int64), np.empty(0, bool))
     tube = _tube(25.0, 0.0)
@@ -146,7 +150,7 @@ def test_an_unseen_stretch_is_a_hole_between_pieces():
     assert len(seen_part(found[0][0], REACH).face) > 0
 
 
-def test_no_piece_outgrows_the_finest_octree():
+def test_no_piece_is_too_large_for_the_finest_octree():
     assert len(piece_cuts(0.0, 300.0, 100.0, 0.5)) == 2
     cuts = piece_cuts(0.0, 100_000.0, 100.0, 0.5)
     assert np.diff(cuts).max() + 50 <= 1024 * 0.5 / 1.1
@@ -154,7 +158,7 @@ def test_no_piece_outgrows_the_finest_octree():
 
 
 def _tube(radius, x):
-    """Return a tube from z = -5 to 125, its triangles turned inward."""
+    """Return a tube from z = -5 to 125 whose triangles face inward."""
     psi, z = np.linspace(0, 2 * np.pi, 40, endpoint=False), np.arange(-5.0, 126.0, 5.0)
     i, j = (g.ravel() for g in np.meshgrid(np.arange(len(z) - 1), np.arange(40), indexing="ij"))
     a, b, c, d = i * 40 + j, i * 40 + (j + 1) % 40, (i + 1) * 40 + j, (i + 1) * 40 + (j + 1) % 40

@@ -1,4 +1,4 @@
-"""Walls that fold over: found by the cloud, reconstructed by screened Poisson, given up in time."""
+"""Walls that fold over: recognised in the cloud, reconstructed by screened Poisson, within a time limit."""
 
 import numpy as np
 import pytest
@@ -34,7 +34,7 @@ def test_a_branch_is_reconstructed_by_poisson_within_its_limit() -> None:
     assert vertex[:, 0].max() > 40
 
 
-def test_poisson_is_given_up_at_its_time_limit() -> None:
+def test_poisson_is_stopped_at_its_time_limit() -> None:
     with pytest.raises(UnusableError, match="longer than"):
         meshed_tee(MeshParameters(surface="poisson", time_limit_s=1.0, poisson_cell_mm=0.05))
 

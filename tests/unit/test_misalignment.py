@@ -1,4 +1,4 @@
-"""The paper's equation, the exact model and what follows from them."""
+"""The equation of the paper, the exact model, and the quantities derived from them."""
 
 import math
 
@@ -22,7 +22,7 @@ from pipeline.instrument.misalignment import (
 CAMERA = KannalaBrandt((1600, 1200), (366.0, 366.0), (797.0, 592.0), (-0.0118, 0.0008, -0.0008, 0.0))
 
 
-def test_figures_of_the_paper():
+def test_the_numbers_of_the_paper_are_reproduced():
     error = misalignment_error(MisalignedScan(101.6, 22.0, 0.6))
     assert error.paper_equation_mm == pytest.approx(1.199, abs=5e-4)
     assert error.max_radial_mm == pytest.approx(1.259, abs=5e-4)
@@ -51,7 +51,7 @@ def test_the_paper_equation_holds_at_every_azimuth_of_a_centred_probe(tilt, dire
 
 
 @pytest.mark.parametrize("tilt_deg", [0.05, 0.2])
-def test_second_order_is_half_r_t2_phi2_in_harmonics_0_and_2(tilt_deg):
+def test_the_second_order_is_half_r_t2_phi2_in_harmonics_0_and_2(tilt_deg):
     scan = MisalignedScan(101.6, 22.0, tilt_deg)
     ring = misread_ring(scan)
     second = scan.radius_mm / 2 * (scan.radius_mm / 22.0 * math.radians(tilt_deg)) ** 2
@@ -60,22 +60,22 @@ def test_second_order_is_half_r_t2_phi2_in_harmonics_0_and_2(tilt_deg):
     assert 2 * spectrum[2] == pytest.approx(second, rel=1e-3)
 
 
-def test_a_small_tilt_is_a_shift_of_the_ring():
+def test_a_small_tilt_shifts_the_ring():
     error = misalignment_error(MisalignedScan(101.6, 22.5, 0.05))
     assert error.max_radial_mm == pytest.approx(0.100, abs=5e-4)
     assert error.ring_centre_shift_mm == pytest.approx(0.100, abs=5e-4)
     assert 1000 * error.ring_radius_change_mm == pytest.approx(0.1, abs=0.05)
 
 
-def test_one_ring_cannot_tell_a_small_tilt_from_an_off_centre_probe():
+def test_one_ring_cannot_distinguish_a_small_tilt_from_an_off_centre_probe():
     tilted = misread_ring(MisalignedScan(101.6, 22.0, 0.05)).xyz_assumed_c[:, :2]
     centre, _ = fit_circle(tilted)
     moved = misread_ring(
         MisalignedScan(101.6, 22.0, offset_x_mm=-centre[0], offset_y_mm=-centre[1])
     ).xyz_assumed_c[:, :2]
     difference = np.linalg.norm(tilted, axis=1) - np.linalg.norm(moved, axis=1)
-    assert np.abs(difference).max() < 3e-4  # 0.3 % of the tilt's own 0.1 mm
-    # far off centre, one ring does tell: the shift alone no longer explains it
+    assert np.abs(difference).max() < 3e-4  # 0.3 % of the tilt's effect of 0.1 mm
+    # far off centre one ring is enough: a shift alone no longer explains it
     far = MisalignedScan(101.6, 22.0, 0.05, offset_x_mm=20.0, offset_y_mm=10.0)
     shifted = misread_ring(far).xyz_assumed_c[:, :2]
     centre, radius = fit_circle(shifted)
@@ -92,14 +92,14 @@ def test_baseline_implied_by_the_paper():
 
 
 @pytest.mark.parametrize("offset", [0.0, 12.0])
-def test_no_tilt_no_error(offset):
+def test_without_tilt_there_is_no_error(offset):
     error = misalignment_error(MisalignedScan(101.6, 22.0, offset_x_mm=offset), CAMERA)
     assert error.paper_equation_mm == 0
     assert max(error.max_radial_mm, error.max_euclidean_mm, error.ring_centre_shift_mm) < 1e-9
     assert abs(error.ring_radius_change_mm) < 1e-9
 
 
-def test_the_believed_camera_changes_nothing_it_sees():
+def test_rays_of_the_assumed_camera_make_no_difference():
     scan = MisalignedScan(101.6, 22.0, 0.6, 40.0, 179.5, 3.0, -2.0)
     without, seen = misalignment_error(scan), misalignment_error(scan, CAMERA)
     assert seen.max_radial_mm == pytest.approx(without.max_radial_mm, abs=1e-8)
@@ -142,7 +142,7 @@ def test_no_tilt_is_allowed_where_the_cone_alone_costs_more():
         ({"offset_x_mm": 60.0}, "offset_x_mm"),
     ],
 )
-def test_values_out_of_range_are_refused_by_name(values, named):
+def test_values_out_of_range_are_refused_with_their_name(values, named):
     with pytest.raises(InputError, match=named):
         MisalignedScan(**({"diameter_mm": 101.6, "baseline_mm": 22.0} | values))
 

@@ -1,4 +1,4 @@
-"""model.glb, cloud.ply and the overlays' pictures, read back by independent readers."""
+"""model.glb, cloud.ply and the pictures of overlays, read back with other libraries."""
 
 import io
 from pathlib import Path
@@ -47,7 +47,7 @@ def picture(document: pygltflib.GLTF2, material: int) -> np.ndarray:
     return np.asarray(Image.open(io.BytesIO(data)).convert("RGB"))
 
 
-def test_model_is_metres_with_twelve_up(mesh: TexturedMesh, tmp_path: Path) -> None:
+def test_the_model_is_in_metres_with_twelve_oclock_up(mesh: TexturedMesh, tmp_path: Path) -> None:
     write_model(mesh, tmp_path)
     document = pygltflib.GLTF2().load(str(tmp_path / "model.glb"))
     assert document.scene == 0
@@ -69,7 +69,7 @@ def test_model_is_metres_with_twelve_up(mesh: TexturedMesh, tmp_path: Path) -> N
         np.testing.assert_array_equal(np.float32(accessor.max), position.max(axis=0))
 
 
-def test_every_tile_has_all_variants_on_one_uv(mesh: TexturedMesh, tmp_path: Path) -> None:
+def test_every_tile_has_all_variants_with_one_uv_map(mesh: TexturedMesh, tmp_path: Path) -> None:
     write_model(mesh, tmp_path)
     document = pygltflib.GLTF2().load(str(tmp_path / "model.glb"))
     assert set(document.extensionsUsed) == {"KHR_materials_variants", "KHR_materials_unlit"}
@@ -90,7 +90,7 @@ def test_every_tile_has_all_variants_on_one_uv(mesh: TexturedMesh, tmp_path: Pat
             np.testing.assert_array_equal(shown[..., ::-1], error.palette_bgr[error.level])
 
 
-def test_model_views_are_aligned_and_inside_the_buffer(mesh: TexturedMesh, tmp_path: Path) -> None:
+def test_buffer_views_are_aligned_and_inside_the_buffer(mesh: TexturedMesh, tmp_path: Path) -> None:
     write_model(mesh, tmp_path)
     document = pygltflib.GLTF2().load(str(tmp_path / "model.glb"))
     length = document.buffers[0].byteLength
@@ -131,12 +131,12 @@ def test_overlay_pictures_are_written(wall: Wall, tmp_path: Path) -> None:
     }  # fmt: skip
     picture = cv2.imread(str(tmp_path / "deviation.png"))
     assert picture.shape[0] >= 500
-    # The pit goes into the wall: dark red somewhere.
+    # The pit is a loss of wall: dark red somewhere.
     blue, _, red = picture.reshape(-1, 3).astype(int).T
     assert np.count_nonzero((red - blue > 80) & (red < 200)) > 20
 
 
-def test_picture_from_inside_shows_wall_around_an_opening(mesh: TexturedMesh) -> None:
+def test_the_picture_from_inside_shows_wall_around_an_opening(mesh: TexturedMesh) -> None:
     shown = render(mesh, inside_view(mesh), 160, 120)
     assert shown.shape == (120, 160, 3)
     assert shown[:20].mean() > 60

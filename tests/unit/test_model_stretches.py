@@ -1,4 +1,4 @@
-"""A model that boresight did not write is refused by name, whatever is wrong within its document."""
+"""A model that boresight did not write is refused by name, whatever is wrong in it."""
 
 import json
 import struct
@@ -32,14 +32,14 @@ def written(folder: Path, tree: dict[str, Any]) -> Path:
     return file
 
 
-def test_a_good_one_gives_its_stretch(tmp_path: Path) -> None:
+def test_a_good_model_gives_its_stretch(tmp_path: Path) -> None:
     model = read_model(written(tmp_path, document()), true_axis(0.0, 0.0))
     (stretch,) = model.stretches()
     assert (stretch.from_mm, stretch.to_mm, stretch.triangles) == pytest.approx((0, 1000, 1))
     assert model.stretch(0)[:4] == b"glTF"
 
 
-def test_a_stretch_in_a_bend_lies_where_its_corners_do(tmp_path: Path) -> None:
+def test_the_box_of_a_stretch_in_a_bend_contains_its_corners(tmp_path: Path) -> None:
     """A bend of 300 mm, and a piece of wall 100 mm along it and 40 mm around its axis."""
     axis, tree = true_axis(1 / 300, 0.4), document()
     corners = from_pipe(axis, np.array([100.0, 200.0])[:, None], np.linspace(0, 6, 12), np.array(20.0))
@@ -60,7 +60,7 @@ def all_of(file: Path) -> tuple[object, ...]:
     "spoil",
     [
         lambda d: d["accessors"][0].pop("min"),
-        # Corners of a box of 40 dimensions would fill any memory.
+        # The corners of a box in 40 dimensions would fill any memory.
         lambda d: d["accessors"][0].update(min=[0] * 40, max=[1] * 40),
         lambda d: d["accessors"].clear(),
         lambda d: d["meshes"][0]["primitives"][0].update(attributes=[0]),
@@ -70,7 +70,7 @@ def all_of(file: Path) -> tuple[object, ...]:
         lambda d: d["images"][0].update(bufferView=7),
     ],
 )
-def test_what_does_not_fit_is_refused(tmp_path: Path, spoil: Any) -> None:
+def test_an_inconsistent_model_is_refused(tmp_path: Path, spoil: Any) -> None:
     tree = document()
     spoil(tree)
     with pytest.raises(InputError, match=r"model\.glb: is not a model of boresight"):

@@ -1,4 +1,4 @@
-"""The bore as rings show it: reducers, and the wall in them."""
+"""The bore estimated from rings: reducers, and the wall in them."""
 
 from dataclasses import replace
 
@@ -21,7 +21,7 @@ RELIEF_MM = 0.03 * np.random.default_rng(3).standard_normal(100)
 REDUCER = replace(ONE_BORE, rings_mm=AT_MM, rings_wider_mm=WIDER_MM)
 
 
-def test_a_reducer_is_as_wide_as_its_rings() -> None:
+def test_the_radius_in_a_reducer_is_that_of_its_rings() -> None:
     seen = 50 + WIDER_MM + RELIEF_MM
     seen[[7, 40]] = np.nan, 70.0
     bore = Bore.of(seen, AT_MM)
@@ -43,7 +43,7 @@ def test_a_pipe_of_one_bore_or_with_a_step_has_no_reducer(step_mm: float) -> Non
     assert step_mm == 0 or "steps by -6.0 mm at 41 mm" in said[0]
 
 
-def test_a_reducer_is_told_as_such_and_as_no_step() -> None:
+def test_a_reducer_is_reported_as_such_and_not_as_a_step() -> None:
     said: list[str] = []
     warn_of_steps(REDUCER, replace(quiet_context(), warn=said.append))
     assert said == []
@@ -56,10 +56,10 @@ def test_the_wall_of_a_reducer_slopes() -> None:
     for i, h in enumerate(1e-4 * np.eye(3)):
         ahead, behind = (residuals.surface(state, inside + sign * h)[0] for sign in (1, -1))
         np.testing.assert_allclose(gradient[:, i], (ahead - behind) / 2e-4, atol=0.02, err_msg=str(i))
-    assert np.abs(gradient[:, 2]).min() > 0.5, "the control: it does slope"
+    assert np.abs(gradient[:, 2]).min() > 0.5, "control: it does slope"
 
 
-def test_a_reducer_does_not_hold_the_probe_where_its_rings_were_taken_to_be() -> None:
+def test_a_reducer_does_not_pull_the_probe_to_where_its_rings_were_first_assumed() -> None:
     made = scene(60, 25, seed=2)
     guess = made.truth.T_pc[:, 2, 3]
     state = replace(made.truth, bore=REDUCER, guess_mm=guess)
@@ -73,13 +73,13 @@ def test_a_reducer_does_not_hold_the_probe_where_its_rings_were_taken_to_be() ->
     by_place, by_place_farther = (replace(s, guess_mm=np.zeros(0)) for s in (state, farther))
     apart = np.abs(off(farther) - off(state)).max()
     held = np.abs(off(by_place_farther) - off(by_place)).max()
-    assert apart < 0.1 * held, "looked up by place, rings would move the probe back"
+    assert apart < 0.1 * held, "if looked up by position, rings would move the probe back"
     moved = farther.with_bore_in_place(made.measured.probe.laser.baseline_mm)
     assert moved.bore.rings_mm[60] - AT_MM[60] == pytest.approx(0.03 * (AT_MM[60] - 22), abs=0.1)
 
 
-def test_texture_is_less_sure_of_the_wall_in_a_reducer() -> None:
-    """The width is known to half a millimetre along the pipe: 0.4 mm across at a slope of 0.8."""
+def test_texture_matches_in_a_reducer_have_a_larger_sigma() -> None:
+    """The radius is known as well as half a millimetre along the pipe: 0.4 mm across at a slope of 0.8."""
     made = scene(60, 25, seed=2)
     state, parameters = replace(made.truth, bore=REDUCER), MotionParameters(surface_sigma_mm=0.1)
     at_mm = to_pipe(state.axis, state.xyz_p)[0]
@@ -91,7 +91,7 @@ def test_texture_is_less_sure_of_the_wall_in_a_reducer() -> None:
     assert sigma_mm[outside] == pytest.approx(0.1)
 
 
-def test_strips_lie_on_the_wall() -> None:
+def test_strips_are_sampled_on_the_wall() -> None:
     wider = Bore(np.array([30.0]), np.array([0.0, 6.5]))
     grid = StripGrid(RADIUS, 480, 12.0, 60.0, wider)
     row = np.arange(60.0) / grid.step_mm

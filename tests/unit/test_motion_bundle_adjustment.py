@@ -81,7 +81,7 @@ def frame_covariance(factor: Factor, frames: Int) -> Float:
 
 @pytest.mark.parametrize("damping", [0.0, 0.3])
 @pytest.mark.parametrize("seed", range(3))
-def test_steps_and_covariances_are_those_of_the_dense_normal_equations(seed: int, damping: float) -> None:
+def test_steps_and_covariances_agree_with_dense_normal_equations(seed: int, damping: float) -> None:
     random = np.random.default_rng(seed)
     rows, marks = random_rows(random), random_landmarks(random)
     j, r, w = dense(rows, marks)
@@ -124,14 +124,14 @@ def test_the_banded_factor_solves_banded_systems(frames: int, lags: int, sparse:
     )
 
 
-def test_what_is_not_determined_is_refused() -> None:
+def test_an_undetermined_system_is_refused() -> None:
     system = BorderedSystem(FRAMES, BORDER, 4)
     with pytest.raises(np.linalg.LinAlgError):
         system.factor()
 
 
 @pytest.mark.parametrize("loss", [Squares(), Cauchy(2.5), GemanMcClure(0.7)])
-def test_weights_are_the_slopes_of_the_costs(loss: Loss) -> None:
+def test_weights_are_the_derivatives_of_the_costs(loss: Loss) -> None:
     residual, sigma, h = np.linspace(0.01, 3, 40), np.linspace(0.1, 0.5, 40), 1e-6
     slope = (loss.cost(residual + h, sigma) - loss.cost(residual - h, sigma)) / (2 * h)
     np.testing.assert_allclose(loss.weight(residual, sigma) * residual, slope, rtol=1e-5)
@@ -139,7 +139,7 @@ def test_weights_are_the_slopes_of_the_costs(loss: Loss) -> None:
     np.testing.assert_allclose(loss.cost(small, sigma), 0.5 * (small / sigma) ** 2, rtol=1e-4)
 
 
-def test_damping_grows_faster_with_every_failure_and_is_gone_after_good_steps() -> None:
+def test_damping_grows_faster_with_every_failure_and_vanishes_after_good_steps() -> None:
     first = Damping().after(0.0)
     second = first.after(-1.0)
     assert second.value / first.value > first.value / 1e-7 > 1
@@ -158,13 +158,16 @@ def stepped(at: State, step: Float) -> State:
 
 
 def pose_difference(T_pc: Float, other_T_pc: Float) -> Float:
-    """Return (N, 6) translation and rotation vector between poses."""
+    """Return translations and rotation vectors (N, 6) between poses."""
     turn = vector_from_rotation(np.swapaxes(other_T_pc[:, :3, :3], 1, 2) @ T_pc[:, :3, :3])
     return np.concatenate([T_pc[:, :3, 3] - other_T_pc[:, :3, 3], turn], -1)
 
 
 def roots_of_costs(equations: Equations, step: Float) -> Float:
-    """Return numbers whose half squares are the costs, first frame's step included: it defines the frame."""
+    """Return numbers whose half squares are the costs, with the first frame's step included.
+
+    The first frame defines the coordinate frame.
+    """
     texture = equations.texture
     out = [step[:3] / 1e-4, step[3:6] / 1e-6]
     for row in (*equations.rows, equations.rings):
@@ -178,8 +181,8 @@ def roots_of_costs(equations: Equations, step: Float) -> Float:
 
 
 @pytest.mark.parametrize("seed", [3, 4])
-def test_optimum_is_that_of_a_dense_levenberg_marquardt(seed: int) -> None:
-    """Both minimise the same robust cost, judged by the scales that the adjustment ended with."""
+def test_the_optimum_agrees_with_dense_levenberg_marquardt(seed: int) -> None:
+    """Both minimise the same robust cost, with the scales that the adjustment ended with."""
     given, parameters = scene(7, 9, noise=1.0, seed=seed), MotionParameters(alike=1.0)
     start = displaced(given.truth, np.random.default_rng(0))
     got = adjust(start, given.measured, parameters, 1e-6)
@@ -189,21 +192,21 @@ def test_optimum_is_that_of_a_dense_levenberg_marquardt(seed: int) -> None:
         return roots_of_costs(linearised(stepped(start, step), given.measured, parameters, scales), step)
 
     zero = np.zeros(7 * len(start.T_pc) + start.border_size + start.xyz_p.size)
-    # Steps that gain less than 10⁻⁴ of the cost, .01 here, are not worth it: that is .15 σ in one number.
+    # Steps that gain less than 10⁻⁴ of the cost, .01 here, are not taken: that is .15 σ in one number.
     best = least_squares(roots, zero, method="lm", x_scale="jac", ftol=1e-4)
     assert got.settled
-    # The turn of the axis' frames is left out of the derivatives; 1 σ off in one number would cost 0.5.
+    # The derivatives neglect the rotation of the axis' frames; 1 σ off in one number would cost 0.5.
     assert got.equations.cost < best.cost + 0.5
     wanted = stepped(start, best.x)
     covariance = frame_covariance(got.equations.factor(), np.arange(1, len(start.T_pc)))
     sigma = np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))
     apart = np.abs(pose_difference(got.state.T_pc, wanted.T_pc))[1:]
     assert np.max(apart / sigma[:, :6]) < 0.6
-    np.testing.assert_allclose(got.state.xyz_p, wanted.xyz_p, atol=0.1)  # surface alone: a σ of 0.1 mm
+    np.testing.assert_allclose(got.state.xyz_p, wanted.xyz_p, atol=0.1)  # of the surface alone: a σ of 0.1 mm
     np.testing.assert_allclose(got.state.globals, wanted.globals, atol=5e-3)
 
 
-def test_promised_decrease_is_that_of_the_dense_equations() -> None:
+def test_the_predicted_decrease_agrees_with_the_dense_equations() -> None:
     random = np.random.default_rng(7)
     rows, marks = random_rows(random), random_landmarks(random)
     j, r, w = dense(rows, marks)
@@ -214,7 +217,7 @@ def test_promised_decrease_is_that_of_the_dense_equations() -> None:
     assert rows.decrease(step) + marks.decrease(step) == pytest.approx(wanted)
 
 
-def test_a_step_that_makes_matters_worse_is_not_taken() -> None:
+def test_a_step_that_increases_the_cost_is_not_taken() -> None:
     given, parameters = scene(12, 30, noise=1.0, seed=6), MotionParameters(alike=1.0, iterations=8)
     start = displaced(given.truth, np.random.default_rng(5), 80.0)
     first = linearised(start, given.measured, parameters, Scales(3.0, 1.0))
@@ -222,12 +225,14 @@ def test_a_step_that_makes_matters_worse_is_not_taken() -> None:
     first = linearised(start, given.measured, parameters, scales)
     plain = first.step(0.0)
     there = start.step(plain.frames, plain.border, plain.landmarks)
-    assert linearised(there, given.measured, parameters, scales).cost > first.cost, "the control"
+    assert linearised(there, given.measured, parameters, scales).cost > first.cost, (
+        "control: the full step increases it"
+    )
     got = adjust(start, given.measured, parameters, 1e-6)
     assert linearised(got.state, given.measured, parameters, scales).cost < 0.5 * first.cost
 
 
-def test_a_start_far_off_finds_home() -> None:
+def test_the_optimum_is_found_from_a_distant_start() -> None:
     given, parameters = scene(12, 30, noise=1.0, seed=6), MotionParameters(alike=1.0)
     got = adjust(displaced(given.truth, np.random.default_rng(3), 40.0), given.measured, parameters, 1e-6)
     assert got.settled
@@ -242,7 +247,7 @@ def test_adjustment_finds_the_truth_from_exact_measurements() -> None:
     np.testing.assert_allclose(got.T_pc[:, :3, :3], given.truth.T_pc[:, :3, :3], atol=5e-4)
 
 
-def test_stated_sigma_covers_the_errors() -> None:
+def test_the_stated_sigma_covers_the_errors() -> None:
     """Over drawn noise the normalised errors of the poses are about one."""
     ratio = []
     for seed in (2, 3, 4, 5):
@@ -255,14 +260,14 @@ def test_stated_sigma_covers_the_errors() -> None:
 
 
 def swung(T_pc: Float, by_rad: Float) -> Float:
-    """Return poses turned about their x-axes, and about the middle of the ring, which hardly shows it."""
+    """Return poses rotated about their x-axes and the ring's centre, a motion that rings hardly show."""
     ahead = np.array([0.0, 0.0, 22.0])
     turned = T_pc[:, :3, :3] @ rotation_from_vector(by_rad[:, None] * np.array([1.0, 0.0, 0.0]))
     return from_parts(turned, T_pc[:, :3, 3] + (T_pc[:, :3, :3] - turned) @ ahead)
 
 
-def test_a_swing_of_the_first_pictures_which_texture_does_not_place_is_no_trap() -> None:
-    """Half of the radii were wrong: loose motion had swung by 14° before the first texture was seen."""
+def test_a_rotation_of_the_first_frames_without_texture_is_no_local_minimum() -> None:
+    """Half of the radii were wrong: free motion had rotated by 14° before the first texture was seen."""
     given = scene(60, 140, noise=1.0, seed=2)
     measured, truth = given.measured, given.truth
     tracks, seen = measured.tracks.some(measured.tracks.frame >= 3)
@@ -274,7 +279,7 @@ def test_a_swing_of_the_first_pictures_which_texture_does_not_place_is_no_trap()
     assert np.abs(across).max() < 0.02
 
 
-def test_ends_without_texture_go_on_from_the_next_poses_unless_they_are_long() -> None:
+def test_ends_without_texture_continue_the_next_poses_unless_they_are_long() -> None:
     time_s = np.r_[np.arange(12), 14, 15] / 30
     turn = np.outer(time_s, [0.1, 0.0, 0.3])
     straight = from_parts(rotation_from_vector(turn), np.outer(time_s, [1.0, 2.0, 30.0]))
@@ -287,8 +292,8 @@ def test_ends_without_texture_go_on_from_the_next_poses_unless_they_are_long() -
         np.testing.assert_array_equal(ends_in_line(poses, time_s, seen)[:2], poses[:2])
 
 
-def test_trembling_loosens_the_motion_across_the_pipe_and_no_other() -> None:
-    """Held to 0 at its own 1 σ, trembling would draw all lengths together."""
+def test_vibration_loosens_the_prior_of_motion_across_the_pipe_only() -> None:
+    """A prior of 0 with the 1 σ of the vibration would shrink all lengths together."""
     parameters = MotionParameters(alike=1.0)
     steady, shaken = (scene(60, 140, noise=1.0, seed=2, shake=s) for s in (0.0, 1.0))
     across = np.array([0, 1, 3, 4])

@@ -1,4 +1,4 @@
-"""An encoder is believed only where it covers the frames and the wall's texture does not contradict it."""
+"""An encoder is used only where it covers the frames and the wall's texture does not contradict it."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ FRAMES = 60
 
 @dataclass(frozen=True)
 class Recorded:
-    """What of a recording the encoder needs."""
+    """The parts of a recording that the encoder needs."""
 
     frames: FrameTable
     encoder: Encoder | None
@@ -54,7 +54,7 @@ def tracked(z: np.ndarray) -> TrackedPoses:
     return TrackedPoses(np.arange(len(z)), T_pc, np.zeros(len(z), bool))
 
 
-def test_sigma_is_that_of_the_quantum() -> None:
+def test_sigma_is_that_of_rounding_to_counts() -> None:
     found = readings(*clean())
     assert found is not None
     assert found.sigma_mm == pytest.approx(0.05 / np.sqrt(12))
@@ -62,7 +62,7 @@ def test_sigma_is_that_of_the_quantum() -> None:
     np.testing.assert_allclose(found.distance_mm, SPEED * np.arange(FRAMES) / RATE, atol=0.05)
 
 
-def test_jump_is_taken_out() -> None:
+def test_a_jump_is_removed() -> None:
     time_s, distance = clean()
     found = readings(time_s, distance + 40.0 * (time_s > 1))
     assert found is not None
@@ -70,8 +70,8 @@ def test_jump_is_taken_out() -> None:
     assert found.distance_mm[-1] == pytest.approx(SPEED * (FRAMES - 1) / RATE, abs=1.0)
 
 
-def test_the_way_over_frames_that_are_missing_is_no_jump() -> None:
-    """A camera hung for a second: the wall had gone on by 18 mm, which were taken for a jump."""
+def test_the_distance_over_missing_frames_is_not_a_jump() -> None:
+    """While the camera hung for a second the wall moved on by 18 mm, which was taken for a jump."""
     frames = recorded(*clean()).frames
     there = (frames.time_s < 0.5) | (frames.time_s > 1.5)
     table = FrameTable(frames.frame[there], frames.time_s[there], frames.illumination[there])
@@ -81,8 +81,8 @@ def test_the_way_over_frames_that_are_missing_is_no_jump() -> None:
 
 
 @pytest.mark.parametrize("silent", [True, False])
-def test_an_encoder_that_hangs_and_catches_up_is_unknown_meanwhile(silent: bool) -> None:
-    """The jump is a right reading: taken out, half a second of way was missing from there on."""
+def test_an_encoder_that_hangs_and_catches_up_is_unknown_in_between(silent: bool) -> None:
+    """The jump is a right reading: after its removal, half a second of distance was missing from there on."""
     time_s, distance = clean()
     hung = (time_s > 0.7) & (time_s < 1.2)
     held = np.where(hung, distance[hung][0], distance)
@@ -92,14 +92,14 @@ def test_an_encoder_that_hangs_and_catches_up_is_unknown_meanwhile(silent: bool)
     assert 12 <= (~found.known).sum() <= 15, "half a second of frames"
 
 
-def test_an_encoder_that_rests_with_its_probe_is_known() -> None:
+def test_an_encoder_that_rests_together_with_its_probe_stays_known() -> None:
     time_s, distance = clean()
     found = readings(time_s, distance - np.clip(time_s - 0.7, 0, 0.5) * SPEED)
     assert found is not None
     assert found.known.all()
 
 
-def test_frames_after_its_end_are_not_known() -> None:
+def test_frames_after_the_end_of_the_encoder_have_no_reading() -> None:
     time_s, distance = clean()
     found = readings(time_s[time_s < 1], distance[time_s < 1])
     assert found is not None
@@ -108,7 +108,7 @@ def test_frames_after_its_end_are_not_known() -> None:
 
 
 def words_on_unread(time_s: np.ndarray, distance_mm: np.ndarray, z: np.ndarray) -> list[str]:
-    """Return what is told of an encoder's readings where texture says that frames lie at z (FRAMES,)."""
+    """Return the messages on unread frames where texture shows that frames lie at z (FRAMES,)."""
     words: list[str] = []
     found = readings(time_s, distance_mm)
     assert found is not None
@@ -121,8 +121,8 @@ def words_on_unread(time_s: np.ndarray, distance_mm: np.ndarray, z: np.ndarray) 
     ("from_s", "until_s", "told"),
     [(0.0, 1.0, "(frames 31 to 59)"), (0.0, 1.95, ""), (0.505, 1.5, "(frames 0 to 14, 46 to 59)")],
 )
-def test_an_encoder_that_was_cut_off_is_told(from_s: float, until_s: float, told: str) -> None:
-    """Two fifths of a run were without encoder, and no word said so; a frame or two are no news."""
+def test_an_encoder_that_was_cut_off_is_reported(from_s: float, until_s: float, told: str) -> None:
+    """Two fifths of a run were without encoder and without a message; one or two frames need none."""
     time_s, distance = clean()
     there = (time_s >= from_s) & (time_s < until_s)
     words = words_on_unread(time_s[there], distance[there], SPEED * np.arange(FRAMES) / RATE)
@@ -131,10 +131,10 @@ def test_an_encoder_that_was_cut_off_is_told(from_s: float, until_s: float, told
 
 @pytest.mark.parametrize("count_mm", [0.5, 1.0, 2.0])
 @pytest.mark.parametrize("rests_s", [(0.0, 0.7), (0.7, 1.3), (1.3, 2.1)])
-def test_a_counter_that_logs_only_what_it_counts_is_read_while_the_probe_rests(
+def test_a_counter_that_logs_only_counts_is_read_while_the_probe_rests(
     count_mm: float, rests_s: tuple[float, float]
 ) -> None:
-    """At rest it "had no readings for 61 of 300 frames", though it lost nothing."""
+    """At rest it "had no readings for 61 of 300 frames", though it had missed nothing."""
     time_s = np.arange(0, FRAMES / RATE, 0.001)
     way = SPEED * (time_s - np.clip(time_s - rests_s[0], 0, rests_s[1] - rests_s[0]))
     counted = count_mm * np.floor(way / count_mm)
@@ -142,12 +142,12 @@ def test_a_counter_that_logs_only_what_it_counts_is_read_while_the_probe_rests(
     z = np.interp(np.arange(FRAMES) / RATE, time_s, way)
     found = readings(time_s[logged], counted[logged])
     assert found is not None
-    assert found.known[25:35].all(), "one count is no gap"
+    assert found.known[25:35].all(), "one count is not a gap"
     assert words_on_unread(time_s[logged], counted[logged], z) == []
 
 
-def test_a_frame_just_before_its_start_or_behind_its_end_lies_where_the_probe_went_on_to() -> None:
-    """Held at the last reading, the end of a run at 280 mm/s lay 0.9 mm (7 σ) short."""
+def test_a_frame_just_outside_the_readings_is_extrapolated() -> None:
+    """With the last reading repeated, the end of a run at 280 mm/s was 0.9 mm (7 σ) short."""
     time_s, distance = clean()
     inside = (time_s > 0.025) & (time_s < (FRAMES - 1) / RATE - 0.025)
     found = readings(time_s[inside], distance[inside])
@@ -157,7 +157,7 @@ def test_a_frame_just_before_its_start_or_behind_its_end_lies_where_the_probe_we
 
 
 @pytest.mark.parametrize(("late_s", "scale"), [(100.0, 1.0), (0.0, 1e6)])
-def test_encoder_of_another_clock_or_unit_is_left_out(late_s: float, scale: float) -> None:
+def test_an_encoder_with_another_clock_or_unit_is_left_out(late_s: float, scale: float) -> None:
     time_s, distance = clean()
     assert readings(time_s + late_s, distance * scale) is None
 
@@ -176,7 +176,7 @@ def test_a_coarse_counter_does_not_contradict_the_wall() -> None:
     assert not contradicted(coarse, tracked(z), quiet_context())
 
 
-def test_texture_lost_in_most_frames_contradicts_nothing() -> None:
+def test_texture_lost_in_most_frames_does_not_contradict_the_encoder() -> None:
     z = SPEED * np.arange(FRAMES) / RATE
     tracks = tracked(0 * z)
     tracks.lost[2:] = True
@@ -186,20 +186,22 @@ def test_texture_lost_in_most_frames_contradicts_nothing() -> None:
 @pytest.mark.parametrize(
     ("wider", "words"), [(0.026, "suggests that the probe is wrong"), (0.0, "cannot show")]
 )
-def test_a_diameter_that_errs_as_the_way_does_speaks_against_the_probe(wider: float, words: str) -> None:
-    """Pictures zoomed by 1 %: the radius was 1.3 mm too large, and only the encoder was blamed."""
+def test_a_diameter_with_the_same_error_as_distance_is_evidence_against_the_probe(
+    wider: float, words: str
+) -> None:
+    """With pictures enlarged by 1 % the radius was 1.3 mm too large, and only the encoder was blamed."""
     told: list[str] = []
     EncoderScale(1.02, 0.001, 0.002).warn(replace(quiet_context(), warn=told.append), wider)
     assert len(told) == 1
     assert words in told[0]
     doubt = EncoderScale(1.02, 0.001, 0.002).doubt_of_probe(wider)
-    assert doubt == pytest.approx(0.02 if wider else 0.0), "σ of radii must hold what is told"
+    assert doubt == pytest.approx(0.02 if wider else 0.0), "σ of radii must include the reported deviation"
 
 
 @pytest.mark.parametrize("scale", [0.98, 1.004])
-def test_texture_that_is_not_trusted_contradicts_no_encoder(scale: float) -> None:
+def test_texture_that_is_not_trusted_does_not_contradict_an_encoder(scale: float) -> None:
     found = EncoderScale(scale, 0.0005, 0.0005)
-    assert found.contradicted, "the control"
+    assert found.contradicted, "control: trusted texture does"
     doubted = found.without_trust_in_texture()
     assert not doubted.contradicted
     assert doubted.sigma >= abs(scale - 1)
@@ -207,7 +209,7 @@ def test_texture_that_is_not_trusted_contradicts_no_encoder(scale: float) -> Non
 
 @dataclass(frozen=True)
 class Held:
-    """What of a run and of its measurements the encoder's scale needs."""
+    """The parts of a run and of its measurements that the encoder's scale needs."""
 
     texture: SimpleNamespace
     bore: Bore = ONE_BORE
@@ -231,17 +233,17 @@ class Adjusted:
 
 
 def window_that_lost(lost: Bool) -> Any:
-    """Return a first window of 20 frames, of a run that lost its texture in some (N,)."""
+    """Return the first window of 20 frames in a run that lost its texture in some (N,)."""
     poses = TrackedPoses(np.arange(len(lost)), np.zeros((len(lost), 4, 4)), lost)
     held = Held(SimpleNamespace(poses=poses))
     return Adjusted(held, held, Window(0, 20), SimpleNamespace(state=None))
 
 
 @pytest.mark.parametrize(("lost", "doubted"), [(0, False), (4, False), (8, True), (19, True)])
-def test_texture_lost_in_many_pictures_speaks_against_no_encoder(
+def test_texture_lost_in_many_pictures_is_no_evidence_against_an_encoder(
     lost: int, doubted: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """By VP9 half of the pictures had no texture, the rest a way 4.8 % short: the encoder was thrown out."""
+    """After VP9 half of the pictures had no texture, the rest were 4.8 % short: the encoder was rejected."""
     found = EncoderScale(0.98, 0.005, 0.002)
     monkeypatch.setattr(first_window, "scale_of_encoder", lambda *_: found)
     _, scale, unsure = first_window.with_scale(window_that_lost(np.arange(20, 0, -1) <= lost), 0.001)
@@ -250,19 +252,19 @@ def test_texture_lost_in_many_pictures_speaks_against_no_encoder(
     assert unsure == (scale.sigma if doubted else 0.001)
 
 
-def test_lost_texture_that_differs_by_less_than_its_sigma_makes_no_encoder_unsure(
+def test_a_difference_from_lost_texture_within_its_sigma_does_not_widen_the_encoders(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """Distances had the σ of what was left of the texture, however little it told."""
+    """Distances got the σ of the remaining texture, however little it showed."""
     monkeypatch.setattr(first_window, "scale_of_encoder", lambda *_: EncoderScale(1.001, 0.6, 0.002))
     assert first_window.with_scale(window_that_lost(np.ones(20, bool)), 0.001)[2] == 0.001
 
 
 @pytest.mark.parametrize(("off", "doubted"), [(0.05, False), (0.08, True)])
-def test_lost_texture_makes_distances_unsure_only_where_it_claims_to_know(
+def test_lost_texture_widens_the_sigma_of_distances_only_where_its_own_is_small(
     off: float, doubted: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """From 1 σ on a distance of 102 mm had 60 mm for σ, by rings that told its scale as .51 ± .32."""
+    """From 1 σ on, a distance of 102 mm got a σ of 60 mm, since rings gave its scale as .51 ± .32."""
     found = [EncoderScale(1 + off * size / 0.02, size, 0.002) for size in (0.019, 0.32)]
     lost = window_that_lost(np.ones(20, bool))
     for scale, sure in zip(found, (not doubted, True), strict=True):
@@ -271,10 +273,10 @@ def test_lost_texture_makes_distances_unsure_only_where_it_claims_to_know(
 
 
 @pytest.mark.parametrize("scale", [1.2, 0.95, 1.01])
-def test_an_encoder_that_differs_from_lost_texture_is_followed_and_told(
+def test_an_encoder_that_differs_from_lost_texture_is_followed_and_reported(
     scale: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A wheel 20 % off was followed without a word: the σ that held the difference hid it."""
+    """A wheel 20 % off was followed without a message: the σ that included the difference hid it."""
     told: list[str] = []
     monkeypatch.setattr(first_window, "scale_of_encoder", lambda *_: EncoderScale(scale, 0.002, 0.002))
     _, found, unsure = first_window.with_scale(window_that_lost(np.arange(20) > 10), 0.001)
@@ -286,8 +288,10 @@ def test_an_encoder_that_differs_from_lost_texture_is_followed_and_told(
     assert unsure >= abs(scale - 1)
 
 
-def test_texture_lost_after_the_first_window_keeps_no_wrong_encoder(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The first window alone tells the scale: by its good texture an encoder 20 % off is thrown out."""
+def test_texture_lost_after_the_first_window_does_not_save_a_wrong_encoder(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Only the first window decides the scale: with its good texture an encoder 20 % off is rejected."""
     monkeypatch.setattr(first_window, "scale_of_encoder", lambda *_: EncoderScale(1.2, 0.002, 0.002))
     _, found, _ = first_window.with_scale(window_that_lost(np.arange(60) >= 20), 0.001)
     assert found is not None
@@ -295,10 +299,10 @@ def test_texture_lost_after_the_first_window_keeps_no_wrong_encoder(monkeypatch:
 
 
 @pytest.mark.parametrize(("lost", "sigma"), [(0, 0.001), (19, 0.048)])
-def test_distances_by_lost_texture_alone_are_as_unsure_as_they_were_off(
+def test_sigma_of_distances_from_lost_texture_alone_covers_their_error(
     lost: int, sigma: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Without encoder they had .5 %, and were 4.8 % short."""
+    """Without encoder σ was .5 %, and distances were 4.8 % short."""
     monkeypatch.setattr(first_window, "scale_of_encoder", lambda *_: None)
     unsure = first_window.with_scale(window_that_lost(np.arange(20, 0, -1) <= lost), 0.001)[2]
     assert unsure == pytest.approx(sigma, rel=0.1)

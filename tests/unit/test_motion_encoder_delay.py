@@ -1,4 +1,4 @@
-"""An encoder whose clock is late is put in time; slips, even speed and sound encoders are no delay."""
+"""A late encoder clock is corrected; slips, constant speed and sound encoders are not taken for a delay."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ QUANTUM = 0.05
 
 
 def way(time_s: Float) -> Float:
-    """Distance, mm, of a probe pulled at 18 mm/s by hand."""
+    """Return the distance, mm, of a probe pulled by hand at 18 mm/s."""
     return 18 * time_s + 0.9 * np.sin(1.7 * time_s) + 0.4 * np.sin(4.1 * time_s + 1)
 
 
 def readings(late_s: float, slip_mm: float = 0.0) -> EncoderReadings:
-    """What an encoder reads whose clock is late: it shows at t what was at t less the delay."""
+    """Return the readings of an encoder with a late clock: at t it shows the value at t less the delay."""
     distance = np.round(1.01 * way(TIME_S - late_s) / QUANTUM) * QUANTUM
     slipped = slip_mm * np.clip((TIME_S - 4) / 0.3, 0, 1)
     return EncoderReadings(distance - slipped, QUANTUM / 12**0.5, np.ones(len(TIME_S), bool))
@@ -39,7 +39,7 @@ def readings(late_s: float, slip_mm: float = 0.0) -> EncoderReadings:
 
 @pytest.mark.parametrize("slip_mm", [0.0, 3.0])
 @pytest.mark.parametrize("late_s", [0.0, 0.2, -0.13, 0.5])
-def test_delay_is_found_with_its_sigma_also_where_the_wheel_slips(late_s: float, slip_mm: float) -> None:
+def test_the_delay_is_found_with_its_sigma_even_if_the_wheel_slips(late_s: float, slip_mm: float) -> None:
     found = find_delay(TIME_S, way(TIME_S), readings(late_s, slip_mm))
     assert found is not None
     assert abs(found.delay_s - late_s) < 3 * found.sigma_s + 1e-3
@@ -48,8 +48,8 @@ def test_delay_is_found_with_its_sigma_also_where_the_wheel_slips(late_s: float,
 
 
 @pytest.mark.parametrize("seed", range(20))
-def test_even_speed_tells_no_delay(seed: int) -> None:
-    """The least cost is then anywhere, and as sharp as rounding happens to make it: .93 ± .03 s was told."""
+def test_constant_speed_shows_no_delay(seed: int) -> None:
+    """The minimum is then anywhere, and as sharp as rounding makes it: .93 ± .03 s was reported."""
     random = np.random.default_rng(seed)
     speed, late_s = random.uniform(10, 25), random.uniform(-0.5, 0.5)
     seen = speed * TIME_S + 0.004 * np.cumsum(random.standard_normal(len(TIME_S)))
@@ -58,20 +58,22 @@ def test_even_speed_tells_no_delay(seed: int) -> None:
     assert found is None or not found.matters
 
 
-def test_readings_are_put_in_time_and_unknown_beyond_their_end() -> None:
+def test_readings_are_shifted_in_time_and_unknown_beyond_their_end() -> None:
     late = readings(0.2)
     found = find_delay(TIME_S, way(TIME_S), late)
     assert found is not None
     mended = found.corrected(late, TIME_S)
     off = mended.distance_mm - 1.01 * (way(TIME_S) - way(TIME_S[:1]))
     assert np.ptp(off[mended.known]) < 2 * QUANTUM
-    assert np.ptp((late.distance_mm - 1.01 * way(TIME_S))[mended.known]) > 10 * QUANTUM, "the control"
-    assert (~mended.known).sum() == 6, "as many frames as the delay is long"
+    assert np.ptp((late.distance_mm - 1.01 * way(TIME_S))[mended.known]) > 10 * QUANTUM, (
+        "control: they were late"
+    )
+    assert (~mended.known).sum() == 6, "as many frames as the delay covers"
 
 
 @dataclass(frozen=True)
 class Made:
-    """What of a measured run its first window needs."""
+    """The parts of a measured run that its first window needs."""
 
     given: Scene
     encoder: EncoderReadings | None
@@ -83,12 +85,12 @@ class Made:
 
     @property
     def whole(self) -> Window:
-        """A longer run: no drift of the image scale is taken out."""
+        """A longer run: no drift of the image scale is removed."""
         return Window(0, 0)
 
     @property
     def texture(self) -> SimpleNamespace:
-        """Texture that most frames show, or two of three."""
+        """Texture in most frames, or in two of three."""
         count = len(self.time_s)
         lost = (np.arange(count) % 3 == 2) & self.much_lost
         return SimpleNamespace(poses=TrackedPoses(np.arange(count), np.zeros((count, 4, 4)), lost))
@@ -100,7 +102,7 @@ class Made:
         return displaced(self.given.truth, np.random.default_rng(1), 0.3)
 
 
-def test_a_window_is_adjusted_with_the_encoder_put_in_time() -> None:
+def test_a_window_is_adjusted_with_the_corrected_encoder() -> None:
     given = scene(100, 250, noise=1.0, swing_mm=2.0)
     sound, time_s = given.measured.encoder, given.measured.time_s
     assert sound is not None
@@ -113,7 +115,7 @@ def test_a_window_is_adjusted_with_the_encoder_put_in_time() -> None:
     assert np.ptp(z) < 0.3, "with the late encoder it is 5 mm"
 
 
-def test_readings_that_scatter_by_more_than_their_rounding_are_believed_less() -> None:
+def test_readings_that_scatter_by_more_than_their_rounding_get_a_larger_sigma() -> None:
     given = scene(60, 250, noise=1.0)
     sound, time_s = given.measured.encoder, given.measured.time_s
     assert sound is not None
@@ -124,11 +126,11 @@ def test_readings_that_scatter_by_more_than_their_rounding_are_believed_less() -
         assert got.run.encoder is not None
         assert got.run.encoder.sigma_mm == pytest.approx(noise_mm, rel=0.35)
         z = got.estimate.state.T_pc[:, 2, 3] - given.truth.T_pc[:, 2, 3]
-        assert np.std(np.diff(z)) < 0.02, "believed as before it is 0.06"
+        assert np.std(np.diff(z)) < 0.02, "with the σ of rounding it is 0.06"
 
 
-def test_texture_that_was_much_lost_and_contradicts_an_encoder_draws_nothing() -> None:
-    """By VP9 the little texture left drew the lens by 1 σ: radii came out .1 mm wider than without it."""
+def test_frequently_lost_texture_that_contradicts_an_encoder_does_not_pull_the_adjustment() -> None:
+    """After VP9 the remaining texture pulled the lens by 1 σ: radii were .1 mm larger than without it."""
     given = scene(40, 120, noise=1.0)
     sound, time_s = given.measured.encoder, given.measured.time_s
     assert sound is not None
@@ -140,6 +142,6 @@ def test_texture_that_was_much_lost_and_contradicts_an_encoder_draws_nothing() -
     assert np.abs(got.estimate.state.instrument[-MATCH_BIASES:]).max() < 1, "they were 6.7 σ"
 
 
-def test_an_encoder_that_stands_has_no_delay() -> None:
+def test_an_encoder_at_rest_has_no_delay() -> None:
     still = replace(readings(0.0), distance_mm=np.zeros(len(TIME_S)))
     assert find_delay(TIME_S, way(TIME_S), still) is None

@@ -1,4 +1,4 @@
-"""Scattered stamps of an even rhythm are replaced by it; right ones, uneven or even, are kept."""
+"""Scattered time stamps of a regular rhythm are replaced by it; right ones, irregular or not, are kept."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ FRAMES, RATE = 120, 30.0
 
 @dataclass(frozen=True)
 class Recorded:
-    """What of a recording the times need."""
+    """The parts of a recording that the times need."""
 
     frames: FrameTable
     encoder: Encoder | None
@@ -29,7 +29,7 @@ def way(time_s: Float) -> Float:
 
 
 def believed(taken_s: Float, stamps: Float, told: list[str] | None = None) -> Float:
-    """Return the times believed of frames taken at ``taken_s`` and stamped otherwise."""
+    """Return the times that are used for frames taken at ``taken_s`` and stamped otherwise."""
     read_s = np.arange(-0.5, FRAMES / RATE + 0.5, 0.01)
     encoder = Encoder(read_s, np.round(way(read_s) / 0.05) * 0.05)
     recording = Recorded(FrameTable(np.arange(FRAMES), stamps, np.full(FRAMES, "led")), encoder)
@@ -48,14 +48,14 @@ def scatter() -> Float:
 EVEN = np.arange(FRAMES) / RATE
 
 
-def test_scattered_stamps_of_an_even_rhythm_are_replaced_and_told(scatter: Float) -> None:
+def test_scattered_stamps_of_a_regular_rhythm_are_replaced_and_reported(scatter: Float) -> None:
     told: list[str] = []
     got = believed(EVEN, EVEN + scatter, told)
     assert np.ptp(got - EVEN) < 2e-3
     assert "scatter by 3." in told[0]
 
 
-def test_stamps_that_are_right_are_kept_though_they_scatter(scatter: Float) -> None:
+def test_right_stamps_are_kept_though_they_scatter(scatter: Float) -> None:
     told: list[str] = []
     taken = EVEN + scatter
     assert believed(taken, taken, told) is not EVEN
@@ -63,6 +63,6 @@ def test_stamps_that_are_right_are_kept_though_they_scatter(scatter: Float) -> N
     assert not told
 
 
-def test_an_even_table_and_one_with_a_gap_have_no_other_rhythm() -> None:
+def test_regular_stamps_and_ones_with_a_gap_are_kept() -> None:
     assert even_rhythm(EVEN) is None
     assert even_rhythm(EVEN + 0.1 * (np.arange(FRAMES) > 60)) is None

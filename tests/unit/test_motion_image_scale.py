@@ -1,4 +1,4 @@
-"""An image scale that drifts is told from a pipe that widens, taken out, and stated."""
+"""A drift of the image scale is distinguished from a pipe that widens, removed, and reported."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ REDUCER = replace(ONE_BORE, rings_mm=np.arange(2.0), rings_wider_mm=np.arange(2.
 
 @cache
 def adjusted(**changes: float) -> tuple[Scene, Estimate]:
-    """Return a scene and its adjustment, made once for all tests of it, which change neither."""
+    """Return a scene and its adjustment; both are cached, and no test changes them."""
     made = scene(FRAMES, LANDMARKS, noise=1.0, **changes)
     return made, estimate_state(made.truth, made.measured, PARAMETERS)
 
@@ -52,7 +52,7 @@ def drift_in(**changes: float) -> tuple[ScaleDrift, list[str]]:
 
 
 def seen_growing(run: DrawnRun, grows: float) -> DrawnRun:
-    """Return a run whose pictures are larger in the end than at the beginning by the share ``grows``."""
+    """Return a run whose pictures are larger at the end than at the start by the share ``grows``."""
     count, source = len(run.T_pc), run.recording.source
     larger = 1 + grows * (np.arange(count) / (count - 1) - 0.5)
     assert isinstance(source, MemorySource)
@@ -67,7 +67,7 @@ def seen_growing(run: DrawnRun, grows: float) -> DrawnRun:
 
 
 @pytest.mark.parametrize("grows", [GROWS, -GROWS])
-def test_a_picture_that_grows_is_told_with_its_size(grows: float) -> None:
+def test_a_growing_picture_is_reported_with_its_size(grows: float) -> None:
     drift, told = drift_in(picture_grows=grows)
     found = drift.at_frames[-1] - drift.at_frames[0]
     assert drift.certain
@@ -76,21 +76,21 @@ def test_a_picture_that_grows_is_told_with_its_size(grows: float) -> None:
 
 
 @pytest.mark.parametrize("widens", [0.0, 0.01])
-def test_a_pipe_that_widens_is_not_taken_for_it(widens: float) -> None:
+def test_a_pipe_that_widens_is_not_taken_for_a_growing_picture(widens: float) -> None:
     drift, told = drift_in(widens=widens)
     assert drift.p_steady > 1e-3
     assert not drift.ambiguous
     assert told == []
 
 
-def test_a_little_change_of_the_rings_may_be_either() -> None:
+def test_a_small_change_of_the_rings_may_be_either() -> None:
     drift, _ = drift_in(widens=0.002)
     assert drift.ambiguous
     assert np.ptp(drift.stated_sigma) * drift.ring_mm > 0.05
 
 
 def steady_run(bore: Bore, lost: float, **changes: float) -> SteadyRun:
-    """Return what is told of a run's image scale in a ``bore`` where so many lit pictures are ``lost``."""
+    """Return the result for the image scale of a run in a ``bore`` with so many lit pictures ``lost``."""
     made, estimate = adjusted(**changes)
     poses = TrackedPoses(np.arange(FRAMES), made.truth.T_pc, np.arange(FRAMES) < lost * FRAMES)
     run = SimpleNamespace(bore=bore, whole=None, image_scale=None, texture=SimpleNamespace(poses=poses))
@@ -100,16 +100,16 @@ def steady_run(bore: Bore, lost: float, **changes: float) -> SteadyRun:
 
 
 @pytest.mark.parametrize("changes", [{"picture_grows": GROWS}, {"widens": 0.002}], ids=["grows", "either"])
-def test_in_a_reducer_no_drift_is_told(changes: dict[str, float]) -> None:
-    """Rings and texture depart from each other there as they do where the picture grows."""
+def test_in_a_reducer_no_drift_is_reported(changes: dict[str, float]) -> None:
+    """Rings and texture differ from each other there as they do where the picture grows."""
     for bore, told in ((ONE_BORE, True), (REDUCER, False)):
         steady = steady_run(bore, 0.0, **changes)
         assert (steady.drift.certain or steady.drift.ambiguous) == told
         assert (steady.scale_sigma is not None) == told
 
 
-def test_without_texture_a_picture_that_grows_may_be_a_pipe_that_widens() -> None:
-    """Of 85 lit pictures 84 showed no texture, and the picture was said to grow by 8 %."""
+def test_without_texture_a_growing_picture_may_be_a_pipe_that_widens() -> None:
+    """Of 85 lit pictures 84 showed no texture, and the picture was reported to grow by 8 %."""
     seen, lost = (steady_run(ONE_BORE, share, picture_grows=GROWS) for share in (0.1, 0.9))
     assert seen.drift.certain
     assert not lost.drift.certain
@@ -123,7 +123,7 @@ WHOLE = Window(0, FEW)
 
 @dataclass(frozen=True)
 class WholeRun:
-    """A run in one bore, measured as a scene is."""
+    """A run in one bore, measured like a scene."""
 
     made: Scene
     image_scale: Float | None = None
@@ -140,7 +140,7 @@ class WholeRun:
         return SimpleNamespace(poses=TrackedPoses(np.arange(FEW), self.made.truth.T_pc, none_lost))
 
     def measured(self, window: Window, parameters: MotionParameters) -> Measurements:
-        """Return it without what is taken out of the scale."""
+        """Return the same measurements with the scale as recorded."""
         was = self.made.measured
         if self.image_scale is None:
             return was
@@ -150,10 +150,10 @@ class WholeRun:
 
 
 @pytest.mark.parametrize(("again", "corrected"), [(1.0, True), (0.1, False)])
-def test_a_drift_that_is_not_found_again_is_not_taken_out(
+def test_a_drift_that_is_not_found_again_is_not_removed(
     again: float, corrected: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Behind a filter against noise one of .55 % was taken out, and .07 % were found then."""
+    """Behind a noise filter a drift of .55 % was removed, and .07 % were found by the next estimate."""
     made, parameters = scene(FEW, 100, noise=0.1, picture_grows=GROWS), MotionParameters()
     estimate = estimate_state(made.truth, made.measured, parameters)
     drift, found = drift_of_scale(estimate, made.measured), iter([1.0, 1.0, again])
@@ -170,8 +170,8 @@ def test_a_drift_that_is_not_found_again_is_not_taken_out(
     assert steady.distance_sigma > 0
 
 
-def test_a_drift_that_contradicts_itself_is_told_as_such() -> None:
-    """It was told as too little texture to tell which, or not at all: p of a steady scale decided."""
+def test_a_drift_with_contradicting_evidence_is_reported_as_such() -> None:
+    """It was called undecided for lack of texture, or not reported: p of a constant scale decided."""
     made = scene(FEW, 100, noise=0.1, picture_grows=GROWS)
     drift = drift_of_scale(estimate_state(made.truth, made.measured, MotionParameters()), made.measured)
     for p_neither in (0.0, 1.0):
@@ -185,7 +185,7 @@ def test_a_drift_that_contradicts_itself_is_told_as_such() -> None:
         assert "too little texture" not in told[0]
 
 
-def test_a_drift_that_is_real_is_found_again_and_taken_out() -> None:
+def test_a_real_drift_is_found_again_and_removed() -> None:
     made = scene(FEW, 100, noise=0.1, picture_grows=GROWS)
     parameters = MotionParameters(match_bias_px=0.01)
     estimate = estimate_state(made.truth, made.measured, parameters)
@@ -199,14 +199,14 @@ def test_a_drift_that_is_real_is_found_again_and_taken_out() -> None:
 
 
 @pytest.mark.parametrize(("course", "told"), [((-1, 0.5, 1), True), ((-1, 1, -0.5), False)])
-def test_what_drifts_goes_one_way(course: tuple[float, ...], told: bool) -> None:
-    """Grooves of a gauge left a course up and down in a healthy probe, 6 σ from a steady scale."""
+def test_a_drift_goes_in_one_direction(course: tuple[float, ...], told: bool) -> None:
+    """Grooves of a gauge gave a course up and down in a sound probe, 6 σ from a constant scale."""
     drift = drift_in()[0]
     assert not drift.certain
     assert replace(drift, at_frames=GROWS * np.array(course), p_steady=1e-9).certain == told
 
 
-def test_what_no_lens_does_is_told_with_other_causes() -> None:
+def test_a_course_that_no_lens_can_have_is_reported_with_other_causes() -> None:
     drift, told = drift_in(picture_grows=GROWS)[0], []
     context = replace(quiet_context(), warn=told.append)
     for times in (1.0, 10.0):
@@ -215,7 +215,7 @@ def test_what_no_lens_does_is_told_with_other_causes() -> None:
     assert "No lens changes so much" in told[1]
 
 
-def test_a_step_of_the_bore_may_explain_what_the_rings_do() -> None:
+def test_a_step_of_the_bore_may_explain_the_rings() -> None:
     made, estimate = adjusted(widens=0.002)
     plain = drift_of_scale(estimate, made.measured)
     middle = float(np.median(made.truth.T_pc[:, 2, 3]))
@@ -227,8 +227,8 @@ def test_a_step_of_the_bore_may_explain_what_the_rings_do() -> None:
     assert stepped.sigma[-1] > plain.sigma[-1]
 
 
-def test_radii_of_a_picture_that_grows_lie_within_their_sigma() -> None:
-    """Taken as they are, the rings change by 1.1 mm of radius with 0.02 mm stated."""
+def test_radii_with_a_growing_picture_are_within_their_sigma() -> None:
+    """Without correction the radii of rings change by 1.1 mm, with 0.02 mm stated."""
     k = np.arange(150)
     run, told = seen_growing(drawn_run(0.9 * k, 0.004 * k), 0.008), []
     parameters = MotionParameters(strip_step_mm=0.6, cell_px=20, patch_half_px=8)
@@ -243,7 +243,7 @@ def test_radii_of_a_picture_that_grows_lie_within_their_sigma() -> None:
     assert np.mean(np.abs(radius - RADIUS)[seen] < 1.96 * sigma[seen]) > 0.93
 
 
-def test_what_is_known_of_the_scale_goes_into_the_radii() -> None:
+def test_the_estimated_scale_is_used_for_the_radii() -> None:
     run = drawn_run(0.9 * np.arange(40), np.zeros(40))
     axis, count = straight_axis(-50.0, 150.0), 40
     plain = Trajectory(
@@ -259,7 +259,7 @@ def test_what_is_known_of_the_scale_goes_into_the_radii() -> None:
     ]
     assert np.nanmax(np.abs(walls[0].radius_mm - walls[1].radius_mm)) < 0.02
     gain = np.nanmedian(walls[1].sigma_mm ** 2 - walls[0].sigma_mm ** 2) ** 0.5
-    theta = np.arctan2(RADIUS, 22.0)  # dr = b (1 + tan² θ) θ dε where radius in the picture is f θ
+    theta = np.arctan2(RADIUS, 22.0)  # dr = b (1 + tan² θ) θ dε where the radius in the picture is f θ
     assert gain == pytest.approx(22.0 / np.cos(theta) ** 2 * theta * 2e-3, rel=0.05)
     doubted = accumulate_wall(
         run.probe, run.rings, run.points, replace(plain, radius_doubt=0.02), chosen, quiet_context()
@@ -273,7 +273,7 @@ def test_what_is_known_of_the_scale_goes_into_the_radii() -> None:
     [(0.5, False, 3.0, False), (0.7, False, 3.0, True), (0.5, True, 3.0, True), (0.5, False, 6.0, True)],
     ids=["sound", "matches contradict", "the camera trembles", "another probe"],
 )
-def test_a_probe_moved_by_what_is_in_doubt_is_as_unsure_as_it_was_moved(
+def test_sigma_includes_the_change_of_a_probe_by_doubtful_evidence(
     lasting: float, trembles: bool, by: float, doubted: bool
 ) -> None:
     run = drawn_run(0.9 * np.arange(4), np.zeros(4))
@@ -287,7 +287,7 @@ def test_a_probe_moved_by_what_is_in_doubt_is_as_unsure_as_it_was_moved(
     np.testing.assert_allclose(found, 1e-4 * np.eye(len(moved)) + doubted * np.outer(moved, moved))
 
 
-def test_a_probe_moved_by_texture_that_was_much_lost_is_in_doubt(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_probe_changed_by_frequently_lost_texture_is_doubtful(monkeypatch: pytest.MonkeyPatch) -> None:
     run = without_encoder(drawn_run(0.9 * np.arange(12), np.zeros(12)))
     parameters, found = MotionParameters(strip_step_mm=0.6, cell_px=20, patch_half_px=8), []
     told: dict[str, float] = {}
@@ -299,13 +299,15 @@ def test_a_probe_moved_by_texture_that_was_much_lost_is_in_doubt(monkeypatch: py
         assert got.instrument_covariance is not None
         found.append(got.instrument_covariance)
     moved = got.instrument - run.probe.parameters
-    assert np.abs(moved).max() > 1e-6, "the control"
+    assert np.abs(moved).max() > 1e-6, "control: with good texture it is not"
     np.testing.assert_allclose(found[1] - found[0], np.outer(moved, moved), atol=1e-15)
-    assert told["1 σ of distance at the end"] == got.distance_sigma_mm, "what is told holds the doubt as well"
+    assert told["1 σ of distance at the end"] == got.distance_sigma_mm, (
+        "the reported uncertainty includes the doubt as well"
+    )
 
 
-def test_distances_are_as_unsure_as_the_pipe_is_wider_by_a_probe_in_doubt() -> None:
-    """A view that drifted by 3 px moved the probe by 12 σ: distances were off by 2.2 to 2.8 of their σ."""
+def test_sigma_of_distances_includes_the_wider_pipe_of_a_doubtful_probe() -> None:
+    """A view that drifted by 3 px changed the probe by 12 σ: distances were off by 2.2 to 2.8 of their σ."""
     run = drawn_run(0.9 * np.arange(4), np.zeros(4))
     moved = np.zeros(len(run.probe.parameters))
     moved[run.probe.parameter_names.index("baseline_mm")] = 0.01 * run.probe.laser.baseline_mm

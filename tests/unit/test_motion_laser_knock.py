@@ -1,4 +1,4 @@
-"""A laser knocked in mid-run is told from a pipe that steps, taken out, and stated."""
+"""A laser knocked during a run is distinguished from a step of the pipe, corrected, and reported."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ KNOCKED_PX = 1.3
 
 @dataclass(frozen=True)
 class SceneRun:
-    """Stands in for `MeasuredRun`: what was measured of a scene, its laser knocked by ``knock``."""
+    """Stands in for `MeasuredRun`: the measurements of a scene whose laser was knocked by ``knock``."""
 
     made: Scene
     jump: RingJump
@@ -67,7 +67,7 @@ class SceneRun:
         measured, rings = self.made.measured, self.made.measured.rings
         if self.knock is None:
             return measured
-        flat = replace(measured.probe, laser=LaserSheet(22.0))  # as the scene's rings were made
+        flat = replace(measured.probe, laser=LaserSheet(22.0))  # as used for the scene's rings
         seen = flat.after(self.knock).laser.intersect(rings.xyz_c)
         xyz_c = np.where((rings.frame >= BEHIND)[:, None], seen, rings.xyz_c)
         return replace(measured, rings=replace(rings, xyz_c=xyz_c))
@@ -81,7 +81,7 @@ def ring_shifted(made: Scene, shift_mm: float) -> Scene:
 
 
 def knock_in(made: Scene, jump_mm: tuple[float, float, float]) -> KnockTest:
-    """Return what a run says of a jump of centre and radius in the middle frame."""
+    """Return the result for a jump of the ring's centre and radius in the middle frame."""
     ring = made.measured.rings.xyz_c[made.measured.rings.frame == BEHIND]
     jump = RingJump.of(BEHIND, np.array(jump_mm), ring, made.measured.probe, joint_at(FRAMES), ONE_BORE)
     run = cast(MeasuredRun, SceneRun(made, jump))
@@ -103,21 +103,21 @@ def jump_in(run: DrawnRun) -> RingJump | None:
     return find_jump(circles, run.T_pc[circles.frame, 2, 3], run.points, run.probe)
 
 
-def test_rings_that_texture_does_not_follow_were_knocked() -> None:
+def test_a_jump_of_rings_that_texture_does_not_follow_is_a_knock() -> None:
     found = knock_in(ring_shifted(scene(FRAMES, LANDMARKS, noise=1.0), SHIFT_MM), (SHIFT_MM, 0, 0))
     assert found.certain
     tilt = SHIFT_MM / (RADIUS * RADIUS / 22.0)  # dr = r tan θ tan φ, tan θ = r / l
     assert found.knock.change[1] == pytest.approx(-tilt, rel=0.1)
 
 
-def test_a_knock_of_which_the_rings_show_a_part_at_first_is_one() -> None:
-    """A knock that takes longer than a ring, as that of one drawn by another renderer, jumps by less."""
+def test_a_knock_is_found_although_rings_show_only_a_part_of_it_at_first() -> None:
+    """A knock that takes longer than one ring, as in a recording of another renderer, jumps by less."""
     found = knock_in(ring_shifted(scene(FRAMES, LANDMARKS, noise=1.0), SHIFT_MM), (0.4 * SHIFT_MM, 0, 0))
     assert found.certain
 
 
 @pytest.mark.parametrize("joint_mm", [(0.0, SHIFT_MM), (SHIFT_MM, 0.0)])
-def test_a_pipe_that_steps_is_not_taken_for_it(joint_mm: tuple[float, float]) -> None:
+def test_a_step_of_the_pipe_is_not_taken_for_a_knock(joint_mm: tuple[float, float]) -> None:
     """The rings jump as much as by a knock, but so do the landmarks behind the joint."""
     wider, aside = joint_mm
     found = knock_in(scene(FRAMES, LANDMARKS, noise=1.0, joint_mm=joint_mm), (aside, 0, wider))
@@ -125,7 +125,7 @@ def test_a_pipe_that_steps_is_not_taken_for_it(joint_mm: tuple[float, float]) ->
     assert not found.ambiguous
 
 
-def test_a_jump_of_which_texture_cannot_tell_is_said_to_be_one() -> None:
+def test_a_jump_that_texture_cannot_decide_is_reported_as_a_jump() -> None:
     told: list[str] = []
     context = replace(quiet_context(), warn=told.append)
     ring, instrument = 50.0 * np.array([[1, 0, 0.44], [0, 1, 0.44], [-1, 0, 0.44], [0, -1, 0.44]]), probe()
@@ -141,8 +141,8 @@ def test_a_jump_of_which_texture_cannot_tell_is_said_to_be_one() -> None:
 
 @cache
 @pytest.mark.parametrize(("lost", "breaks"), [(25, True), (27, True), (23, False), (29, False)])
-def test_where_texture_is_lost_beside_a_jump_it_tells_no_knock(lost: int, breaks: bool) -> None:
-    """Two runs joined came out as a laser knocked by 0.82 ± 0.03 degrees."""
+def test_where_texture_is_lost_beside_a_jump_no_knock_is_reported(lost: int, breaks: bool) -> None:
+    """Two runs joined were reported as a laser knocked by 0.82 ± 0.03 degrees."""
     lit = np.arange(1, 60, 2)
     poses = TrackedPoses(lit, np.tile(np.eye(3, 4), (len(lit), 1, 1)), lit == lost)
     jump = RingJump(26, np.array([2.0, 0, 0]), np.eye(3), 37.0, ONE_BORE)
@@ -150,11 +150,11 @@ def test_where_texture_is_lost_beside_a_jump_it_tells_no_knock(lost: int, breaks
 
 
 def swaying() -> DrawnRun:
-    """Return a run that sways and turns."""
+    """Return a run that sways and rotates."""
     return drawn_run(0.9 * np.arange(100), 0.004 * np.arange(100))
 
 
-def test_rings_of_a_run_that_sways_do_not_jump() -> None:
+def test_rings_of_a_swaying_run_do_not_jump() -> None:
     assert jump_in(swaying()) is None
     found = jump_in(knocked(swaying(), KNOCKED_PX, 50))
     assert found is not None
@@ -162,7 +162,7 @@ def test_rings_of_a_run_that_sways_do_not_jump() -> None:
 
 
 def test_a_swaying_run_does_not_jump_where_rings_are_missing() -> None:
-    """Every tenth frame withheld for a twin: across the wider gap a line leads farther off the way."""
+    """Every tenth frame was withheld for a twin: over the wider gap a linear extrapolation is worse."""
     run = swaying()
     frame = np.setdiff1d(np.arange(100), np.arange(5, 100, 10))
     sway = 1.5 * np.sin(2 * np.pi * np.stack([frame / 40, frame / 31 + 0.2], 1))
@@ -175,7 +175,7 @@ def test_a_swaying_run_does_not_jump_where_rings_are_missing() -> None:
     assert found.frame == 56
 
 
-def test_a_weld_is_no_jump() -> None:
+def test_a_weld_is_not_a_jump() -> None:
     run = swaying()
     weld = 2.0 * ((run.rings.frame >= 48) & (run.rings.frame < 54))[:, None]
     rings = replace(run.rings, radius_px=(run.rings.radius_px - weld).astype(np.float32))
@@ -183,8 +183,8 @@ def test_a_weld_is_no_jump() -> None:
     assert jump_in(replace(run, rings=rings, points=points)) is None
 
 
-def test_radii_and_distance_of_a_knocked_run_lie_within_their_sigma() -> None:
-    """Not taken out, rings half a degree aside shorten the way and dent the wall."""
+def test_radii_and_distance_of_a_knocked_run_are_within_their_sigma() -> None:
+    """Without correction, rings off by half a degree shorten the distance and dent the wall."""
     run, told = knocked(swaying(), KNOCKED_PX, 50), []
     parameters = MotionParameters(strip_step_mm=0.6, cell_px=20, patch_half_px=8)
     context = replace(quiet_context(), warn=told.append)

@@ -1,4 +1,4 @@
-"""Loops closed where the probe comes back: the right ones, all of them, and never a wrong one."""
+"""Loop closure where the probe comes back: all true loops are closed, and no wrong one."""
 
 from __future__ import annotations
 
@@ -51,14 +51,16 @@ def closing(run: LoopedRun, view: DrawnView, **changes: float) -> tuple[JoinedRu
 
 
 def gap(run: LoopedRun, joined: JoinedRun) -> tuple[Float, Float, Float]:
-    """Return by how much distance, roll and axis at the way out differ from those on the way back."""
+    """Return by how much distance, roll and axis differ between the way out and the way back."""
     distance, roll, aside = run.believed(joined)
     there, here = np.arange(10, 150), FRAMES - 1 - np.arange(10, 150)
     off, turned = distance - run.distance_mm, roll - run.roll_rad
     return off[here] - off[there], turned[here] - turned[there], aside[here] - aside[there]
 
 
-def test_what_drifted_comes_together_again(run: LoopedRun, closed: tuple[JoinedRun, LoopReport]) -> None:
+def test_the_drift_between_the_ways_out_and_back_is_removed(
+    run: LoopedRun, closed: tuple[JoinedRun, LoopReport]
+) -> None:
     joined, loops = closed
     assert len(loops.revisits) >= 6
     assert all(loops.closed)
@@ -83,7 +85,7 @@ def test_loops_are_closed_beyond_a_bend() -> None:
     assert np.abs(after[2]).max() < 0.15
 
 
-def test_sigma_falls_and_holds(run: LoopedRun, closed: tuple[JoinedRun, LoopReport]) -> None:
+def test_sigma_decreases_and_covers_the_errors(run: LoopedRun, closed: tuple[JoinedRun, LoopReport]) -> None:
     joined, _ = closed
     sigma = [np.sqrt(np.diagonal(j.covariance, axis1=1, axis2=2)) for j in (run.joined, joined)]
     assert np.all(sigma[1] <= sigma[0] + 1e-12)
@@ -99,20 +101,20 @@ def test_sigma_falls_and_holds(run: LoopedRun, closed: tuple[JoinedRun, LoopRepo
     assert 0.6 < np.sqrt(np.mean(np.square(squares))) < 1.4
 
 
-def test_another_wall_closes_nothing(run: LoopedRun) -> None:
+def test_with_another_wall_no_loop_is_closed(run: LoopedRun) -> None:
     joined, loops = closing(run, DrawnView(run, WALL, rough_wall(seed=2), {}))
     assert joined is run.joined
     assert set(loops.verdicts) == {Verdict.OTHER}
 
 
-def test_a_wall_without_texture_closes_nothing(run: LoopedRun) -> None:
+def test_with_a_wall_without_texture_no_loop_is_closed(run: LoopedRun) -> None:
     bare = np.zeros_like(WALL)
     joined, loops = closing(run, DrawnView(run, bare, bare, {}))
     assert joined is run.joined
     assert set(loops.verdicts) <= {Verdict.PLAIN, Verdict.OTHER}
 
 
-def test_a_wall_that_repeats_itself_closes_nothing(run: LoopedRun) -> None:
+def test_with_a_wall_that_repeats_itself_no_loop_is_closed(run: LoopedRun) -> None:
     same = rough_wall(repeat_mm=12.0)
     joined, loops = closing(run, DrawnView(run, same, same, {}))
     assert joined is run.joined
@@ -120,18 +122,18 @@ def test_a_wall_that_repeats_itself_closes_nothing(run: LoopedRun) -> None:
     assert Verdict.REPEATED in loops.verdicts
 
 
-def test_equal_welds_at_equal_spacing_are_told_apart(run: LoopedRun) -> None:
-    """A run believed a whole spacing off: every weld meets another one's image, none may be closed."""
+def test_equal_welds_at_equal_spacing_are_not_confused(run: LoopedRun) -> None:
+    """In a run estimated a whole spacing off, every weld meets the image of another; none may be closed."""
     wall = rough_wall(welds_every_mm=100.0)
     off = {frame: 100.0 for frame in range(FRAMES // 2, FRAMES)}
     joined, loops = closing(run, DrawnView(run, wall, wall, off))
     assert joined is run.joined
     assert not any(loops.closed)
     _, right = closing(run, DrawnView(run, wall, wall, {}))
-    assert all(right.closed), "the control: with the same welds where they are believed"
+    assert all(right.closed), "control: with the same welds at their estimated places"
 
 
-def test_a_few_wrong_places_are_found_out(run: LoopedRun, closed: tuple[JoinedRun, LoopReport]) -> None:
+def test_a_few_wrong_places_are_rejected(run: LoopedRun, closed: tuple[JoinedRun, LoopReport]) -> None:
     places = closed[1].revisits
     wrong = {places[2].later: 2.8, places[5].later: -3.2}
     joined, loops = closing(run, DrawnView(run, WALL, WALL, wrong))
@@ -140,7 +142,7 @@ def test_a_few_wrong_places_are_found_out(run: LoopedRun, closed: tuple[JoinedRu
     assert np.abs(gap(run, joined)[0]).max() < 0.15
 
 
-def test_none_is_closed_when_as_many_contradict_as_agree(
+def test_no_loop_is_closed_if_as_many_places_contradict_as_agree(
     run: LoopedRun, closed: tuple[JoinedRun, LoopReport]
 ) -> None:
     wrong = {p.later: 2.5 * (-1) ** n for n, p in enumerate(closed[1].revisits)}
@@ -166,14 +168,14 @@ def test_shift_and_its_sigma_are_right(run: LoopedRun) -> None:
     beyond = register(
         [StoredStrip.of(earlier)], later, ExpectedShift(np.zeros(2), np.array([5.0, 20.0])), PARAMETERS
     )
-    assert beyond.verdict is not Verdict.SAME, "further off than can be"
+    assert beyond.verdict is not Verdict.SAME, "further off than possible"
 
 
 def passage(distance_mm: Float) -> Passage:
     return Passage.of(np.arange(len(distance_mm)), distance_mm, 10.0, 60.0)
 
 
-def test_only_a_way_back_makes_places() -> None:
+def test_places_are_chosen_only_on_a_way_back() -> None:
     out = np.arange(0, 800, 4.0)
     assert not passage(out).seen_again(10).size
     small = np.concatenate([out, out[-1] - np.arange(0, 40, 4.0), np.arange(out[-1] - 40, 1200, 4.0)])
@@ -185,16 +187,16 @@ def test_only_a_way_back_makes_places() -> None:
     assert np.all(np.diff(back.frame[pairs], axis=1) > 10)
     third = passage(np.concatenate([out, out[::-1], out]))
     before = [third.number[a] for a, b in third.seen_again(10) if third.number[b] == 2]
-    assert np.mean(before) > 0.9, "against the pass before, not the first"
+    assert np.mean(before) > 0.9, "compared with the pass before, not the first"
 
 
-def test_places_prefer_welds_then_texture() -> None:
+def test_welds_are_preferred_as_places_then_texture() -> None:
     out = np.arange(0, 800, 4.0)
     back = passage(np.concatenate([out, out[::-1]]))
     texture = np.where(np.arange(400) == 60, 5.0, 1.0)
     pairs = back.seen_again(10)
     places = choose_revisits(back, pairs, WallFeatures(texture, np.array([355.0])), 100.0, 50)
-    assert [p for p in places if p.earlier == (60,)], "most texture"
+    assert [p for p in places if p.earlier == (60,)], "the most texture"
     welds = [p for p in places if p.at_weld]
     assert len(welds) in (1, 2)
     assert all(abs(back.distance_mm[p.later] + 35 - 355) <= 12.5 for p in welds)
@@ -205,7 +207,7 @@ def test_places_prefer_welds_then_texture() -> None:
     assert max(abs(back.distance_mm[f] - 400.0) for f in beside.earlier) < 40
 
 
-def test_bands_are_rings_that_stand_out_all_round() -> None:
+def test_bands_are_rings_that_stand_out_around_the_whole_pipe() -> None:
     distance = np.arange(0, 1000, 5.0)
     radius = 50 + 0.01 * np.random.default_rng(0).standard_normal(len(distance)) + 1e-4 * distance
     assert not bands_in_rings(distance, radius).size
@@ -220,8 +222,8 @@ def test_texture_is_counted_by_frame() -> None:
     np.testing.assert_allclose(texture_at(np.array([3, 5, 7]), [seen, seen]), [8.0, 0.0, 4.0])
 
 
-def test_what_is_expected_is_learnt_from_place_to_place() -> None:
-    """Shifts that grow as a random walk, one step a place: the reach stays that of the next step."""
+def test_the_expected_shift_is_learnt_from_place_to_place() -> None:
+    """Shifts grow as a random walk, one step a place: the search range stays that of the next step."""
     walk = 100.0 * np.minimum.outer(np.arange(1, 7), np.arange(1, 7))
     predictor = ShiftPredictor(np.kron(walk, np.eye(2)))
     before = predictor.predict(5).reach
@@ -236,13 +238,13 @@ def test_what_is_expected_is_learnt_from_place_to_place() -> None:
     assert not expected.allows(np.array([28.0, 60.0]))
 
 
-def test_none_is_closed_where_none_is_wanted(run: LoopedRun) -> None:
+def test_no_loop_is_closed_if_loop_closure_is_off(run: LoopedRun) -> None:
     joined, loops = closing(run, DrawnView(run, WALL, WALL, {}), most_loops=0)
     assert joined is run.joined
     assert not loops.revisits
 
 
-def test_pictures_there_and_back_close_loops_and_the_report_says_so() -> None:
+def test_pictures_forth_and_back_close_loops_and_the_report_says_so() -> None:
     way = np.concatenate([np.arange(0, 110, 2.0), np.arange(110, 0, -2.0)])
     drawn = without_encoder(drawn_run(way, 0.1 * np.sin(np.arange(len(way)) / 20)))
     told: dict[str, float | int | str] = {}

@@ -1,4 +1,4 @@
-"""Errors that matches of texture share, against distances without an encoder."""
+"""Errors that matches of texture share, and distances without an encoder."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ def last_frame_covariance(factor: Factor) -> Float:
     return np.asarray(factor.joint_covariance(np.array([FRAMES - 1]))[0, :, 0])
 
 
-def test_match_biases_come_last() -> None:
+def test_match_biases_are_the_last_parameters() -> None:
     given = scene(8, 14, seed=2)
     assert len(given.truth.instrument) == given.measured.unsure.shape[1] + MATCH_BIASES
 
 
 @pytest.mark.parametrize("seed", [1, 2])
-def test_a_bias_of_far_matches_is_not_taken_for_distance(seed: int) -> None:
-    """Compression drops texture far ahead: matches at less than 0.85 rad lag behind, by up to 0.25 px."""
+def test_a_bias_of_distant_matches_is_not_taken_for_distance(seed: int) -> None:
+    """Compression removes texture far ahead: matches at less than 0.85 rad lag by up to 0.25 px."""
     given = scene(FRAMES, 90, encoder=False, seed=seed)
     tracks, truth = given.measured.tracks, given.truth
     xyz_c = transform(inverse(truth.T_pc[tracks.frame]), truth.xyz_p[tracks.landmark])
@@ -46,7 +46,7 @@ def test_a_bias_of_far_matches_is_not_taken_for_distance(seed: int) -> None:
     assert abs(found.state.T_pc[-1, 2, 3] - truth.T_pc[-1, 2, 3]) < 2 * sigma
 
 
-def test_what_shifts_near_matches_alone_makes_distances_unsure() -> None:
+def test_a_shift_of_near_matches_alone_makes_distances_unsure() -> None:
     given = scene(FRAMES, 90, encoder=False, seed=1)
     tracks, truth = given.measured.tracks, given.truth
     away = tracks.uv - given.measured.probe.camera.centre_px
@@ -67,8 +67,8 @@ def test_what_shifts_near_matches_alone_makes_distances_unsure() -> None:
     assert unsure[1] > 3 * unsure[0], unsure
 
 
-def test_templates_cut_off_their_place_lengthen_the_way_by_what_is_stated() -> None:
-    """Landmarks seem to lie farther on by a lag that fades until they pass: the residuals do not show it."""
+def test_misplaced_templates_lengthen_the_distance_within_the_stated_sigma() -> None:
+    """Landmarks seem to lie farther on by a lag that fades until they pass: residuals do not show it."""
     given, lag_px = scene(FRAMES, 90, encoder=False, seed=1), 0.3
     tracks, truth, camera = given.measured.tracks, given.truth, given.measured.probe.camera
     grid = StripGrid(truth.nominal_radius_mm, 360, *(truth.nominal_radius_mm / np.tan([1.4, 0.6])))

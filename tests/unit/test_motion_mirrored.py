@@ -1,4 +1,4 @@
-"""Pictures that a recorder mirrors are named, and a probe that is off otherwise is not called mirrored."""
+"""Mirrored pictures are recognised, and a probe with other errors is not called mirrored."""
 
 from __future__ import annotations
 
@@ -27,9 +27,10 @@ def stated(centre: tuple[float, float] = CENTRE, sigma: dict[str, float] = SIGMA
 
 
 def estimated(probe: Probe, truth: dict[str, float]) -> Trajectory:
-    """Return what a run finds whose pictures were taken with ``truth`` beside the stated parameters.
+    """Return the result of a run whose pictures were taken with ``truth`` instead of the stated parameters.
 
-    It sees the tilt and the principal point mixed, as rings do, and each four times worse than was stated.
+    It sees a mixture of tilt and principal point, as rings do, and each four times less precisely than
+    stated.
     """
     names, sigma = probe.parameter_names, np.sqrt(np.diag(probe.covariance))
     true = np.array([truth.get(n, p) for n, p in zip(names, probe.parameters, strict=True)])
@@ -65,14 +66,14 @@ LEFT_RIGHT, UPSIDE_DOWN = {"cx": 1599 - CENTRE[0]}, {"cy": 1199 - CENTRE[1]}
     ],
 )
 def test_mirrored_pictures_are_named_and_other_faults_are_not(truth: dict[str, float], named: str) -> None:
-    """In mirrored pictures of half the size the principal point moved by .11 of the way: nothing was said."""
+    """In mirrored pictures of half the size the principal point moved by .11 of the way: no message."""
     assert mirrored_way(stated(), estimated(stated(), truth)) == named
 
 
 @pytest.mark.parametrize("axes", ["x", "y", "xy"])
 @pytest.mark.parametrize("name", CAMERAS)
-def test_a_mirrored_probe_sees_the_mirrored_wall(name: str, axes: str) -> None:
-    """Distortion that is not even, and waves of the sheet, must be mirrored, too: .4 and .9 mm without."""
+def test_a_mirrored_probe_measures_the_mirrored_wall(name: str, axes: str) -> None:
+    """Odd distortion and waves of the sheet must be mirrored, too: without that errors were .4 and .9 mm."""
     sheet = LaserSheet(
         23.4, tilt_x=0.01, tilt_y=-0.006, cone_rad=0.004, decentre_x_mm=0.3, decentre_y_mm=-0.2,
         waviness=(2e-3, -1e-3, 1.5e-3, 3e-3, -2e-3, 1e-3),
@@ -90,14 +91,14 @@ def test_a_mirrored_probe_sees_the_mirrored_wall(name: str, axes: str) -> None:
     np.testing.assert_allclose(mirrored.triangulate(other), wanted, atol=1e-6)
 
 
-def test_nothing_tells_where_the_probe_is_its_own_mirror_image_or_known_exactly() -> None:
+def test_a_symmetric_or_exactly_known_probe_cannot_show_mirroring() -> None:
     middle = stated((799.5, 599.5))
     assert mirrored_way(middle, estimated(middle, {"cx": 802.0})) == ""
     exact = stated(sigma={"fx": 0.06})
     assert mirrored_way(exact, estimated(exact, {"fx": 366.5})) == ""
 
 
-def test_the_warning_says_what_the_recorder_did() -> None:
+def test_the_warning_says_that_the_recorder_mirrored_the_pictures() -> None:
     said: list[str] = []
     context = replace(quiet_context(), warn=said.append)
     report_instrument(stated(), estimated(stated(), LEFT_RIGHT), context)

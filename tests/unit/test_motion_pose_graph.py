@@ -1,4 +1,4 @@
-"""Errors along a chain of windows against the same chain written out in full, and loops closed in it."""
+"""Errors along a chain of windows compared with the explicit chain, and loop closure in it."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def dense(sums: ErrorSums, chain: ErrorChain) -> Float:
 
 
 def closures(chain: ErrorChain, count: int, seed: int = 2) -> Closures:
-    """Return differences between far ends, two components each, as errors drawn from the chain show."""
+    """Return differences between distant ends, two components each, with errors drawn from the chain."""
     random = np.random.default_rng(seed)
     knots = len(chain.at)
     by_error = np.zeros((knots, 6, count))
@@ -71,20 +71,20 @@ def closures(chain: ErrorChain, count: int, seed: int = 2) -> Closures:
     return Closures(sums_of(by_error), seen, sigma, np.arange(count) // 2)
 
 
-def test_covariances_are_those_of_the_chain_written_out(chain: ErrorChain) -> None:
+def test_covariances_agree_with_the_explicit_chain(chain: ErrorChain) -> None:
     every = np.eye(6 * len(chain.at)).reshape(len(chain.at), 6, -1)
     got = np.concatenate(list(chain.covariances_with(sums_of(every)))).reshape(6 * len(chain.at), -1)
     np.testing.assert_allclose(got, written_out(chain), rtol=1e-9, atol=1e-9)
 
 
-def test_some_sums_are_those_sums(chain: ErrorChain) -> None:
+def test_selected_sums_are_right(chain: ErrorChain) -> None:
     known = closures(chain, 6).by_error
     some = known.select(np.array([4, 1]), np.array([2.0, -1.0]))
     np.testing.assert_array_equal(dense(some, chain), dense(known, chain)[..., [4, 1]] * [2.0, -1.0])
     np.testing.assert_array_equal(known.dense(3, 9), dense(known, chain)[3:9])
 
 
-def test_closing_is_conditioning(chain: ErrorChain) -> None:
+def test_loop_closure_is_conditioning(chain: ErrorChain) -> None:
     known = closures(chain, 6)
     full, by_error = written_out(chain), dense(known.by_error, chain).reshape(-1, 6)
     spread = by_error.T @ full @ by_error + np.diag(known.sigma**2)
@@ -97,8 +97,8 @@ def test_closing_is_conditioning(chain: ErrorChain) -> None:
     np.testing.assert_allclose(before - found.gained, blocks, rtol=1e-6, atol=1e-7)
 
 
-def test_errors_that_are_left_lie_within_sigma(chain: ErrorChain) -> None:
-    """Over many drawn runs the squared error left, in its stated covariance, is on average its dimension."""
+def test_remaining_errors_are_within_sigma(chain: ErrorChain) -> None:
+    """Over many drawn runs the squared remaining error, over its covariance, averages its dimension."""
     random, full = np.random.default_rng(0), written_out(chain)
     known, knots = closures(chain, 6), len(chain.at)
     by_error = dense(known.by_error, chain)
@@ -114,17 +114,17 @@ def test_errors_that_are_left_lie_within_sigma(chain: ErrorChain) -> None:
     assert np.mean(squares) == pytest.approx(6.0, abs=0.7)
     open_ = (root @ random.standard_normal((len(full), 50))).T[:, -6:]
     plain = np.einsum("ni,ij,nj->n", open_, np.linalg.inv(left[-1]), open_)
-    assert np.mean(plain) > 12, "the control: without closing they do not"
+    assert np.mean(plain) > 12, "control: without closure they are not"
 
 
 def off_by(known: Closures, chain: ErrorChain, component: int, sigmas: float) -> Closures:
-    """Return the closures with one component off by some σ of its prediction by the motion alone."""
+    """Return the closures with one component off by some σ of its prediction from motion alone."""
     wrong = known.residual.copy()
     wrong[component] += sigmas * np.sqrt(known.residual_covariance(chain)[component, component])
     return Closures(known.by_error, wrong, known.sigma, known.place)
 
 
-def test_what_contradicts_the_rest_is_found_and_nothing_else(chain: ErrorChain) -> None:
+def test_a_contradicting_closure_is_rejected_and_no_other(chain: ErrorChain) -> None:
     known = closures(chain, 16)
     spread = known.residual_covariance(chain)
     assert contradicted_places(spread, known, 1e-6) == set()
@@ -135,7 +135,7 @@ def test_what_contradicts_the_rest_is_found_and_nothing_else(chain: ErrorChain) 
     }
 
 
-def test_where_two_contradict_each_other_neither_is_believed(chain: ErrorChain) -> None:
+def test_of_two_contradicting_closures_both_are_rejected(chain: ErrorChain) -> None:
     first = closures(chain, 2)
     twice = Closures(
         sums_of(np.repeat(dense(first.by_error, chain), 2, 2)),
@@ -144,11 +144,11 @@ def test_where_two_contradict_each_other_neither_is_believed(chain: ErrorChain) 
         np.array([0, 1, 0, 1]),
     )
     spread = twice.residual_covariance(chain)
-    assert np.sqrt(spread[0, 0]) > 2.0, "the motion alone would believe either"
+    assert np.sqrt(spread[0, 0]) > 2.0, "motion alone would accept either"
     assert contradicted_places(spread, twice, 1e-6) == {0, 1}
 
 
-def test_values_between_knots_are_linear() -> None:
+def test_values_between_knots_are_interpolated_linearly() -> None:
     at = np.array([0, 10, 10, 20])
     got = interpolated(np.array([0, 5, 10, 15, 20, 25]), at, np.array([[0.0], [1.0], [1.0], [3.0]]))
     np.testing.assert_allclose(got[:5, 0], [0, 0.5, 1, 2, 3])

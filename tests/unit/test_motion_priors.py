@@ -1,4 +1,4 @@
-"""The priors of motion against simulated motion: the stride law, derivatives, spacing, drift."""
+"""The priors of motion against simulated motion: the law of strides, derivatives, spacing, drift."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ FRAMES = 6000
 def white_jerk(seed: int, frames: int = FRAMES) -> Float:
     """Return poses whose third differences from frame to frame are independent, 1 σ ``SIGMA``."""
     third = np.random.default_rng(seed).standard_normal((frames, 6)) * SIGMA
-    # Turns only about as far as a vector of rotation adds up.
+    # Rotations are kept so small that rotation vectors add up.
     third[:, 3:] -= third[:, 3:].mean(0)
     return poses(np.cumsum(np.cumsum(np.cumsum(third, 0), 0), 0))
 
@@ -37,38 +37,38 @@ def poses(path: Float) -> Float:
 
 
 def learned(stride: int) -> Float:
-    """Return what every ``stride``-th frame shows of the process, relative to what it was made with."""
+    """Return the process noise estimated from every ``stride``-th frame over the true one."""
     T_pc = white_jerk(1)
     return third_difference_sigma(T_pc, TIME_S, np.arange(0, FRAMES, stride))[:3] / SIGMA[:3]
 
 
 @pytest.mark.parametrize("stride", [1, 2, 3, 5])
-def test_every_stride_shows_the_same_process(stride: int) -> None:
-    error = 1.2 / np.sqrt(FRAMES / (3 * stride - 2))  # a robust 1 σ of values that overlap
+def test_every_stride_gives_the_same_process_noise(stride: int) -> None:
+    error = 1.2 / np.sqrt(FRAMES / (3 * stride - 2))  # robust 1 σ of overlapping values
     np.testing.assert_allclose(learned(stride), 1, atol=4 * error)
 
 
 @pytest.mark.parametrize("power", [2.0, 2.5])
-def test_a_power_of_the_stride_would_be_refused(power: float) -> None:
-    """At stride 2, σ × stride² and σ × stride^2.5 are 12 % and 27 % off: the test above can tell."""
+def test_a_power_law_of_the_stride_would_fail(power: float) -> None:
+    """At stride 2, σ × stride² and σ × stride^2.5 are 12 % and 27 % off: the test above would notice."""
     found = np.mean(learned(2)) * third_difference_growth(2) / 2**power
     assert abs(found - 1) > 0.08
 
 
 @pytest.mark.parametrize("stride", range(1, 9))
-def test_growth_is_the_length_of_the_running_sums_taken_three_times(stride: int) -> None:
+def test_growth_is_the_norm_of_the_threefold_running_sums(stride: int) -> None:
     one = np.ones(stride)
     thrice = np.convolve(np.convolve(one, one), one)
     assert third_difference_growth(stride) == pytest.approx(np.linalg.norm(thrice))
 
 
-def test_few_frames_show_nothing() -> None:
+def test_few_frames_give_no_estimate() -> None:
     np.testing.assert_array_equal(
         third_difference_sigma(white_jerk(2, 60), TIME_S, np.arange(0, 35, 5)), LOOSE
     )
 
 
-def test_outliers_do_not_loosen_the_motion() -> None:
+def test_outliers_do_not_loosen_the_prior_of_motion() -> None:
     T_pc = white_jerk(3)
     T_pc[::50, :3, 3] += 40.0
     np.testing.assert_allclose(
@@ -77,7 +77,7 @@ def test_outliers_do_not_loosen_the_motion() -> None:
 
 
 @pytest.mark.parametrize("stride", [1, 2])
-def test_trembling_is_told_from_motion(stride: int) -> None:
+def test_vibration_is_distinguished_from_motion(stride: int) -> None:
     shake = np.array([0.5, 0.4, 0.3, 2e-3, 3e-3, 1e-3])
     T_pc, known = white_jerk(5), np.arange(0, FRAMES, stride)
     assert trembling(T_pc, TIME_S, known)[:3].max() < 0.05 * shake[:3].max()
@@ -88,8 +88,8 @@ def test_trembling_is_told_from_motion(stride: int) -> None:
     np.testing.assert_allclose(trembling(turned, TIME_S, known)[3:] / shake[3:], 1, atol=4 * error)
 
 
-def test_lost_pictures_neither_tremble_nor_loosen_the_motion() -> None:
-    """With one picture in five lost, differences by number alone made a camera tremble that stood firm."""
+def test_lost_pictures_are_no_vibration_and_do_not_loosen_the_prior() -> None:
+    """With one picture in five lost, differences by number made a steady camera seem to vibrate."""
     turning = np.zeros((200, 6))
     turning[:, :] = np.sin(np.arange(200)[:, None] / 25) * [3, 3, 3, 0.02, 0.02, 0.02]
     kept = np.arange(200)[np.arange(200) % 5 != 3]
@@ -117,7 +117,7 @@ def test_rows_are_third_differences_with_their_derivatives() -> None:
 
 
 def late_by(sigma: Float, path: Float, time_s: Float) -> float:
-    """Return by how many σ pictures seem late where every fourth tells without noise where the probe is."""
+    """Return by how many σ pictures seem late; every fourth picture shows the position without noise."""
     rows = smooth_motion_rows(poses(path), time_s, sigma, 0)
     along, frames = slice(2, None, 6), len(time_s)
     prior = np.zeros((frames - 3, frames))
@@ -134,7 +134,7 @@ def late_by(sigma: Float, path: Float, time_s: Float) -> float:
 
 
 def test_a_probe_that_turns_back_does_not_seem_to_be_late() -> None:
-    """Speeds of a rendered gauge run, 32, -20, 14 and 39 mm/s, each reached as a motor reaches its speed."""
+    """Speeds of a rendered gauge run, 32, -20, 14 and 39 mm/s, each reached as a motor does."""
     time_s = np.arange(216) / 30
     speed = np.full(216, 32.0)
     for start_s, change in ((3.1, -52.0), (4.3, 34.0), (5.1, 25.0)):
@@ -146,7 +146,7 @@ def test_a_probe_that_turns_back_does_not_seem_to_be_late() -> None:
     assert abs(late_by(usual, path, time_s)) > 2
 
 
-def test_where_a_probe_jerks_its_motion_may_jerk() -> None:
+def test_where_a_probe_jerks_the_prior_allows_jerks() -> None:
     time_s = np.arange(30.0)
     path = np.zeros((30, 6))
     path[15:, 2] = 7.0 * (time_s[15:] - 14)
@@ -156,7 +156,7 @@ def test_where_a_probe_jerks_its_motion_may_jerk() -> None:
     assert np.max(rows.residual**2 * rows.weight) <= 1
 
 
-def test_drift_is_the_change_of_slip_and_jumps_weigh_little() -> None:
+def test_drift_is_the_change_of_slip_and_jumps_have_little_weight() -> None:
     slip = np.array([0.0, 0.01, 0.02, 5.0, 5.01])
     rows = slip_drift_rows(slip, 0.02, 3)
     np.testing.assert_allclose(rows.residual, np.diff(slip))

@@ -56,7 +56,7 @@ def check_rows(
         for i in range(7):
             wanted = slope(lambda s: make(s).residual, state, frame=(f, i))
             got = np.sum(np.where(rows.frame == f, rows.by_frame[:, :, i], 0.0), 1)
-            atol = frame_atol * (60 if 3 <= i < 6 else 1)  # lever arm of a turn, mm
+            atol = frame_atol * (60 if 3 <= i < 6 else 1)  # lever arm of a rotation, mm
             np.testing.assert_allclose(got, wanted, atol=atol, err_msg=f"frame {f} coordinate {i}")
     for b in range(state.border_size):
         wanted = slope(lambda s: make(s).residual, state, border=b)
@@ -70,7 +70,7 @@ def test_steps_of_the_bore_are_found_and_the_wall_follows_them(given) -> None:
     radius_mm = np.where(at_mm < 32, wavy, wavy - 2.0)
     radius_mm[[7, 41]] = np.nan, 70.0
     order = random.permutation(100)
-    assert not len(Bore.of(wavy, at_mm).at_mm), "the control: a pipe of one bore has none"
+    assert not len(Bore.of(wavy, at_mm).at_mm), "control: a pipe of one bore has none"
     steps = Bore.of(radius_mm[order], at_mm[order])
     assert steps.at_mm == pytest.approx([32.0])
     assert steps.wider_mm == pytest.approx([2.0, 0.0], abs=0.3)
@@ -82,8 +82,8 @@ def test_steps_of_the_bore_are_found_and_the_wall_follows_them(given) -> None:
     np.testing.assert_allclose(apart, np.where(to_pipe(state.axis, wall)[0] > 30, 2.0, 0.0), atol=1e-9)
 
 
-def test_relief_of_the_wall_does_not_pull_on_the_instrument() -> None:
-    """Rings of a rough wall, seen by the true probe: residual and derivative may have nothing in common."""
+def test_relief_of_the_wall_does_not_pull_the_instrument() -> None:
+    """Rings of a rough wall and a true probe: residual and derivative must be uncorrelated."""
     random, azimuth = np.random.default_rng(4), np.linspace(-np.pi, np.pi, 720, endpoint=False)
     probe, rough_mm, frames = stated_probe(), 1.0, 60
     radius_mm = 50 + rough_mm * random.standard_normal((frames, len(azimuth)))
@@ -101,17 +101,17 @@ def test_relief_of_the_wall_does_not_pull_on_the_instrument() -> None:
     normal_c /= np.linalg.norm(normal_c, axis=1)[:, None]
 
     def pull(by_instrument: Float) -> Float:
-        """Return by how many σ the residuals pull on each correction."""
+        """Return by how many σ the residuals pull each correction."""
         score = off[:, None] * np.einsum("mj,mjq->mq", normal_c, by_instrument)
         return np.abs(score.sum(0)) / np.sqrt(np.sum(score**2, 0))
 
     assert pull(bins.instrument_where_expected(off, normal_c)).max() < 3.5
-    assert pull(bins.by_instrument).max() > 5, "the control: derivatives at the found ring pull"
+    assert pull(bins.by_instrument).max() > 5, "control: derivatives at the measured ring pull"
 
 
 def test_ring_rows(given) -> None:
     measured, state = given
-    # The axis' frames turn a little with its deflection, which the derivative leaves out.
+    # The frames of the axis rotate a little with its deflection, which the derivative neglects.
     check_rows(lambda s: residuals.ring_rows(s, measured.rings, GemanMcClure(0.1)), state, 0.02, 2e-4)
 
 
@@ -133,7 +133,7 @@ def test_ring_rows_in_a_taper(given) -> None:
     for b in range(first, state.border_size):
         wanted = slope(lambda s: rows(s, taper).residual - rows(s, held).residual, state, border=b)
         np.testing.assert_allclose(follow[:, b], wanted, atol=1e-5, err_msg=f"border {b}")
-    assert np.abs(follow).max() > 1e-3, "the control: widths follow the instrument"
+    assert np.abs(follow).max() > 1e-3, "control: widths follow the instrument"
 
 
 def test_encoder_rows(given) -> None:
@@ -152,7 +152,7 @@ def test_turn_rows(given) -> None:
 
 
 def test_view_rows(given) -> None:
-    # The pipe turns with its axis by 1/30 rad per mm of a knot: without it steps end beside the optimum.
+    # The frame rotates with its axis by 1/30 rad per mm of a knot: otherwise steps end beside the optimum.
     check_rows(residuals.view_rows, given[1], 0.004, frame_atol=1e-3)
 
 
@@ -164,7 +164,7 @@ def test_axis_and_prior_rows(given) -> None:
 def test_smooth_rows(given) -> None:
     measured, state = given
     make = lambda s: smooth_motion_rows(s.T_pc, measured.time_s, measured.smooth_sigma, s.border_size)  # noqa: E731
-    # Rotations are taken as a vector space here: exact to the rotation between neighbours, about 0.03 rad.
+    # Rotations are treated as a vector space, exact to the rotation between neighbours, about 0.03 rad.
     check_rows(make, state, 1e-9, frame_atol=0.1 / 60)
     rows = make(state)
     for i in range(3):
@@ -173,7 +173,7 @@ def test_smooth_rows(given) -> None:
         np.testing.assert_allclose(got, wanted, atol=1e-6)
 
 
-def test_third_difference_is_blind_to_parabolas_at_any_spacing() -> None:
+def test_third_differences_ignore_parabolas_at_any_spacing() -> None:
     t = np.array([[0.0, 0.1, 0.25, 0.3], [1.0, 2.0, 3.0, 4.0]])
     coefficient = third_difference_coefficients(t)
     np.testing.assert_allclose(coefficient[1], [-1, 3, -3, 1], atol=1e-12)
@@ -234,11 +234,11 @@ def test_a_landmark_behind_the_lens_is_left_out(given) -> None:
     assert np.all(rows.by_pose[astray] == 0)
     assert np.all(rows.by_point[astray] == 0)
     stayed = landmark_rows(state, measured, MotionParameters())
-    assert rows.cost > stayed.cost, "or the adjustment would gain by losing landmarks"
+    assert rows.cost > stayed.cost, "otherwise the adjustment would gain by losing landmarks"
 
 
-def test_lines_mirrored_far_away_do_not_draw_the_circle() -> None:
-    """Mirrored in standing water, a third of the line lay up to 9 m away: motion tracked a pipe 1 m wide."""
+def test_distant_mirrored_points_do_not_pull_the_circle() -> None:
+    """Reflected in standing water, a third of the line lay up to 9 m away: motion saw a pipe 1 m wide."""
     azimuth = np.linspace(-np.pi, np.pi, 360, endpoint=False)
     radius = np.where(azimuth > np.pi / 3, np.random.default_rng(1).uniform(50, 9000, 360), 50.0)
     xyz = np.stack([3 + radius * np.cos(azimuth), radius * np.sin(azimuth), 0 * azimuth], -1)
@@ -249,8 +249,8 @@ def test_lines_mirrored_far_away_do_not_draw_the_circle() -> None:
     np.testing.assert_allclose(circles.centre_c, [[3, 0]] * 3, atol=0.1)
 
 
-def test_a_ring_mirrored_in_water_is_the_circle_of_the_part_above() -> None:
-    """With 40 % of the line mirrored, circles came out 9 % too wide and 5 mm aside."""
+def test_the_circle_of_a_ring_mirrored_in_water_is_that_of_its_upper_part() -> None:
+    """With 40 % of the line mirrored, circles were 9 % too wide and 5 mm off."""
     azimuth = np.linspace(-np.pi, np.pi, 1440, endpoint=False)
     xy = seen_above_water(azimuth, radius=50.0, centre_y=-2.0, water_y=9.0)
     xyz = np.concatenate([xy, np.zeros((1440, 1))], -1)

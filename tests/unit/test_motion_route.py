@@ -38,16 +38,16 @@ def across_sigma(found: Trajectory) -> float:
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_a_straight_pipe_whose_camera_drifts_comes_back_straight(seed: int) -> None:
+def test_a_straight_pipe_stays_straight_although_the_camera_drifts(seed: int) -> None:
     run = chain(STRAIGHT, (0.94e-5, 0.0), seed)
-    assert aside(run.seen, run)[-1] > 30e3, "the control: by vision alone it is tens of metres aside"
+    assert aside(run.seen, run)[-1] > 30e3, "control: by vision alone it is off by tens of metres"
     found = laid(run)
     assert [p.kind for p in found.pieces] == ["straight"]
     assert aside(found, run)[-1] < 500
     assert aside(found, run)[-1] < 3 * across_sigma(found)
 
 
-def test_beside_the_axis_nothing_moves() -> None:
+def test_positions_relative_to_the_axis_stay() -> None:
     run = chain(STRAIGHT, (0.94e-5, 0.0))
     found = laid(run)
     for k in (0, 700, 1999):
@@ -72,15 +72,15 @@ def test_bends_are_found_with_angle_radius_and_standard() -> None:
     assert aside(found, run)[-1] < 3 * across_sigma(found)
 
 
-def test_a_long_curve_passes_for_straight_unless_an_imu_tells() -> None:
+def test_a_long_curve_is_taken_for_straight_without_an_imu() -> None:
     run = chain(curved((1e5, 1.0, 0.5)), (0.94e-5, 0.0), 1, rest_s=20.0)
-    assert aside(laid(run), run)[-1] > 20e3, "the control: without an IMU nothing tells it from a drift"
+    assert aside(laid(run), run)[-1] > 20e3, "control: without an IMU it looks like a drift"
     found = laid(run, drawn_imu(run, MOUNT, UP, 1), mount=MOUNT)
     assert aside(found, run)[-1] < 1000
     assert aside(found, run)[-1] < 3 * across_sigma(found)
 
 
-def test_gravity_turns_the_clock_upright() -> None:
+def test_gravity_gives_clock_positions_their_vertical() -> None:
     up = np.array([np.sin(0.7), -np.cos(0.7), 0.0])
     run = chain(BENT, seed=2, rest_s=5.0)
     mount = replace(MOUNT, accelerometer_bias=0.01)
@@ -89,7 +89,7 @@ def test_gravity_turns_the_clock_upright() -> None:
     np.testing.assert_allclose((turn @ up)[:2], [0.0, -1.0], atol=0.01)
 
 
-def test_an_imu_that_cannot_be_right_is_refused_by_name() -> None:
+def test_an_impossible_imu_is_refused_with_its_name() -> None:
     run = chain(BENT, seed=3, rest_s=5.0)
     imu, told = drawn_imu(run, MOUNT, UP, 3), []
     alone = laid(run)
@@ -114,7 +114,7 @@ def test_a_plan_of_another_pipe_is_refused() -> None:
     assert "bend 1 turns by 45.0°" in told[1]
 
 
-def test_short_runs_stay_as_they_are() -> None:
+def test_short_runs_are_not_changed() -> None:
     run = chain(curved((2000.0, 0.0, 0.0)), (0.94e-5, 0.0))
     found = laid(run)
     np.testing.assert_array_equal(found.T_pc, run.seen.T_pc)
@@ -125,8 +125,8 @@ STRETCH = curved((12e3, 0.0, 0.0))
 
 
 @pytest.mark.parametrize(("axis", "has_imu"), [(STRETCH, False), (BENT, True)])
-def test_sigma_along_the_way_is_true_of_drawn_runs(axis: PipeAxis, has_imu: bool) -> None:
-    """Twice or half the σ fails: `python -m tests.benchmarks.bench_route` counts more runs of more kinds."""
+def test_sigma_along_the_route_is_right_for_drawn_runs(axis: PipeAxis, has_imu: bool) -> None:
+    """Twice or half the σ fails; `python -m tests.benchmarks.bench_route` counts more runs of more kinds."""
     z = []
     for seed in range(4):
         drift = 1e-5 * np.random.default_rng(seed).standard_normal(2)

@@ -1,4 +1,4 @@
-"""The whole motion stage on drawn recordings: pose within σ, and nothing found where nothing can be seen."""
+"""The whole motion stage on drawn recordings: poses within σ, and no result where nothing can be seen."""
 
 from __future__ import annotations
 
@@ -50,8 +50,8 @@ def steady() -> DrawnRun:
     return drawn_run(STEP * k, 0.004 * k)
 
 
-def test_the_report_holds_what_is_unknown_at_a_cut(steady: DrawnRun) -> None:
-    """It was made before, with σ of a run without cuts."""
+def test_the_report_includes_the_unknown_distance_at_a_cut(steady: DrawnRun) -> None:
+    """The report was made earlier, with σ of a run without cuts."""
     told: dict[str, object] = {}
     context = replace(quiet_context(), report=lambda name, value, unit="": told.update({name: value}))
     run = steady
@@ -64,7 +64,7 @@ def test_the_report_holds_what_is_unknown_at_a_cut(steady: DrawnRun) -> None:
 
 
 @pytest.mark.parametrize("encoder", [True, False])
-def test_pose_lies_within_its_sigma(steady: DrawnRun, encoder: bool) -> None:
+def test_poses_are_within_their_sigma(steady: DrawnRun, encoder: bool) -> None:
     run = steady if encoder else without_encoder(steady)
     got = estimated(run)
     z, roll, sigma = errors(got, run)
@@ -87,22 +87,24 @@ def reduced() -> DrawnRun:
 
 
 @pytest.mark.parametrize("encoder", [True, False])
-def test_a_reducer_is_told_and_nothing_else_is_blamed(reduced: DrawnRun, encoder: bool) -> None:
-    """Taken for one bore, distance was 6 mm off, and encoder and lens were named."""
+def test_a_reducer_is_reported_and_nothing_else_is_blamed(reduced: DrawnRun, encoder: bool) -> None:
+    """Taken for one bore, distance was 6 mm off, and encoder and lens were blamed."""
     run = reduced if encoder else without_encoder(reduced)
     told: list[str] = []
     got = estimated(run, replace(quiet_context(), warn=told.append))
     z, roll, sigma = errors(got, run)
     assert abs(z[-1]) < 3 * sigma[-1, 0]
-    assert 0.2 < sigma[-1, 0] < 0.02 * STEP * 64, "σ holds what texture on a slope may be off by"
+    assert 0.2 < sigma[-1, 0] < 0.02 * STEP * 64, "σ includes the error of texture on a slope"
     assert abs(roll[-1]) < 3 * sigma[-1, 1] + 1e-3
     assert len(told) == 1
     assert "width changes by 15.0 mm" in told[0]
 
 
 @pytest.mark.parametrize("wrong", [1.0, 1.05])
-def test_encoder_of_another_scale_is_told_and_pulls_no_distance(steady: DrawnRun, wrong: float) -> None:
-    """Its scale is stated to .2 %: at 5 %, distance followed it by 4 of its stated σ, without a word."""
+def test_an_encoder_with_another_scale_is_reported_and_does_not_pull_distances(
+    steady: DrawnRun, wrong: float
+) -> None:
+    """Its scale is stated to .2 %: at 5 %, distance followed it by 4 of its stated σ, without a message."""
     reading = steady.recording.encoder
     assert reading is not None
     encoder = replace(reading, distance_mm=wrong * reading.distance_mm)
@@ -115,22 +117,24 @@ def test_encoder_of_another_scale_is_told_and_pulls_no_distance(steady: DrawnRun
     assert any("wheel" in words for words in told) == (wrong != 1)
 
 
-def test_the_diagnosis_takes_the_same_way_as_the_run(steady: DrawnRun) -> None:
-    """Measured without the encoder and adjusted at once, a short run is what the stage makes of it."""
+def test_the_diagnosis_uses_the_same_distances_as_the_run(steady: DrawnRun) -> None:
+    """Measured without the encoder and adjusted in one piece, a short run equals the result of the stage."""
     parts = steady.recording, steady.probe, steady.rings, steady.points, PARAMETERS, quiet_context()
     run = measure_run(*parts, use_encoder=False)
     assert run.encoder is None
-    assert measure_run(*parts).encoder is not None, "the control: it has one"
+    assert measure_run(*parts).encoder is not None, "control: it has an encoder"
     measured = run.measured(run.whole, PARAMETERS)
     start, frames = run.start(run.whole, measured, PARAMETERS), steady.recording.frames
     got = adjust_at_once(start, measured, frames, run.texture.grid.radius_mm, PARAMETERS, quiet_context())
     wanted = estimated(without_encoder(steady))
     assert got.trajectory.T_pc.tobytes() == wanted.T_pc.tobytes()
     assert got.trajectory.covariance.tobytes() == wanted.covariance.tobytes()
-    assert got.trajectory.T_pc.tobytes() != estimated(steady).T_pc.tobytes(), "the control: the encoder tells"
+    assert got.trajectory.T_pc.tobytes() != estimated(steady).T_pc.tobytes(), (
+        "control: the encoder makes a difference"
+    )
 
 
-def test_an_adjustment_that_leaves_the_rings_is_refused(steady: DrawnRun) -> None:
+def test_an_adjustment_that_departs_from_the_rings_is_refused(steady: DrawnRun) -> None:
     points = steady.recording, steady.probe, steady.rings, steady.points
     run = measure_run(*points, PARAMETERS, quiet_context(), use_encoder=False)
     measured = run.measured(run.whole, PARAMETERS)
@@ -139,9 +143,9 @@ def test_an_adjustment_that_leaves_the_rings_is_refused(steady: DrawnRun) -> Non
         adjust_at_once(start, measured, frames, 60.0, PARAMETERS, quiet_context())
 
 
-def test_distance_0_and_roll_0_are_the_first_camera(steady: DrawnRun) -> None:
+def test_distance_and_roll_are_zero_at_the_first_camera(steady: DrawnRun) -> None:
     got = estimated(steady)
-    assert got.T_pc[0, 2, 3] == pytest.approx(0, abs=0.005)  # z is square to a pipe that bends a little
+    assert got.T_pc[0, 2, 3] == pytest.approx(0, abs=0.005)  # not exactly 0, as the pipe bends a little
     assert roll_of(got.T_pc)[0] == pytest.approx(0, abs=1e-3)
     np.testing.assert_allclose(
         got.T_pc[:, :3, :3] @ np.swapaxes(got.T_pc[:, :3, :3], 1, 2),
@@ -150,7 +154,7 @@ def test_distance_0_and_roll_0_are_the_first_camera(steady: DrawnRun) -> None:
     )
 
 
-def test_same_recording_same_bytes(steady: DrawnRun) -> None:
+def test_the_same_recording_gives_the_same_bytes(steady: DrawnRun) -> None:
     first, second = estimated(steady), estimated(steady)
     assert first.T_pc.tobytes() == second.T_pc.tobytes()
     assert first.covariance.tobytes() == second.covariance.tobytes()
@@ -159,7 +163,7 @@ def test_same_recording_same_bytes(steady: DrawnRun) -> None:
 @pytest.mark.parametrize("window", [800, 44])
 def test_stop_and_reversal_are_followed_without_encoder(window: int) -> None:
     step = np.concatenate([np.full(14, STEP), np.zeros(28), np.full(14, -STEP), np.full(8, STEP)])
-    step = np.convolve(np.pad(step, 4, mode="edge"), np.hanning(11)[1:-1] / 5, mode="valid")  # no jerks
+    step = np.convolve(np.pad(step, 4, mode="edge"), np.hanning(11)[1:-1] / 5, mode="valid")  # without jerks
     run = drawn_run(np.concatenate([[0], np.cumsum(step)]), np.zeros(len(step) + 1), encoder=False)
     got = estimated(run, window_frames=window, overlap_frames=20)
     z, _, sigma = errors(got, run)
@@ -167,40 +171,40 @@ def test_stop_and_reversal_are_followed_without_encoder(window: int) -> None:
     assert {"stop", "reversal"} <= {e.kind for e in got.events}
 
 
-def test_roll_is_not_invented_on_a_plain_wall(steady: DrawnRun) -> None:
+def test_no_roll_is_found_on_a_plain_wall(steady: DrawnRun) -> None:
     k = np.arange(36)
     run = drawn_run(STEP * k, 0.004 * k, contrast=0.0)
     got = estimated(run)
     _, _, sigma = errors(got, run)
     known = errors(estimated(steady), steady)[2]
     found = roll_of(got.T_pc)
-    assert abs(found[-1] - found[0]) < sigma[-1, 1], "there is nothing to see it by"
+    assert abs(found[-1] - found[0]) < sigma[-1, 1], "nothing shows it"
     assert sigma[-1, 1] > 10 * known[-1, 1]
     assert sigma[-1, 1] > sigma[4, 1]
     assert abs(found[-1] - found[0] - 0.004 * 35) < 3 * sigma[-1, 1]
 
 
-def test_a_stationary_probe_yields_no_distance() -> None:
+def test_a_probe_at_rest_gives_no_distance() -> None:
     run = drawn_run(np.zeros(24), np.zeros(24), encoder=False)
     got = estimated(run)
     assert np.ptp(got.T_pc[:, 2, 3]) < 0.1
     assert "stop" in {e.kind for e in got.events}
 
 
-def test_neither_texture_nor_encoder_is_refused() -> None:
+def test_a_run_with_neither_texture_nor_encoder_is_refused() -> None:
     run = drawn_run(STEP * np.arange(24), np.zeros(24), contrast=0.0, encoder=False)
     with pytest.raises(UnusableError, match="no encoder"):
         estimated(run)
 
 
-def test_no_rings_are_refused(steady: DrawnRun) -> None:
+def test_a_run_without_rings_is_refused(steady: DrawnRun) -> None:
     blind = np.full_like(steady.points.xyz_c, np.nan)
     points = type(steady.points)(**{**vars(steady.points), "xyz_c": blind})
     with pytest.raises(UnusableError, match="0 laser frames"):
         estimate_motion(steady.recording, steady.probe, steady.rings, points, PARAMETERS, quiet_context())
 
 
-def test_text_burnt_in_is_not_followed() -> None:
+def test_burnt_in_text_is_not_tracked() -> None:
     k = np.arange(72)
     run = drawn_run(STEP * k, 0.004 * k, encoder=False)
     sign = np.sign(np.random.default_rng(3).standard_normal((20, 100))).astype(np.float32)
@@ -216,7 +220,7 @@ def test_text_burnt_in_is_not_followed() -> None:
     assert "burnt-in" in told[0]
     z, _, sigma = errors(estimated(replace(run, recording=replace(run.recording, stays=stays))), run)
     assert abs(z[-1]) < 3 * sigma[-1, 0] + 0.02
-    assert abs(followed) > 0.2 * STEP * k[-1], "the control: text is followed as if it were the wall"
+    assert abs(followed) > 0.2 * STEP * k[-1], "control: text is tracked as if it were the wall"
 
 
 @pytest.mark.parametrize(("turned_deg", "wrong"), [(30, False), (80, True)])
@@ -235,7 +239,7 @@ def test_a_camera_that_looks_at_the_wall_ends_the_run(
         require_along_pipe(replace(got, T_pc=T_pc))
 
 
-def test_where_texture_is_lost_the_camera_goes_on_looking_along_the_pipe(
+def test_where_texture_is_lost_the_camera_keeps_looking_along_the_pipe(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     k = np.arange(100)
@@ -253,11 +257,11 @@ def test_where_texture_is_lost_the_camera_goes_on_looking_along_the_pipe(
 
     assert lean_deg() < 1.5
     monkeypatch.setattr(residuals, "_VIEW_RAD", 1e3)
-    assert lean_deg() > 2, "the control: it turns on"
+    assert lean_deg() > 2, "control: it keeps turning"
 
 
-def test_what_does_not_agree_is_followed_anew() -> None:
-    """Matches that go astray a little more in each frame must not end the tracking."""
+def test_matches_that_do_not_agree_are_replaced() -> None:
+    """Matches whose error grows a little in each frame must not end the tracking."""
     grid = StripGrid(RADIUS, 400, 12.0, 60.0)
     tracker = TextureTracker(small_probe(), grid, PARAMETERS, Hidden())
     strip = np.random.default_rng(0).standard_normal((80, 400)).astype(np.float32)
@@ -272,4 +276,4 @@ def test_what_does_not_agree_is_followed_anew() -> None:
     tracker._record(found, seen, 1)
     assert found.lost
     assert tracker._map.retired.all()
-    assert not replace(found, offset=0 * away).lost, "the control: these agree"
+    assert not replace(found, offset=0 * away).lost, "control: these agree"

@@ -1,4 +1,4 @@
-"""Patch matching against plain NumPy, and strips of a drawn pipe against the pipe."""
+"""Patch matching against plain NumPy, and strips of a drawn pipe against the true pipe."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ HALF = 8
 
 
 def texture(shape: tuple[int, int] = (90, 240), seed: int = 0, finest: float = 2.0) -> Float32:
-    """Return texture that goes on round the columns."""
+    """Return texture that is periodic in the columns."""
     white = np.random.default_rng(seed).standard_normal(shape).astype(np.float32)
     wide = np.concatenate([white[:, -40:], white, white[:, :40]], 1)
     return cv2.GaussianBlur(wide, (0, 0), finest)[:, 40:-40] * 3
 
 
 def shifted(image: Float32, rows: float, columns: float) -> Float32:
-    """Move an image by a broken number of pixels, exactly, through its spectrum."""
+    """Move an image by a fractional number of pixels, exactly, through its spectrum."""
     k, m = np.fft.fftfreq(image.shape[0])[:, None], np.fft.fftfreq(image.shape[1])
     turn = np.exp(-2j * np.pi * (k * rows + m * columns))
     return np.real(np.fft.ifft2(np.fft.fft2(image) * turn)).astype(np.float32)
@@ -47,7 +47,7 @@ def look(image, row, column, side):
 
 
 def plain_match(image, value, by_row, by_column, inverse, row, column, steps=30):
-    """Return offset and correlation of one patch, written as in the paper."""
+    """Return offset and correlation of one patch, by the formula of the paper."""
     at, step = np.zeros(2), np.ones(2)
     for _ in range(steps + 1):
         seen = look(image, row + at[0], column + at[1], len(value))
@@ -59,7 +59,7 @@ def plain_match(image, value, by_row, by_column, inverse, row, column, steps=30)
     return at, np.sum(value * seen) / np.sqrt(np.sum(value**2) * np.sum(seen**2))
 
 
-def test_match_is_the_plain_one() -> None:
+def test_the_match_agrees_with_the_plain_formula() -> None:
     image = texture()
     random = np.random.default_rng(1)
     row, column = random.integers(25, 65, 20), random.integers(0, 240, 20)
@@ -75,7 +75,7 @@ def test_match_is_the_plain_one() -> None:
 
 
 @pytest.mark.parametrize(("gain", "offset"), [(1.0, 0.0), (0.6, 0.3)])
-def test_shift_is_found_within_sigma(gain: float, offset: float) -> None:
+def test_a_shift_is_found_within_sigma(gain: float, offset: float) -> None:
     random = np.random.default_rng(2)
     image, noise = texture(finest=2.5), 0.05
     there = gain * shifted(image, 0.37, -0.81) + offset
@@ -87,14 +87,15 @@ def test_shift_is_found_within_sigma(gain: float, offset: float) -> None:
     found = patches.match(there, np.ones(image.shape, bool), row.astype(float), column.astype(float))
     error = (found.offset - [0.37, -0.81]) / found.sigma[:, None]
     assert np.all(found.correlation > 0.9)
-    # Looking between samples averages their noise, so that σ, taken from what is left, is low by this factor;
+    # Interpolation between samples averages their noise, so that σ, taken from the residual, is low by this
+    # factor;
     # the adjustment scales σ by what the residuals show.
     averaged = np.sqrt((0.37**2 + 0.63**2) * (0.19**2 + 0.81**2))
     assert 0.7 < np.sqrt(np.median(error**2)) / 0.6745 * averaged < 1.3
     assert np.all(np.abs(error.mean(0)) < 4 / np.sqrt(len(error)) + 0.3)
 
 
-def test_patches_that_leave_the_strip_or_meet_unusable_pixels_are_lost() -> None:
+def test_patches_that_leave_the_strip_or_contain_unusable_pixels_are_lost() -> None:
     image = texture()
     usable = np.ones(image.shape, bool)
     usable[50:55, 100:105] = False
@@ -103,14 +104,14 @@ def test_patches_that_leave_the_strip_or_meet_unusable_pixels_are_lost() -> None
     np.testing.assert_array_equal(np.isfinite(found.offset[:, 0]), [True, False, False, True])
 
 
-def test_another_texture_is_not_taken_for_the_patch() -> None:
+def test_another_texture_does_not_match() -> None:
     row, column = np.full(12, 45), 20 * np.arange(12)
     patches = cut(texture(seed=0), row, column, HALF)
     found = patches.match(texture(seed=9), np.ones((90, 240), bool), row.astype(float), column.astype(float))
     assert not np.any(found.correlation > 0.8)
 
 
-def test_sample_is_a_bilinear_look_up() -> None:
+def test_sampling_is_bilinear() -> None:
     random = np.random.default_rng(3)
     image = cv2.GaussianBlur(random.integers(0, 255, (60, 80)).astype(np.uint8), (0, 0), 2)
     coarse = np.stack(np.meshgrid(np.linspace(3, 70, 11), np.linspace(4, 50, 8)), -1).astype(np.float32)
@@ -123,10 +124,10 @@ def test_sample_is_a_bilinear_look_up() -> None:
     ]
     wanted = cv2.remap(image.astype(np.float32), uv[0], uv[1], cv2.INTER_LINEAR)
     assert seen.all()
-    np.testing.assert_allclose(grey, wanted, atol=0.3)  # cv2 rounds places to 1/32 px
+    np.testing.assert_allclose(grey, wanted, atol=0.3)  # cv2 rounds positions to 1/32 px
 
 
-def test_sample_tells_what_lies_outside() -> None:
+def test_sampling_marks_what_lies_outside() -> None:
     coarse = np.stack(np.meshgrid(np.linspace(-20, 100, 11), np.linspace(-20, 80, 8)), -1).astype(np.float32)
     grey, seen = sample(np.full((60, 80), 9, np.uint8), coarse, (8, 4))
     assert 0 < seen.mean() < 1
@@ -143,14 +144,14 @@ def pose(roll: float = 0.2, z: float = 7.0):
 
 
 def true_contrast(strip: Strip, wall: StripGrid) -> Float32:
-    """Return the wall's own reflectance on the strip over the mean of each row."""
+    """Return the wall's reflectance on the strip over the mean of each row."""
     row, column = np.meshgrid(*(np.arange(n) for n in strip.contrast.shape), indexing="ij")
     xyz = wall.wall(strip.first_row + row, column)
     own = reflectance(xyz[..., 2], np.arctan2(xyz[..., 1], xyz[..., 0]))[..., 1].astype(np.float32)
     return (own / own.mean(1, keepdims=True) - 1).astype(np.float32)
 
 
-def test_unrolled_texture_lies_where_the_wall_has_it() -> None:
+def test_unrolled_texture_is_at_its_place_on_the_wall() -> None:
     probe, wall = small_probe(), grid()
     image = draw(probe, pose())[..., 1]
     strip = unroll(image, probe, pose(), wall, Hidden())
@@ -163,7 +164,7 @@ def test_unrolled_texture_lies_where_the_wall_has_it() -> None:
     assert max(abs(dx), abs(dy)) < 0.5
 
 
-def test_a_plain_wall_seen_from_off_the_axis_is_even_but_for_wrong_lamps() -> None:
+def test_a_plain_wall_seen_off_the_axis_is_uniform_except_for_errors_of_the_lamps() -> None:
     probe, wall = small_probe(), grid()
     T = from_parts(np.eye(3), np.array([3.0, -2.0, 7.0]))
     light = led_light(probe, T, wall_hits(probe, T))
@@ -175,7 +176,7 @@ def test_a_plain_wall_seen_from_off_the_axis_is_even_but_for_wrong_lamps() -> No
     assert np.abs(uneven.contrast[uneven.usable]).max() > 2 * np.abs(even.contrast[even.usable]).max()
 
 
-def test_patches_are_looked_for_only_where_they_may_err_and_still_be_seen_whole() -> None:
+def test_the_search_range_of_patches_is_that_of_possible_errors_within_the_view() -> None:
     probe, wall = small_probe(), grid()
     strip = unroll(softened(draw(probe, pose())[..., 1]), probe, pose(), wall, Hidden((20.0, 24.0)))
     tracker = TextureTracker(
@@ -189,7 +190,7 @@ def test_patches_are_looked_for_only_where_they_may_err_and_still_be_seen_whole(
     assert not tracker._in_view(strip, np.array([[-4.0, 100.0], [len(row) + 2.0, 100.0]])).any()
 
 
-def test_the_strip_knows_the_pixels_it_looked_at() -> None:
+def test_the_strip_knows_which_pixels_it_was_sampled_from() -> None:
     probe, wall = small_probe(), grid()
     strip = unroll(softened(draw(probe, pose())[..., 1]), probe, pose(), wall, Hidden())
     row, column = strip.first_row + np.array([5.0, 30.3, 50.9]), np.array([2.0, 100.7, 479.5])
@@ -209,7 +210,7 @@ def test_the_wall_under_the_laser_line_is_not_usable() -> None:
 
 
 def mean_shift(slope_per_px: float) -> float:
-    """Return by how many rows matches move when light falls off by ``slope_per_px`` along one strip."""
+    """Return by how many rows matches move when light falls by ``slope_per_px`` along one strip."""
     image = 100 * (1 + 0.15 * texture(seed=4, finest=2.5))
     light = np.exp(-slope_per_px * np.arange(90))[:, None]
     usable = np.ones(image.shape, bool)
@@ -234,14 +235,14 @@ def naive_shift(slope_per_px: float) -> float:
     return float(np.nanmean(found.offset[:, 0]))
 
 
-def test_a_slope_of_the_light_does_not_shift_matches() -> None:
+def test_a_gradient_of_the_light_does_not_shift_matches() -> None:
     assert abs(mean_shift(0.03)) < 0.02
-    assert abs(naive_shift(0.03)) > 0.1, "the control must be shifted, or this test shows nothing"
+    assert abs(naive_shift(0.03)) > 0.1, "the control must be shifted, otherwise this test shows nothing"
 
 
 @pytest.mark.parametrize("px_per_sample", [0.7, 1.5])
-def test_blurred_samples_that_err_alike(px_per_sample: float) -> None:
-    """The mean of many blurred samples of noise is as unsure as that of so many fewer independent ones."""
+def test_correlated_noise_of_blurred_samples_counts_as_fewer_samples(px_per_sample: float) -> None:
+    """The mean of many blurred noise samples is as unsure as that of so many fewer independent ones."""
     blur, side = np.hypot(SOFTENING_PX / px_per_sample, 0.7), 64
     noise = np.random.default_rng(0).standard_normal((64 * side, 64 * side)).astype(np.float32)
     seen = cv2.GaussianBlur(noise, (0, 0), blur)

@@ -1,4 +1,4 @@
-"""A probe that the adjustment had to move by many σ is told of; one that it merely refined is not."""
+"""A probe that the adjustment had to change by many σ is reported; one that it merely refined is not."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def at(name: str, value: float) -> np.ndarray:
     return np.array([value if n == name else 0.0 for n in names])
 
 
-def test_moved_by_36_sigma_is_a_warning_with_the_figure() -> None:
+def test_a_probe_changed_by_36_sigma_gives_a_warning_with_the_number() -> None:
     numbers = told(probe(loose(baseline_mm=0.008, fx=0.05)), at("baseline_mm", -0.288))
     assert numbers["instrument moved by the adjustment, at most"] == pytest.approx(36)
     text = str(numbers["warning"])
@@ -64,13 +64,13 @@ def test_moved_by_36_sigma_is_a_warning_with_the_figure() -> None:
 
 
 @pytest.mark.parametrize(("times", "warned"), [(0.0, False), (2.0, False), (4.9, False), (5.1, True)])
-def test_refined_within_its_uncertainty_is_not(times: float, warned: bool) -> None:
+def test_a_probe_refined_within_its_uncertainty_gives_no_warning(times: float, warned: bool) -> None:
     numbers = told(probe(loose(baseline_mm=0.008, fx=0.05)), at("fx", 0.05 * times))
     assert ("warning" in numbers) is warned
 
 
-def test_a_move_against_a_known_correlation_counts_as_what_it_is() -> None:
-    """Two σ each are nothing when the two go together, and far when they are known to go together."""
+def test_a_change_against_a_known_correlation_has_the_size_that_this_implies() -> None:
+    """Two σ each are small if the correlation is right, and large against a known correlation."""
     covariance = loose(fx=0.05, fy=0.05)
     both = at("fx", 0.1) - at("fy", 0.1)
     assert "warning" not in told(probe(covariance), both)
@@ -79,7 +79,7 @@ def test_a_move_against_a_known_correlation_counts_as_what_it_is() -> None:
     assert "warning" not in told(probe(covariance), at("fx", 0.1) + at("fy", 0.1))
 
 
-def test_nothing_is_said_of_a_probe_left_as_stated() -> None:
+def test_a_probe_that_was_not_adjusted_gives_no_warning() -> None:
     assert told(probe(loose(fx=0.05)), None) == {}
     assert told(probe(np.zeros((COUNT, COUNT))), np.zeros(COUNT)) == {
         "instrument moved by the adjustment, at most": 0.0
@@ -87,8 +87,8 @@ def test_nothing_is_said_of_a_probe_left_as_stated() -> None:
 
 
 @pytest.mark.parametrize(("ring_trembles", "denied"), [(0.0, True), (0.3, True), (1.0, False), (6.0, False)])
-def test_a_ring_that_does_not_tremble_denies_that_the_camera_does(ring_trembles: float, denied: bool) -> None:
-    """1: the whole probe trembles; 6: the camera does, on its mount, which moves the picture of the ring."""
+def test_a_ring_without_vibration_excludes_a_vibrating_camera(ring_trembles: float, denied: bool) -> None:
+    """1: the whole probe vibrates; 6: the camera does, on its mount, which moves the picture of the ring."""
     number, random = np.arange(200), np.random.default_rng(3)
     shaken = np.zeros((200, 2))
     shaken[:, 1] = 0.05 * random.standard_normal(200)
@@ -102,8 +102,8 @@ def test_a_ring_that_does_not_tremble_denies_that_the_camera_does(ring_trembles:
 
 
 @pytest.mark.parametrize(("lost", "told"), [(0.1, True), (0.9, False)])
-def test_without_texture_no_camera_is_said_to_tremble(lost: float, told: bool) -> None:
-    """Of 85 lit pictures 84 showed no texture, and the camera was said to tremble by 0.03°."""
+def test_without_texture_no_camera_is_reported_to_vibrate(lost: float, told: bool) -> None:
+    """Of 85 lit pictures 84 showed no texture, and the camera was reported to vibrate by 0.03°."""
     number, random = np.arange(80), np.random.default_rng(3)
     T_pc = np.tile(np.eye(4), (80, 1, 1))
     T_pc[:, :3, :3] = Rotation.from_rotvec(2e-3 * random.standard_normal((80, 3))).as_matrix()
@@ -115,8 +115,8 @@ def test_without_texture_no_camera_is_said_to_tremble(lost: float, told: bool) -
     assert camera_trembles(run, poses, SeenCentres(np.full((40, 2), np.nan), 22.0)) is told
 
 
-def test_rings_of_a_probe_that_jerks_deny_nothing() -> None:
-    """Jerks hide what rings tremble by. That it came out as 0 had denied trembling in one of four runs."""
+def test_rings_of_a_jerking_probe_exclude_no_vibration() -> None:
+    """Jerks hide the vibration of rings. Estimated as 0, it excluded vibration in one of four runs."""
     number, axis = np.arange(40), straight_axis(-50, 300)
     for seed in range(20):
         random = np.random.default_rng(seed)
@@ -141,7 +141,7 @@ def run_of(z_mm: list[float]) -> Trajectory:
 
 
 @pytest.mark.parametrize("cut", [(), (2,), (2, 3)])
-def test_distances_beyond_a_cut_are_as_unsure_as_the_run_is_long(cut: tuple[int, ...]) -> None:
+def test_sigma_of_distances_beyond_a_cut_is_the_length_of_the_run(cut: tuple[int, ...]) -> None:
     """Where ten pictures were stored ten too late, distances erred by 73 of their σ."""
     found = beyond_cuts(run_of([0.0, 10.0, 20.0, 30.0]), cut, 20.0)
     behind = bool(cut) * (np.arange(4) >= 2)
@@ -152,8 +152,8 @@ def test_distances_beyond_a_cut_are_as_unsure_as_the_run_is_long(cut: tuple[int,
     assert [p.sigma_mm for p in found.pieces] == pytest.approx([0.3, 30.0 if cut else 0.3], rel=1e-4)
 
 
-def test_a_probe_that_stood_went_at_a_cut_at_least_as_far_as_a_picture_shows() -> None:
-    """Its run has no length, so that σ was 0 beyond the cut."""
+def test_sigma_at_a_cut_is_at_least_the_distance_that_a_picture_shows_even_if_the_probe_stood() -> None:
+    """Such a run has no length, so that σ was 0 beyond the cut."""
     found = beyond_cuts(run_of([5.0, 5.0, 5.0, 5.0]), (2,), 20.0)
     np.testing.assert_allclose(np.sqrt(found.covariance[:, 2, 2]), [0.1, 0.1, 20.0, 20.0], rtol=1e-4)
     assert found.distance_sigma_mm == pytest.approx(20.0, rel=1e-4)

@@ -1,4 +1,4 @@
-"""Landmarks of which no view is left in a window: they move by their surface, and no other is changed."""
+"""Landmarks without a view in a window: they move with their surface, and no other is changed."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ SEEN, FRAMES, BORDER, OWN = 3, 4, 6, 3
 
 
 @pytest.mark.parametrize("place", [1, SEEN], ids=["amid the others", "after the others"])
-def test_a_landmark_without_views_moves_by_its_surface_alone(place: int) -> None:
-    """Behind a noise filter the last landmark had no view left: the run ended as a fault of the program."""
+def test_a_landmark_without_views_moves_with_its_surface_only(place: int) -> None:
+    """Behind a noise filter the last landmark had no view left: the run ended with a program error."""
     random = np.random.default_rng(3)
     draw, views = random.standard_normal, 2 * SEEN
     start = np.insert(2 * np.arange(SEEN + 1), place, 2 * place)

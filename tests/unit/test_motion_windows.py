@@ -1,4 +1,4 @@
-"""A run cut in windows: joined again it is what all frames at once give, within a fraction of σ."""
+"""A run cut into windows and joined again equals one adjustment of all frames, within a fraction of σ."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def since_first(T_pc: Float) -> Float:
 
 
 def difference(T_pc: Float, other_T_pc: Float) -> Float:
-    """Return (N, 6) of translations and rotation vectors, both runs reckoned from their first pose."""
+    """Return (N, 6) differences of translations and rotation vectors, relative to the first poses."""
     a, b = since_first(T_pc), since_first(other_T_pc)
     turn = vector_from_rotation(np.swapaxes(b[:, :3, :3], 1, 2) @ a[:, :3, :3])
     return np.concatenate([a[:, :3, 3] - b[:, :3, 3], turn], -1)
@@ -70,26 +70,31 @@ def sigma_of(run: JoinedRun) -> Float:
     return np.sqrt(np.diagonal(run.covariance, axis1=1, axis2=2))
 
 
-def test_windows_give_what_all_frames_at_once_do(at_once: RunEstimate, in_windows: RunEstimate) -> None:
+def test_windows_agree_with_one_adjustment_of_all_frames(
+    at_once: RunEstimate, in_windows: RunEstimate
+) -> None:
     one, many = at_once.joined, in_windows.joined
     apart = difference(many.T_pc, one.T_pc)[10:] / sigma_of(one)[10:]
     assert np.abs(apart).max() < 0.35
-    assert in_windows.trials > at_once.trials, "the control: it was cut"
+    assert in_windows.trials > at_once.trials, "control: it was cut"
     sigma = np.sqrt(np.diagonal(one.shared.covariance))
     assert np.abs((many.shared.value - one.shared.value) / sigma).max() < 0.5
     assert many.radius_mm == pytest.approx(one.radius_mm, abs=0.005)
 
 
-def test_stated_sigma_is_that_of_all_frames_at_once(at_once: RunEstimate, in_windows: RunEstimate) -> None:
+def test_stated_sigma_agrees_with_one_adjustment_of_all_frames(
+    at_once: RunEstimate, in_windows: RunEstimate
+) -> None:
     one, many = sigma_of(at_once.joined)[10:], sigma_of(in_windows.joined)[10:]
     assert np.all(many / one > 0.7)
     assert np.all(many / one < 1.5)
 
 
-def test_sigma_of_the_way_is_that_of_a_straight_pipe_and_of_all_frames_at_once(
+def test_sigma_of_the_distance_is_that_of_a_straight_pipe_and_of_all_frames_at_once(
     at_once: RunEstimate, in_windows: RunEstimate
 ) -> None:
-    # Along a straight pipe of a few windows, heading lengthens nothing: the last pose's z has the same σ.
+    # In a straight pipe of a few windows heading does not change the length: the last pose's z has the same
+    # σ.
     for estimate in (at_once, in_windows):
         last = np.sqrt(estimate.joined.covariance[-1, 2, 2])
         assert estimate.joined.distance_sigma_mm == pytest.approx(last, rel=0.05)
@@ -97,13 +102,13 @@ def test_sigma_of_the_way_is_that_of_a_straight_pipe_and_of_all_frames_at_once(
     assert cut == pytest.approx(alone, rel=0.1)
 
 
-def test_errors_lie_within_sigma(drawn: LongMotion, in_windows: RunEstimate) -> None:
+def test_errors_are_within_sigma(drawn: LongMotion, in_windows: RunEstimate) -> None:
     run = in_windows.joined
     error = difference(run.T_pc, drawn.T_pc)[10:]
     assert np.mean(np.abs(error / sigma_of(run)[10:]) < 3) > 0.97
 
 
-def test_many_windows_that_err_alike_do_not_overrule_what_is_stated(drawn: LongMotion) -> None:
+def test_many_windows_with_a_common_error_do_not_overrule_the_stated_uncertainty(drawn: LongMotion) -> None:
     parameters, window = MotionParameters.model_validate({}), Window(0, 110)
     measured = drawn.run.measured(window, parameters)
     state = drawn.run.start(window, measured, parameters)
@@ -131,7 +136,7 @@ def test_windows_cover_all_frames_and_overlap() -> None:
 
 
 def submaps(T_pc: Float, axis: PipeAxis, windows: tuple[Window, ...]) -> list[Submap]:
-    """Return pieces of one course, each moved somewhere else, without any error."""
+    """Return pieces of one course, each displaced as a whole, without any other error."""
     random = np.random.default_rng(3)
     found = []
     for k, window in enumerate(windows):
@@ -162,7 +167,7 @@ def submaps(T_pc: Float, axis: PipeAxis, windows: tuple[Window, ...]) -> list[Su
     return found
 
 
-def test_pieces_of_one_course_become_that_course_again() -> None:
+def test_pieces_of_one_course_are_joined_to_that_course() -> None:
     k = np.arange(100)
     turn = np.stack([0.01 * np.sin(k / 9), 0.02 * np.cos(k / 7), 0.01 * k], -1)
     T_pc = from_parts(rotation_from_vector(turn), np.stack([np.sin(k / 20), np.cos(k / 15), 0.7 * k], -1))
@@ -177,12 +182,12 @@ def test_pieces_of_one_course_become_that_course_again() -> None:
     broken[1] = replace(
         broken[1], T_pc=from_parts(broken[1].T_pc[:, :3, :3], 1.001 * broken[1].T_pc[:, :3, 3])
     )
-    assert np.abs(join_submaps(broken, settled).T_pc - T_pc).max() > 1e-4, "the control"
+    assert np.abs(join_submaps(broken, settled).T_pc - T_pc).max() > 1e-4, "control: the pieces are apart"
     variance = got.covariance[:, 0, 0]
     assert np.all(np.diff(variance) > -1e-9), "errors only grow"
 
 
-def test_an_error_of_the_anchor_is_carried_as_a_motion_of_the_whole() -> None:
+def test_an_error_of_the_anchor_moves_the_rest_as_a_whole() -> None:
     random = np.random.default_rng(1)
     T_pc = from_parts(
         rotation_from_vector(random.standard_normal((5, 3))), 30 * random.standard_normal((5, 3))
@@ -197,7 +202,7 @@ def test_an_error_of_the_anchor_is_carried_as_a_motion_of_the_whole() -> None:
         np.testing.assert_allclose(moved(T, carry @ step), whole @ T, atol=1e-9)
 
 
-def test_tracks_come_back_from_the_disk_thinned_and_cut() -> None:
+def test_tracks_are_read_from_the_disk_thinned_and_cut() -> None:
     store = ObservationStore.on(Scratch(), most=4)
     for frame in range(20):
         seen = np.array([0, 1] if frame < 12 else [1, 2])
@@ -217,7 +222,7 @@ def test_tracks_come_back_from_the_disk_thinned_and_cut() -> None:
     assert part["frame"].max() < 12
 
 
-def test_matches_share_more_of_their_error_where_they_disagree_by_more() -> None:
+def test_matches_with_larger_disagreement_share_more_of_their_error() -> None:
     usual = MotionParameters()
     assert with_shared_error(usual, 0.14) is usual
     assert with_shared_error(usual, 0.6).match_bias_px == pytest.approx(0.2)
@@ -225,7 +230,7 @@ def test_matches_share_more_of_their_error_where_they_disagree_by_more() -> None
 
 
 class Noisy(TrackedTexture):
-    """Texture whose matches err by noise alone."""
+    """Texture whose matches have noise alone."""
 
     def between(self, first: int, last: int) -> Tracks:
         tracks = super().between(first, last)
@@ -234,7 +239,7 @@ class Noisy(TrackedTexture):
 
 
 class Lagging(Noisy):
-    """Texture as a hasty codec shows it: off for some frames alike, and moved too little far ahead."""
+    """Texture behind a fast codec: off by the same for some frames, and with too little motion far ahead."""
 
     def between(self, first: int, last: int) -> Tracks:
         tracks, camera = super().between(first, last), small_probe().camera
@@ -254,7 +259,7 @@ def with_texture(drawn: LongMotion, shown: type[TrackedTexture]) -> RunEstimate:
     return estimated(replace(drawn, run=run), 100, 20)
 
 
-def test_texture_that_lags_far_ahead_does_not_lengthen_the_way(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_texture_that_lags_far_ahead_does_not_lengthen_the_distance(monkeypatch: pytest.MonkeyPatch) -> None:
     drawn, off = long_motion(100, 0.6, 4.0), []
     for farthest in (np.radians(45), 0.0):
         monkeypatch.setattr("stages.motion.windows.first_window._FARTHEST_RAD", farthest)
@@ -263,14 +268,14 @@ def test_texture_that_lags_far_ahead_does_not_lengthen_the_way(monkeypatch: pyte
     assert abs(off[0]) < 0.3 * abs(off[1]), off
 
 
-def test_noise_alone_is_no_reason_to_leave_texture_out() -> None:
+def test_noise_alone_does_not_exclude_texture() -> None:
     drawn = long_motion(100, 0.6, 4.0)
     farthest = [with_texture(drawn, shown).steady.run.farthest_rad for shown in (Noisy, Lagging)]
     assert farthest == [0.0, np.radians(45)]
 
 
-def test_unsure_heading_does_not_become_roll_where_the_way_turns() -> None:
-    """The heading errs by a radian at the second anchor, behind which the way turns by a right angle."""
+def test_uncertain_heading_does_not_become_roll_where_the_pipe_turns() -> None:
+    """The heading errs by a radian at the second anchor, behind which the pipe turns by a right angle."""
     right_angle = np.eye(6)
     right_angle[3:, 3:] = [[0, 0, -1], [0, 1, 0], [1, 0, 0]]
     joint = np.zeros((2, 6, 2, 6))
@@ -278,5 +283,5 @@ def test_unsure_heading_does_not_become_roll_where_the_way_turns() -> None:
     carry = np.stack([np.eye(6), right_angle])
     links = tuple(Link(np.arange(2) + 2 * n, carry, joint, np.zeros((2, 6, 1))) for n in range(2))
     chain = ErrorChain(links, np.zeros((6, 6)), np.zeros((1, 1)))
-    assert chain.covariances()[-1, 5, 5] > 0.9, "the control: roll of the poses takes the heading over"
+    assert chain.covariances()[-1, 5, 5] > 0.9, "control: the roll of the poses contains the heading error"
     np.testing.assert_allclose(chain.turn_variances()[-1], [2.0, 0.0, 2e-6])

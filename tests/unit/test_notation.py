@@ -27,13 +27,13 @@ def test_a_clock_position_has_hours_and_minutes(hours, told):
     assert notation.clock(hours) == told
 
 
-def test_an_extent_on_the_clock_runs_clockwise_also_past_twelve():
+def test_an_extent_on_the_clock_runs_clockwise_even_past_twelve():
     assert notation.clock_extent(7.017, 7.183) == "7:01–7:11"
     assert notation.clock_extent(11.5, 0.5) == "11:30–12:30"
     assert notation.clock_extent(0.0, 12.0) == "all round"
 
 
-def test_a_distance_is_the_peak_with_its_extent():
+def test_a_distance_is_that_of_the_peak_with_its_extent():
     assert notation.distance(412.34, 408.1, 416.0) == "412.3 mm (408.1–416.0 mm)"
     assert notation.distance(None, 408.1, 416.0) == "408.1–416.0 mm"
 
@@ -43,16 +43,16 @@ def test_a_distance_is_the_peak_with_its_extent():
     [(1.5846, 0.0283, "1.585 ± 0.028 mm"), (1.5846, 0.283, "1.58 ± 0.28 mm"), (80.04, 12.0, "80 ± 12 mm"),
      (1.5846, 0.0002, "1.585 ± < 0.001 mm"), (1.5846, None, "1.585 mm"), (float("nan"), 1.0, "not seen")],
 )  # fmt: skip
-def test_a_value_bears_as_many_digits_as_its_sigma(value, sigma, told):
+def test_a_value_has_as_many_digits_as_its_sigma(value, sigma, told):
     assert notation.measured(value, sigma) == told
 
 
-def test_a_depth_has_a_direction_in_place_of_a_sign():
+def test_a_depth_has_a_direction_instead_of_a_sign():
     assert notation.depth(-1.482, 0.05) == "1.482 ± 0.050 mm inward"
     assert notation.depth(1.585, 0.028) == "1.585 ± 0.028 mm deep"
     assert notation.depth(float("nan"), 0.1) == "depth not seen"
 
 
-def test_one_sigma_stands_in_brackets_with_or_without_a_unit():
+def test_one_sigma_is_in_brackets_with_or_without_a_unit():
     assert notation.plus_minus(0.0123, "mm") == "(± 0.012 mm)"
     assert notation.plus_minus(0.00062499, "") == "(± 0.00062)"

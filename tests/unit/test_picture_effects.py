@@ -1,4 +1,4 @@
-"""Effects on pictures alone: place, size and law of each, and that the diagnosis does not know them."""
+"""Effects on pictures only: place, size and law of each, and that the diagnosis does not name them."""
 
 from dataclasses import replace
 
@@ -27,7 +27,7 @@ def truth_with(name: str, *sizes: float) -> SceneTruth:
 
 
 def ratio(truth: SceneTruth, frame: int) -> np.ndarray:
-    """Light (H, W) of a frame over that without the effect; NaN where it is dark."""
+    """Return the light (H, W) of a frame over that without the effect; NaN where it is dark."""
     one, other = (renderer_of(t).seen(frame)[..., 1].astype(float) for t in (truth, small_truth()))
     return np.where(other > 0.02, one / np.maximum(other, 0.02), np.nan)
 
@@ -52,7 +52,7 @@ def test_flicker_changes_rows_by_the_mean_power_of_their_exposure():
         for t in (truth, small_truth())
     )
     seen = [np.nansum(renderer_of(t).light(LED)[..., 1], axis=1) for t in (banded, steady)]
-    # the mean over many moments of the exposure, by hand
+    # the mean over many moments of the exposure, computed here
     row = np.arange(300)
     opened = 1 / 30 + ((row + 0.5) / 300 - 0.5) * readout
     within = np.linspace(-exposure / 2, exposure / 2, 2001)
@@ -63,19 +63,19 @@ def test_flicker_changes_rows_by_the_mean_power_of_their_exposure():
     assert np.ptp(power) > 0.3
 
 
-def test_a_global_shutter_shows_flicker_as_one_factor_a_frame():
+def test_with_a_global_shutter_flicker_is_one_factor_a_frame():
     change = ratio(truth_with("light_flicker", 0.2, 7.0), LED)
     assert np.nanmax(change) - np.nanmin(change) < 1e-4
     assert np.nanmean(change) == pytest.approx(1 + 0.2 * np.sin(2 * np.pi * 7 / 30), abs=1e-4)
 
 
-def test_a_dead_led_takes_its_own_light_and_darkens_its_side():
+def test_a_dead_led_removes_its_own_light_and_darkens_its_side():
     truth = truth_with("led_dead", 1.0, 60.0)
     assert sum(truth.instrument.light.pattern) == 7
     change = ratio(truth, LED)
     near, far = np.abs(azimuth_deg() - 60) < 15, np.abs(azimuth_deg() + 120) < 15
     assert np.nanmean(change[near]) < np.nanmean(change[far]) - 0.02 < 1
-    # each LED takes what it gave: dead one by one, they take all the light once
+    # each LED removes what it gave: dead one by one, they remove all the light once
     whole = renderer_of(small_truth()).light(LED).astype(float)
     lost = sum(whole - renderer_of(truth_with("led_dead", 1.0, 22.5 + 45.0 * k)).light(LED) for k in range(8))
     np.testing.assert_allclose(lost, whole, atol=1e-4)
@@ -83,7 +83,7 @@ def test_a_dead_led_takes_its_own_light_and_darkens_its_side():
 
 
 def test_a_ghost_ring_adds_light_beside_the_line():
-    """Its kernel did not compile, so that no recording could be given one."""
+    """Its kernel did not compile, so that the effect could not be used."""
     with_it, plain = (renderer_of(t).light(LASER) for t in (truth_with("ghost_ring", 0.1), small_truth()))
     more = (with_it - plain).astype(float)
     assert more.min() > -1e-5
@@ -101,7 +101,7 @@ def test_a_blocked_sector_of_the_laser_has_its_place_and_width():
     assert np.array_equal(renderer_of(truth).light(LED), renderer_of(small_truth()).light(LED))
 
 
-def test_bloom_keeps_the_light_and_leaks_along_columns_alone():
+def test_bloom_keeps_the_total_light_and_leaks_along_columns_only():
     light = np.zeros((101, 61, 3), np.float32)
     light[50, 30] = 5.0
     sensor = replace(BLANK, bloom_relative=0.4, bloom_px=4.0)
@@ -114,7 +114,7 @@ def test_bloom_keeps_the_light_and_leaks_along_columns_alone():
     assert np.array_equal(through_lens(dim, sensor, None), dim)
 
 
-def test_blur_grows_with_the_square_of_the_way_from_the_middle():
+def test_blur_grows_with_the_square_of_the_distance_from_the_middle():
     sensor = replace(BLANK, psf_sigma_px=0.8, psf_edge_px=2.0)
     for u in (200, 260, 340):
         light = np.zeros((301, 401, 3), np.float32)
@@ -126,7 +126,7 @@ def test_blur_grows_with_the_square_of_the_way_from_the_middle():
         assert seen.sum() == pytest.approx(1.0, rel=0.05)
 
 
-def test_scattering_takes_contrast_and_leaves_the_mean():
+def test_scattering_reduces_contrast_and_keeps_the_mean():
     v, u = np.mgrid[:300, :400]
     light = np.repeat((0.4 + 0.2 * np.sin(u / 3.0))[..., None], 3, -1).astype(np.float32)
     truth = truth_with("window_scatter", 0.6, 60.0, 6.0)
@@ -141,7 +141,7 @@ def test_scattering_takes_contrast_and_leaves_the_mean():
     assert np.array_equal(seen[away > 8], light[..., 0][away > 8])
 
 
-def test_a_drop_moves_the_picture_inside_and_nothing_outside():
+def test_a_drop_moves_the_picture_inside_it_and_nothing_outside():
     v, u = np.mgrid[:300, :400].astype(float)
     light = np.repeat((u / 400)[..., None], 3, -1).astype(np.float32)
     for power in (0.5, 2.0):
@@ -156,7 +156,7 @@ def test_a_drop_moves_the_picture_inside_and_nothing_outside():
         np.testing.assert_allclose(seen[half], moved, atol=0.05)
 
 
-def test_defective_pixels_stay_where_they_are_and_are_as_many_as_said():
+def test_defective_pixels_stay_at_their_places_and_have_the_given_number():
     sensor = replace(BLANK, defective_share=0.01, hot_level=0.3)
     light = np.full((300, 400, 3), 0.5, np.float32)
     one, again, other = (with_dark_signal(light, sensor, seed)[..., 0] for seed in (4, 4, 5))
@@ -169,7 +169,7 @@ def test_defective_pixels_stay_where_they_are_and_are_as_many_as_said():
 
 
 def test_noise_follows_emva_1288():
-    """Variance is that of reading plus one electron for each electron of signal; a dark pattern stays."""
+    """The variance is that of reading plus one electron for each electron of signal; a dark pattern stays."""
     sizes = (("full_well", 4000.0), ("read_noise", 30.0), ("dark_pattern", 0.02))
     truth = switch_on(small_truth(), [Switch(name, (size,)) for name, size in sizes])
     sensor = truth.instrument.sensor
@@ -182,14 +182,14 @@ def test_noise_follows_emva_1288():
         assert pattern == pytest.approx(np.hypot(0.02 * 255, np.sqrt(variance / 24)), rel=0.03)
 
 
-def test_black_level_is_what_a_dark_pixel_shows():
+def test_black_level_is_the_value_of_a_dark_pixel():
     sensor = truth_with("black_level", 12.0).instrument.sensor
     grey = exposed(np.zeros((50, 50, 3), np.float32), replace(sensor, read_noise_e=0.0), 1, 0)
     assert (grey == 12).all()
 
 
-def test_what_a_ring_sends_to_a_ring_is_the_sum_over_their_elements():
-    """Lambert's law between two elements of a cylinder, added up around; and all light meets some wall."""
+def test_light_from_ring_to_ring_is_the_sum_over_their_elements():
+    """Lambert's law between two elements of a cylinder, summed around; all light meets some wall."""
     radius, around = 30.0, 2 * np.pi * (np.arange(20000) + 0.5) / 20000
     for apart in (1.0, 12.0, 55.0):
         across = radius * (1 - np.cos(around))
@@ -200,7 +200,7 @@ def test_what_a_ring_sends_to_a_ring_is_the_sum_over_their_elements():
     assert step * ring_to_ring(np.arange(-5000, 5000, step), radius).sum() == pytest.approx(1.0, abs=1e-4)
 
 
-def test_the_line_glows_on_the_wall_ahead():
+def test_light_of_the_line_falls_on_the_wall_ahead():
     truth = truth_with("interreflection", 1.0)
     lit, plain = (renderer_of(t).light(LASER)[..., 1].astype(float) for t in (truth, small_truth()))
     glow, laser, pose = lit - plain, truth.instrument.laser, truth.poses()[LASER]
@@ -211,7 +211,7 @@ def test_the_line_glows_on_the_wall_ahead():
         assert glow[v, u] == pytest.approx(by_hand, rel=0.05)
 
 
-def test_what_lamps_throw_back_is_their_light_times_the_reflectance():
+def test_reflected_light_of_the_lamps_is_their_light_times_the_reflectance():
     lamps = lamps_of(small_truth().instrument.light)
     once = glow_of_lamps(lamps, 50.0, np.array([0.2, 0.4, 0.8]), 7.0)
     twice = glow_of_lamps(lamps._replace(share=2 * lamps.share), 50.0, np.array([0.2, 0.4, 0.8]), 7.0)
@@ -233,7 +233,7 @@ def test_a_longer_exposure_from_the_same_start_shows_the_camera_later():
     assert np.linalg.norm(expected[:3, 3] - truth.poses()[LED, :3, 3]) > 0.1
 
 
-def test_the_line_of_a_longer_exposure_lies_where_the_camera_is_at_its_middle():
+def test_the_line_of_a_longer_exposure_is_that_of_the_camera_at_its_middle():
     across = Signal(np.array([-1.0, 1.0]), np.array([-20.0, 20.0]))
     truth, longer = replace(small_truth(), motion=replace(small_truth().motion, x_mm=across)), 0.024
     azimuth = np.linspace(-3.0, 3.0, 12)

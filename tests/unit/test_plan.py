@@ -1,4 +1,4 @@
-"""Stages are wired by type before anything runs; keys change with whatever a result depends on."""
+"""Stages are connected by type before anything runs; keys change with everything that a result depends on."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def keys(plan: Plan) -> list[str]:
         ((DRAW, DRAW), "two stages are named draw"),
     ],
 )
-def test_what_does_not_fit_is_refused(stages: tuple[Stage, ...], message: str) -> None:
+def test_stages_that_cannot_be_connected_are_refused(stages: tuple[Stage, ...], message: str) -> None:
     with pytest.raises(PipelineError, match=message):
         plan_of(*stages)
 
@@ -43,7 +43,7 @@ def test_a_missing_source_is_refused() -> None:
         make_plan(TOYS, resolve(TOYS), ())
 
 
-def test_keys_are_the_same_again() -> None:
+def test_the_same_plan_has_the_same_keys() -> None:
     assert keys(plan_of(*TOYS)) == keys(plan_of(*TOYS))
     assert len(set(keys(plan_of(*TOYS)))) == len(TOYS)
 
@@ -83,7 +83,7 @@ def two_recordings(first: str, second: str) -> Plan:
     return make_plan(stages, resolve(stages), sources)
 
 
-def test_stages_of_two_recordings_stand_side_by_side() -> None:
+def test_stages_of_two_recordings_are_separate() -> None:
     plan = two_recordings("a" * 64, "b" * 64)
     names = [s.stage.label for s in plan.steps]
     assert names == ["draw", "smooth", "total", "gauge draw", "gauge smooth", "gauge total", "compare"]
@@ -92,20 +92,20 @@ def test_stages_of_two_recordings_stand_side_by_side() -> None:
     assert plan.step("total").key != plan.step("gauge total").key
 
 
-def test_a_result_has_one_key_whatever_its_role() -> None:
+def test_a_result_has_one_key_in_every_role() -> None:
     one, swapped = two_recordings("a" * 64, "b" * 64), two_recordings("b" * 64, "a" * 64)
     assert one.step("gauge total").key == swapped.step("total").key
     assert one.step("total").key == swapped.step("gauge total").key
     assert one.step("compare").key != swapped.step("compare").key
 
 
-def test_a_seed_depends_on_what_the_result_is_made_from_alone() -> None:
+def test_a_seed_depends_only_on_the_inputs_of_the_result() -> None:
     one, other = two_recordings("a" * 64, "b" * 64), two_recordings("a" * 64, "c" * 64)
     assert one.step("draw").seed == other.step("draw").seed
     assert one.step("gauge draw").seed != other.step("gauge draw").seed
 
 
-def test_what_may_be_none_is_left_out_where_no_stage_makes_it_and_waited_for_where_one_does() -> None:
+def test_an_optional_input_is_none_where_no_stage_makes_it_and_waited_for_where_one_does() -> None:
     alone, both = plan_of(DRAW, WEIGH).step("weigh"), plan_of(*TOYS, WEIGH).step("weigh")
     assert dict(alone.inputs) == {"drawn": Drawn}
     assert dict(both.inputs) == {"drawn": Drawn, "total": Total}

@@ -1,4 +1,4 @@
-"""How many frames got the times of other rows is told right, whatever else is wrong with the times."""
+"""The reported number of frames with times of other rows is right, whatever else is wrong with the times."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ ROWS = NUMBERS - np.searchsorted(PUT_IN, NUMBERS, "right")
 
 
 def told(row: np.ndarray, jump_s: float) -> list[str]:
-    """Return the warnings where frames belong to rows (F,), and a jump of the clock was taken out."""
+    """Return the warnings where frames belong to rows (F,), and a jump of the clock was removed."""
     light = np.array(["laser", "led"])[NUMBERS % 2]
     table = FrameTable(NUMBERS, NUMBERS / 30, light)
     time_s = row / 30 - jump_s * (NUMBERS >= JUMP)
@@ -36,14 +36,14 @@ def told(row: np.ndarray, jump_s: float) -> list[str]:
 
 
 @pytest.mark.parametrize("jump_s", [0.0, 5.0], ids=["steady clock", "the clock jumps"])
-def test_after_pictures_that_were_put_in_so_many_frames_belong_to_earlier_rows(jump_s: float) -> None:
-    """With a jump of the clock before them, the frames between were counted too."""
+def test_after_inserted_pictures_the_right_number_of_frames_belongs_to_earlier_rows(jump_s: float) -> None:
+    """With a jump of the clock before them, the frames in between were counted too."""
     (again,) = told(ROWS, jump_s)
     assert f"the {COUNT - 22} frames after them now have the times of earlier rows" in again
 
 
 @pytest.mark.parametrize("jump_s", [0.0, 5.0], ids=["steady clock", "the clock jumps"])
-def test_where_one_was_lost_and_two_were_put_in_both_are_told(jump_s: float) -> None:
+def test_one_lost_and_two_inserted_pictures_are_both_reported(jump_s: float) -> None:
     """Only the lost one was, with all frames after it, although most of them belong to earlier rows."""
     lost, again = told(ROWS + (NUMBERS >= LOST), jump_s)
     assert f"The {PUT_IN[0] - LOST} frames after them now have the times and lights" in lost

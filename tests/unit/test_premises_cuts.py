@@ -1,4 +1,7 @@
-"""Two runs joined in one recording are told; lost pictures, failing lamps and standing probes are not."""
+"""Two runs joined in one recording are reported.
+
+Lost pictures, failing lamps and a standing probe are not.
+"""
 
 from __future__ import annotations
 
@@ -33,32 +36,32 @@ def found(change: Float, step: Float, time_s: Float = NUMBERS / 30) -> list[int]
 
 
 @pytest.mark.parametrize("step", [np.nan, -0.3, 0.4], ids=["none", "back", "far"])
-def test_a_wall_that_is_another_is_a_cut(step: float) -> None:
+def test_a_change_of_the_wall_is_a_cut(step: float) -> None:
     change, steps = steady()
     change[CUT], steps[CUT] = 13.0, step
     assert found(change, steps) == [CUT]
 
 
-def test_no_cut_is_told_where_nothing_or_one_thing_alone_happens() -> None:
+def test_one_sign_of_a_cut_alone_is_not_reported() -> None:
     change, steps = steady()
     assert found(change, steps) == []
-    assert found(np.where(NUMBERS == CUT, 40.0, change), steps) == [], "lamps fail, texture goes on"
-    assert found(change, np.where(NUMBERS == CUT, np.nan, steps)) == [], "blurred"
+    assert found(np.where(NUMBERS == CUT, 40.0, change), steps) == [], "lamps fail, texture continues"
+    assert found(change, np.where(NUMBERS == CUT, np.nan, steps)) == [], "pictures are blurred"
 
 
-def test_pictures_that_are_known_to_be_missing_are_no_cut() -> None:
+def test_known_missing_pictures_are_not_a_cut() -> None:
     change, steps = steady()
     change[CUT], steps[CUT] = 13.0, 0.4
     assert found(change, steps, np.where(NUMBERS >= CUT, NUMBERS + 28, NUMBERS) / 30) == []
 
 
-def test_a_probe_that_stood_and_goes_on_makes_no_cut() -> None:
+def test_a_probe_that_stood_and_moves_on_is_not_a_cut() -> None:
     change, steps = steady()
     still = NUMBERS < CUT
     assert found(np.where(still, 0.3, change), np.where(still, 0.0, steps)) == []
 
 
-def test_of_pictures_that_are_left_out_nothing_is_told() -> None:
+def test_pictures_that_are_left_out_give_no_report() -> None:
     change, steps = steady()
     change[CUT], steps[CUT] = 13.0, np.nan
     assert cuts(pictures(change, steps), SHOWN, NUMBERS == CUT, NUMBERS / 30).size == 0

@@ -23,14 +23,14 @@ def interlaced(recording: Recording, later: int) -> Recording:
     return replace(recording, source=MemorySource(woven, recording.source.image_size))
 
 
-def test_sound_pictures_are_used_as_they_are() -> None:
+def test_sound_pictures_are_not_changed() -> None:
     frames, told = checked(good_recording(), steady_run().probe)
     assert not frames.interlaced
     assert not [w for w in told if "interlaced" in w]
 
 
 @pytest.mark.parametrize("later", [1, 2], ids=["the other light", "the same light"])
-def test_of_interlaced_pictures_even_rows_are_used(later: int) -> None:
+def test_of_interlaced_pictures_the_even_rows_are_used(later: int) -> None:
     good, probe = good_recording(), steady_run().probe
     woven = interlaced(good, later)
     frames, told = checked(woven, probe)
@@ -42,13 +42,13 @@ def test_of_interlaced_pictures_even_rows_are_used(later: int) -> None:
         assert combing(seen) < 1
 
 
-def test_interlaced_pictures_end_a_run_that_is_not_to_mend() -> None:
+def test_interlaced_pictures_end_a_run_without_repair() -> None:
     with pytest.raises(UnusableError, match="interlaced"):
         checked(interlaced(good_recording(), 2), steady_run().probe, mend=False)
 
 
 @pytest.mark.parametrize("rows", [1, 2, 3, 4])
-def test_odd_rows_are_the_mean_of_those_beside_them(rows: int) -> None:
+def test_odd_rows_become_the_mean_of_their_neighbours(rows: int) -> None:
     image = np.array([10, 99, 21, 99], np.uint8)[:rows, None]
     wanted = {1: [10], 2: [10, 10], 3: [10, 16, 21], 4: [10, 16, 21, 21]}[rows]
     assert even_rows(image)[:, 0].tolist() == wanted
@@ -62,5 +62,5 @@ def test_noise_is_not_taken_for_interlacing(row_noise: float) -> None:
     assert combing(image) == pytest.approx(1.0, abs=0.08)
 
 
-def test_a_black_picture_tells_nothing() -> None:
+def test_black_pictures_are_not_called_interlaced() -> None:
     assert np.isnan(combing(np.zeros((48, 64), np.uint8)))

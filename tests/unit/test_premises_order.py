@@ -33,7 +33,7 @@ def test_repeated_pictures_are_left_out(good, run):
 
 @pytest.mark.parametrize("often", [8, 11])
 @pytest.mark.parametrize("by_picture", [True, False])
-def test_the_encoder_tells_whether_times_move_up_behind_pictures_put_in(often, by_picture, good, run):
+def test_the_encoder_shows_whether_times_move_up_behind_inserted_pictures(often, by_picture, good, run):
     """By the lights alone they always did, or never: the encoder "slipped" at every such picture."""
     kept = np.sort(np.r_[np.arange(COUNT), 9:COUNT:often])
     time_s = np.arange(len(kept)) / 30
@@ -79,7 +79,7 @@ def test_pictures_that_repeat_the_last_one_of_their_light_are_left_out(repeats, 
 @pytest.mark.parametrize("encoder", ["goes on", "none"])
 @pytest.mark.parametrize("count", [5, 15])
 def test_pictures_of_a_recorder_that_repeats_each_light_are_left_out(count, encoder, good, run):
-    """After a second of it "42 pictures were lost", and the run came out 12 % too long."""
+    """After a second of such repeats "42 pictures were lost", and the run became 12 % too long."""
     frame = np.arange(COUNT)
     hung = (frame >= 22) & (frame < 22 + count)
     shown = {k: good.source.images[20 + k % 2 if hung[k] else k] for k in frame}
@@ -92,7 +92,7 @@ def test_pictures_of_a_recorder_that_repeats_each_light_are_left_out(count, enco
     assert f"{count} picture{'s' * (count > 1)} left out, since the recorder hung" in told[0]
 
 
-def test_pictures_of_a_probe_that_stops_are_no_repeats():
+def test_pictures_of_a_probe_that_stops_are_not_repeats():
     z = np.concatenate([np.arange(20), np.full(20, 20), 20 + np.arange(20)])
     halting = drawn_run(STEP_MM * z, 0.0 * z)
     found, _ = checked(with_rings(halting), halting.probe)
@@ -115,8 +115,8 @@ def test_a_repeated_picture_in_one_light_is_left_out(good, run, replaced):
     assert any("they repeat the picture before" in t for t in told)
 
 
-def test_a_speed_that_varies_over_pictures_left_out_is_no_loss():
-    """After a camera hung for a second, 6 pictures "were lost": the probe had gone 20 % faster meanwhile."""
+def test_varying_speed_over_pictures_left_out_is_not_a_loss():
+    """After a camera hung for a second, 6 pictures "were lost": the probe had moved 20 % faster meanwhile."""
     frame = np.arange(0, 120, 2)
     there = (frame < 60) | (frame >= 90)
     place = np.cumsum(np.where(there, 0.02 + 0.001 * np.sin(frame / 3), 0.024))
@@ -129,8 +129,8 @@ def test_a_speed_that_varies_over_pictures_left_out_is_no_loss():
 
 
 @pytest.mark.parametrize(("mm_a_frame", "lost"), [(1.0, 2), (-1.0, 2), (2.0, 0), (-2.0, 0)])
-def test_steps_that_a_codec_holds_back_make_no_loss(mm_a_frame, lost):
-    """Blocks of a codec stood, most steps came out at half, and the others were taken for lost pictures."""
+def test_steps_that_a_codec_holds_back_are_not_a_loss(mm_a_frame, lost):
+    """Blocks of a codec stood still, most steps were half as long, and the others seemed lost pictures."""
     frame = np.arange(0, 120, 2)
     size = np.where(frame[1:] == 60, 0.04, 0.02) + 0.0001 * np.sin(frame[1:])
     table = FrameTable(np.arange(120), np.arange(120) / 30, np.full(120, "led"))
@@ -141,8 +141,8 @@ def test_steps_that_a_codec_holds_back_make_no_loss(mm_a_frame, lost):
 
 
 @pytest.mark.parametrize("knocked", [False, True])
-def test_a_camera_knocked_in_mid_run_is_no_loss(knocked):
-    """Its pictures moved by 4 px, the wall seemed to leap, and times were taken from other rows."""
+def test_a_camera_knocked_during_a_run_is_not_a_loss(knocked):
+    """Its pictures moved by 4 px, the wall seemed to jump, and times were taken from other rows."""
     frame = np.arange(0, 120, 2)
     size = np.where(frame[1:] == 60, 0.04, 0.02) + 0.0001 * np.sin(frame[1:])
     table = FrameTable(np.arange(120), np.arange(120) / 30, np.full(120, "led"))
@@ -159,8 +159,8 @@ def test_a_camera_knocked_in_mid_run_is_no_loss(knocked):
 
 
 @pytest.mark.parametrize(("turns", "lost"), [(False, 2), (True, 0)])
-def test_where_a_probe_turns_back_a_longer_step_is_no_loss(turns, lost):
-    """Sizes of steps in a gauge differ by its bores; where it turned, up to 44 pictures "were lost"."""
+def test_where_a_probe_turns_back_a_longer_step_is_not_a_loss(turns, lost):
+    """The steps in a gauge differ with its bores; at a turn up to 44 pictures "were lost"."""
     frame = np.arange(0, 120, 2)
     size = np.where(frame[1:] == 60, 0.04, 0.02) + 0.0001 * np.sin(frame[1:])
     table = FrameTable(np.arange(120), np.arange(120) / 30, np.full(120, "led"))
@@ -172,8 +172,8 @@ def test_where_a_probe_turns_back_a_longer_step_is_no_loss(turns, lost):
 
 
 @pytest.mark.parametrize(("broken", "lost"), [(10, 10), (1, 0)])
-def test_a_doubtful_break_of_the_rhythm_is_a_loss_where_most_breaks_are(broken, lost):
-    """One picture in six lost, and one of the breaks half as clear as the others."""
+def test_a_doubtful_break_of_the_rhythm_is_a_loss_if_most_breaks_are(broken, lost):
+    """One picture in six is lost, and one of the breaks is half as clear as the others."""
     passed = np.full(40, 2)
     passed[1 : 2 * broken : 2] = 3
     frame = np.r_[0, np.cumsum(passed)]
@@ -188,8 +188,8 @@ def test_a_doubtful_break_of_the_rhythm_is_a_loss_where_most_breaks_are(broken, 
 
 
 @pytest.mark.parametrize("stood", [False, True])
-def test_a_jump_of_the_clock_is_taken_out_and_a_probe_that_stood_is_not(stood, good, run):
-    """At 5 s the run came out more than twice as long as it was."""
+def test_a_jump_of_the_clock_is_removed_and_a_standing_probe_is_not_taken_for_one(stood, good, run):
+    """With a jump of 5 s the run was more than twice as long as it should be."""
     time_s = good.frames.time_s + np.where(np.arange(COUNT) >= 30, 5.0, 0.0)
     read_s = np.linspace(-1, 8, 900)
     moved_s = read_s - np.clip(read_s - good.frames.time_s[30], 0, 5) if stood else read_s
@@ -203,8 +203,8 @@ def test_a_jump_of_the_clock_is_taken_out_and_a_probe_that_stood_is_not(stood, g
 
 @pytest.mark.parametrize("first", [20, 31], ids=["laser-led", "led-laser"])
 @pytest.mark.parametrize("apart", [1, 2, 4, 8])
-def test_pictures_in_another_order_are_left_out_and_nothing_was_lost(first, apart, good, run):
-    """Neighbours exchanged in five places were told as "10 pictures lost", and 100 times were wrong."""
+def test_pictures_in_another_order_are_left_out_and_no_loss_is_reported(first, apart, good, run):
+    """Neighbours exchanged in five places were reported as "10 pictures lost", and 100 times were wrong."""
     lit = first + (apart > 1 and first % 2 == 0)
     order, wrong = np.arange(COUNT), [lit, lit + apart]
     order[wrong] = order[wrong[::-1]]
@@ -219,7 +219,7 @@ def test_pictures_in_another_order_are_left_out_and_nothing_was_lost(first, apar
 
 @pytest.mark.parametrize("outside", [slice(0, 20), slice(40, COUNT)], ids=["before", "behind"])
 def test_pictures_from_outside_the_pipe_are_left_out(outside, good, run):
-    """A run that began outside ended with a fault of the program, after 4 pictures that were lost."""
+    """A run that began outside ended with a program error, after 4 pictures reported as lost."""
     width, height = run.probe.camera.image_size
     draw = np.random.default_rng(1)
     rooms = {
@@ -235,7 +235,7 @@ def test_pictures_from_outside_the_pipe_are_left_out(outside, good, run):
 
 
 def told_by_motion(order, way, noise_mm):
-    """Return which of lit pictures stored in this ``order`` are told, the first of which has no partner."""
+    """Return which lit pictures, stored in this ``order``, are reported; the first has no partner."""
     count = len(order)
     step = np.diff(way[order], prepend=np.nan) + noise_mm
     pictures = Pictures(
@@ -250,10 +250,12 @@ def told_by_motion(order, way, noise_mm):
 @pytest.mark.parametrize(
     "pair", [[50, 53], [1, 4], [75, 78]], ids=["in the run", "near its begin", "its end"]
 )
-def test_a_probe_that_stands_hides_no_exchange_and_makes_none(pair, noise, seed):
-    """A step over the usual one is there noise over noise, or 0 / 0, which hid all exchanges behind it.
+def test_a_standing_probe_neither_hides_an_exchange_nor_causes_one(pair, noise, seed):
+    """The ratio of a step to the usual one is there noise over noise, or 0
 
-    Near the begin, the first step was the usual one: it was repeated before the run, and outvoted all others.
+    0, which hid later exchanges.
+
+    Near the start the first step was the usual one; repeated before the run, it outweighed all others.
     """
     random = np.random.default_rng(seed)
     way = np.cumsum(np.where((np.arange(80) > 9) & (np.arange(80) < 30), 0.0, 2.0))
@@ -263,15 +265,15 @@ def test_a_probe_that_stands_hides_no_exchange_and_makes_none(pair, noise, seed)
 
 
 @pytest.mark.parametrize("pair", [[0, 1], [0, 3], [76, 79], [78, 79]])
-def test_nothing_shows_where_the_first_and_the_last_picture_of_the_wall_would_have_lain(pair):
-    """It was said to be told, by a step before the first picture, which no recording has."""
+def test_exchanges_of_the_first_and_the_last_lit_picture_cannot_be_detected(pair):
+    """They were said to be detectable, by a step before the first picture, which no recording has."""
     order = np.arange(80)
     order[pair] = order[pair[::-1]]
     assert told_by_motion(order, 2.0 * np.arange(80), 0.0) == []
 
 
 def exchanged(taken, way):
-    """Return which pictures count as exchanged, of those ``taken`` in this order at ``way``, by turns lit."""
+    """Return which pictures count as exchanged, of those ``taken`` in this order at ``way``, lit in turn."""
     light = np.where(taken % 2 == 0, Light.WALL, Light.LINE)
     place = np.flatnonzero(light == Light.WALL)[1:]
     size = np.diff(way[taken[np.flatnonzero(light == Light.WALL)]])
@@ -281,8 +283,8 @@ def exchanged(taken, way):
 @pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize("sense", [1, -1])
 @pytest.mark.parametrize("still", [0, 6, 36])
-def test_neighbours_exchanged_are_told_also_where_the_probe_stood_just_before(still, sense):
-    """Three pictures of a standing wall made the usual speed 0, by which the way was divided."""
+def test_exchanged_neighbours_are_reported_even_just_after_a_standstill(still, sense):
+    """Three pictures of a standing wall made the usual speed 0, by which the distance was divided."""
     speed = np.ones(100)
     speed[36 - still : 36] = 0
     taken = np.arange(100)
@@ -292,16 +294,16 @@ def test_neighbours_exchanged_are_told_also_where_the_probe_stood_just_before(st
 
 
 @pytest.mark.parametrize("sense", [1, -1])
-def test_two_losses_are_no_exchange_whichever_way_the_probe_goes(sense):
-    """Of a probe that goes back the longest steps around were taken for the usual ones, not the shortest."""
+def test_two_losses_are_not_an_exchange_in_either_direction_of_motion(sense):
+    """For backward motion the longest steps around were taken for the usual ones, not the shortest."""
     pairs = np.concatenate([k + np.arange(2) for k in (28, 34, 48, 54, 60)])
     taken = np.setdiff1d(np.arange(100), np.r_[pairs, 42, 45])
     assert exchanged(taken, sense * np.arange(100.0)) == []
 
 
 @pytest.mark.parametrize("others", [0, 5])
-def test_two_losses_on_slow_wall_are_no_exchange_where_pictures_are_lost_all_the_time(others):
-    """With one picture in ten lost, two were "exchanged", left out, and three lost ones there not told."""
+def test_two_losses_on_slow_wall_are_not_an_exchange_in_a_run_with_many_losses(others):
+    """With one picture in ten lost, two were "exchanged" and left out, and three losses were not found."""
     speed = np.ones(120)
     speed[50:60] = 0.7
     taken = np.setdiff1d(np.arange(120), np.r_[52, 55, 5 + 5 * np.arange(others), 80 + 5 * np.arange(others)])
@@ -309,7 +311,7 @@ def test_two_losses_on_slow_wall_are_no_exchange_where_pictures_are_lost_all_the
     assert exchanged(taken, np.cumsum(speed)) == ([] if others else [first, first + 1])
 
 
-def test_an_exchange_is_told_in_a_long_run_that_lost_pictures_elsewhere():
+def test_an_exchange_is_reported_in_a_long_run_with_losses_elsewhere():
     """Three lost pictures of 10 000 hid every exchange."""
     taken = np.arange(10_000)
     taken[[40, 41]] = taken[[41, 40]]
@@ -318,8 +320,8 @@ def test_an_exchange_is_told_in_a_long_run_that_lost_pictures_elsewhere():
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_a_probe_that_stands_for_most_of_a_run_makes_no_exchange(seed):
-    """More than half of the run noise was compared with noise."""
+def test_a_probe_that_stands_for_most_of_a_run_causes_no_exchange(seed):
+    """For more than half of the run noise was compared with noise."""
     random = np.random.default_rng(seed)
     size = np.where((np.arange(100) > 20) & (np.arange(100) < 90), 0.0, 2.0) + 0.05 * random.standard_normal(
         100
@@ -329,7 +331,7 @@ def test_a_probe_that_stands_for_most_of_a_run_makes_no_exchange(seed):
 
 @pytest.fixture(scope="module")
 def smooth(good, run):
-    """The recording as if the lit wall had no texture, but noise."""
+    """Return the recording with noise instead of texture on the lit wall."""
     random = np.random.default_rng(3)
     lit = set(good.frames.frame[good.frames.illumination == "led"].tolist())
     shown = {
@@ -339,14 +341,14 @@ def smooth(good, run):
     return replace(good, source=MemorySource(shown, run.probe.camera.image_size))
 
 
-def test_pictures_without_texture_tell_no_order(smooth, run):
+def test_pictures_without_texture_do_not_show_their_order(smooth, run):
     found, told = checked(smooth, run.probe)
     assert found.frame.tolist() == list(range(COUNT))
     assert not told
 
 
-def test_pictures_without_texture_tell_no_motion(smooth, good, run):
+def test_pictures_without_texture_show_no_motion(smooth, good, run):
     lit = good.frames.illumination == "led"
     moved, none = (examine_pictures(r, run.probe, quiet_context()).step[lit] for r in (good, smooth))
-    assert np.isfinite(moved).mean() > 0.9, "the control: texture tells it"
+    assert np.isfinite(moved).mean() > 0.9, "control: texture shows it"
     assert not np.isfinite(none).any()

@@ -1,4 +1,4 @@
-"""The light of pictures, and how far the wall moves in pictures that are cut off."""
+"""The light of pictures, and the motion of the wall in pictures that are cropped."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ LIT = np.arange(COUNT) % 2 == 1
 
 @pytest.mark.parametrize(("brighter", "told"), [(0.03, False), (0.08, True)])
 def test_two_lights_differ_in_brightness(brighter: float, told: bool) -> None:
-    """Two runs of open-3 joined, in one light, differ by a hundredth of their brightness."""
+    """Two joined runs of open-3, in one light, differ by a hundredth of their brightness."""
     brightness = 10 * (1 + brighter * LIT) + 0.01 * np.random.default_rng(1).standard_normal(COUNT)
     line, nothing = np.ones((COUNT, 1), np.float32), np.full(COUNT, np.nan)
     seen = Pictures(
@@ -47,8 +47,8 @@ def cut_off(run: DrawnRun, good: Recording, columns: int) -> tuple[Recording, Dr
     return recording, replace(run, probe=replace(run.probe, camera=camera))
 
 
-def test_a_wall_that_leaves_the_picture_is_seen_to_move_as_far(run: DrawnRun, good: Recording) -> None:
-    """The edge of the picture stays where it is: taken for wall, it left 26 of 29 steps untold."""
+def test_the_motion_of_a_wall_that_leaves_the_picture_is_right(run: DrawnRun, good: Recording) -> None:
+    """The edge of the picture does not move: taken for wall, it left 26 of 29 steps unknown."""
     recording, cut = cut_off(run, good, 300)
     seen = examine_pictures(recording, cut.probe, quiet_context())
     lit = np.isin(good.frames.frame, good.frames.of(Illumination.LED))
@@ -60,7 +60,7 @@ def test_a_wall_that_leaves_the_picture_is_seen_to_move_as_far(run: DrawnRun, go
 
 @pytest.mark.parametrize("step", [0.0, 0.4])
 def test_a_light_that_drifts_is_one_light_and_one_that_steps_is_two(step: float) -> None:
-    """A table that turned to the laser half way was believed, as the lamps had warmed up by then."""
+    """A table that changed to the laser half way was believed, as the lamps had warmed up by then."""
     number, random = np.arange(160), np.random.default_rng(4)
     brightness = 8.5 + 0.004 * number + 0.01 * random.standard_normal(160) + step * (number >= 80)
     nothing = np.full(160, np.nan)
@@ -73,7 +73,7 @@ def test_a_light_that_drifts_is_one_light_and_one_that_steps_is_two(step: float)
 
 @pytest.mark.parametrize("flash", [False, True])
 @pytest.mark.parametrize("apart", [0.0, 4.0])
-def test_two_lights_are_not_alike_because_of_one_flash(flash: bool, apart: float) -> None:
+def test_one_flash_does_not_make_two_lights_equal(flash: bool, apart: float) -> None:
     """One flash within a light made all changes between the lights look usual."""
     one = np.arange(COUNT) % 20 < 10
     brightness = 10 + apart * one + 0.05 * np.random.default_rng(2).standard_normal(COUNT)
@@ -86,8 +86,8 @@ def test_two_lights_are_not_alike_because_of_one_flash(flash: bool, apart: float
     assert look_the_same(seen, one, ~one) is (apart == 0)
 
 
-def test_a_light_that_drifts_goes_on_into_what_the_table_calls_another() -> None:
-    """The control: the step from one to the other is like all steps, though the medians are far apart."""
+def test_a_drifting_light_continues_under_another_label_of_the_table() -> None:
+    """Control: the step between the two is like all others, though the medians are far apart."""
     first = np.arange(COUNT) < COUNT // 2
     drifts = [
         10 + 0.1 * np.arange(COUNT) + 0.1 * np.random.default_rng(s).standard_normal(COUNT) for s in range(20)

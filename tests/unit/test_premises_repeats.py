@@ -1,4 +1,4 @@
-"""Pictures shown once more are told by how little they change, whatever their exposures."""
+"""Repeated pictures are recognised by how little they change, whatever their exposures."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from stages.premises.pictures import Pictures, change_between
 from stages.premises.repeats import copies, rows_that_follow_encoder
 
 
-def test_pictures_exposed_alike_by_chance_are_no_copies() -> None:
-    """The wall goes on in both, in one at 1.4 times the light; a copy hardly changes, whatever its light."""
+def test_pictures_with_equal_exposure_by_chance_are_not_copies() -> None:
+    """The wall moves on in both, in one at 1.4 times the light; a copy hardly changes, whatever its light."""
     random = np.random.default_rng(2)
     wall = cv2.GaussianBlur(random.uniform(40, 160, (80, 240)).astype(np.float32), (0, 0), 2)
     moved = np.roll(wall, 3, 0)
@@ -27,7 +27,7 @@ def test_pictures_exposed_alike_by_chance_are_no_copies() -> None:
 
 
 def line_copies(change: Float) -> Bool:
-    """Return which pictures of the line, which take turns with lit ones, are copies by their change."""
+    """Return which pictures of the line, alternating with lit ones, are copies by their change."""
     count = 2 * len(change)
     both = np.full(count, 5.8)
     both[::2] = change
@@ -40,7 +40,7 @@ def line_copies(change: Float) -> Bool:
     return np.asarray(told[::2])
 
 
-def test_trembling_pictures_moved_alike_by_chance_are_no_copies() -> None:
+def test_pictures_of_a_vibrating_camera_with_equal_shift_are_not_copies() -> None:
     """Shifted by a pixel, one in nine lies as the one before: a pit under two of these was missed."""
     random = np.random.default_rng(4)
     alike = random.random(900) < 1 / 9
@@ -51,15 +51,15 @@ def test_trembling_pictures_moved_alike_by_chance_are_no_copies() -> None:
 
 
 @pytest.mark.parametrize("often", [3, 4, 5, 8])
-def test_copies_that_come_often_are_all_told(often: int) -> None:
-    """Every third one, as a converter from 20 to 30 pictures a second makes them, hid the others."""
+def test_frequent_copies_are_all_reported(often: int) -> None:
+    """Every third one, as by conversion from 20 to 30 pictures a second, hid the others."""
     change = np.random.default_rng(6).uniform(0.2, 0.25, 240)
     change[often::often] = 0.02
     assert np.flatnonzero(line_copies(change)).tolist() == list(range(often, 240, often))
 
 
 def rows_told(seed: int, copied: slice, covered: slice, put_in: bool) -> tuple[Int, Int]:
-    """Return the rows told and the true ones; the encoder's table has only the rows in ``covered``."""
+    """Return the rows found and the true ones; the encoder's table has only the rows in ``covered``."""
     random, count = np.random.default_rng(seed), 300
     again = np.zeros(count, bool)
     again[copied] = True
@@ -79,16 +79,17 @@ def rows_told(seed: int, copied: slice, covered: slice, put_in: bool) -> tuple[I
     ("copied", "covered"),
     [(slice(20, 80), slice(200, 300)), (slice(100, 180), slice(250, 300)), (slice(20, 40), slice(0, 60))],
 )
-def test_rows_for_which_the_encoder_has_no_reading_do_not_follow_the_wall(
-    copied: slice, covered: slice
-) -> None:
-    """Beyond its table it read no advance, which departs from no wall: later rows were up to 80 too early."""
+def test_rows_without_an_encoder_reading_do_not_follow_the_wall(copied: slice, covered: slice) -> None:
+    """Beyond its table the encoder showed no motion, which contradicts no wall.
+
+    Rows were up to 80 too early.
+    """
     for seed in range(4):
         told, true = rows_told(seed, copied, covered, put_in=False)
         np.testing.assert_array_equal(told, true)
 
 
 @pytest.mark.parametrize("covered", [slice(0, 300), slice(60, 240)])
-def test_rows_move_up_behind_pictures_put_in_as_an_encoder_of_most_rows_shows(covered: slice) -> None:
+def test_rows_move_up_behind_inserted_pictures_if_an_encoder_of_most_rows_shows_it(covered: slice) -> None:
     told, true = rows_told(1, slice(100, 110), covered, put_in=True)
     np.testing.assert_array_equal(told, true)

@@ -30,7 +30,7 @@ from tests.spoiled_recordings import KeptFrames
         (-0.1, "in cm instead of mm and"),
     ],
 )
-def test_the_encoder_is_brought_to_mm_and_to_the_sense_of_the_motion(factor, message, good, run):
+def test_encoder_readings_are_converted_to_mm_and_to_the_direction_of_motion(factor, message, good, run):
     encoder = Encoder(good.encoder.time_s, good.encoder.distance_mm * factor)
     found, told = checked(replace(good, encoder=encoder), run.probe)
     assert found.encoder_factor == pytest.approx(1 / factor)
@@ -48,8 +48,8 @@ def test_a_diameter_that_the_ring_contradicts_ends_the_run(diameter_mm, message,
 
 
 @pytest.mark.parametrize(("stretch", "told_of"), [(1.0, False), (1.03, True)])
-def test_pictures_that_were_stretched_are_told_from_a_round_pipe(stretch, told_of, good, run):
-    """Of pixels 2 % too wide three warnings came, and none said what was wrong."""
+def test_stretched_pictures_are_distinguished_from_an_oval_pipe(stretch, told_of, good, run):
+    """Pixels 2 % too wide gave three warnings, and none said what was wrong."""
     (u, _), size = run.probe.camera.centre_px, good.source.image_size
     wider = np.float32([[stretch, 0, u * (1 - stretch)], [0, 1, 0]])
     images = {k: cv2.warpAffine(image, wider, size) for k, image in good.source.images.items()}
@@ -57,8 +57,8 @@ def test_pictures_that_were_stretched_are_told_from_a_round_pipe(stretch, told_o
     assert any("% longer towards 3:00 in the picture" in t or "towards 9:00" in t for t in told) is told_of
 
 
-def test_a_ring_with_gaps_is_oval_by_what_is_seen_of_it():
-    """A point in the very centre and sectors without a line ended gauge runs with a division by nothing."""
+def test_the_ovality_of_a_ring_with_gaps_is_that_of_its_visible_part():
+    """A point in the very centre, and sectors without a line, ended gauge runs with a division by zero."""
     azimuth = np.linspace(-np.pi, np.pi, 72, endpoint=False)
     radius = 25 * (1 + 0.03 * np.cos(2 * (azimuth - np.pi / 2)))
     rings = np.tile(radius[:, None] * np.stack([np.cos(azimuth), np.sin(azimuth)], -1), (20, 1, 1))
@@ -69,7 +69,7 @@ def test_a_ring_with_gaps_is_oval_by_what_is_seen_of_it():
     assert "6.0 % longer towards 6:00" in told[0] or "6.0 % longer towards 12:00" in told[0], told
 
 
-def test_blocks_of_a_codec_taken_for_the_line_make_no_oval():
+def test_blocks_of_a_codec_on_the_line_are_not_an_oval():
     azimuth = np.linspace(-np.pi, np.pi, 128, endpoint=False)
     rings = np.tile(25 * np.stack([np.cos(azimuth), np.sin(azimuth)], -1), (20, 1, 1))
     rings[:, 60:70] *= 0.7
@@ -79,8 +79,8 @@ def test_blocks_of_a_codec_taken_for_the_line_make_no_oval():
     assert not told
 
 
-def test_lengths_in_inch_throughout_end_the_run(good, run):
-    """All of them agree, but for the lamps, and the pipe came out 25 times too small without a word."""
+def test_a_probe_file_all_in_inches_ends_the_run(good, run):
+    """All lengths agree, except for the lamps, and the pipe was 25 times too small without a message."""
     laser = replace(run.probe.laser, baseline_mm=BASELINE / 25.4)
     encoder = Encoder(good.encoder.time_s, good.encoder.distance_mm / 25.4)
     inch = replace(good, pipe=PipeFacts(2 * RADIUS / 25.4), encoder=encoder)
@@ -94,16 +94,16 @@ def test_a_baseline_in_metres_ends_the_run(good, run):
         checked(good, replace(run.probe, laser=laser))
 
 
-def test_a_camera_that_looks_nowhere_ends_the_run(good, run):
-    """A focal length of 1e-9 px had no complaint: not one pixel of the line has a place by it."""
+def test_an_absurd_camera_ends_the_run(good, run):
+    """A focal length of 1e-9 px was not refused, though it gives no pixel of the line a place."""
     camera = replace(run.probe.camera, focal_px=(1e-9, 1e-9))
     with pytest.raises(UnusableError, match=r"100 % of the laser line's pixels(.|\n)*focal_px"):
         checked(good, replace(run.probe, camera=camera))
 
 
-def test_a_ratio_that_fits_no_unit_does_not_turn_the_encoder_round(good):
+def test_a_scale_that_fits_no_unit_does_not_reverse_the_encoder(good):
     place = np.arange(1, 40)
-    # the encoder goes on by 1 mm a frame, what is taken for the wall back by a seventh
+    # the encoder moves on by 1 mm a frame, what is taken for the wall back by a seventh
     steps = Steps(place - 1, place, np.full(len(place), -1 / 7))
     time_s = np.arange(40) / 30
     told: list[str] = []
@@ -113,7 +113,7 @@ def test_a_ratio_that_fits_no_unit_does_not_turn_the_encoder_round(good):
     assert "one of the encoder's scale, its clock and the probe's baseline is wrong" in told[0]
 
 
-def test_another_diameter_and_another_clock_are_told(good, run):
+def test_another_diameter_and_another_clock_are_reported(good, run):
     table = replace(good.frames, time_s=good.frames.time_s * 1000)
     _, told = checked(replace(good, frames=table, pipe=PipeFacts(2.3 * RADIUS)), run.probe)
     assert any("diameter of 100" in t for t in told)
@@ -121,7 +121,7 @@ def test_another_diameter_and_another_clock_are_told(good, run):
 
 
 def scratches(size):
-    """Nine thin bright strokes on the window, as bright as the lamps make them."""
+    """Return nine thin bright scratches on the window, as bright as the lamps make them."""
     drawn, random = np.zeros(size[::-1], np.uint8), np.random.default_rng(2)
     for _ in range(9):
         at, way = random.uniform(0.2, 0.8, 2) * size, random.uniform(-60, 60, 2)
@@ -130,7 +130,7 @@ def scratches(size):
 
 
 def test_scratches_on_the_window_are_not_taken_for_the_wall(good, run, monkeypatch):
-    """A wrong unit of the encoder is seen by how the wall moves; scratches stand still."""
+    """A wrong unit of the encoder is detected by the wall's motion; scratches stand still."""
     size, light = run.probe.camera.image_size, good.frames.illumination
     by_light = {"led": scratches(size), "laser": scratches(size) // 20}
     images = {n: cv2.add(image, by_light[light[n]]) for n, image in good.source.images.items()}
@@ -141,7 +141,7 @@ def test_scratches_on_the_window_are_not_taken_for_the_wall(good, run, monkeypat
     assert found.encoder_factor == 25.4
     assert found.applied_to(scratched).stays is not None
     monkeypatch.setattr("stages.premises.find_static_places", lambda *parts: None)
-    assert checked(scratched, run.probe)[0].encoder_factor == 1, "the control: scratches are followed"
+    assert checked(scratched, run.probe)[0].encoder_factor == 1, "control: scratches are tracked"
 
 
 def turned_round(run, sense=1):
@@ -155,7 +155,7 @@ def turned_round(run, sense=1):
 @pytest.mark.parametrize("encoder", [(100, 0.0), (10, 1.0)], ids=str)
 @pytest.mark.parametrize("sense", [1, -1])
 def test_pictures_stored_last_first_end_the_run(seed, encoder, sense):
-    """The encoder's sign was turned round, and half of the radii were wrong by more than stated."""
+    """The encoder's sign was reversed, and half of the radii were wrong by more than stated."""
     run = pulled(seed, encoder_hz=encoder[0], quantum_mm=encoder[1])
     with pytest.raises(UnusableError, match="last first"):
         runs_forwards(*turned_round(run, sense))
@@ -163,7 +163,7 @@ def test_pictures_stored_last_first_end_the_run(seed, encoder, sense):
     assert runs_forwards(sound, run.table.time_s, run.steps)
 
 
-def test_a_steady_probe_does_not_tell_whether_the_video_runs_backwards(good, run):
+def test_at_constant_speed_a_reversed_video_cannot_be_detected(good, run):
     assert not runs_forwards(*turned_round(pulled(1, steady=True)))
     backwards = replace(good, encoder=replace(good.encoder, distance_mm=-good.encoder.distance_mm))
     assert "Check whether the video runs backwards" in checked(backwards, run.probe)[1][0]
@@ -183,14 +183,14 @@ def test_a_recording_whose_video_runs_backwards_is_refused(good, run):
     last_first = {k: good.source.images[n] for k, n in enumerate(kept[::-1])}
     source = MemorySource(last_first, run.probe.camera.image_size)
     turned = replace(table, illumination=table.illumination[::-1])
-    assert not checked(forward, run.probe)[1], "the control: as it was taken nothing is wrong"
+    assert not checked(forward, run.probe)[1], "control: in its true order nothing is wrong"
     with pytest.raises(UnusableError, match="last first"):
         checked(replace(forward, source=source, frames=turned), run.probe)
 
 
 @pytest.mark.parametrize("late_s", [-0.1, 0.02, 0.1])
-def test_a_probe_that_goes_there_and_back_is_not_refused_for_a_late_clock(late_s):
-    """Where it turns just before the middle, a tenth of a second makes the encoder fit backwards."""
+def test_a_probe_that_drives_forth_and_back_is_not_refused_for_a_late_clock(late_s):
+    """Where it turns just before the middle, a delay of a tenth of a second fits a reversed video."""
     time_s = np.arange(217) / 30
     turn_s = (time_s[-1] - late_s) / 2
     at = np.arange(0, 217, 4)
@@ -203,7 +203,7 @@ def test_a_probe_that_goes_there_and_back_is_not_refused_for_a_late_clock(late_s
 @pytest.mark.parametrize("late_s", [0.3, 0.5, 1.0])
 @pytest.mark.parametrize("stop_s", [0.5, 1.0])
 def test_a_probe_that_stops_and_goes_is_not_refused_for_a_late_clock(stop_s, late_s):
-    """Pushed by rods, ended with "stored last first" in up to 15 of 60 runs."""
+    """A probe pushed by rods was "stored last first" in up to 15 of 60 runs."""
     read_s = np.arange(-200, 2200) / 100
     for seed in range(12):
         random = np.random.default_rng(seed)
@@ -217,8 +217,8 @@ def test_a_probe_that_stops_and_goes_is_not_refused_for_a_late_clock(stop_s, lat
         runs_forwards(encoder, np.arange(600) / 30, Steps(at[:-1], at[1:], size))
 
 
-def test_a_motion_that_tells_its_direction_is_not_called_too_steady(good):
-    """An encoder with its sign reversed was told to be a video that may run backwards all the same."""
+def test_a_motion_that_shows_its_direction_is_not_called_too_steady(good):
+    """An encoder with reversed sign was still reported as a video that may run backwards."""
     run, told = pulled(1), []
     turned = replace(run.encoder, distance_mm=-run.encoder.distance_mm)
     context = replace(quiet_context(), warn=told.append)
@@ -230,15 +230,15 @@ def test_a_motion_that_tells_its_direction_is_not_called_too_steady(good):
 
 
 @pytest.mark.parametrize("unit_mm", [1.0, 25.4, 1000.0])
-def test_an_encoder_is_brought_to_mm_whichever_its_sign(unit_mm):
+def test_an_encoder_of_either_sign_is_converted_to_mm(unit_mm):
     run = pulled(2)
     read = replace(run.encoder, distance_mm=-run.encoder.distance_mm / unit_mm)
     brought = in_mm(read, run.table.time_s, run.steps, 50.0)
     np.testing.assert_allclose(brought.distance_mm, -run.encoder.distance_mm)
 
 
-def test_an_encoder_that_stands_beside_a_moving_wall_stays_as_it_is():
-    """It ended the run with a division by nothing."""
+def test_an_encoder_that_stands_beside_a_moving_wall_is_not_changed():
+    """It ended the run with a division by zero."""
     run = pulled(2)
     stands = replace(run.encoder, distance_mm=np.full(len(run.encoder.time_s), 3.0))
     assert in_mm(stands, run.table.time_s, run.steps, 50.0) is stands

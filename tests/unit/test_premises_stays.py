@@ -1,4 +1,4 @@
-"""What stays in the picture while the wall moves: found where it is, and nowhere else."""
+"""What stays in the picture while the wall moves is found where it is, and nowhere else."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def texture(shape: tuple[int, int], seed: int, finest: float = 2.0) -> Float32:
 def passing(
     count: int = 40, step_px: int = 3, contrast: float = 0.2, sign: float = 0.0, noise: float = 1.0
 ) -> list[Image]:
-    """Return pictures of a wall that moves on by so many pixels each, with a sign before it that stays."""
+    """Return pictures of a wall that moves by so many pixels each, with a fixed sign in front of it."""
     random = np.random.default_rng(5)
     wall = texture((150 + step_px * count, 200), seed=6)
     wall = 100 * (1 + contrast * wall / wall.std())
@@ -33,10 +33,10 @@ def passing(
     ]
 
 
-def test_a_sign_that_stays_while_the_wall_moves_is_found_where_it_is() -> None:
+def test_a_sign_that_stays_while_the_wall_moves_is_found_at_its_place() -> None:
     hidden = static_places(passing(sign=60.0), WALL)
     assert hidden[SIGN].mean() > 0.95
-    assert hidden.sum() < 1.8 * hidden[SIGN].sum(), "little is hidden beside it"
+    assert hidden.sum() < 1.8 * hidden[SIGN].sum(), "little else is masked"
 
 
 def test_a_sign_is_found_on_a_plain_wall_too() -> None:
@@ -58,7 +58,7 @@ def test_nothing_is_hidden_where_the_wall(pictures: dict[str, float]) -> None:
     assert not static_places(passing(**pictures), WALL).any()
 
 
-def test_where_more_stays_than_moves_nothing_is_hidden() -> None:
+def test_where_more_stays_than_moves_nothing_is_masked() -> None:
     still = passing(step_px=0, noise=0.0)[0]
     pictures = [np.where(np.arange(200) < 140, still, p).astype(np.uint8) for p in passing(step_px=9)]
     assert not static_places(pictures, WALL).any()

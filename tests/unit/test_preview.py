@@ -1,4 +1,4 @@
-"""Live diameters: their σ is that of drawn probes and rings, whole ones and such with a part missing."""
+"""Live diameters: their σ agrees with drawn probes and rings, whole ones and incomplete ones."""
 
 from dataclasses import replace
 
@@ -21,7 +21,7 @@ RADIUS = 50.0
 
 
 def measured(true: Probe, seed: int, share: float, believed: Probe = PROBE) -> tuple[float, float]:
-    """Return error and 1 σ of the diameter by a believed probe of an oval pipe that ``true`` looks at."""
+    """Return error and 1 σ of the diameter by an assumed probe in an oval pipe seen by ``true``."""
     random = np.random.default_rng(seed)
     radius = RADIUS * (1 + 0.002 * np.cos(2 * AZIMUTH - random.uniform(0, 6)))
     height = true.laser.height(AZIMUTH) + radius * true.laser.slope(AZIMUTH)
@@ -42,7 +42,7 @@ def measured(true: Probe, seed: int, share: float, believed: Probe = PROBE) -> t
 
 
 @pytest.mark.parametrize("share", [1.0, 0.75])
-def test_the_sigma_of_a_live_diameter_is_true(share: float) -> None:
+def test_the_sigma_of_a_live_diameter_is_right(share: float) -> None:
     errors, known = [], []
     for seed in range(80):
         drawn = np.random.default_rng(1000 + seed).normal(size=20) * SIGMA
@@ -54,7 +54,7 @@ def test_the_sigma_of_a_live_diameter_is_true(share: float) -> None:
     assert share < 1 or np.std([e for e, _ in errors]) > 5 * np.std(known), "the probe decides, not the noise"
 
 
-def test_the_noise_of_a_whole_ring_is_stated_where_the_probe_is_known() -> None:
+def test_sigma_is_the_noise_of_a_whole_ring_where_the_probe_is_known() -> None:
     exact = replace(PROBE, covariance=np.zeros((20, 20)))
     z = np.array([np.divide(*measured(PROBE, seed, 1.0, exact)) for seed in range(80)])
     assert 0.75 < np.std(z) < 1.3

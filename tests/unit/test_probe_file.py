@@ -36,14 +36,14 @@ def _sigma(probe: Probe, name: str) -> float:
     return float(np.sqrt(probe.covariance[i, i]))
 
 
-def test_laser_angles_become_slopes(file: Path) -> None:
+def test_angles_of_the_laser_become_slopes(file: Path) -> None:
     laser = read_probe(file).laser
     slope = np.tan(np.radians(0.5))
     np.testing.assert_allclose(
         [laser.tilt_x, laser.tilt_y], [slope * np.cos(np.radians(120)), slope * np.sin(np.radians(120))]
     )
     np.testing.assert_allclose(laser.cone_rad, np.radians(-0.01))
-    # The stated direction is the one in which the sheet leans forward: there it meets larger z.
+    # The stated direction is the one in which the sheet leans forward, where it meets larger z.
     far, near = laser.intersect(np.array([[np.cos(a), np.sin(a), 0.5] for a in np.radians([120, 300])]))
     assert far[2] > near[2]
 
@@ -75,7 +75,7 @@ def test_round_trip_is_exact(calibrated: Probe, tmp_path: Path) -> None:
     )
 
 
-def test_written_uncertainty_alone_gives_the_same_sigmas(file: Path, tmp_path: Path) -> None:
+def test_the_written_uncertainty_alone_gives_the_same_sigmas(file: Path, tmp_path: Path) -> None:
     stated, out = read_probe(file), tmp_path / "out.yaml"
     write_probe(stated, out)
     text = out.read_text()
@@ -104,7 +104,7 @@ def test_focal_uncertainty_of_a_camera_without_focal_length_is_refused(file: Pat
         read_probe(out)
 
 
-def test_covariance_is_placed_by_name(file: Path) -> None:
+def test_the_covariance_is_ordered_by_names(file: Path) -> None:
     file.write_text(PROBE + "covariance: {names: [tilt_x, fx], matrix: [[4.0e-8, 1.0e-6], [1.0e-6, 0.01]]}\n")
     probe = read_probe(file)
     fx, tilt_x = (probe.parameter_names.index(n) for n in ("fx", "tilt_x"))
@@ -142,7 +142,7 @@ SPOILED = {
 
 
 @pytest.mark.parametrize("case", SPOILED)
-def test_spoiled_probes_are_refused_with_the_key(file: Path, case: str) -> None:
+def test_wrong_probe_files_are_refused_with_the_key(file: Path, case: str) -> None:
     old, new, complaint = SPOILED[case]
     assert old is None or old in PROBE
     file.write_text(PROBE + new if old is None else PROBE.replace(old, new, 1))
@@ -151,7 +151,7 @@ def test_spoiled_probes_are_refused_with_the_key(file: Path, case: str) -> None:
     assert "probe.yaml" in str(caught.value)
 
 
-def test_parameters_are_the_cameras_and_the_lasers(file: Path) -> None:
+def test_parameters_are_those_of_camera_and_laser(file: Path) -> None:
     probe = read_probe(file)
     assert probe.parameter_names[-len(LaserSheet.PARAMETER_NAMES) :] == LaserSheet.PARAMETER_NAMES
     assert probe.covariance.shape == (len(probe.parameter_names),) * 2

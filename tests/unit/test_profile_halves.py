@@ -1,4 +1,4 @@
-"""Effects of the line's light: found in whole recordings, and borne out by one half of the other."""
+"""Effects on the line's light: found in whole recordings, and confirmed by each half of them."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def evidence(hidden: Hidden) -> ProfileEvidence:
     return profile_evidence(run, rings, stated, quiet_context())
 
 
-def test_plain_light_shows_nothing() -> None:
+def test_plain_light_gives_no_finding() -> None:
     assert evidence(Hidden()).found == ()
 
 
@@ -37,17 +37,17 @@ def test_a_second_line_is_found_in_both_halves(hidden: Hidden, name: str, size: 
     assert found.effect == name
     assert found.sizes[0].value == pytest.approx(size, abs=4 * found.sizes[0].sigma)
     assert [a.confirmation.agrees for a in found.agreements] == [True]
-    # Which of laser and camera it turns with is not what this test asks.
+    # Whether it turns with the laser or with the camera is not tested here.
     assert found.fixed_to is None
 
 
-def test_a_spot_is_no_pattern_of_pixels_and_keeps_to_the_image() -> None:
+def test_a_spot_in_the_image_is_not_a_pattern_of_pixels() -> None:
     (found,) = evidence(Hidden(dust=0.4)).found
     assert (found.effect, found.alike, found.fixed_to) == ("dust", (), "camera")
 
 
 def cells(blocks: int) -> Cells:
-    """Return cells of blocks with nothing in them: what is told of them, the tests below make up."""
+    """Return cells of empty blocks; the tests below make up what is found in them."""
     none = np.zeros(blocks)
     return Cells(
         np.zeros(3), np.arange(blocks), np.zeros(blocks, int), np.zeros((blocks, 3)), none, none,
@@ -70,7 +70,7 @@ def told(value: float, sigma: float = 0.1) -> Finding:
         (told(1.0), replace(told(1.0), sizes=()), []),
     ],
 )
-def test_halves_confirm_contradict_or_tell_too_little(
+def test_halves_confirm_contradict_or_show_too_little(
     first: Finding, second: Finding, agree: list[bool]
 ) -> None:
     def test(part: Cells) -> tuple[Finding, ...]:
@@ -80,6 +80,6 @@ def test_halves_confirm_contradict_or_tell_too_little(
     assert [a.confirmation.agrees for a in found.agreements] == agree
 
 
-def test_halves_of_too_few_blocks_are_not_asked() -> None:
+def test_halves_with_too_few_blocks_are_not_used() -> None:
     (found,) = with_halves((told(1.0),), (), cells(5))
     assert found.agreements == ()

@@ -1,4 +1,4 @@
-"""Wall errors of a proof: the true instrument leaves the noise alone, a wrong one what it is wrong by."""
+"""Wall errors of a proof: with the true instrument they are noise, with a wrong one its error."""
 
 import json
 from pathlib import Path
@@ -33,7 +33,7 @@ def concealed():
     truth = build_truth(scene, SMALL)
     azimuth, frames = np.linspace(-np.pi, np.pi, 480, endpoint=False), np.array([0, 2, 4, 6])
     centre = truth.stated.camera.centre_px
-    # The wall's errors use every fourth sample: only these need be there.
+    # The wall's errors use every fourth sample: only these must exist.
     radius = np.full((len(frames), 480), np.nan)
     radius[:, ::4] = exact_rings(truth, frames, azimuth[::4], centre)
     radius += np.random.default_rng(1).normal(0, NOISE_PX, radius.shape)
@@ -47,7 +47,7 @@ def concealed():
 
 
 def errors(concealed, folder, monkeypatch, changes):
-    """Return the wall errors when the diagnosis writes a probe with ``changes`` to the sheet."""
+    """Return the wall errors for a diagnosis that writes a probe with ``changes`` to the sheet."""
     scene, _, rings = concealed
     monkeypatch.setattr(prove_cases, "open_recording", lambda path: path)
     monkeypatch.setattr(prove_cases, "measured_rings", lambda *_: rings)
@@ -61,7 +61,7 @@ def errors(concealed, folder, monkeypatch, changes):
     return wall_errors(Case("a", None, folder / "a-field"), folder / "answer", folder / "truth")
 
 
-def test_an_uncorrected_probe_errs_by_the_concealed_effect_and_the_oracle_by_noise(
+def test_an_uncorrected_probe_errs_by_the_concealed_effect_and_the_true_one_by_noise(
     concealed, tmp_path, monkeypatch
 ):
     found = errors(concealed, tmp_path, monkeypatch, {})
@@ -71,7 +71,7 @@ def test_an_uncorrected_probe_errs_by_the_concealed_effect_and_the_oracle_by_noi
     assert found.stated_mm > 4 * found.oracle_mm
 
 
-def test_a_corrected_probe_errs_no_more_than_the_oracle_and_is_kept(concealed, tmp_path, monkeypatch):
+def test_a_corrected_probe_errs_no_more_than_the_true_one_and_is_kept(concealed, tmp_path, monkeypatch):
     direction = concealed[1].instrument.laser.sheet
     true = dict(zip(direction.PARAMETER_NAMES, direction.parameters.tolist(), strict=True))
     tilt = np.array([true["tilt_x"], true["tilt_y"]])
@@ -85,6 +85,6 @@ def test_a_corrected_probe_errs_no_more_than_the_oracle_and_is_kept(concealed, t
     assert json.loads((tmp_path / "answer" / "wall_errors.json").read_text()) == vars(found)
 
 
-def test_without_the_scene_there_is_no_wall_to_compare_with(tmp_path):
+def test_without_the_scene_there_is_no_wall_error(tmp_path):
     (tmp_path / "probe.yaml").write_text("camera: {}\n")
     assert wall_errors(Case("a", None, tmp_path / "a-field"), tmp_path, tmp_path / "truth") is None

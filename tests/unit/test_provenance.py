@@ -1,4 +1,4 @@
-"""Every result says what it was made by and from, and a run says so of its probe."""
+"""Every result states its inputs and the program that made it, and a run does so for its probe."""
 
 import json
 from dataclasses import replace
@@ -32,17 +32,17 @@ def test_a_run_names_what_made_its_probe(tmp_path):
     assert set(record["libraries"]) == set(record["probe"]["made_by"]["libraries"])
 
 
-def test_a_data_sheet_says_nothing(tmp_path):
+def test_a_data_sheet_has_no_record_of_origin(tmp_path):
     assert read_with_source(written(tmp_path, None))[1].made_by is None
 
 
-def test_dates_put_in_by_hand_do_not_spoil_the_record(tmp_path):
+def test_dates_added_by_hand_do_not_break_the_record(tmp_path):
     file = written(tmp_path, None)
     file.write_text(file.read_text() + "made_by: {command: by hand, day: 2026-11-21}\n")
     assert read_with_source(file)[1].made_by == {"command": "by hand", "day": "2026-11-21"}
 
 
-def test_the_hash_tells_content_and_order(tmp_path):
+def test_the_hash_depends_on_content_and_order(tmp_path):
     a, b = tmp_path / "a", tmp_path / "b"
     a.write_bytes(b"1")
     b.write_bytes(b"2")

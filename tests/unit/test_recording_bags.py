@@ -28,7 +28,7 @@ WRITERS = {
 
 @pytest.mark.parametrize("compressed", [False, True])
 @pytest.mark.parametrize("kind", WRITERS)
-def test_every_bag_gives_back_what_was_written(tmp_path: Path, kind: str, compressed: bool) -> None:
+def test_every_bag_contains_what_was_written(tmp_path: Path, kind: str, compressed: bool) -> None:
     recording = open_recording(WRITERS[kind](tmp_path, compressed=compressed))
     assert recording.name == "made"
     assert recording.warnings == ()
@@ -64,19 +64,19 @@ def test_raw_encodings(tmp_path: Path, encoding: str) -> None:
     if encoding == "rgb8":
         np.testing.assert_array_equal(bgr, picture(5))
     elif encoding == "bayer_rggb8":
-        # Interpolation is exact where colours are flat or linear: red is flat outside the square.
+        # Interpolation is exact where colours are constant or linear: red is constant outside the square.
         np.testing.assert_array_equal(bgr[30:40, 30:50, 2], picture(5)[30:40, 30:50, 2])
     else:
         np.testing.assert_array_equal(grey, picture(5)[..., 0])
         np.testing.assert_array_equal(bgr[..., 2], grey)
 
 
-def test_light_holds_until_the_next_message(tmp_path: Path) -> None:
+def test_the_light_holds_until_the_next_message(tmp_path: Path) -> None:
     recording = open_recording(write_ros1(tmp_path, lights=["laser", "both"]))
     assert recording.frames.illumination.tolist() == ["laser"] + ["both"] * (COUNT - 1)
 
 
-def test_light_by_stated_pattern(tmp_path: Path) -> None:
+def test_the_light_follows_a_stated_pattern(tmp_path: Path) -> None:
     bag = write_ros2(tmp_path, lights=None)
     with pytest.raises(InputError, match="key illumination: is missing"):
         open_recording(bag)
@@ -86,12 +86,12 @@ def test_light_by_stated_pattern(tmp_path: Path) -> None:
     assert lights[:4] == ["led", "laser", "both", "led"]
 
 
-def test_unknown_light_names_its_message(tmp_path: Path) -> None:
+def test_an_unknown_light_is_refused_with_its_message(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="message 3: is 'uv'"):
         open_recording(write_mcap(tmp_path, lights=["laser", "led", "uv"]))
 
 
-def test_named_topic_that_is_not_there(tmp_path: Path) -> None:
+def test_a_named_topic_that_does_not_exist_is_refused(tmp_path: Path) -> None:
     bag = write_ros1(tmp_path)
     described = tmp_path / "recording.yaml"
     described.write_text(described.read_text() + "topics: {image: /camera/image_rw}\n")
@@ -99,7 +99,7 @@ def test_named_topic_that_is_not_there(tmp_path: Path) -> None:
         open_recording(bag)
 
 
-def test_bag_without_description_says_which_file_to_write(tmp_path: Path) -> None:
+def test_for_a_bag_without_description_the_error_names_the_file_to_write(tmp_path: Path) -> None:
     bag = write_mcap(tmp_path)
     (tmp_path / "recording.yaml").unlink()
     with pytest.raises(InputError, match=r"run\.recording\.yaml or recording\.yaml"):
@@ -107,7 +107,7 @@ def test_bag_without_description_says_which_file_to_write(tmp_path: Path) -> Non
 
 
 @pytest.mark.parametrize("kind", WRITERS)
-def test_cut_off_bag_is_refused(tmp_path: Path, kind: str) -> None:
+def test_a_truncated_bag_is_refused(tmp_path: Path, kind: str) -> None:
     path = WRITERS[kind](tmp_path)
     files = [path] if path.is_file() else [f for f in path.iterdir() if f.suffix in (".db3", ".mcap")]
     for file in files:
@@ -116,7 +116,7 @@ def test_cut_off_bag_is_refused(tmp_path: Path, kind: str) -> None:
         open_recording(path)
 
 
-def test_refusals_say_what_was_tried(tmp_path: Path) -> None:
+def test_refusals_list_what_was_tried(tmp_path: Path) -> None:
     file = tmp_path / "notes.txt"
     file.write_text("nothing")
     with pytest.raises(InputError) as caught:

@@ -1,4 +1,4 @@
-"""A recording that is not what it was when it was opened is refused by name; times of files say nothing."""
+"""A recording that has changed since it was opened is refused by name; file times do not matter."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ LONG_AGO_NS = 10**17
 
 
 def same_size_and_time(file: Path) -> None:
-    """Flip a byte and put the old times back, as a sloppy copy or somebody with an interest would."""
+    """Flip a byte and restore the old times, as a careless copy or a forger would."""
     found, content = file.stat(), bytearray(file.read_bytes())
     content[len(content) // 2] ^= 1
     file.write_bytes(content)
@@ -74,7 +74,7 @@ def linked(file: Path) -> None:
 
 
 @pytest.mark.parametrize("handle", [touched_back, copied_over, linked])
-def test_the_same_bytes_are_the_same_whatever_the_clock(
+def test_the_same_bytes_are_accepted_whatever_their_times(
     tmp_path: Path, handle: Callable[[Path], None]
 ) -> None:
     folder = write_folder(tmp_path / "r")
@@ -85,7 +85,7 @@ def test_the_same_bytes_are_the_same_whatever_the_clock(
     assert open_recording(folder).content_key == recording.content_key
 
 
-def test_a_video_gone_is_told_by_name_where_it_is_read(tmp_path: Path) -> None:
+def test_a_missing_video_is_reported_by_name_where_it_is_read(tmp_path: Path) -> None:
     folder = write_folder(tmp_path / "r")
     recording = open_recording(folder)
     (folder / "frames.mkv").unlink()

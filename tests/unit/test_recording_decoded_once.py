@@ -1,4 +1,4 @@
-"""Frames that stages share: the same pixels as those of the video, decoded once."""
+"""Frames that stages share: their pixels equal those of the video, and they are decoded once."""
 
 import errno
 import os
@@ -33,7 +33,7 @@ def _shared(folder: Path, video: VideoSource, lasers: Sequence[int] = ()) -> Dec
 
 
 def _count_decoded(monkeypatch: pytest.MonkeyPatch) -> list[int]:
-    """Return the list to which every frame that is decoded from now on is added."""
+    """Return a list to which every frame decoded from now on is added."""
     decoded, of_video = [], VideoSource.decoded
 
     def counted(self: VideoSource, wanted: np.ndarray) -> object:
@@ -45,7 +45,7 @@ def _count_decoded(monkeypatch: pytest.MonkeyPatch) -> list[int]:
 
 
 @pytest.mark.parametrize("made", FORMATS)
-def test_luma_and_small_colours_are_those_of_the_whole_picture(
+def test_luma_and_small_colours_equal_those_of_the_whole_picture(
     tmp_path: Path, made: tuple[str, str, str]
 ) -> None:
     ext, codec, pixel_format = made
@@ -68,7 +68,7 @@ def test_luma_and_small_colours_are_those_of_the_whole_picture(
 
 
 @pytest.mark.parametrize("made", FORMATS)
-def test_luma_alone_is_that_of_the_split_picture(tmp_path: Path, made: tuple[str, str, str]) -> None:
+def test_luma_alone_equals_that_of_the_split_picture(tmp_path: Path, made: tuple[str, str, str]) -> None:
     ext, codec, pixel_format = made
     write_video(tmp_path / f"v.{ext}", codec, pixel_format, {"g": "4"} if codec == "libx264" else {})
     source = _shared(tmp_path, open_video(tmp_path / f"v.{ext}"))
@@ -83,7 +83,7 @@ def test_luma_alone_is_that_of_the_split_picture(tmp_path: Path, made: tuple[str
 
 
 @pytest.mark.parametrize("made", FORMATS)
-def test_pixels_are_those_of_the_video_however_often_they_are_read(
+def test_pixels_equal_those_of_the_video_however_often_they_are_read(
     tmp_path: Path, made: tuple[str, str, str]
 ) -> None:
     ext, codec, pixel_format = made
@@ -98,7 +98,7 @@ def test_pixels_are_those_of_the_video_however_often_they_are_read(
             np.testing.assert_array_equal(got, want, f"{planes} {n}", strict=True)
 
 
-def test_a_frame_is_decoded_once_and_whole_colours_when_they_are_asked_for(
+def test_a_frame_is_decoded_once_and_its_whole_colours_when_they_are_requested(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     write_video(tmp_path / "v.mkv", "libx264", "yuv444p", {"g": "4"})
@@ -115,7 +115,7 @@ def test_a_frame_is_decoded_once_and_whole_colours_when_they_are_asked_for(
     assert decoded == [*range(COUNT), 0, 1]
 
 
-def test_a_full_disk_costs_time_and_nothing_else(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_full_disk_costs_only_time(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     write_video(tmp_path / "v.mkv", "libx264", "yuv444p", {"g": "4"})
     video = open_video(tmp_path / "v.mkv")
     shared, want = _shared(tmp_path, video), dict(video.read(range(COUNT), "grey"))
@@ -131,6 +131,6 @@ def test_a_full_disk_costs_time_and_nothing_else(tmp_path: Path, monkeypatch: py
     assert len(decoded) == 2 * COUNT
 
 
-def test_images_that_are_files_of_their_own_are_read_from_these(tmp_path: Path) -> None:
+def test_image_files_are_read_directly(tmp_path: Path) -> None:
     recording: Recording = replace(open_recording(write_folder(tmp_path / "r")), source=object())  # type: ignore[arg-type]
     assert decoded_once(recording, Scratch(tmp_path)) is recording

@@ -20,7 +20,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def copy(folder: Path, tmp_path: Path) -> Path:
-    """Return a copy of the recording to spoil."""
+    """Return a copy of the recording, to be spoiled."""
     target = tmp_path / "r"
     target.mkdir()
     for file in folder.iterdir():
@@ -28,7 +28,7 @@ def copy(folder: Path, tmp_path: Path) -> Path:
     return target
 
 
-def test_folder_says_what_it_holds(folder: Path) -> None:
+def test_a_folder_lists_its_contents(folder: Path) -> None:
     recording = open_recording(folder)
     assert (recording.name, recording.kind, recording.frame_rate) == ("made", "inspection", 30.0)
     assert recording.frames.illumination.tolist() == LIGHTS
@@ -64,7 +64,7 @@ def test_imu_plan_and_mount_are_read(copy: Path) -> None:
         read_probe(copy / "probe.yaml")
 
 
-def test_gauge_facts() -> None:
+def test_the_facts_of_a_gauge_are_read() -> None:
     pipe = open_recording(shared("recordings", "open-1-gauge")).pipe
     assert [(b.length_mm, b.diameter_mm) for b in pipe.bore] == [(42.0, 101.6), (42.0, 84.0), (42.0, 70.0)]
     assert pipe.bore_tolerance_mm == 0.01
@@ -97,7 +97,7 @@ def test_damaged_and_missing_images_are_none(tmp_path: Path) -> None:
     assert lost == [3, 5, 7]
 
 
-def test_images_numbered_otherwise_than_the_table_are_refused(tmp_path: Path) -> None:
+def test_images_with_other_numbers_than_the_table_are_refused(tmp_path: Path) -> None:
     made = write_folder(tmp_path / "r", "frames/%06d.png")
     (made / "frames" / "000000.png").unlink()
     with pytest.raises(InputError, match="table of frames starts at 0"):
@@ -105,14 +105,14 @@ def test_images_numbered_otherwise_than_the_table_are_refused(tmp_path: Path) ->
 
 
 @pytest.mark.parametrize("pattern", ["frames/%06d_%d.png", "%s.png", "none/%06d.png", "%06d/a.png"])
-def test_wrong_patterns(copy: Path, pattern: str) -> None:
+def test_wrong_patterns_are_refused(copy: Path, pattern: str) -> None:
     described = copy / "recording.yaml"
     described.write_text(described.read_text().replace("video: 'frames.mkv'", f"video: '{pattern}'"))
     with pytest.raises(InputError, match=r"pattern|fits no image"):
         open_recording(copy)
 
 
-def test_content_key_follows_bytes_and_nothing_else(folder: Path, copy: Path) -> None:
+def test_the_content_key_depends_on_the_bytes_only(folder: Path, copy: Path) -> None:
     key = open_recording(folder).content_key
     assert open_recording(copy).content_key == key
     for name in ("recording.yaml", "frames.csv", "encoder.csv", "frames.mkv"):
@@ -124,7 +124,7 @@ def test_content_key_follows_bytes_and_nothing_else(folder: Path, copy: Path) ->
     assert open_recording(copy).content_key == key
 
 
-def test_shorter_table_of_frames_uses_the_common_part(copy: Path) -> None:
+def test_with_a_shorter_table_of_frames_the_common_part_is_used(copy: Path) -> None:
     table = copy / "frames.csv"
     table.write_text("".join(table.read_text().splitlines(keepends=True)[:11]))
     recording = open_recording(copy)
@@ -149,8 +149,8 @@ def test_suspicious_encoders_are_named(copy: Path, edit, warning: str) -> None:
 
 
 @pytest.mark.parametrize("backward", [False, True])
-def test_a_counter_that_begins_anew_counts_on(copy: Path, backward: bool) -> None:
-    """It had moved poses by .8 mm across and 1.2° of roll."""
+def test_a_restarted_counter_counts_on(copy: Path, backward: bool) -> None:
+    """It moved poses by .8 mm across and 1.2° of roll."""
     whole = 0.02 + 0.05 * np.arange(400) * (-1 if backward else 1)
     for distance, counts in ((whole % 4.0, True), (whole + 4.0 * (whole > 10), False)):
         rows = (f"{0.0025 * k:.4f},{d:.3f}" for k, d in enumerate(distance))
@@ -165,7 +165,7 @@ def test_a_counter_that_begins_anew_counts_on(copy: Path, backward: bool) -> Non
         )
 
 
-def test_run_without_encoder_or_probe_file(copy: Path) -> None:
+def test_a_run_without_encoder_or_probe_file_is_opened(copy: Path) -> None:
     (copy / "encoder.csv").unlink()
     (copy / "probe.yaml").unlink()
     recording = open_recording(copy)
@@ -174,7 +174,7 @@ def test_run_without_encoder_or_probe_file(copy: Path) -> None:
     assert len(recording.warnings) == 2
 
 
-def test_images_of_another_size_than_the_cameras(folder: Path) -> None:
+def test_images_of_another_size_than_the_cameras_are_refused(folder: Path) -> None:
     recording, probe = open_recording(folder), read_probe(folder / "probe.yaml")
     check_probe_fits(recording, probe)
     other = replace(probe, camera=replace(probe.camera, image_size=(1600, 1200)))
@@ -187,7 +187,9 @@ def test_images_of_another_size_than_the_cameras(folder: Path) -> None:
     [((48, 64), "rotate the pictures back by 90°"), ((64, 60), "cut rows off"), ((80, 48), "cut columns off"),
      ((32, 24), "at this resolution"), ((128, 96), "at this resolution")],
 )  # fmt: skip
-def test_images_that_were_turned_or_cut_are_told_so(folder: Path, size: tuple[int, int], hint: str) -> None:
+def test_for_rotated_or_cropped_images_the_error_says_so(
+    folder: Path, size: tuple[int, int], hint: str
+) -> None:
     recording, probe = open_recording(folder), read_probe(folder / "probe.yaml")
     other = replace(probe, camera=replace(probe.camera, image_size=size))
     with pytest.raises(InputError, match=hint):
@@ -243,7 +245,7 @@ SPOILED = {
 
 
 @pytest.mark.parametrize("case", SPOILED)
-def test_spoiled_recordings_are_refused_with_the_place(copy: Path, case: str) -> None:
+def test_spoiled_recordings_are_refused_with_the_place_of_the_error(copy: Path, case: str) -> None:
     name, old, new, complaint = SPOILED[case]
     file = copy / name
     text = file.read_text()
@@ -254,13 +256,13 @@ def test_spoiled_recordings_are_refused_with_the_place(copy: Path, case: str) ->
     assert name in str(caught.value) or "x.mkv" in str(caught.value)
 
 
-def test_yaml_too_large_is_refused_unread(copy: Path) -> None:
+def test_too_large_a_yaml_file_is_refused_unread(copy: Path) -> None:
     (copy / "recording.yaml").write_text("#" * 1_000_001)
     with pytest.raises(InputError, match="bytes long"):
         open_recording(copy)
 
 
-def test_for_whom_and_how_it_was_inspected_is_read_where_it_is_stated(folder: Path, copy: Path) -> None:
+def test_client_and_method_of_the_inspection_are_read_where_stated(folder: Path, copy: Path) -> None:
     assert open_recording(folder).inspection == InspectionFacts()
     with (copy / "recording.yaml").open("a") as file:
         file.write("\ninspection: {client: Water Works, line: A 12, date: 2026-05-31}\n")

@@ -1,4 +1,4 @@
-"""A growing recording is looked at for the price of what is new, and seen as it would be if read anew."""
+"""Each look at a growing recording reads only what is new, and sees the same as a fresh reader."""
 
 import shutil
 from dataclasses import dataclass, fields
@@ -38,7 +38,7 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def repeated_video(source: Path, target: Path) -> int:
-    """Copy a video's packets several times over, at one rate; return how many frames that makes."""
+    """Copy a video's packets several times over, at one rate; return the resulting number of frames."""
     count, held_back = 0, 4
     with av.open(str(target), "w") as written:
         copy = None
@@ -57,7 +57,7 @@ def repeated_video(source: Path, target: Path) -> int:
 
 
 def written(whole: Path, growing: Path, share: Fraction) -> None:
-    """Write so much of every file of a recording that grows, wherever that cuts them."""
+    """Write a share of every file of a growing recording, wherever that cuts them."""
     growing.mkdir(exist_ok=True)
     for name in ("recording.yaml", "probe.yaml"):
         shutil.copy(whole / name, growing / name)
@@ -69,19 +69,19 @@ def written(whole: Path, growing: Path, share: Fraction) -> None:
 
 
 def bytes_read() -> int:
-    """Return the bytes that this process has read so far, from whatever file."""
+    """Return the bytes that this process has read so far, from any file."""
     return int(Path("/proc/self/io").read_text().splitlines()[0].split()[1])
 
 
 def newest(recording, after: int) -> dict[int, np.ndarray]:
-    """Return the pictures behind a frame that are sure to be whole."""
+    """Return the pictures behind a frame that are surely complete."""
     wanted = recording.frames.frame[(recording.frames.frame > after)][:-8]
     return {n: image.copy() for n, image in recording.read(wanted, "grey") if image is not None}
 
 
 @dataclass(frozen=True)
 class Look:
-    """What one look at the growing recording saw and cost, and what a reader that opens it anew needs."""
+    """Results and cost of one look at the growing recording, and those of a reader that opens it anew."""
 
     recording: Recording
     fresh: VideoSource
@@ -93,7 +93,7 @@ class Look:
 
 @pytest.fixture(scope="module")
 def looks(whole: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[Look]]:
-    """The recording that grew by pieces, and what each look saw while it did."""
+    """A recording that grew in steps, and the results of a look after each step."""
     folder = tmp_path_factory.mktemp("looks") / "r"
     growing, seen, out = GrowingRecording(folder), -1, []
     for piece in range(1, PIECES + 1):
@@ -117,7 +117,7 @@ def test_every_look_sees_what_a_fresh_reader_sees(looks: tuple[Path, list[Look]]
     folder, every = looks
     for look in every:
         index, anew = look.recording.source.index, look.fresh.index
-        # where a shown frame is not in the file yet, frames about it are not to be trusted yet
+        # where a shown frame is not in the file yet, frames near it are not reliable yet
         for field in (f for f in fields(index) if f.name != "broken" or look is every[-1]):
             assert np.array_equal(getattr(index, field.name), getattr(anew, field.name)), field.name
         assert look.pictures > 0
@@ -128,18 +128,18 @@ def test_every_look_sees_what_a_fresh_reader_sees(looks: tuple[Path, list[Look]]
     assert np.array_equal(recording.encoder.distance_mm, last.encoder.distance_mm)
 
 
-def test_a_look_reads_what_is_new_however_long_the_recording_is(
+def test_a_look_reads_only_what_is_new_however_long_the_recording_is(
     whole: Path, looks: tuple[Path, list[Look]]
 ) -> None:
     every = looks[1]
     cost = [look.read_bytes for look in every]
     new = sum((whole / name).stat().st_size for name in GROWING) / PIECES
-    # what is new is listed and decoded, each from the cluster before it on; a cluster holds a second
+    # new data is listed and decoded, each from the cluster before it on; a cluster holds a second
     cluster = RATE * (whole / "frames.mkv").stat().st_size / len(every[-1].recording.frames.frame)
     most = 2 * (new + 2 * cluster) + 200_000
     assert max(cost) < most
     assert np.mean(cost[-3:]) < 1.3 * np.mean(cost[2:5])
-    # the negative control: opened anew, a look costs the whole
+    # negative control: opened anew, a look reads everything
     assert every[-1].anew_bytes > 2 * max(cost)
 
 
@@ -158,7 +158,7 @@ def test_a_recorder_that_starts_again_is_read_from_its_start(whole: Path, tmp_pa
     assert len(growing.look().frames.frame) > len(half.frames.frame)
 
 
-def test_a_line_that_is_half_there_waits(whole: Path, tmp_path: Path) -> None:
+def test_an_incomplete_line_is_read_later(whole: Path, tmp_path: Path) -> None:
     growing = GrowingRecording(tmp_path / "r")
     written(whole, tmp_path / "r", Fraction(1, 2))
     table = tmp_path / "r" / "frames.csv"
@@ -170,7 +170,7 @@ def test_a_line_that_is_half_there_waits(whole: Path, tmp_path: Path) -> None:
     assert len(growing.look().frames.frame) == 19
 
 
-def test_what_cannot_be_opened_yet_says_so_and_is_opened_later(whole: Path, tmp_path: Path) -> None:
+def test_what_cannot_be_opened_yet_is_reported_and_opened_later(whole: Path, tmp_path: Path) -> None:
     growing = GrowingRecording(tmp_path / "r")
     with pytest.raises(InputError, match="does not exist"):
         growing.look()
@@ -181,7 +181,7 @@ def test_what_cannot_be_opened_yet_says_so_and_is_opened_later(whole: Path, tmp_
     assert len(growing.look().frames.frame) > 10
 
 
-def test_a_mark_that_is_not_a_cluster_is_not_taken_for_one(whole: Path, tmp_path: Path) -> None:
+def test_a_cluster_mark_inside_other_data_is_ignored(whole: Path, tmp_path: Path) -> None:
     tail = matroska_tail(whole / "frames.mkv")
     assert tail is not None
     last = tail.last_cluster(tail.head_bytes)

@@ -1,4 +1,4 @@
-"""Stamps that were rounded until some are equal are parted again; a clock that stood still is refused."""
+"""Time stamps that are equal after rounding are separated again; a clock that stood still is refused."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ def parted(time_s: Float) -> tuple[Float, tuple[str, ...]]:
     return table.time_s, noticed
 
 
-def test_times_that_rise_are_left_alone() -> None:
+def test_increasing_times_are_not_changed() -> None:
     found, noticed = parted(TIMES_S)
     np.testing.assert_array_equal(found, TIMES_S)
     assert noticed == ()
 
 
 @pytest.mark.parametrize("unit_s", [0.05, 0.1, 1.0])
-def test_rounded_times_of_an_even_rhythm_are_those_of_the_rhythm(unit_s: float) -> None:
+def test_rounded_times_of_a_regular_rhythm_get_those_of_the_rhythm(unit_s: float) -> None:
     found, (noticed,) = parted(np.round(TIMES_S / unit_s) * unit_s)
     assert f"rounded to {unit_s:g} s" in noticed
     assert "an even rhythm" in noticed
@@ -40,12 +40,12 @@ def test_rounded_times_of_an_even_rhythm_are_those_of_the_rhythm(unit_s: float) 
     assert np.abs(found - TIMES_S).max() < unit_s / 4
 
 
-def test_a_rhythm_that_is_not_the_stated_one_is_that_of_the_stamps() -> None:
+def test_a_rhythm_that_differs_from_the_stated_one_is_taken_from_the_stamps() -> None:
     found, _ = parted(np.round(TIMES_S * RATE / 25, 1))
     np.testing.assert_allclose(np.diff(found), 1 / 25, rtol=0.003)
 
 
-def test_rounded_times_of_an_uneven_rhythm_stay_within_their_rounding() -> None:
+def test_rounded_times_of_an_irregular_rhythm_stay_within_their_rounding() -> None:
     kept = np.sort(np.random.default_rng(1).choice(TIMES_S, COUNT * 3 // 4, replace=False))
     found, (noticed,) = parted(np.round(kept, 1))
     assert "spread evenly over its rounding" in noticed

@@ -65,7 +65,9 @@ def test_imu_round_trip(tmp_path: Path, rates: list[tuple[float, ...]], order: l
         ("0.02,0,0,0,0,-9.8", "has 6 cells"),
     ],
 )
-def test_imu_in_other_units_or_broken_is_refused_by_name(tmp_path: Path, row: str, complaint: str) -> None:
+def test_an_imu_with_other_units_or_errors_is_refused_with_its_name(
+    tmp_path: Path, row: str, complaint: str
+) -> None:
     file = tmp_path / "imu.csv"
     usual = "-1" if complaint.startswith("usually") else "-9.8"
     rows = [f"{t},0,0,0,0,0,{usual}" for t in ("0.00", "0.01")]

@@ -12,7 +12,7 @@ from tests.made_recording import COUNT, HEIGHT, WIDTH, picture, write_folder, wr
 
 GOP4 = {"g": "4", "sc_threshold": "0"}
 HEVC4 = {"x265-params": "log-level=none:keyint=4:min-keyint=4:scenecut=0"}
-# Container, codec, pixel format, options, largest difference from the picture: 0 where nothing is lost.
+# Container, codec, pixel format, options, largest difference from the picture: 0 for lossless ones.
 ENCODINGS = {
     "H.264 4:4:4 MKV": ("mkv", "libx264", "yuv444p", GOP4),
     "H.264 4:2:0 MP4": ("mp4", "libx264", "yuv420p", GOP4),
@@ -45,7 +45,7 @@ def test_every_codec_shows_the_pictures_in_order(tmp_path: Path, name: str) -> N
     assert (source.count, source.image_size) == (COUNT, (WIDTH, HEIGHT))
     images = dict(source.read(range(COUNT), "bgr"))
     for number, image in images.items():
-        # Lossy coding of so small a picture costs a few levels; a neighbour's red differs by 15.
+        # Lossy coding of so small a picture costs a few levels; red of adjacent frames differs by 15.
         assert image.shape == (HEIGHT, WIDTH, 3)
         if "grey" not in name:
             red = image[30:, :10, 2].astype(float).mean()
@@ -54,7 +54,7 @@ def test_every_codec_shows_the_pictures_in_order(tmp_path: Path, name: str) -> N
 
 
 @pytest.mark.parametrize("name", ENCODINGS)
-def test_luma_of_white_is_that_of_the_range_of_the_video(tmp_path: Path, name: str) -> None:
+def test_the_luma_of_white_follows_from_the_range_of_the_video(tmp_path: Path, name: str) -> None:
     source = _made(tmp_path, name)
     (_, grey), (_, bgr) = (next(source.read([2], planes)) for planes in ("grey", "bgr"))
     full = "MJPEG" in name or "grey" in name or "bgr0" in ENCODINGS[name]
@@ -66,7 +66,7 @@ def test_luma_of_white_is_that_of_the_range_of_the_video(tmp_path: Path, name: s
 def test_luma_of_white_does_not_depend_on_the_colour_of_the_wall(
     colour: tuple[int, int, int], full: bool
 ) -> None:
-    """By the weights of BT.601, red wall of a BT.709 video was of full range, and green wall of limited."""
+    """With BT.601 weights, red wall in a BT.709 video seemed of full range, and green wall of limited."""
     wall = np.random.default_rng(3).uniform(0.7, 1.2, (HEIGHT, WIDTH, 1)) * colour
     weights, black, white = np.array([0.0722, 0.7152, 0.2126]), 0 if full else 16, 255 if full else 219
     luma = np.rint(black + white / 255 * (wall @ weights)).astype(np.uint8)
@@ -74,7 +74,7 @@ def test_luma_of_white_does_not_depend_on_the_colour_of_the_wall(
 
 
 @pytest.mark.parametrize("name", ENCODINGS)
-def test_colours_are_those_of_swscale(tmp_path: Path, name: str) -> None:
+def test_colours_equal_those_of_swscale(tmp_path: Path, name: str) -> None:
     source = _made(tmp_path, name)
     for (number, image), frame in zip(source.read(range(COUNT), "bgr"), _decoded(source.path), strict=True):
         want = frame.to_ndarray(format="bgr24").astype(int)
@@ -90,7 +90,7 @@ def test_grey_is_the_luma_plane(tmp_path: Path, name: str) -> None:
         np.testing.assert_array_equal(image, luma, str(number))
 
 
-def test_grey_of_ten_bits_keeps_the_range_of_eight(tmp_path: Path) -> None:
+def test_grey_of_ten_bits_has_the_range_of_eight(tmp_path: Path) -> None:
     ten, eight = _made(tmp_path, "H.264 10 bit MKV"), _made(tmp_path, "H.264 4:2:0 MP4")
     ((_, a),), ((_, b),) = ten.read([8], "grey"), eight.read([8], "grey")
     # Black stays 16 in both; stretching to 0 to 255 would move it by 16 levels.
@@ -98,7 +98,7 @@ def test_grey_of_ten_bits_keeps_the_range_of_eight(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("colorspace", "full"), [(1, False), (5, False), (1, True), (5, True)])
-def test_matrix_and_range_named_by_the_stream(tmp_path: Path, colorspace: int, full: bool) -> None:
+def test_matrix_and_range_are_those_named_by_the_stream(tmp_path: Path, colorspace: int, full: bool) -> None:
     file = tmp_path / "v.mkv"
     params = f"colormatrix={'bt709' if colorspace == 1 else 'bt470bg'}:fullrange={'on' if full else 'off'}"
     write_video(file, "libx264", "yuv444p", {"x264-params": params})
@@ -121,7 +121,7 @@ def test_frames_by_number_equal_the_same_frames_in_order(tmp_path: Path, name: s
         assert all(np.array_equal(some[n], whole[n]) for n in some)
 
 
-def test_numbers_must_ascend_and_those_past_the_end_are_none(tmp_path: Path) -> None:
+def test_numbers_must_ascend_and_frames_past_the_end_are_none(tmp_path: Path) -> None:
     source = _made(tmp_path, "H.264 4:4:4 MKV")
     for wrong in ([3, 2], [1, 1], [-1, 0]):
         with pytest.raises(ValueError, match="ascend"):
@@ -132,10 +132,10 @@ def test_numbers_must_ascend_and_those_past_the_end_are_none(tmp_path: Path) -> 
 
 @pytest.mark.parametrize("packet", [5, 7, 9])
 @pytest.mark.parametrize("name", ["H.264 4:4:4 MKV", "H.264 4:2:0 MP4", "HEVC MKV", "MJPEG AVI", "FFV1 MKV"])
-def test_damage_costs_frames_and_falsifies_none(tmp_path: Path, name: str, packet: int) -> None:
+def test_damage_loses_frames_and_changes_none(tmp_path: Path, name: str, packet: int) -> None:
     source = _made(tmp_path, name)
     whole = {n: image.copy() for n, image in source.read(range(COUNT), "grey")}
-    packet += name == "HEVC MKV" and packet == 5  # there, that packet of zeros happens to decode
+    packet += name == "HEVC MKV" and packet == 5  # at that place a packet of zeros happens to decode
     with av.open(str(source.path)) as container:
         hit = [p for p in container.demux(video=0) if p.size][packet]
     data = bytearray(source.path.read_bytes())
@@ -150,7 +150,7 @@ def test_damage_costs_frames_and_falsifies_none(tmp_path: Path, name: str, packe
     assert all(np.array_equal(images[n], whole[n]) for n in images if n not in lost)
 
 
-def test_truncated_video_gives_what_it_holds(tmp_path: Path) -> None:
+def test_a_truncated_video_gives_the_frames_it_has(tmp_path: Path) -> None:
     folder = write_folder(tmp_path / "r", options=GOP4)
     video = folder / "frames.mkv"
     video.write_bytes(video.read_bytes()[: video.stat().st_size * 6 // 10])
@@ -171,7 +171,7 @@ GOP8_NO_B = {"g": "8", "sc_threshold": "0", "bf": "0"}
     ("codec", "options"),
     [("mjpeg", {}), ("libx264", GOP4), ("libx264", GOP8_NO_B), ("libx265", HEVC4), ("ffv1", {})],
 )
-def test_packets_lost_on_the_way_to_the_disk_neither_shift_nor_falsify_others(
+def test_packets_lost_in_writing_neither_shift_nor_change_other_frames(
     tmp_path: Path, codec: str, options: dict[str, str], lost: int, end: int
 ) -> None:
     pix_fmt = "yuvj420p" if codec == "mjpeg" else "yuv420p"
@@ -197,7 +197,7 @@ def test_packets_lost_on_the_way_to_the_disk_neither_shift_nor_falsify_others(
 
 
 @pytest.mark.parametrize("ext", ["mkv", "mp4"])
-def test_frames_that_no_other_needs_are_passed_over_and_change_none(tmp_path: Path, ext: str) -> None:
+def test_frames_that_no_other_needs_are_skipped_and_change_none(tmp_path: Path, ext: str) -> None:
     file = tmp_path / f"v.{ext}"
     options = {"g": "8", "x264-params": "log-level=none:bframes=2:b-adapt=0:b-pyramid=none:scenecut=0"}
     write_video(file, "libx264", "yuv420p", options)
@@ -219,14 +219,14 @@ def test_frames_without_lengths_are_all_decoded(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("content", [b"", b"not a video at all", b"\x1aE\xdf\xa3" + bytes(500)])
-def test_what_is_no_video_is_refused(tmp_path: Path, content: bytes) -> None:
+def test_a_file_that_is_not_a_video_is_refused(tmp_path: Path, content: bytes) -> None:
     file = tmp_path / "v.mkv"
     file.write_bytes(content)
     with pytest.raises(InputError, match=r"v\.mkv"):
         open_video(file)
 
 
-def test_sound_alone_is_no_video(tmp_path: Path) -> None:
+def test_a_file_with_sound_only_is_not_a_video(tmp_path: Path) -> None:
     file = tmp_path / "v.mkv"
     with av.open(str(file), "w") as container:
         stream = container.add_stream("pcm_s16le", rate=8000)

@@ -1,4 +1,4 @@
-"""Every geometric effect as rendered lies where its rays, traced one by one, say; the others stay put."""
+"""Every geometric effect is rendered where its traced rays are, and other effects do not move the ring."""
 
 from dataclasses import replace
 
@@ -19,7 +19,7 @@ from pipeline.simulator.sensor import through_lens
 from pipeline.simulator.truth import SceneTruth
 
 FOCAL_PX, SIZE = 100.0, (256, 256)
-TIME_S = 0.0472  # a crest of 5.3 Hz
+TIME_S = 0.0472  # the crest of a wave of 5.3 Hz
 AROUND = 48
 
 GEOMETRIC = (
@@ -33,7 +33,7 @@ GEOMETRIC = (
 
 
 def small_truth() -> SceneTruth:
-    """The bench seen by a small picture, the probe moving to the side, at one moment."""
+    """Return the test scene in a small picture, with the probe moving sideways, at one moment."""
     truth = bench_truth(50.8)
     model = KannalaBrandt(SIZE, (FOCAL_PX, FOCAL_PX), (127.3, 127.8))
     sideways = Signal(np.array([-1.0, 1.0]), np.array([-6.0, 6.0]))
@@ -52,12 +52,12 @@ def small_truth() -> SceneTruth:
 
 
 def at_start(truth: SceneTruth) -> SceneTruth:
-    """The scene as an effect sees it whose clock begins at time 0."""
+    """Return the scene for an effect whose clock begins at time 0."""
     return replace(truth, frames=replace(truth.frames, time_s=np.zeros(1)))
 
 
 def rendered_radii(truth: SceneTruth) -> Float:
-    """Centroids along the picture's radii, px."""
+    """Return centroids along the picture's radii, px."""
     sensor = truth.instrument.sensor
     light = through_lens(renderer_of(truth).light(0), sensor, None)[..., 1].astype(float)
     psi = -np.pi + 2 * np.pi * np.arange(AROUND) / AROUND
@@ -81,7 +81,7 @@ def switched(*switches: Switch) -> SceneTruth:
 
 @pytest.fixture(scope="module")
 def plain() -> tuple[Float, Float]:
-    """Rendered and traced radii without any effect; their difference is the finite line's own."""
+    """Rendered and traced radii without any effect; their difference is due to the finite line width."""
     return rendered_radii(small_truth()), traced_radii(small_truth())
 
 
@@ -89,13 +89,13 @@ def plain() -> tuple[Float, Float]:
 def test_a_geometric_effect_is_rendered_where_its_rays_go(text: str, plain: tuple[Float, Float]) -> None:
     truth = switched(parse_switch(text))
     moved = traced_radii(truth) - plain[1]
-    assert np.abs(moved).max() > 0.03  # the effect is there at all
-    # a hundredth of a pixel, and what the line's own width makes of a ring that moved
+    assert np.abs(moved).max() > 0.03  # the effect is visible at all
+    # a hundredth of a pixel, and the effect of the line's width on a displaced ring
     tolerance = 0.01 + 0.01 * np.abs(moved).max()
     np.testing.assert_allclose(rendered_radii(truth) - plain[0], moved, atol=tolerance)
 
 
-def test_effects_together_are_rendered_where_their_rays_go(plain: tuple[Float, Float]) -> None:
+def test_combined_effects_are_rendered_where_their_rays_go(plain: tuple[Float, Float]) -> None:
     texts = [
         "laser_tilt=0.3@40",
         "focal_scale=0.004",
@@ -111,6 +111,6 @@ def test_effects_together_are_rendered_where_their_rays_go(plain: tuple[Float, F
 
 
 @pytest.mark.parametrize("name", ["encoder_scale", "encoder_slip", "encoder_backlash", "time_offset"])
-def test_effects_of_the_encoder_leave_the_picture(name: str) -> None:
+def test_effects_of_the_encoder_do_not_change_the_picture(name: str) -> None:
     light = renderer_of(switched(typical_switch(name))).light(0)
     np.testing.assert_array_equal(light, renderer_of(small_truth()).light(0))

@@ -1,4 +1,4 @@
-"""The report: opens offline, says what was not used, and lets no text become markup."""
+"""The report opens offline, lists what was not used, and lets no text become markup."""
 
 import re
 from dataclasses import replace
@@ -88,7 +88,7 @@ def written(summary, folder):
 
 
 class Outside(HTMLParser):
-    """Collects tags, and every address that is not inside the file."""
+    """Collects tags, and every address outside the file."""
 
     def __init__(self):
         super().__init__()
@@ -118,7 +118,7 @@ def test_no_text_becomes_markup(summary, tmp_path):
     assert text.count("&lt;script&gt;") >= 6
 
 
-def test_shows_the_pit_with_pictures_clock_and_wall_loss(summary):
+def test_the_pit_is_shown_with_pictures_clock_position_and_wall_loss(summary):
     (finding,) = page_of(summary).findings
     assert finding.kind == "pit"
     assert finding.probability == "above 90 %"
@@ -132,7 +132,7 @@ def test_shows_the_pit_with_pictures_clock_and_wall_loss(summary):
     assert finding.deviation.startswith("data:image/jpeg;base64,")
 
 
-def test_a_probability_is_stated_no_finer_than_it_was_shown(summary):
+def test_a_probability_is_stated_no_more_precisely_than_it_was_validated(summary):
     (pit,) = summary.defects.items
     for stated, told in ((0.99, "above 90 %"), (0.64, "about 64 %"), (np.nan, "not known")):
         defects = replace(summary.defects, items=(replace(pit, probability=stated),))
@@ -140,13 +140,13 @@ def test_a_probability_is_stated_no_finer_than_it_was_shown(summary):
         assert finding.probability == told
 
 
-def test_mark_lies_in_the_middle_of_the_flat_view(summary):
+def test_the_mark_is_in_the_middle_of_the_flat_view(summary):
     (mark,) = page_of(summary).flats[0].strips[0].marks
     assert mark.left + mark.width / 2 == pytest.approx(50, abs=2)
     assert mark.top + mark.height / 2 == pytest.approx(50, abs=2)
 
 
-def test_the_wall_is_not_hidden_behind_the_numbers_of_very_many_findings(summary, tmp_path):
+def test_the_wall_stays_visible_behind_the_numbers_of_very_many_findings(summary, tmp_path):
     few = written(summary, tmp_path)
     one = summary.defects.items[0]
     many = replace(summary.defects, items=tuple(replace(one, id=k + 1) for k in range(60)))
@@ -156,7 +156,7 @@ def test_the_wall_is_not_hidden_behind_the_numbers_of_very_many_findings(summary
     assert re.search(r"\.crowded \.mark b \{ display: none", crowd)
 
 
-def test_what_stages_warn_of_is_told_first_and_as_text(summary, tmp_path):
+def test_warnings_of_stages_come_first_and_as_text(summary, tmp_path):
     motion = StageOutcome("motion", "1", "", State.COMPLETED, 1.0, (Number("warning", f"36 σ {HOSTILE}"),))
     warned = replace(summary, stages=(*summary.stages, motion))
     text = written(warned, tmp_path)
@@ -178,7 +178,7 @@ def test_every_frame_and_sample_is_accounted_for(summary):
     assert told["Not used, by stage and reason"].rows[0][2] == "12 samples"
 
 
-def test_says_that_the_instrument_was_only_stated(summary):
+def test_the_report_says_that_the_instrument_was_only_stated(summary):
     assert any("not calibrated" in c.warning for c in page_of(summary).cards)
     calibrated = replace(summary, probe=replace(PROBE, calibrated_from="gauge 7"))
     assert not any(c.warning for c in page_of(calibrated).cards)
@@ -190,7 +190,7 @@ def test_an_incomplete_run_still_gets_its_report(summary, tmp_path):
     assert "The run stopped at the stage rings: no ring in any frame" in text
 
 
-def test_same_run_same_bytes(summary, tmp_path):
+def test_the_same_run_gives_the_same_bytes(summary, tmp_path):
     assert written(summary, tmp_path) == written(summary, tmp_path)
 
 

@@ -1,4 +1,4 @@
-"""A run computed again is compared file by file with what it was."""
+"""A run computed again is compared file by file with the original."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def published(folder: Path, **files: str) -> RunFolder:
     return run
 
 
-def test_every_way_to_differ_is_told(tmp_path: Path) -> None:
+def test_every_kind_of_difference_is_reported(tmp_path: Path) -> None:
     run = published(tmp_path / "run", same="1", differs="1", edited="1", lost="1")
     again = published(tmp_path / "again", same="1", differs="2", edited="1", made="1")
     (run.path / "edited").write_text("2")
@@ -54,7 +54,7 @@ def test_every_way_to_differ_is_told(tmp_path: Path) -> None:
     }
 
 
-def test_a_record_comes_back(tmp_path: Path) -> None:
+def test_the_record_is_read_back_as_written(tmp_path: Path) -> None:
     (tmp_path / "run.json").write_text(json.dumps(RECORD))
     record = read_run_record(tmp_path)
     assert record.recording == Path("recording")
@@ -71,24 +71,24 @@ def test_other_inputs_are_refused(tmp_path: Path, changed: str) -> None:
 
 
 @pytest.mark.parametrize("text", ["", "[]", "{}", '{"state": "completed", "recording": 1}', "\0"])
-def test_no_record_is_told(tmp_path: Path, text: str) -> None:
+def test_a_missing_record_is_reported(tmp_path: Path, text: str) -> None:
     (tmp_path / "run.json").write_text(text)
     with pytest.raises(InputError, match="is not the record of a run"):
         read_run_record(tmp_path)
 
 
-def test_a_folder_that_is_not_there_is_told_as_missing(tmp_path: Path) -> None:
+def test_a_missing_folder_is_reported(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="does not exist"):
         read_run_record(tmp_path / "nowhere")
 
 
-def test_an_unfinished_run_is_told(tmp_path: Path) -> None:
+def test_an_unfinished_run_is_reported(tmp_path: Path) -> None:
     (tmp_path / "run.json").write_text(json.dumps(RECORD | {"state": "failed"}))
     with pytest.raises(InputError, match="the run is failed"):
         read_run_record(tmp_path)
 
 
-def test_a_run_is_not_made_again_over_itself(tmp_path: Path) -> None:
+def test_a_run_is_not_computed_again_into_its_own_folder(tmp_path: Path) -> None:
     run = tmp_path / "run"
     run.mkdir()
     (run / "run.json").write_text(json.dumps({"format": 1, **RECORD}))
@@ -98,7 +98,7 @@ def test_a_run_is_not_made_again_over_itself(tmp_path: Path) -> None:
             reproduce(run, output)
 
 
-def test_no_room_for_what_is_only_compared_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_lack_of_room_for_compared_files_is_reported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     run = tmp_path / "run"
     run.mkdir()
     (run / "run.json").write_text(json.dumps({"format": 1, **RECORD}))

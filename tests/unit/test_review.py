@@ -1,4 +1,4 @@
-"""The review: what is decided is kept, undone and refused as it should be; strangers are turned away."""
+"""The review: decisions are kept, undone and refused as they should be; strangers are refused."""
 
 import subprocess
 import sys
@@ -69,7 +69,7 @@ def test_an_author_who_has_not_seen_the_last_action_is_refused(ledger):
     assert after(ledger)["1"].decided_by == "ann"
 
 
-def test_what_is_gone_cannot_be_decided(ledger):
+def test_a_removed_finding_cannot_be_decided(ledger):
     ledger.append(do.Merge(findings=("1", "2")), "ann", "b", 0)
     ledger.append(do.Accept(finding="1"), "ann", "b", 1)
     with pytest.raises(ImpossibleError, match="no longer exists"):
@@ -88,14 +88,14 @@ def square(name, s, a, half_s, half_a):
     )
 
 
-def test_what_a_merged_outline_covers_besides_its_own_is_told():
+def test_findings_covered_by_a_merged_outline_are_reported():
     wide = square("m7", 50, 3.1, 20, 0.3)
     within, around = square("1", 45, 3.1 - 2 * np.pi, 2, 0.1), square("2", 50, 3.1, 30, 0.5)
     beyond, behind = square("3", 90, 3.1, 5, 0.1), square("4", 50, 0.0, 5, 0.1)
     assert covered(wide, [wide, within, around, beyond, behind]) == ("1", "2")
 
 
-def test_findings_made_by_hand_are_numbered_on_from_the_measured_ones():
+def test_findings_added_by_hand_are_numbered_after_the_measured_ones():
     ids = ("1", "2", "3", "m8", "a9", "2.1", "m8.2")
     assert labels([replace(found(1), id=name) for name in ids]) == {
         "1": "1", "2": "2", "3": "3", "m8": "4 (merged)", "a9": "5 (added)", "2.1": "2.1 (split)",
@@ -108,19 +108,19 @@ def test_findings_made_by_hand_are_numbered_on_from_the_measured_ones():
     [("deposit", 1.0, True), ("deposit", -1.0, False), ("pit", -1.0, True), ("pit", 1.0, False),
      ("dent", 1.0, True), ("deposit", 0.15, False), ("pit", float("nan"), False)],
 )  # fmt: skip
-def test_a_kind_that_the_measured_depth_contradicts_is_told(kind, depth, contradicts):
+def test_a_kind_that_the_measured_depth_contradicts_is_reported(kind, depth, contradicts):
     told = contradiction(replace(found(1), kind=kind, size=replace(SIZE, depth_mm=depth)))
     assert ("Check its kind" in told) == contradicts
 
 
-def test_a_file_that_is_no_ledger_is_refused(tmp_path):
+def test_a_file_that_is_not_a_ledger_is_refused(tmp_path):
     file = tmp_path / "decisions.sqlite"
     file.write_text("not a database, " * 20)
     with pytest.raises(InputError, match="cannot be used as a ledger"):
         Ledger(file).prepare()
 
 
-def test_a_pit_of_known_depth_is_measured_against_the_wall_around_it():
+def test_the_depth_of_a_pit_is_measured_against_the_wall_around_it():
     s, psi = np.arange(0, 100, 0.5), -np.pi + 2 * np.pi / 720 * np.arange(720)
     radius = np.full((len(s), len(psi)), 50.0)
     radius[(s > 45)[:, None] & (s < 55)[:, None] & (np.abs(psi - 0.15) < 0.1)[None]] += 1.0
@@ -137,7 +137,7 @@ def test_a_pit_of_known_depth_is_measured_against_the_wall_around_it():
     assert (diameter.value, diameter.sigma) == pytest.approx((100.0, 0.06))
 
 
-def test_strength_falls_from_sound_pipe_to_the_barlow_pressure_of_what_is_left():
+def test_strength_falls_from_that_of_sound_pipe_to_the_barlow_pressure_of_the_remaining_wall():
     assert b31g(0.0, 5.0) == 1.0
     assert b31g(0.5, 1e9) == 0.5
     assert strength(-1, 10, 100, 6, 240) is None
@@ -145,8 +145,8 @@ def test_strength_falls_from_sound_pipe_to_the_barlow_pressure_of_what_is_left()
     assert shallow.b31g_mpa > deep.b31g_mpa > 0
 
 
-def test_a_review_of_one_run_starts_without_what_only_runs_need() -> None:
-    """Stages, Numba and SciPy take longer to load than all the rest."""
+def test_a_review_of_one_run_starts_without_slow_imports() -> None:
+    """Stages, Numba and SciPy take longer to load than everything else."""
     told = "import sys, pipeline.commands.review as _; print(*sys.modules)"
     loaded = subprocess.run(
         [sys.executable, "-c", told], cwd=PROJECT_ROOT, capture_output=True, text=True, check=True

@@ -1,4 +1,4 @@
-"""The flat view's pictures: tiles lie where their cells are, whatever the level."""
+"""The pictures of the flat view: tiles are where their cells are, at every level."""
 
 import cv2
 import numpy as np
@@ -17,7 +17,7 @@ def decoded(tile):
     return cv2.imdecode(np.frombuffer(tile, np.uint8), cv2.IMREAD_UNCHANGED)
 
 
-def test_a_tile_shows_its_cells_distance_to_the_right():
+def test_distance_increases_to_the_right_in_a_tile():
     stored = np.random.default_rng(0).integers(0, 255, (700, 600), np.uint8)
     tile = decoded(picture(stored).tile(0, 1, 1))
     assert tile.shape[:2] == (600 - TILE_PX, 700 - TILE_PX)
@@ -35,7 +35,7 @@ def test_shrunk_tiles_keep_place_and_brightness(level):
     assert np.abs(shrunk - exact).max() < 2.5
 
 
-def test_the_last_level_is_one_tile_and_no_others_are_there():
+def test_the_last_level_is_one_tile_and_there_are_no_others():
     made = picture(np.zeros((5000, 300), np.uint8))
     last = made.levels - 1
     assert max(decoded(made.tile(last, 0, 0)).shape[:2]) <= TILE_PX
@@ -44,7 +44,7 @@ def test_the_last_level_is_one_tile_and_no_others_are_there():
             made.tile(*wrong)
 
 
-def test_the_photo_reaches_half_a_texel_beyond_its_centres():
+def test_the_photo_extends_half_a_texel_beyond_its_centres():
     made = photo_picture(WallTexture(np.zeros((10, 20, 4), np.uint8), 5.0, 0.5, -np.pi, 2 * np.pi / 20))
     assert (made.distance_from_mm, made.distance_to_mm) == (4.75, 9.75)
     assert made.azimuth_from_rad == pytest.approx(-np.pi - np.pi / 20)

@@ -1,4 +1,4 @@
-"""The review's colours: text readable, controls and focus visible, in light and in dark (WCAG 2.2 AA)."""
+"""The review's colours: text readable, controls and focus visible, in light and dark mode (WCAG 2.2 AA)."""
 
 import re
 
@@ -10,7 +10,7 @@ STYLE = (PROJECT_ROOT / "pipeline/review/page/src/style.css").read_text("utf-8")
 BUILT = (PROJECT_ROOT / "pipeline/review/page/dist/assets/style.css").read_text("utf-8")
 GROUNDS = ("bg", "surface")
 TEXT = ("ink", "muted", "accent", "chosen", "accepted", "bad")
-# What is no text but must be seen: edges of fields and buttons, focus, dots, curves.
+# Visible parts that are not text: edges of fields and buttons, focus, dots, curves.
 SHAPES = ("edge", "chosen", "accent", "open", "accepted", "rejected", "muted", "ink")
 
 
@@ -31,13 +31,13 @@ def contrast(one, other):
     return (light + 0.05) / (dark + 0.05)
 
 
-def test_contrast_is_computed_as_the_standard_says():
+def test_contrast_is_computed_as_in_the_standard():
     assert contrast("#000000", "#ffffff") == pytest.approx(21)
     assert contrast("#777777", "#ffffff") == pytest.approx(4.48, abs=0.01)
 
 
 @pytest.mark.parametrize("theme", ["light", "dark"])
-def test_text_can_be_read(theme):
+def test_text_is_readable(theme):
     colour = themes()[theme]
     pairs = [(text, ground) for text in TEXT for ground in GROUNDS] + [
         ("on-accent", "accent"),
@@ -48,13 +48,13 @@ def test_text_can_be_read(theme):
 
 
 @pytest.mark.parametrize("theme", ["light", "dark"])
-def test_controls_and_focus_can_be_seen(theme):
+def test_controls_and_focus_are_visible(theme):
     colour = themes()[theme]
     poor = {(s, g): round(contrast(colour[s], colour[g]), 2) for s in SHAPES for g in GROUNDS}
     assert {pair: c for pair, c in poor.items() if c < 3} == {}
 
 
-def test_both_themes_name_the_same_colours_and_nothing_else_colours_text():
+def test_both_themes_define_the_same_colours_and_all_text_uses_them():
     blocks = re.findall(r":root\s*\{([^}]*)\}", STYLE)
     light, dark = (set(re.findall(r"--([\w-]+):\s*#", b)) for b in blocks)
     assert light == dark
@@ -65,11 +65,11 @@ def test_both_themes_name_the_same_colours_and_nothing_else_colours_text():
     }  # fmt: skip
 
 
-def test_controls_have_the_visible_edge_and_focus_is_drawn():
+def test_controls_have_a_visible_edge_and_focus_is_drawn():
     assert re.search(r"button, select, input, textarea \{[^}]*border: 1px solid var\(--edge\)", STYLE)
     assert re.search(r":focus-visible \{ outline: 3px solid var\(--chosen\)", STYLE)
     assert "outline: none" not in STYLE
 
 
-def test_the_build_is_that_of_the_source():
+def test_the_build_is_made_from_the_source():
     assert BUILT == STYLE

@@ -1,4 +1,7 @@
-"""Rings unlike those of a good recording are warned of by what is wrong with them; sound ones are not."""
+"""Rings that differ from those of a good recording get a warning that says what is wrong.
+
+Sound ones do not.
+"""
 
 from __future__ import annotations
 
@@ -34,7 +37,7 @@ def spoilt(rows: slice, columns: slice, reason: RingValidity) -> RingSamples:
     return rings
 
 
-def test_sound_rings_and_a_few_bad_samples_are_no_matter() -> None:
+def test_sound_rings_and_a_few_bad_samples_give_no_warning() -> None:
     assert told(sound()) == ""
     assert told(spoilt(slice(3, 5), slice(10, 20), RingValidity.GLINT)) == ""
 
@@ -53,13 +56,13 @@ def test_sound_rings_and_a_few_bad_samples_are_no_matter() -> None:
         (slice(0, 10), slice(0, 20), RingValidity.GLINT, "1.4 % of the ring samples show light"),
     ],
 )
-def test_what_is_wrong_is_named(rows: slice, columns: slice, reason: RingValidity, words: str) -> None:
+def test_the_fault_is_named(rows: slice, columns: slice, reason: RingValidity, words: str) -> None:
     text = told(spoilt(rows, columns, reason))
     assert words in text
     assert text.count("What to do") == 1
 
 
-def test_of_coarse_pictures_the_pixels_are_blamed_not_the_window() -> None:
+def test_in_coarse_pictures_the_pixels_are_blamed_and_not_the_window() -> None:
     rings = spoilt(slice(None), slice(-5, None), RingValidity.NO_LINE)
     coarse = replace(rings, width_px=np.full((RINGS, AZIMUTHS), 0.43, np.float32))
     text = told(coarse, wander_px=0.01)
@@ -67,7 +70,7 @@ def test_of_coarse_pictures_the_pixels_are_blamed_not_the_window() -> None:
     assert text.count("What to do") == 1
 
 
-def test_hidden_parts_near_to_each_other_are_told_together() -> None:
+def test_neighbouring_hidden_parts_are_reported_together() -> None:
     rings = spoilt(slice(None), slice(-5, None), RingValidity.NO_LINE)
     rings.validity[:, 10:15] = RingValidity.GHOST
     text = told(rings)
@@ -77,7 +80,7 @@ def test_hidden_parts_near_to_each_other_are_told_together() -> None:
     assert told(rings).count("What to do") == 2
 
 
-def test_a_line_that_wanders_is_named() -> None:
+def test_a_wandering_line_is_reported() -> None:
     assert "the line wanders by 0.30 px" in told(sound(), 0.3)
 
 

@@ -49,8 +49,8 @@ def test_every_frame_is_accounted_for():
     assert np.allclose(samples.pixels()[0, 0], np.array(CENTRE) - [samples.radius_px[0, 0], 0], atol=1e-4)
 
 
-def test_rings_of_interlaced_pictures_rest_on_rows_that_were_taken(monkeypatch):
-    """Rows put between them broaden the line where it runs along them, and give no noise of their own."""
+def test_rings_of_interlaced_pictures_use_recorded_rows_only(monkeypatch):
+    """Interpolated rows broaden the line where it runs along them, and add no noise of their own."""
     ring = off_centre(165.0, 7.0)
     whole = memory_recording({i: image(ring, i, 200.0) for i in range(4)}, ["laser"] * 4, SIZE)
     halved = replace(whole, source=OneField(whole.source))
@@ -67,7 +67,7 @@ def test_rings_of_interlaced_pictures_rest_on_rows_that_were_taken(monkeypatch):
     assert of_taken_rows < 0.75 * error_px()
 
 
-def test_a_recording_without_rings_is_unusable():
+def test_a_recording_without_rings_is_refused():
     dark = {i: exposed(np.zeros(SIZE[::-1]), np.random.default_rng(i)) for i in range(2)}
     with pytest.raises(UnusableError, match="no laser ring"):
         extracted(dark)
@@ -75,7 +75,7 @@ def test_a_recording_without_rings_is_unusable():
         extracted(dark, ["led", "led"])
 
 
-def test_a_pit_three_millimetres_wide_survives_and_a_spike_does_not():
+def test_a_pit_three_millimetres_wide_is_kept_and_a_spike_is_not():
     pit_sectors, depth = 12, 4.0
 
     def radius(psi):
@@ -94,7 +94,7 @@ def test_a_pit_three_millimetres_wide_survives_and_a_spike_does_not():
     assert np.abs(row[left] - 165.0).max() < 0.6
 
 
-def test_sigma_holds_what_it_says_when_speckle_moves_the_line():
+def test_sigma_covers_the_errors_where_speckle_moves_the_line():
     """Speckle of the wall, narrower than the line's image, shifts the line by more than its noise."""
     random, error, z = np.random.default_rng(4), [], []
     ring, images = off_centre(165.0, 5.0), {}
@@ -111,7 +111,7 @@ def test_sigma_holds_what_it_says_when_speckle_moves_the_line():
 
 
 def lit_image(ring, seed, texture):
-    """A green line on a wall of grey and rust, lit by white LEDs."""
+    """Return a green line on a wall of grey and rust, lit by white LEDs."""
     random = np.random.default_rng(seed)
     line = ring_light(SIZE, CENTRE, ring, 1.5, 90.0)
     rust = cv2.resize(random.uniform(0, 1, (12, 16)), SIZE, interpolation=cv2.INTER_CUBIC)[..., None]
@@ -135,7 +135,7 @@ def test_the_line_is_found_on_a_lit_textured_wall():
 
 
 def white_wall(ring, seed, texture):
-    """The same line, much brighter, on a grey wall; it is in all channels, as bright lines are."""
+    """Return the same line, much brighter, on a grey wall; it appears in all channels, as bright lines do."""
     random = np.random.default_rng(seed)
     line = ring_light(SIZE, CENTRE, ring, 1.5, 200.0)[..., None] * np.array([0.6, 1.0, 0.5])
     light = texture[..., None] * np.array([100.0, 105.0, 110.0]) + line
@@ -143,8 +143,8 @@ def white_wall(ring, seed, texture):
     return np.clip(np.rint(noisy), 0, 255).astype(np.uint8)
 
 
-def test_a_line_that_clips_on_a_bright_wall_is_where_it_is_said_to_be():
-    """The other channels go on rising where the laser's clips: the line was up to 1.6 px beside itself."""
+def test_the_position_of_a_clipped_line_on_a_bright_wall_is_within_sigma():
+    """The other channels go on rising where the laser's clips: the line was off by up to 1.6 px."""
     ring, random = off_centre(165.0, 8.0), np.random.default_rng(3)
     v, u = np.mgrid[: SIZE[1], : SIZE[0]] - np.array(CENTRE)[::-1, None, None]
     bright = np.where(np.abs(np.arctan2(v, u)) < 0.6, 1.8, 1.0)
@@ -166,11 +166,11 @@ def test_the_same_recording_gives_the_same_bytes():
     assert first.sigma_px.tobytes() == second.sigma_px.tobytes()
 
 
-def test_the_stage_is_wired_by_type():
+def test_the_stage_is_connected_by_type():
     assert list(RINGS.inputs()) == ["recording", "frames", "probe"]
 
 
-def test_outliers_are_marked_in_batches_as_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_outliers_in_batches_equal_those_of_all_rings_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
     random = np.random.default_rng(2)
     shape = (23, 60)
     radius = (200 + random.normal(0, 0.1, shape)).astype(np.float32)
@@ -187,4 +187,4 @@ def test_outliers_are_marked_in_batches_as_at_once(monkeypatch: pytest.MonkeyPat
     extract._compare_rings(samples)
     np.testing.assert_array_equal(samples.validity, wanted)
     np.testing.assert_array_equal(samples.sigma_px, sigma)
-    assert np.sum(wanted == RingValidity.OUTLIER) > 3, "the control"
+    assert np.sum(wanted == RingValidity.OUTLIER) > 3, "control: the batches differ"

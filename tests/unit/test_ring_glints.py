@@ -1,4 +1,4 @@
-"""What one ring alone shows: glints go, pits that two rings see stay, a lone line is unsure."""
+"""What only one ring shows: glints are removed, pits on two rings are kept, a single line is unsure."""
 
 import numpy as np
 import pytest
@@ -16,7 +16,7 @@ RUN = slice(200, 216)
 
 @pytest.fixture
 def drawn():
-    """Rings of a probe that moves across the pipe: radius, σ, width and amplitude."""
+    """Return rings of a probe that moves across the pipe: radius, σ, width and amplitude."""
     random = np.random.default_rng(3)
     shift = 2.0 * np.sin(0.7 * np.arange(RINGS))[:, None]
     radius = 300 + shift * np.cos(AZIMUTH - 0.3) + random.normal(0, NOISE, (RINGS, SECTORS))
@@ -25,14 +25,14 @@ def drawn():
     return [x.astype(np.float32) for x in (radius, np.full_like(radius, NOISE), width, amplitude)]
 
 
-def test_noise_and_motion_leave_every_sample_alone(drawn):
+def test_noise_and_motion_remove_no_sample(drawn):
     rejected, sigma = lone_runs(*drawn)
     assert rejected.sum() == 0
     assert np.mean(sigma > 1.01 * NOISE) < 1e-3
 
 
 @pytest.mark.parametrize("away", [1.0, 6.0, -6.0])
-def test_a_glint_goes(drawn, away):
+def test_a_glint_is_removed(drawn, away):
     radius, _, width, amplitude = drawn
     radius[5, RUN] += away
     width[5, RUN] *= 1.4
@@ -44,7 +44,7 @@ def test_a_glint_goes(drawn, away):
 
 
 @pytest.mark.parametrize(("rings", "width_factor", "gain"), [(2, 1.1, 1.7), (3, 1.4, 2.0), (6, 1.4, 2.0)])
-def test_a_pit_that_two_rings_show_stays_and_of_three_however_bright_it_is(drawn, rings, width_factor, gain):
+def test_a_pit_on_two_rings_is_kept_and_on_three_even_if_it_is_bright(drawn, rings, width_factor, gain):
     radius, _, width, amplitude = drawn
     for row in range(4, 4 + rings):
         radius[row, RUN] += 3 * np.hanning(16)
@@ -55,14 +55,14 @@ def test_a_pit_that_two_rings_show_stays_and_of_three_however_bright_it_is(drawn
     assert sigma[4 : 4 + rings, RUN].max() < 2 * NOISE
 
 
-def test_a_line_that_one_ring_alone_shows_stays_and_is_unsure(drawn):
+def test_a_line_on_one_ring_only_is_kept_and_unsure(drawn):
     drawn[0][5, RUN] += 3.0
     rejected, sigma = lone_runs(*drawn)
     assert rejected.sum() == 0
     assert np.allclose(sigma[5, RUN], 3 * np.sqrt(0.1), rtol=0.15)
 
 
-def test_where_there_are_glints_a_lone_line_is_no_more_likely_than_not(drawn):
+def test_where_there_are_glints_a_single_line_is_as_likely_a_glint(drawn):
     radius, _, width, amplitude = drawn
     radius[5, RUN] += 3.0
     for row, first in ((4, 300), (5, 400), (5, 500), (6, 600)):
@@ -74,7 +74,7 @@ def test_where_there_are_glints_a_lone_line_is_no_more_likely_than_not(drawn):
     assert np.all(sigma[5, RUN] > 1.5 * 3 * np.sqrt(0.1))
 
 
-def test_a_step_of_the_bore_is_no_glint(drawn):
+def test_a_step_of_the_bore_is_not_a_glint(drawn):
     radius, _, width, _ = drawn
     radius[6:] += 20.0
     width[6:] *= 1.3
@@ -99,13 +99,13 @@ def test_gaps_and_lost_rings_are_bridged(drawn):
 
 
 def candidates_of(line, line_score, other, other_score):
-    """Two candidates a sector, the stronger first."""
+    """Return two candidates a sector, the stronger first."""
     radius, score = (np.stack(x, 1) for x in ((line, other), (line_score, other_score)))
     order = np.argsort(-score, axis=1)
     return Candidates(*(np.take_along_axis(x, order, 1) for x in (radius, score)))
 
 
-def test_the_brighter_of_two_is_not_the_line_where_the_curve_goes_on():
+def test_the_brighter_of_two_candidates_is_not_the_line_where_the_other_continues_the_curve():
     random = np.random.default_rng(1)
     line, glint = 300 + random.normal(0, 0.1, SECTORS), np.full(SECTORS, np.nan)
     glint[RUN] = 307.0
@@ -117,15 +117,15 @@ def test_the_brighter_of_two_is_not_the_line_where_the_curve_goes_on():
     assert found.probability.min() > 0.99
 
 
-def test_a_jump_of_the_wall_is_followed_and_a_weak_remnant_is_not():
+def test_a_jump_of_the_wall_is_followed_and_a_weak_remainder_is_not():
     line, remnant = np.full(SECTORS, 300.0), np.full(SECTORS, np.nan)
     line[RUN], remnant[RUN] = 312.0, 300.0
     weak = candidates_of(line, np.full(SECTORS, 40.0), remnant, np.where(np.isfinite(remnant), 6.0, 0.0))
     assert np.allclose(choose_line(weak, np.full(SECTORS, 300.0), 1.2).radius_px, line)
 
 
-def test_between_two_equal_lines_the_chain_does_not_decide_with_confidence():
-    """A split curve that both branches close: the σ must hold the distance between them."""
+def test_between_two_equal_lines_the_choice_is_unsure():
+    """Both branches close a split curve: the σ must include the distance between them."""
     line, other = np.full(SECTORS, 296.0), np.full(SECTORS, 304.0)
     both = candidates_of(line, np.full(SECTORS, 40.0), other, np.full(SECTORS, 39.0))
     found = choose_line(both, np.full(SECTORS, 296.0), 1.2)
@@ -133,7 +133,7 @@ def test_between_two_equal_lines_the_chain_does_not_decide_with_confidence():
     assert unsure.all() or np.allclose(found.radius_px, 296.0)
 
 
-def test_a_run_over_a_place_without_a_wall_to_compare_with_leaves_no_sigma_unknown(drawn):
+def test_a_run_past_a_place_without_wall_to_compare_has_no_unknown_sigma(drawn):
     radius = drawn[0]
     radius[5, RUN] += 3.0
     radius[:5, 208:210] = radius[6:, 208:210] = np.nan

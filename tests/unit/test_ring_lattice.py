@@ -1,4 +1,4 @@
-"""Errors of the line that repeat with the picture's rows are told by their period and taken out."""
+"""Errors of the line that repeat with the rows of the picture are recognised by their period and removed."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ ALONG_ROWS = np.abs(np.sin(AZIMUTH)) > 0.9
 
 
 def extracted(enlarged: float) -> tuple[float, list[str]]:
-    """Return the r.m.s. error where rings run along rows, px, and what is warned of.
+    """Return the rms error where rings run along rows, px, and the warnings.
 
-    Pictures are made smaller by a factor and brought back to their size.
+    Pictures are reduced by a factor and enlarged to their size again.
     """
     images, true, said = {}, [], list[str]()
     for k in range(FRAMES):
@@ -43,23 +43,26 @@ def extracted(enlarged: float) -> tuple[float, list[str]]:
     return float(np.sqrt(np.nanmean(error**2))), [w for w in said if "repeats every" in w]
 
 
-def test_enlarged_pictures_are_told_and_their_lattice_taken_out() -> None:
-    """A careless export drew the line to its coarse pixels: two false findings of .98, and a false seam."""
+def test_enlarged_pictures_are_reported_and_their_periodic_error_removed() -> None:
+    """After a careless export the line followed its coarse pixels.
+
+    Two false findings of .98, and a false seam.
+    """
     error, said = extracted(2.5)
     assert len(said) == 1
     assert "every 2.5 px" in said[0] or "every 5 px" in said[0]
-    assert error < 0.12  # 0.225 px as they are
+    assert error < 0.12  # 0.225 px without correction
 
 
-def test_pictures_as_the_camera_took_them_have_no_lattice() -> None:
+def test_unscaled_pictures_have_no_such_error() -> None:
     error, said = extracted(1.0)
     assert not said
     assert error < 0.05
 
 
 @pytest.mark.parametrize("step_px", [0.2, 0.02, 0.0])
-def test_sigma_holds_what_cannot_be_taken_out_where_every_second_row_is_made_up(step_px: float) -> None:
-    """Errors of half a row were left beside a σ of a fifth of it: six false findings, at .95 to .98.
+def test_sigma_includes_what_cannot_be_removed_where_every_second_row_is_interpolated(step_px: float) -> None:
+    """Errors of half a row remained, with a σ of a fifth of that: six false findings, at .95 to .98.
 
     Means over rings, which share the error where the probe hardly sways, erred by up to 2.7 σ.
     """
@@ -89,9 +92,9 @@ def test_sigma_holds_what_cannot_be_taken_out_where_every_second_row_is_made_up(
 def drawn(
     period_px: float, size_px: float, sway_px: float = 12.0, rough_px: float = 0.1, seed: int = 2
 ) -> RingSamples:
-    """Return rings of a swaying probe, drawn to blocks of rows, with noise that is alike in neighbours.
+    """Return rings of a swaying probe, attracted to blocks of rows, with noise that neighbours share.
 
-    A probe that does not sway sees the same wall in all its rings, as one that stands.
+    A probe that does not sway sees the same wall in all its rings, like one that stands.
     """
     random = np.random.default_rng(seed)
     way = np.stack([np.sin(0.3 * np.arange(RINGS)), np.cos(0.2 * np.arange(RINGS))], -1)
@@ -109,25 +112,25 @@ def drawn(
 
 
 @pytest.mark.parametrize("period_px", [2.5, 8.0, 16.0])
-def test_blocks_of_rows_are_found_and_leave_a_groove_as_it_is(period_px: float) -> None:
+def test_blocks_of_rows_are_found_and_a_groove_is_not_changed(period_px: float) -> None:
     spoilt, sound = drawn(period_px, 0.3), drawn(period_px, 0.0)
     lattices = lattices_of(spoilt)
     assert [each.axis for each in lattices] == [1]
     assert lattices[0].period_px == pytest.approx(period_px, rel=0.03)
     take_out(lattices, spoilt)
     error = spoilt.radius_px - sound.radius_px
-    assert np.sqrt(np.mean(error[:, ALONG_ROWS] ** 2)) < 0.1  # 0.2 px as they are
+    assert np.sqrt(np.mean(error[:, ALONG_ROWS] ** 2)) < 0.1  # 0.2 px without correction
     groove = np.abs(AZIMUTH - 1.5) < 0.05
     assert np.mean(error[:, groove]) == pytest.approx(0.0, abs=0.05)
 
 
-def test_noise_and_a_groove_are_no_lattice() -> None:
+def test_noise_and_a_groove_are_no_periodic_error() -> None:
     assert lattices_of(drawn(8.0, 0.0)) == ()
 
 
 @pytest.mark.parametrize("half_deg", [2.0, 4.0, 12.0])
 @pytest.mark.parametrize("seed", range(5))
-def test_an_arc_of_a_ring_bears_no_lattice_out(half_deg: float, seed: int) -> None:
+def test_an_arc_of_a_ring_confirms_no_periodic_error(half_deg: float, seed: int) -> None:
     samples = drawn(8.0, 0.0, 0.0, 0.1, seed)
     samples.validity[:, np.abs(AZIMUTH - np.pi / 2) > np.radians(half_deg)] = 1
     assert lattices_of(samples) == ()
@@ -135,6 +138,6 @@ def test_an_arc_of_a_ring_bears_no_lattice_out(half_deg: float, seed: int) -> No
 
 @pytest.mark.parametrize("rough_px", [0.02, 0.1])
 @pytest.mark.parametrize("seed", range(5))
-def test_a_wall_that_all_rings_see_alike_is_no_lattice(rough_px: float, seed: int) -> None:
-    """A groove in a smooth pipe, or the roughness where a probe stands, repeats a little with some period."""
+def test_a_wall_that_all_rings_see_the_same_is_no_periodic_error(rough_px: float, seed: int) -> None:
+    """A groove in a smooth pipe, or roughness where a probe stands, is partly periodic by chance."""
     assert lattices_of(drawn(8.0, 0.0, 0.0, rough_px, seed)) == ()

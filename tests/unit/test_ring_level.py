@@ -1,4 +1,4 @@
-"""Gauge runs at ring level: exact by the simulator's own roots, the same from the same seed."""
+"""Gauge runs at ring level: exact by the simulator's own root finding, and repeatable with the same seed."""
 
 import numpy as np
 import pytest
@@ -24,13 +24,13 @@ QUIET = Noise(1e-6, 1e-6, 1e-6, 1e-6, 1e-6)
 
 
 def scene_of(seed):
-    """Return a drawn scene and its file, few frames of it."""
+    """Return a drawn scene with few frames, and its file."""
     case = drawn(Mode.NULLS, seed)
     return case.scene.model_copy(update={"frames": 24}), case.file
 
 
 @pytest.mark.parametrize("text", [None, "laser_tilt=0.5@40", "dome_lateral=2@10", "rolling_shutter=0.02"])
-def test_a_traced_ring_lies_where_the_simulator_finds_it_by_roots(text):
+def test_a_traced_ring_is_where_the_simulator_finds_it_by_roots(text):
     scene, file = scene_of(3)
     truth = switch_on(plain_truth(scene, file), [parse_switch(text)] if text else ())
     gauge, frame = gauge_of(truth.facts, truth.facts.fiducials), 8
@@ -38,11 +38,11 @@ def test_a_traced_ring_lies_where_the_simulator_finds_it_by_roots(text):
     rho, _ = traced_ring(Eye.at(truth, float(truth.frames.time_s[frame])), gauge, centre, OUTWARD)
     expected = exact_rings(truth, [frame], AZIMUTH, centre)[0]
     assert np.isfinite(rho).sum() > 18
-    # The rendered wall has relief of a few µm, which the known bore has not.
+    # The rendered wall has relief of a few µm, which the exact bore lacks.
     assert np.nanmax(np.abs(rho - expected)) < 0.06
 
 
-def test_a_wall_point_is_seen_where_its_ray_passes_it():
+def test_a_wall_point_is_seen_by_the_ray_through_it():
     scene, file = scene_of(4)
     truth = plain_truth(scene, file)
     eye = Eye.at(truth, float(truth.frames.time_s[5]))
@@ -61,7 +61,7 @@ def test_the_same_seed_gives_the_same_case_and_another_another():
     assert not drawn(Mode.NULLS, 7).switches
 
 
-def test_an_effect_moves_the_measurements_and_noise_is_what_it_is_told_to_be():
+def test_an_effect_moves_the_measurements_and_the_noise_has_its_stated_size():
     scene, file = scene_of(5)
     plain, loud, tilted = (
         ring_level_run(scene, file, switches, noise).measured.source.rings.radius_px
@@ -72,26 +72,26 @@ def test_an_effect_moves_the_measurements_and_noise_is_what_it_is_told_to_be():
     assert np.nanstd(tilted - plain) > 5 * spread
 
 
-def test_effects_left_out_are_not_asked_about():
+def test_effects_left_out_of_the_library_are_not_searched():
     name = drawn(Mode.LEFTOUT, 0).switches[0].name
     assert name == "laser_tilt"
     assert name in of_positions(without([]))
     assert name not in of_positions(without([name]))
 
 
-def test_every_effect_of_the_draw_can_be_measured_in_rings_or_travel():
+def test_every_drawn_effect_can_be_measured_in_rings_or_travel():
     channels = {effect(e.name).channel for e in read_prior(PRIOR).effects}
     assert channels == {"ring", "motion"}
 
 
-def test_a_field_scene_is_refused():
+def test_a_scene_of_an_inspection_is_refused():
     scene, file = scene_of(6)
     facts = scene.model_copy(update={"pipe": scene.pipe.model_copy(update={"fiducials": None})})
     with pytest.raises(ValueError, match="no gauge run"):
         ring_level_run(facts, file, ())
 
 
-def test_cases_of_several_effects_hold_look_alikes_and_repeated_laws():
+def test_cases_of_several_effects_contain_look_alikes_and_repeated_laws():
     cases = [[s.name for s in drawn(Mode.SEVERAL, seed).switches] for seed in range(6)]
     assert all(2 <= len(names) <= 4 for names in cases)
     assert all(names[:2] == ["sheet_waviness"] * 2 for names in cases[2::3])
@@ -117,8 +117,8 @@ def test_several_effects_are_scored_name_by_name_and_a_wrong_answer_scores_badly
     assert "Brier score a case: 3.0000" in wrong
 
 
-def test_what_rings_cannot_tell_of_is_no_truth_that_was_ruled_out():
-    """A slip that was in the class, and one that was not seen, counted as told with less than .001."""
+def test_effects_that_rings_cannot_show_do_not_count_as_excluded():
+    """A slip inside the class, and one that was not seen, counted as excluded at less than .001."""
 
     def told(true: str) -> str:
         effects = [{"name": "laser_tilt", "probability": 0.5}]
@@ -134,8 +134,8 @@ def test_what_rings_cannot_tell_of_is_no_truth_that_was_ruled_out():
 
 
 @pytest.mark.parametrize(("seed", "key"), [(41, "baseline~ramp"), (66, "focal_scale~ramp")])
-def test_courses_are_drawn_of_all_that_the_simulator_can_give_a_course(seed, key):
-    """What the diagnosis ceased to search was no longer concealed, so that no figure showed the loss."""
+def test_courses_are_drawn_from_all_that_the_simulator_can_render(seed, key):
+    """Courses no longer searched by the diagnosis were not concealed either: no figure showed the loss."""
     assert drawn(Mode.COURSES, seed).switches[0].key == key
     searched = {(m.law, m.kind) for m in with_courses(LIBRARY).values() if isinstance(m, Coursed)}
     assert searched < set(with_a_course())

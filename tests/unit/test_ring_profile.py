@@ -1,4 +1,4 @@
-"""The matched fit against exact lines: bias, σ against the Cramér–Rao bound, coverage, clipping."""
+"""The matched fit on exact lines: bias, σ against the Cramér–Rao bound, coverage, clipping."""
 
 import numpy as np
 import pytest
@@ -36,7 +36,7 @@ def fitted(sectors, radius, amplitude, read, shot, seed, width=WIDTH, clip_level
 
 
 def bound(sectors, a, r, slope, read, shot):
-    """Cramér–Rao 1 σ of the position with height, width and a constant background unknown."""
+    """Return the Cramér–Rao 1 σ of the position with height, width and a constant background unknown."""
     own = slice(sectors.start[a], sectors.start[a + 1])
     x = (sectors.radius_px[own] - r - slope * sectors.offset_rad[own]) / WIDTH
     x = x[np.abs(x) < 8]
@@ -47,7 +47,7 @@ def bound(sectors, a, r, slope, read, shot):
 
 
 @pytest.mark.parametrize(("read", "shot"), [(0.7, 0.0), (1.0, 0.1), (2.0, 0.4), (4.0, 1.0)])
-def test_sigma_is_true_and_near_the_cramer_rao_bound(sectors, read, shot):
+def test_sigma_is_right_and_near_the_cramer_rao_bound(sectors, read, shot):
     radius = off_centre(170.0, 6.0)
     slope = np.gradient(radius(sectors.azimuth_rad), sectors.azimuth_rad)
     z, error, sigma = [], [], []
@@ -74,7 +74,7 @@ def test_bias_is_below_a_hundredth_of_a_pixel_at_every_pixel_phase(sectors):
     assert np.max(np.abs(binned)) < 0.01
 
 
-def test_a_slanted_background_does_not_pull_the_line(sectors):
+def test_a_sloping_background_does_not_pull_the_line(sectors):
     v, u = np.mgrid[: SIZE[1], : SIZE[0]]
     slant = 1.5 * (np.hypot(u - CENTRE[0], v - CENTRE[1]) - 170) + 60
     radius = off_centre(170.0, 0.0)
@@ -124,7 +124,7 @@ def test_clipped_peaks_are_fitted_by_their_flanks(sectors):
     assert np.median(fit.amplitude[settled]) == pytest.approx(180, rel=0.05)
 
 
-def test_a_seed_that_is_nan_stays_out(sectors):
+def test_a_seed_that_is_nan_is_left_out(sectors):
     radius = off_centre(170.0, 0.0)
     image = exposed(ring_light(SIZE, CENTRE, radius, WIDTH, AMPLITUDE), np.random.default_rng(0))
     seed = np.full(AZIMUTHS, 170.0)
@@ -134,8 +134,8 @@ def test_a_seed_that_is_nan_stays_out(sectors):
     assert np.isfinite(fit.radius_px[1::2]).all()
 
 
-def test_of_one_field_the_line_is_fitted_to_rows_that_were_taken(sectors):
-    """Rows put between them broadened the line below and above: findings as long as the run were false."""
+def test_with_one_field_the_line_is_fitted_to_recorded_rows_only(sectors):
+    """Interpolated rows broadened the line at top and bottom: false findings as long as the run."""
     radius = off_centre(170.0, 6.0)
     truth = radius(sectors.azimuth_rad)
     image = even_rows(np.rint(BLACK + ring_light(SIZE, CENTRE, radius, WIDTH, 200.0)).astype(np.uint8))
@@ -146,7 +146,7 @@ def test_of_one_field_the_line_is_fitted_to_rows_that_were_taken(sectors):
     assert np.isnan(fits[1]).mean() < 0.01
 
 
-def test_of_one_field_all_sectors_beside_the_centre_keep_their_pixels(sectors):
+def test_with_one_field_all_sectors_beside_the_centre_keep_their_pixels(sectors):
     taken, flat = one_field(sectors).taken, np.abs(np.sin(sectors.azimuth_rad)) < 0.7
     np.testing.assert_array_equal(np.diff(taken.start)[flat], np.diff(sectors.start)[flat])
     assert np.all(np.diff(taken.start) > 0)

@@ -1,4 +1,7 @@
-"""A picture of two parts that do not meet is told by its rings; a pipe that steps on one side is not."""
+"""A picture of two parts that do not fit together is recognised by its rings.
+
+A one-sided step of the pipe is not.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +19,7 @@ AZIMUTH = -np.pi + np.arange(AZIMUTHS) * 2 * np.pi / AZIMUTHS
 
 
 def rings(aside: tuple[float, float] = (0.0, 0.0), axis: int = 0, at_px: float = 400.0) -> RingSamples:
-    """Return rings of a swaying probe in an oval pipe, beyond a column (axis 0) or row moved ``aside``.
+    """Return rings of a swaying probe in an oval pipe, moved beyond a column (axis 0) or row by ``aside``.
 
     The line is followed finely, moved, and read at its azimuths again; on the seam there is none.
     """
@@ -44,10 +47,10 @@ def rings(aside: tuple[float, float] = (0.0, 0.0), axis: int = 0, at_px: float =
 
 
 @pytest.mark.parametrize(("axis", "aside"), [(0, (0.0, 2.0)), (0, (0.5, -1.0)), (1, (1.0, 0.0))])
-def test_parts_of_the_picture_that_lie_aside_are_told_with_place_and_size(
+def test_displaced_parts_of_the_picture_are_reported_with_place_and_size(
     axis: int, aside: tuple[float, float]
 ) -> None:
-    """Half of the picture 2 px lower hid a pit and left 44 % of the radii inside their σ, inexpressible."""
+    """Half of the picture 2 px lower hid a pit; 44 % of the radii were inside their σ, without a message."""
     at_px = (400.0, 310.0)[axis]
     seam = seam_of(rings(aside, axis, at_px))
     assert seam is not None
@@ -59,8 +62,8 @@ def test_parts_of_the_picture_that_lie_aside_are_told_with_place_and_size(
     assert "the picture has a seam" in said[0]
 
 
-def test_a_seam_is_told_beside_other_steps() -> None:
-    """Burnt-in text or a ledge of the wall makes steps of its own."""
+def test_a_seam_is_reported_beside_other_steps() -> None:
+    """Burnt-in text or a ledge of the wall causes steps too."""
     seamed = rings((0.0, 2.0))
     ledge = seamed.radius_px + 3.0 * (np.abs(AZIMUTH - 0.4) < 0.25).astype(np.float32)
     seam = seam_of(replace(seamed, radius_px=ledge))
@@ -69,8 +72,8 @@ def test_a_seam_is_told_beside_other_steps() -> None:
     assert seam.step_px == pytest.approx(2.0, abs=0.25)
 
 
-def test_whole_pictures_and_walls_that_step_on_one_side_have_no_seam() -> None:
-    """A row that grazes the ring met both ends of what interlacing does to the line along rows."""
+def test_whole_pictures_and_walls_with_a_one_sided_step_have_no_seam() -> None:
+    """A row tangent to the ring touched both ends of the part that interlacing disturbs."""
     sound = rings()
     assert seam_of(sound) is None
     ledge = sound.radius_px + 2.0 * (np.abs(AZIMUTH - 1.0) < 0.4).astype(np.float32)
@@ -81,7 +84,7 @@ def test_whole_pictures_and_walls_that_step_on_one_side_have_no_seam() -> None:
     assert seam_of(replace(sound, radius_px=weld)) is None
 
 
-def test_a_step_in_some_rings_is_none_of_the_picture() -> None:
+def test_a_step_in_some_rings_is_not_one_of_the_picture() -> None:
     sound, spoilt = rings(), rings((0.0, 2.0))
     some = np.arange(FRAMES)[:, None] < FRAMES // 3
     radius = np.where(some, spoilt.radius_px, sound.radius_px)

@@ -1,4 +1,4 @@
-"""Finding the ring without help: off centre, broken, beside glints, or not there at all."""
+"""Finding the ring without a start value: off centre, broken, beside glints, or absent."""
 
 from dataclasses import replace
 
@@ -47,7 +47,7 @@ def test_pixels_near_a_ring_are_those_at_its_distance(sectors):
 
 @pytest.mark.parametrize(("radius", "along"), [(150.0, 0.0), (120.0, 45.0), (200.0, 15.0)])
 @pytest.mark.parametrize("width", [0.9, 1.6, 3.0])
-def test_a_ring_is_found_wherever_it_is_and_however_thick(sectors, radius, along, width):
+def test_a_ring_is_found_at_any_place_and_thickness(sectors, radius, along, width):
     ring = off_centre(radius, along)
     trace = trace_ring(image_of(ring_light(SIZE, CENTRE, ring, width, 60.0)), sectors, 255.0)
     error = errors(trace, ring(sectors.azimuth_rad))
@@ -56,7 +56,7 @@ def test_a_ring_is_found_wherever_it_is_and_however_thick(sectors, radius, along
     assert trace.width_px == pytest.approx(width, rel=0.05)
 
 
-def test_gap_and_glint_are_not_taken_for_the_ring(sectors):
+def test_a_gap_and_a_glint_are_not_taken_for_the_ring(sectors):
     ring = off_centre(150.0, 20.0)
     light = ring_light(SIZE, CENTRE, ring, 1.2, lambda psi: 80.0 * (np.abs(psi - 1.5) > 0.15))
     light[100:112, 300:330] += 230
@@ -69,7 +69,7 @@ def test_gap_and_glint_are_not_taken_for_the_ring(sectors):
 
 
 @pytest.mark.parametrize("read", [0.0, 1.0, 6.0])
-def test_no_ring_is_invented_in_an_empty_image(sectors, read):
+def test_no_ring_is_found_in_an_empty_image(sectors, read):
     trace = trace_ring(image_of(np.zeros(SIZE[::-1]), read=read), sectors, 255.0)
     assert trace is None or trace.coverage < 0.01
 
@@ -90,7 +90,7 @@ def test_a_ring_that_steps_to_another_bore_is_followed(sectors):
     assert whole.coverage > 0.98
 
 
-def test_a_sector_that_was_on_a_reflection_comes_back_to_the_line(sectors):
+def test_a_sector_that_followed_a_reflection_returns_to_the_line(sectors):
     ring = off_centre(170.0, 8.0)
     light = ring_light(SIZE, CENTRE, ring, 1.2, 80.0)
     light += ring_light(SIZE, CENTRE, lambda psi: ring(psi) - 20.0, 1.2, 16.0)
@@ -103,7 +103,7 @@ def test_a_sector_that_was_on_a_reflection_comes_back_to_the_line(sectors):
     assert np.isfinite(error[[40, 301, 500]]).all()
 
 
-def test_sectors_narrower_than_a_pixel_see_the_line_and_not_what_is_beside_it():
+def test_sectors_narrower_than_a_pixel_use_the_line_and_not_its_neighbours():
     sectors, ring = cut_sectors(SIZE, np.array(CENTRE), 1440), off_centre(120.0, 3.0)
     light = ring_light(SIZE, CENTRE, ring, 0.7, 80.0)
     light += ring_light(SIZE, CENTRE, lambda psi: ring(psi) - 12.0, 0.7, 16.0)
@@ -123,7 +123,7 @@ def test_two_equally_bright_lines_are_ghosts(sectors):
     assert (trace.validity[~double] == RingValidity.VALID).mean() > 0.95
 
 
-def test_a_ring_partly_outside_the_image_is_told_apart(sectors):
+def test_a_ring_partly_outside_the_image_is_recognised(sectors):
     ring = off_centre(235.0, 30.0, np.pi / 2)
     trace = trace_ring(image_of(ring_light(SIZE, CENTRE, ring, 1.2, 80.0)), sectors, 255.0)
     v = CENTRE[1] + ring(sectors.azimuth_rad) * np.sin(sectors.azimuth_rad)
@@ -134,7 +134,7 @@ def test_a_ring_partly_outside_the_image_is_told_apart(sectors):
 
 
 def lit(gone, seed):
-    """A ring whose line is gone on some sectors, in a lit pipe at whose dark far end a faint rim shines."""
+    """Return a ring that is missing in some sectors, in a lit pipe with a faint rim at its dark far end."""
     random = np.random.default_rng(seed)
     line = ring_light(SIZE, CENTRE, off_centre(150.0, 6.0), 1.5, lambda psi: np.where(gone(psi), 0.0, 60.0))
     v, u = np.mgrid[: SIZE[1], : SIZE[0]]
@@ -146,10 +146,10 @@ def lit(gone, seed):
 
 @pytest.mark.parametrize("half_gone_rad", [0.15, 0.5, 1.0])
 @pytest.mark.parametrize("followed", [False, True])
-def test_where_the_line_is_gone_no_other_light_of_a_lit_pipe_is_taken_for_it(
+def test_where_the_line_is_missing_no_other_light_of_a_lit_pipe_is_taken_for_it(
     sectors, followed, half_gone_rad
 ):
-    """The end of the light far down the pipe, seen in three rings running, was a deposit of 12 mm at .98."""
+    """The end of the light far down the pipe, in three successive rings, was a deposit of 12 mm at .98."""
     ring = off_centre(150.0, 6.0)(sectors.azimuth_rad)
 
     def gone(psi):
@@ -162,12 +162,12 @@ def test_where_the_line_is_gone_no_other_light_of_a_lit_pipe_is_taken_for_it(
 
 
 def stepped(psi):
-    """A bore that is wider on 36 % of the way round."""
+    """Return a bore that is wider on 36 % of the circumference."""
     return np.where(np.abs(psi + 1.5) < 1.13, 180.0, 150.0)
 
 
 def holed(psi):
-    """A hole of 23 degrees."""
+    """Return a bore with a hole of 23 degrees."""
     return np.where(np.abs(psi + 1.5) < 0.2, 180.0, 150.0)
 
 
@@ -200,18 +200,18 @@ def texture():
 @pytest.mark.parametrize("followed", [False, True])
 @pytest.mark.parametrize("other", [glint, reflection, mirrored, texture])
 @pytest.mark.parametrize("wall", [stepped, holed])
-def test_no_other_light_takes_a_step_or_a_hole_of_the_wall_away(sectors, wall, other, followed):
-    """One glint of σ 4 px took all samples of a step of the bore from a ring."""
+def test_no_other_light_replaces_a_step_or_a_hole_of_the_wall(sectors, wall, other, followed):
+    """One glint of σ 4 px replaced all samples of a step of the bore in a ring."""
     psi = sectors.azimuth_rad
     line = ring_light(SIZE, CENTRE, wall, 1.5, lambda p: np.where(wall(p) > 150, 45.0, 60.0))
     before = trace_ring(image_of(line, 4), sectors, 255.0) if followed else None
     trace = trace_ring(image_of(line + other(), 5), sectors, 255.0, before)
     off = (wall(psi) > 150) & (wall(psi - 0.03) > 150) & (wall(psi + 0.03) > 150)
-    assert (np.abs(errors(trace, wall(psi)))[off] < 2.0).mean() > 0.8, "but for the ends of an arc"
+    assert (np.abs(errors(trace, wall(psi)))[off] < 2.0).mean() > 0.8, "except for the ends of an arc"
 
 
 @pytest.mark.parametrize("half_gone_rad", [0.15, 0.5, 1.0])
-def test_light_that_goes_on_beyond_where_the_line_is_gone_is_not_the_line(sectors, half_gone_rad):
+def test_light_that_continues_where_the_line_is_missing_is_not_the_line(sectors, half_gone_rad):
     line = ring_light(
         SIZE, CENTRE, off_centre(150.0, 6.0), 1.5, lambda p: 60.0 * (np.abs(p - 1.0) > half_gone_rad)
     )

@@ -1,4 +1,4 @@
-"""How far the line wanders beyond its noise, read from rings with errors that are known."""
+"""The errors of the line beyond its noise ("wander"), estimated from rings with known errors."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ HEIGHTS = (40.0, 200.0)
 
 
 def rings(even_px: float, slope_px: float, seed: int, count: int = RINGS) -> RingSamples:
-    """Round rings of lines of any height, with errors as stated and those of a wander."""
+    """Return round rings of lines of any brightness, with errors as stated and a wander."""
     draw = np.random.default_rng(seed)
     amplitude = np.repeat(np.exp(draw.uniform(*np.log(HEIGHTS), (count, AZIMUTHS // 90))), 90, axis=1)
     sigma = np.hypot(STATED_PX, np.hypot(even_px, slope_px / amplitude))
@@ -29,18 +29,18 @@ def rings(even_px: float, slope_px: float, seed: int, count: int = RINGS) -> Rin
 
 
 @pytest.mark.parametrize(("even_px", "slope_px"), [(0.1, 0.0), (0.0, 12.0), (0.08, 12.0)])
-def test_faint_and_bright_lines_get_the_wander_that_each_has(even_px: float, slope_px: float) -> None:
+def test_faint_and_bright_lines_each_get_their_wander(even_px: float, slope_px: float) -> None:
     heights = np.array(HEIGHTS)
     true: Float = np.hypot(even_px, slope_px / heights)
     found = np.mean([wander_of(rings(even_px, slope_px, seed)).at(heights) for seed in range(8)], 0)
     np.testing.assert_allclose(found, true, rtol=0.08)
 
 
-def test_rings_as_good_as_they_say_wander_next_to_nothing() -> None:
+def test_rings_with_right_sigma_have_nearly_no_wander() -> None:
     assert wander_of(rings(0.0, 0.0, 1)).at(np.array(HEIGHTS)).max() < STATED_PX / 2
 
 
-def test_few_samples_tell_one_wander_for_all_heights() -> None:
+def test_few_samples_give_one_wander_for_all_brightnesses() -> None:
     found = wander_of(rings(0.1, 0.0, 2, count=1))
     assert found.slope_px == 0.0
     assert found.even_px == pytest.approx(0.1, rel=0.25)

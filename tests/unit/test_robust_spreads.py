@@ -1,4 +1,4 @@
-"""Medians of rows of which some values miss."""
+"""Medians of rows with missing values."""
 
 from __future__ import annotations
 
@@ -12,9 +12,7 @@ from pipeline.adjustment.robust import MAD_TO_SIGMA, robust_spreads, row_median
 
 @pytest.mark.parametrize("shape", [(7,), (5, 1), (5, 2), (4, 9), (3, 4, 6), (0, 5), (2, 0, 3)])
 @pytest.mark.parametrize("gone", [0.0, 0.4])
-def test_the_median_of_rows_is_that_of_numpy_whatever_their_shape(
-    shape: tuple[int, ...], gone: float
-) -> None:
+def test_the_median_of_rows_equals_that_of_numpy_for_any_shape(shape: tuple[int, ...], gone: float) -> None:
     """Of three axes the middle one was taken for the last."""
     random = np.random.default_rng(len(shape))
     rows = random.standard_normal(shape)
@@ -31,12 +29,12 @@ def test_rows_without_values_have_no_median() -> None:
     assert np.isnan(row_median(np.full((2, 4), np.nan))).all()
 
 
-def test_infinite_values_are_not_seen() -> None:
+def test_infinite_values_count_as_missing() -> None:
     np.testing.assert_array_equal(row_median(np.array([[-np.inf, 1, 2, 4], [np.inf, 1, 2, 4]])), [2.0, 2.0])
 
 
 @pytest.mark.parametrize("axis", [0, 1, 2])
-def test_spreads_along_each_axis_leave_out_what_misses(axis: int) -> None:
+def test_spreads_along_each_axis_ignore_missing_values(axis: int) -> None:
     values = np.random.default_rng(3).standard_normal((4, 5, 6))
     values[1, 2, 3] = np.nan
     expected = MAD_TO_SIGMA * np.nanmedian(np.abs(values), axis)

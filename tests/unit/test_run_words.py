@@ -1,4 +1,4 @@
-"""What figures of a run are called on pages: no name of the program's own."""
+"""The names of figures of a run on pages are plain words, not names of the program."""
 
 import pytest
 
@@ -7,7 +7,7 @@ from pipeline.pages.notation import SAMPLE_REASONS, STAGES, figure_name, stage_t
 from stages.catalogue import PIPELINE
 
 
-def test_every_reason_and_every_stage_has_words() -> None:
+def test_every_reason_and_every_stage_has_a_plain_name() -> None:
     assert set(SAMPLE_REASONS) == {v.name.lower() for v in RingValidity}
     assert set(STAGES) == {stage.name for stage in PIPELINE}
     assert all(" " in stage_title(s) or stage_title(s)[0].isupper() for s in STAGES)
@@ -28,5 +28,5 @@ def test_every_reason_and_every_stage_has_words() -> None:
         ("mean radius", "mean radius"),
     ],
 )
-def test_figures_are_named_plainly(raw: str, plain: str) -> None:
+def test_figures_have_plain_names(raw: str, plain: str) -> None:
     assert figure_name(raw) == plain

@@ -1,4 +1,4 @@
-"""Nothing is done twice, every ending is accounted for, and a folder never mixes two configurations."""
+"""Nothing is done twice, every outcome is recorded, and a folder never mixes two configurations."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def record(folder: Path) -> dict[str, Any]:
 
 
 def snapshot(folder: Path) -> dict[str, tuple[int, int]]:
-    """Identity and time of every file: what is written again differs."""
+    """Return identity and time of every file: those of rewritten files differ."""
     names = (p for p in folder.rglob("*") if p.is_file() and p.name not in ("run.json", "run.log", "lock"))
     return {str(p.relative_to(folder)): (p.stat().st_ino, p.stat().st_mtime_ns) for p in names}
 
@@ -53,7 +53,7 @@ def test_a_second_call_does_nothing_again(tmp_path: Path) -> None:
     assert snapshot(tmp_path / "run") == before
 
 
-def test_run_json_tells_what_was_run(tmp_path: Path) -> None:
+def test_run_json_states_what_was_run(tmp_path: Path) -> None:
     outcome = run_toys(tmp_path / "run", "smooth.width=5")
     told = record(tmp_path / "run")
     assert told["format"] == 1
@@ -72,7 +72,7 @@ def warn_of_it(drawn: Drawn, *, parameters: Any, context: Context) -> SMOOTH.out
     return SMOOTH.function(drawn, parameters=parameters, context=context)
 
 
-def test_what_a_stage_warns_of_stands_in_run_json_also_when_it_is_reused(tmp_path: Path) -> None:
+def test_a_warning_of_a_stage_is_in_run_json_even_if_its_result_is_reused(tmp_path: Path) -> None:
     job = toy_job(tmp_path / "run")
     job = replace(job, stages=(DRAW, replace(SMOOTH, function=warn_of_it), job.stages[2]))
     for _ in range(2):
@@ -80,13 +80,13 @@ def test_what_a_stage_warns_of_stands_in_run_json_also_when_it_is_reused(tmp_pat
         assert record(tmp_path / "run")["warnings"] == ["smooth: the probe was moved by 36 σ"]
 
 
-def test_numbers_of_reused_stages_are_told_again(tmp_path: Path) -> None:
+def test_numbers_of_reused_stages_are_reported_again(tmp_path: Path) -> None:
     first = run_toys(tmp_path / "run")
     again = run_toys(tmp_path / "run")
     assert [s.numbers for s in again.stages] == [s.numbers for s in first.stages]
 
 
-def test_the_same_numbers_in_another_folder(tmp_path: Path) -> None:
+def test_a_run_in_another_folder_gives_the_same_numbers(tmp_path: Path) -> None:
     for name in ("a", "b"):
         run_toys(tmp_path / name)
     a, b = (np.load(tmp_path / n / "numbers.dir" / "values.npy") for n in ("a", "b"))
@@ -111,12 +111,12 @@ def test_a_parameter_recomputes_from_its_stage_on(tmp_path: Path) -> None:
         (Selection(only="smooth", resume=False), ["reused", "completed", "reused"]),
     ],
 )
-def test_selection(tmp_path: Path, selection: Selection, expected: list[str]) -> None:
+def test_the_selected_stages_are_run(tmp_path: Path, selection: Selection, expected: list[str]) -> None:
     run_toys(tmp_path / "run")
     assert states(run_toys(tmp_path / "run", selection=selection)) == expected
 
 
-def test_only_computes_one_stage_and_asks_for_what_it_needs(tmp_path: Path) -> None:
+def test_the_option_only_computes_one_stage_and_needs_its_inputs(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="no result of stage draw, which smooth needs"):
         run_toys(tmp_path / "run", selection=Selection(only="smooth"))
     outcome = run_toys(tmp_path / "run", selection=Selection(only="draw"))
@@ -130,7 +130,7 @@ def test_an_unknown_stage_is_refused_before_anything_is_written(tmp_path: Path) 
     assert not (tmp_path / "run").exists()
 
 
-def test_unusable_keeps_what_was_completed(tmp_path: Path) -> None:
+def test_after_unusable_input_completed_results_are_kept(tmp_path: Path) -> None:
     with pytest.raises(UnusableError):
         run_toys(tmp_path / "run", "smooth.unusable_above=0.001")
     told = record(tmp_path / "run")
@@ -140,7 +140,7 @@ def test_unusable_keeps_what_was_completed(tmp_path: Path) -> None:
     assert states(run_toys(tmp_path / "run")) == ["reused", "completed", "completed"]
 
 
-def test_a_bug_leaves_its_traceback_in_the_log(tmp_path: Path) -> None:
+def test_a_program_error_leaves_its_traceback_in_the_log(tmp_path: Path) -> None:
     with pytest.raises(
         FailedError, match=r"stage smooth failed: ZeroDivisionError: the toy broke(?s:.*)run\.log"
     ):
@@ -152,7 +152,7 @@ def test_a_bug_leaves_its_traceback_in_the_log(tmp_path: Path) -> None:
     assert states(run_toys(tmp_path / "run")) == ["reused", "completed", "completed"]
 
 
-def test_files_of_another_configuration_do_not_stay(tmp_path: Path) -> None:
+def test_files_of_another_configuration_are_removed(tmp_path: Path) -> None:
     run_toys(tmp_path / "run")
     with pytest.raises(FailedError):
         run_toys(tmp_path / "run", "smooth.fails=true")
@@ -162,7 +162,7 @@ def test_files_of_another_configuration_do_not_stay(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", ["report.html", "numbers.dir/values.npy"])
 @pytest.mark.parametrize("damage", [Path.unlink, lambda p: p.write_bytes(b"edited")])
-def test_a_file_lost_or_changed_is_written_again(tmp_path: Path, name: str, damage: Any) -> None:
+def test_a_lost_or_changed_file_is_written_again(tmp_path: Path, name: str, damage: Any) -> None:
     run_toys(tmp_path / "run")
     whole = (tmp_path / "run" / name).read_bytes()
     damage(tmp_path / "run" / name)
@@ -173,7 +173,7 @@ def test_a_file_lost_or_changed_is_written_again(tmp_path: Path, name: str, dama
 def stop_in_the_middle(*, parameters: DrawParameters, context: Context) -> Drawn:
     context.progress(1, 4)
     os.kill(os.getpid(), signal.SIGINT)
-    for _ in range(1000):  # the thread that takes signals is another
+    for _ in range(1000):  # the thread that receives signals is another
         time.sleep(0.01)
         context.progress(2, 4)
     raise AssertionError("it went on")
@@ -190,7 +190,7 @@ def test_ctrl_c_stops_at_the_next_progress(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("stages", "weighed"), [((DRAW,), "nothing else"), (TOYS, "the total")])
-def test_a_stage_is_given_none_for_what_no_stage_makes(
+def test_a_stage_gets_none_for_what_no_stage_makes(
     tmp_path: Path, stages: tuple[Stage, ...], weighed: str
 ) -> None:
     job = replace(toy_job(tmp_path), stages=(*stages, WEIGH), exporters=())
@@ -210,7 +210,7 @@ def test_linear_algebra_runs_on_one_thread_whatever_the_number_of_cores(tmp_path
     job = replace(toy_job(tmp_path), stages=stages, exporters=(), configuration=resolve(stages))
     with threadpool_limits(2, "blas"):
         run_job(job, Selection(), SilentDisplay())
-        assert count_threads(None, parameters=Parameters(), context=None).value == 2, "given back"  # type: ignore[arg-type]
+        assert count_threads(None, parameters=Parameters(), context=None).value == 2, "restored afterwards"  # type: ignore[arg-type]
     assert result_of(job, Weighed).value == 1
 
 
@@ -218,14 +218,14 @@ def answer_something_else(drawn: Drawn, *, parameters: Any, context: Context) ->
     return drawn
 
 
-def test_a_stage_that_breaks_its_word_fails(tmp_path: Path) -> None:
+def test_a_stage_that_returns_another_type_than_declared_fails(tmp_path: Path) -> None:
     job = toy_job(tmp_path / "run")
     job = replace(job, stages=(DRAW, replace(SMOOTH, function=answer_something_else), job.stages[2]))
     with pytest.raises(FailedError, match="stage smooth"):
         run_job(job, Selection(), SilentDisplay())
 
 
-def test_a_foreign_folder_is_refused_untouched(tmp_path: Path) -> None:
+def test_a_foreign_folder_is_refused_and_not_changed(tmp_path: Path) -> None:
     (tmp_path / "thesis.txt").write_text("mine")
     with pytest.raises(InputError, match="do not belong to a boresight run"):
         run_toys(tmp_path)
@@ -234,13 +234,13 @@ def test_a_foreign_folder_is_refused_untouched(tmp_path: Path) -> None:
         run_toys(tmp_path / "thesis.txt")
 
 
-def test_a_folder_that_cannot_be_written_is_told() -> None:
+def test_a_folder_that_cannot_be_written_is_reported() -> None:
     with pytest.raises(InputError, match="cannot be written"):
         run_toys(Path("/proc/boresight-run"))
 
 
 @pytest.mark.parametrize("limit", [0, 500, 3000, 6000])
-def test_a_full_disk_is_told_and_the_run_continues_later(tmp_path: Path, limit: int) -> None:
+def test_a_full_disk_is_reported_and_the_run_continues_later(tmp_path: Path, limit: int) -> None:
     run_toys(tmp_path / "whole")
     with file_size_limit(limit), pytest.raises(InputError, match=r"cannot be written(?s:.*)the same command"):
         run_toys(tmp_path / "run")
@@ -264,20 +264,20 @@ def test_two_processes_do_not_share_a_folder(tmp_path: Path) -> None:
     assert states(run_toys(tmp_path / "run"))[1:] == ["completed"] * 2
 
 
-def test_a_moved_run_goes_on(tmp_path: Path) -> None:
+def test_a_moved_run_can_be_continued(tmp_path: Path) -> None:
     run_toys(tmp_path / "run")
     shutil.move(tmp_path / "run", tmp_path / "moved")
     assert states(run_toys(tmp_path / "moved")) == ["reused"] * 3
 
 
-def test_what_another_run_holds_is_not_computed_again(tmp_path: Path) -> None:
+def test_results_of_another_run_are_not_computed_again(tmp_path: Path) -> None:
     run_toys(tmp_path / "first")
     job = replace(toy_job(tmp_path / "second"), lent=(tmp_path / "first",))
     assert [s.state.value for s in run_job(job, Selection(), SilentDisplay()).stages] == ["reused"] * 3
     assert result_of(job, Total).total == result_of(toy_job(tmp_path / "first"), Total).total
 
 
-def test_a_damaged_result_of_another_run_is_computed_here_and_left_there(tmp_path: Path) -> None:
+def test_a_damaged_result_of_another_run_is_computed_here_and_stays_there(tmp_path: Path) -> None:
     run_toys(tmp_path / "first")
     array = next((tmp_path / "first" / ".boresight").glob("draw-*/*.npy"))
     array.write_bytes(array.read_bytes()[:-2])

@@ -1,4 +1,4 @@
-"""Stages that need nothing of each other run side by side; one that fails stops the others."""
+"""Independent stages run at the same time; one that fails stops the others."""
 
 from __future__ import annotations
 
@@ -73,14 +73,14 @@ def forked_job(folder: Path, left: Any, right: Any) -> Job:
     return replace(toy_job(folder), stages=stages, exporters=(), configuration=resolve(stages, None, ()))
 
 
-def test_stages_that_need_nothing_of_each_other_run_side_by_side(tmp_path: Path) -> None:
+def test_independent_stages_run_at_the_same_time(tmp_path: Path) -> None:
     """Each waits for the other: one after the other, they would wait for ever."""
     outcome = run_job(forked_job(tmp_path / "run", go_left, go_right), Selection(), SilentDisplay())
     assert states(outcome) == ["completed"] * 3
     assert [s.name for s in outcome.stages] == ["draw", "left", "right"]
 
 
-def test_a_stage_that_fails_stops_the_one_beside_it(tmp_path: Path) -> None:
+def test_a_stage_that_fails_stops_the_one_that_runs_with_it(tmp_path: Path) -> None:
     with pytest.raises(UnusableError, match="there is no way"):
         run_job(forked_job(tmp_path / "run", fail_left, linger_right), Selection(), SilentDisplay())
     told = record(tmp_path / "run")

@@ -1,4 +1,4 @@
-"""Calibration and diagnosis from a script: typed, the commands' own results, and refusals that say why."""
+"""Calibration and diagnosis from a script: typed, equal to the commands' results, and with clear refusals."""
 
 import json
 from dataclasses import replace
@@ -39,10 +39,10 @@ def test_a_diagnosis_is_read_as_it_was_written(tmp_path):
     assert (effect.name, effect.probability, effect.statement) == ("laser_tilt", 0.99, TILT.statement)
     tilt, direction = effect.parameters["tilt_deg"], effect.parameters["direction_deg"]
     assert (tilt.value, tilt.sd, direction.value) == (0.61, 0.01, 40.0)
-    assert np.isnan(direction.sd), "what is not known is not taken for a number"
+    assert np.isnan(direction.sd), "an unknown value is not taken for a number"
 
 
-def test_every_effect_has_its_place_and_the_names_it_cannot_be_told_from():
+def test_every_effect_has_its_place_and_the_names_that_cannot_be_distinguished_from_it():
     place = Location("motion", "time", "event", frames=(131, 133))
     (alone,) = to_json(replace(FOUND, location=place))["effects"]
     assert alone["location"] == {
@@ -51,11 +51,11 @@ def test_every_effect_has_its_place_and_the_names_it_cannot_be_told_from():
         "time": "event",
         "frames": [131, 133],
     }
-    assert alone["credible_set"] == ["laser_tilt"], "a name that is told is the only one"
+    assert alone["credible_set"] == ["laser_tilt"], "a sure name is the only one"
     (doubted,) = to_json(replace(FOUND, verdict=Verdict.CLASS))["effects"]
     assert doubted["credible_set"] == ["laser_tilt", "principal_point"]
     two = to_json(replace(FOUND, location=place, effects=(TILT, TILT)))["effects"]
-    assert [e["location"] for e in two] == [None, None], "of both together, it is of neither"
+    assert [e["location"] for e in two] == [None, None], "a class of both belongs to neither"
 
 
 def test_a_folder_without_a_diagnosis_is_refused(tmp_path):
@@ -63,7 +63,7 @@ def test_a_folder_without_a_diagnosis_is_refused(tmp_path):
         boresight.open_diagnosis(tmp_path)
 
 
-def test_a_run_of_an_older_boresight_is_refused_by_name(tmp_path):
+def test_a_run_of_an_older_boresight_is_refused_with_the_reason(tmp_path):
     parts = ("probe", "input_sha256", "configuration", "stages", "metrics", "reader_warnings")
     older = {"format": 1, "state": "completed", **{part: {} for part in parts}}
     (tmp_path / "run.json").write_text(json.dumps(older))
@@ -91,7 +91,7 @@ def recording(tmp_path, monkeypatch):
     return cut_sample(tmp_path / "recording", 20)
 
 
-def test_a_diagnosis_from_a_script_is_that_of_the_command(tmp_path, recording):
+def test_a_diagnosis_from_a_script_equals_that_of_the_command(tmp_path, recording):
     found = boresight.diagnose(recording, output=tmp_path / "script")
     assert found.answer.effects[0].parameters["tilt_deg"].value == 0.61
     assert "diagnosis: frames 3 to 5 were left out" in found.warnings
@@ -105,7 +105,7 @@ def test_a_diagnosis_from_a_script_is_that_of_the_command(tmp_path, recording):
     assert repr(boresight.open_diagnosis(tmp_path / "command").answer) == repr(found.answer)
 
 
-def test_what_a_diagnosis_lacks_is_said_before_it_starts(tmp_path, recording):
+def test_missing_inputs_of_a_diagnosis_are_reported_before_it_starts(tmp_path, recording):
     with pytest.raises(boresight.InputError, match="no recording"):
         boresight.diagnose(output=tmp_path / "out")
     with pytest.raises(boresight.InputError, match="needs an inspection and a gauge run"):
@@ -113,7 +113,7 @@ def test_what_a_diagnosis_lacks_is_said_before_it_starts(tmp_path, recording):
     assert not (tmp_path / "out").exists()
 
 
-def test_an_inspection_is_not_calibrated_on(tmp_path, recording):
+def test_an_inspection_is_refused_for_calibration(tmp_path, recording):
     with pytest.raises(boresight.InputError, match="it is not a gauge run"):
         boresight.calibrate(recording, tmp_path / "out", settings=["gauge.iterations=9"])
     assert not (tmp_path / "out").exists()

@@ -1,4 +1,4 @@
-"""A second line is told from the skirt that compression leaves around a bright line."""
+"""A second line is distinguished from the halo that compression leaves around a bright line."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ FLOOR = 1e-3
 
 
 def cells(second: float, skirt: float, seed: int = 0) -> Cells:
-    """A line with a second one up to 10 px off, and a skirt higher on the side that faces one direction."""
+    """Return a line with a second one up to 10 px off, and a halo that is higher toward one direction."""
     random = np.random.default_rng(seed)
     count = BLOCKS * SECTORS
     block, sector = np.repeat(np.arange(BLOCKS), SECTORS), np.tile(np.arange(SECTORS), BLOCKS)
@@ -43,15 +43,15 @@ def cells(second: float, skirt: float, seed: int = 0) -> Cells:
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_an_uneven_skirt_is_no_second_line(seed):
+def test_an_uneven_halo_is_not_a_second_line(seed):
     drawn = cells(0.0, 0.02, seed)
     line = bounced(responses(drawn), drawn, FLOOR)
-    assert line.relative > FOUND_Z * FLOOR, "the skirt is too even to feign anything"
+    assert line.relative > FOUND_Z * FLOOR, "the halo is too even to look like a second line"
     assert abs(line.test.z) < FOUND_Z / 2
 
 
 @pytest.mark.parametrize("skirt", [0.0, 0.002])
-def test_a_second_line_beyond_the_skirt_is_found_where_it_is(skirt):
+def test_a_second_line_beyond_the_halo_is_found_at_its_place(skirt):
     drawn = cells(0.03, skirt)
     line = bounced(responses(drawn), drawn, FLOOR)
     assert line.test.z > FOUND_Z
@@ -70,7 +70,7 @@ def test_a_second_line_that_is_missing_where_it_should_be_clearest_is_none():
 
 
 def ghost(tilt_x: float, tilt_y: float, cone: float):
-    """The finding of a second line whose place asks for these misalignments, deg."""
+    """Return the finding of a second line whose place implies these misalignments, deg."""
     confirms = (
         Size("laser_tilt.tilt_deg along x", "deg", tilt_x, 0.01),
         Size("laser_tilt.tilt_deg along y", "deg", tilt_y, 0.01),
@@ -80,11 +80,11 @@ def ghost(tilt_x: float, tilt_y: float, cone: float):
 
 
 def rings(tilt_x: float, tilt_y: float, cone: float):
-    """What the rings of a gauge say of the sheet: true minus stated, deg, with 0.01° each."""
+    """Return the misalignments by the rings of a gauge: true minus stated, deg, with 0.01° each."""
     return Part("rings", "", np.array([tilt_x, tilt_y, cone]), 1e-4 * np.eye(3))
 
 
-def test_rings_bear_a_second_line_out():
+def test_rings_confirm_a_second_line():
     told = against_rings(ghost(0.3, 0.5, 0.0), rings(0.301, 0.49, 0.005))
     assert told is not None
     assert told.confirmation.agrees
@@ -98,7 +98,7 @@ def test_rings_contradict_a_second_line(seen):
 
 
 def plainly_matched(cells: Cells, row: int, distance_px: np.ndarray) -> np.ndarray:
-    """Return scores (D,) of one cell by least squares of whole arrays, the kernel's reference."""
+    """Return scores (D,) of one cell by least squares on whole arrays, the reference for the kernel."""
     noise = np.hypot(robust_spreads(cells.rest - np.median(cells.rest, axis=0), axis=0), NOISE_FLOOR)
     x = (OFFSET - cells.centre_px[row]) / cells.width_px[row]
     near = np.abs(x) < 3.5
@@ -112,7 +112,7 @@ def plainly_matched(cells: Cells, row: int, distance_px: np.ndarray) -> np.ndarr
     return np.array(out).T
 
 
-def test_the_matched_filter_is_that_of_plain_least_squares():
+def test_the_matched_filter_agrees_with_plain_least_squares():
     drawn = cells(0.03, 0.002, 3)
     drawn = replace(drawn, centre_px=np.linspace(-0.7, 0.7, len(drawn.rest)))
     found = responses(drawn)

@@ -1,4 +1,4 @@
-"""Sections against analytic ovals and the scatter of repeated draws."""
+"""Sections compared with analytic ovals and with the scatter of repeated draws."""
 
 import numpy as np
 import pytest
@@ -31,7 +31,7 @@ def test_every_ovality_definition_on_a_known_oval():
     assert np.allclose(sections.major_axis_rad, 0.4, atol=np.pi / 360)
 
 
-def test_centre_is_taken_out_before_diameters_are_read():
+def test_the_centre_is_subtracted_before_diameters_are_read():
     direction = np.stack([np.cos(AZIMUTH), np.sin(AZIMUTH)], -1)
     along = direction @ np.array([0.6, -0.8])
     offset = 2.0
@@ -42,7 +42,7 @@ def test_centre_is_taken_out_before_diameters_are_read():
     assert np.all(sections.max_diameter_mm - sections.min_diameter_mm < 0.003)
 
 
-def test_random_part_is_the_scatter_and_calibration_part_stays():
+def test_the_random_part_is_the_scatter_and_the_calibration_part_stays():
     rng = np.random.default_rng(3)
     oval = 50 + 0.2 * np.cos(2 * AZIMUTH)
     drawn = [
@@ -63,7 +63,7 @@ def test_random_part_is_the_scatter_and_calibration_part_stays():
     assert np.all(calibrated.ovality_mean_sigma < 1e-3)
 
 
-def test_unseen_stations_stay_empty_and_are_counted():
+def test_unmeasured_stations_stay_empty_and_are_counted():
     radius = np.full((len(DISTANCE), 360), 50.0)
     radius[20:40, 80:] = np.nan
     sections = measure(radius)
@@ -72,13 +72,13 @@ def test_unseen_stations_stay_empty_and_are_counted():
     assert np.all(sections.coverage[missing] < 0.3)
 
 
-def test_an_empty_wall_is_unusable():
+def test_an_empty_wall_is_refused():
     with pytest.raises(UnusableError, match="no measured radius"):
         measure(np.full((len(DISTANCE), 360), np.nan))
 
 
 @pytest.mark.parametrize("gap_deg", [0, 60, 120])
-def test_an_unseen_arc_makes_a_section_less_sure_and_never_wild(gap_deg):
+def test_an_unmeasured_arc_makes_a_section_less_sure_but_not_wild(gap_deg):
     rng = np.random.default_rng(7)
     oval = 50 + 0.25 * np.cos(2 * (AZIMUTH - 0.4)) + 3 * np.cos(AZIMUTH)
     off = []
@@ -89,6 +89,6 @@ def test_an_unseen_arc_makes_a_section_less_sure_and_never_wild(gap_deg):
         off.append((sections.max_diameter_mm - 100.5) / sections.max_diameter_sigma_mm)
     off = np.array(off)
     assert np.isfinite(off).all()
-    # an eccentricity of 3 mm is itself worth 0.09 mm of mean diameter to second order
+    # an eccentricity of 3 mm itself adds 0.09 mm of mean diameter at second order
     assert np.sqrt(np.mean((off - off.mean()) ** 2)) < 2.5
     assert np.abs(sections.mean_diameter_mm - 100).max() < 0.3

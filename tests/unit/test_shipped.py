@@ -1,4 +1,7 @@
-"""Shipped files are found by name; a file that is there goes before them, and a wrong name is answered."""
+"""Shipped files are found by name.
+
+An existing file has priority, and for a wrong name the choices are listed.
+"""
 
 from __future__ import annotations
 
@@ -27,17 +30,17 @@ def test_the_shipped_files_are_those_of_configs() -> None:
     assert found.resolve() == PROJECT_ROOT / "configs" / "long.yaml"
 
 
-def test_a_file_that_is_there_goes_first(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_existing_file_has_priority(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     Path("pairs").write_text("mine", "utf-8")
     assert file_or_shipped(Path("pairs"), PRIORS) == Path("pairs")
 
 
 @pytest.mark.parametrize("given", ["pairs.yaml", "./priors/pairs", "configs/priors/pairs.yaml"])
-def test_a_path_is_left_as_it_is(given: str) -> None:
+def test_a_path_is_not_changed(given: str) -> None:
     assert file_or_shipped(Path(given), PRIORS) == Path(given)
 
 
-def test_a_name_that_is_not_shipped_is_answered_with_those_that_are() -> None:
+def test_for_a_name_that_is_not_shipped_the_error_lists_the_shipped_ones() -> None:
     with pytest.raises(InputError, match=r"one of: pairs, small"):
         file_or_shipped(Path("straight-4-inch"), PRIORS)

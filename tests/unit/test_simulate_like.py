@@ -1,4 +1,4 @@
-"""A scene that refers to a measured pipe: its wall, its way, what is put in, and what is refused."""
+"""A scene that refers to a measured pipe: its wall, its route, what is added, and what is refused."""
 
 from types import SimpleNamespace
 
@@ -63,21 +63,21 @@ def scene(tmp_path):
     return scene_from(values, tmp_path / "scene.yaml"), tmp_path / "scene.yaml"
 
 
-def test_wall_and_way_are_the_measured_ones(scene):
+def test_wall_and_route_are_the_measured_ones(scene):
     truth, pipe = plain_truth(*scene), _pipe()
     np.testing.assert_array_equal(truth.wall.radius_mm, pipe.wall.radius_mm)
     np.testing.assert_allclose(truth.wall.albedo_bgr, pipe.wall.albedo_bgr, atol=1e-6)
     np.testing.assert_allclose(truth.poses(), pipe.T_pc, atol=1e-9)
 
 
-def test_twice_the_speed_passes_the_same_places_in_half_the_frames(scene):
+def test_at_twice_the_speed_the_same_places_are_passed_in_half_the_frames(scene):
     described, file = scene
     fast = change(described, Changed(speed=2.0))
     assert fast.frames == 6
     np.testing.assert_allclose(plain_truth(fast, file).poses(), _pipe().T_pc[::2], atol=1e-9)
 
 
-def test_a_defect_is_put_into_the_wall_and_nowhere_else(scene):
+def test_a_defect_is_added_to_the_wall_at_its_place_only(scene):
     described, file = scene
     pitted = plain_truth(change(described, Changed(defects=("pit,75,40,8,8,1.5",))), file)
     deeper = pitted.wall.radius_mm - _pipe().wall.radius_mm
@@ -89,12 +89,12 @@ def test_a_defect_is_put_into_the_wall_and_nowhere_else(scene):
 
 
 @pytest.mark.parametrize("text", ["pit,75,40,8,8", "pit,75,forty,8,8,1"])
-def test_a_defect_that_is_not_understood_is_refused(scene, text):
+def test_an_invalid_defect_is_refused(scene, text):
     with pytest.raises(InputError, match="KIND,DISTANCE"):
         change(scene[0], Changed(defects=(text,)))
 
 
-def test_a_way_is_either_measured_or_made_of_legs(scene):
+def test_a_route_is_either_measured_or_made_of_legs(scene):
     described, file = scene
     values = described.model_dump(mode="json", exclude_defaults=True)
     for motion in ({}, {"measured": "measured.npz", "legs": [{"duration_s": 1.0, "speed_mm_s": 9.0}]}):
@@ -103,7 +103,7 @@ def test_a_way_is_either_measured_or_made_of_legs(scene):
 
 
 @pytest.mark.parametrize("content", [None, b"no archive"])
-def test_a_file_that_holds_no_measured_pipe_is_refused(tmp_path, content):
+def test_a_file_without_a_measured_pipe_is_refused(tmp_path, content):
     file = tmp_path / "measured.npz"
     if content is not None:
         file.write_bytes(content)
@@ -111,7 +111,7 @@ def test_a_file_that_holds_no_measured_pipe_is_refused(tmp_path, content):
         read_measured(file)
 
 
-def test_what_the_photo_did_not_see_takes_the_mean_about_it():
+def test_unphotographed_wall_gets_the_mean_around_it():
     bgra = np.full((60, 80, 4), 100, np.uint8)
     bgra[20:30, 20:30] = 0
     filled = photo_as_reflectance(WallTexture(bgra, 0.0, 0.2, -np.pi, 2 * np.pi / 80))
@@ -120,10 +120,10 @@ def test_what_the_photo_did_not_see_takes_the_mean_about_it():
 
 @pytest.mark.parametrize("shot", [0.02, 0.0])
 @pytest.mark.parametrize("slope", [1.0, 219 / 255])
-def test_grey_of_the_rendered_camera_is_as_noisy_as_that_of_the_recorded_one(slope, shot):
-    """The electrons of the grey picture had been given to each of its three colours: too little noise.
+def test_grey_of_the_rendered_camera_has_the_noise_of_the_recorded_one(slope, shot):
+    """The electrons of the grey picture were given to each of its three colours: too little noise.
 
-    Without shot noise the camera had been any.
+    Without shot noise the camera was arbitrary.
     """
     dark = 1.2  # variance of recorded grey; ``shot`` is its growth per grey level
     noise = CameraNoise(

@@ -1,4 +1,4 @@
-"""Rendered frames against the exact line, and their being the same again."""
+"""Rendered frames agree with the exact line, and are repeatable."""
 
 from dataclasses import replace
 
@@ -15,7 +15,7 @@ AZIMUTHS = 180
 
 
 def centroid_error(truth):
-    """Mean and rms over azimuth of the rendered line's centroid less the exact line, px."""
+    """Return mean and rms over azimuth of the rendered line's centroid less the exact line, px."""
     light = through_lens(renderer_of(truth).light(0), truth.instrument.sensor, None)[..., 1]
     centre = truth.stated.camera.centre_px
     azimuth = -np.pi + 2 * np.pi * np.arange(AZIMUTHS) / AZIMUTHS
@@ -29,16 +29,16 @@ def centroid_error(truth):
     return float(error.mean()), float(np.sqrt(np.mean(error**2)))
 
 
-def test_line_lies_where_the_root_finding_puts_it():
+def test_the_line_is_where_root_finding_puts_it():
     truth = with_sensor(small_truth(), psf_sigma_px=0.8)
     mean, _ = centroid_error(truth)
-    # half the curvature of image radius over height times the line's variance: physics, not error
+    # half the curvature of image radius over height times the line's variance: physics, not an error
     z, f = 22.0, 95.0
     curved = 0.5 * 2 * f * 50 * z / (50**2 + z**2) ** 2 * 0.5**2
     assert mean == pytest.approx(curved, abs=0.005)
 
 
-def test_a_shifted_sheet_is_seen():
+def test_the_comparison_notices_a_shifted_sheet():
     """Negative control: the comparison above would notice a sheet 0.1 mm further on."""
     truth = small_truth()
     laser = truth.instrument.laser
@@ -49,7 +49,7 @@ def test_a_shifted_sheet_is_seen():
     assert by_hand[0, 0] < -0.1
 
 
-def test_same_scene_and_seed_give_the_same_bytes():
+def test_the_same_scene_and_seed_give_the_same_bytes():
     truth = with_sensor(small_truth(), full_well_e=8000.0, read_noise_e=10.0)
     first, again = (renderer_of(truth).frame(0) for _ in range(2))
     other = renderer_of(replace(truth, seed=6)).frame(0)
@@ -57,6 +57,6 @@ def test_same_scene_and_seed_give_the_same_bytes():
     assert not np.array_equal(first, other)
 
 
-def test_leds_light_the_wall_and_fall_off_ahead():
+def test_leds_light_the_wall_and_their_light_falls_off_ahead():
     light = renderer_of(small_truth()).light(1)[..., 1]
     assert light[150, 199] < light[150, 260] < light[150, 310]

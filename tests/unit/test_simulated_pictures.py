@@ -1,4 +1,4 @@
-"""The noise-free picture of one shot, as frames of a recording and on its own."""
+"""The noise-free picture of one exposure, as a frame of a recording and on its own."""
 
 from dataclasses import replace
 
@@ -8,7 +8,7 @@ from pipeline.simulator.render import mean_grey, picture, renderer_of, scenery_o
 from tests.unit.simulated_pipe import small_truth, with_sensor
 
 
-def test_a_still_shot_is_the_frame_of_a_camera_that_stands_there():
+def test_a_still_picture_equals_the_frame_of_a_camera_at_rest():
     truth = small_truth()
     pose = truth.poses()[1]
     shot = still(truth.instrument, "led", pose, truth.rendering)

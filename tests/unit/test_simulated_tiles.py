@@ -1,4 +1,4 @@
-"""The LEDs' light tile by tile against the plain path, which marches along every ray."""
+"""The light of the LEDs computed tile by tile against the plain method, which marches along every ray."""
 
 from dataclasses import replace
 
@@ -16,7 +16,7 @@ from tests.unit.simulated_pipe import RADIUS, small_truth
 
 
 def rough_truth(axis: PipeAxis | None = None) -> SceneTruth:
-    """A rough, glossy pipe with a step to a wider bore and a dent on one side."""
+    """Return a rough, glossy pipe with a step to a wider bore and a dent on one side."""
     truth = small_truth()
     wall, grid = truth.wall, truth.wall.shape
     s, psi = grid.distance_mm[:, None], grid.azimuth_rad[None, :]
@@ -32,7 +32,7 @@ def rough_truth(axis: PipeAxis | None = None) -> SceneTruth:
 
 
 def both_ways(truth: SceneTruth, **surface: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the light (H, W) tile by tile, with tables of the surface replaced, and by the plain path."""
+    """Return the light (H, W) tile by tile, with tables of the surface replaced, and by the plain method."""
     renderer = renderer_of(truth)
     shot = renderer.shot(1)
     view = view_of(renderer.scenery, shot)
@@ -53,7 +53,7 @@ def bent() -> PipeAxis:
 
 
 @pytest.mark.parametrize("axis", [None, bent()], ids=["straight", "bent"])
-def test_tiles_agree_with_the_plain_path_far_below_the_noise(axis):
+def test_tiles_agree_with_the_plain_method_far_below_the_noise(axis):
     tiles, plain = both_ways(rough_truth(axis))
     assert (plain > 0).mean() > 0.4
     # noise of a pixel at 10,000 electrons full scale is 1 % of full scale and more
@@ -61,8 +61,8 @@ def test_tiles_agree_with_the_plain_path_far_below_the_noise(axis):
     assert np.sqrt(np.mean((tiles - plain) ** 2)) < 1e-4
 
 
-def test_a_wall_that_is_called_calm_everywhere_is_rendered_wrongly():
-    """Negative control: the comparison sees hits taken behind the dent and lamps that it should hide."""
+def test_a_wall_declared_calm_everywhere_is_rendered_wrongly():
+    """Negative control: the comparison notices hits behind the dent and lamps that it should hide."""
     calm = np.zeros_like(renderer_of(rough_truth()).scenery.surface.steepest)
     tiles, plain = both_ways(rough_truth(), steepest=calm)
     assert np.abs(tiles - plain).max() > 0.05
@@ -78,8 +78,8 @@ def test_parts_of_pixels_and_a_moving_camera_agree_too():
     assert np.abs(tiles - plain).max() < 2e-3
 
 
-def test_a_coarse_axis_is_made_fine_without_moving():
-    """An axis of few points, as a run measures it, gives the wall that `frames_at` describes."""
+def test_a_coarse_axis_is_refined_without_moving():
+    """An axis of few points, as measured by a run, gives the wall that `frames_at` describes."""
     fine = bent()
     coarse = PipeAxis(fine.distance_mm[::40], fine.origin_p[::40], fine.R_pa[::40])
     surface = renderer_of(rough_truth(coarse)).scenery.surface
@@ -89,7 +89,7 @@ def test_a_coarse_axis_is_made_fine_without_moving():
     np.testing.assert_allclose(surface.axis_turn, turn, atol=1e-9)
 
 
-def test_shadows_are_looked_for_wherever_an_led_of_a_wide_ring_is_hidden():
+def test_shadows_are_computed_wherever_an_led_of_a_wide_ring_is_hidden():
     truth = rough_truth()
     renderer = renderer_of(truth)
     shot = renderer.shot(1)

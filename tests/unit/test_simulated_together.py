@@ -1,4 +1,4 @@
-"""Recordings that belong together are rendered all or none: a pair has no half."""
+"""Recordings that belong together are rendered all or none: there is never half a pair."""
 
 from pathlib import Path
 

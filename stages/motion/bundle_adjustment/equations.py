@@ -30,7 +30,7 @@ MATCH_BIASES = 5
 and linear between. Causes of these errors are local in the picture: compression drops the fine texture of the
 dim wall far ahead, an edge of the tracked field cuts patches, a template is seen from another angle. A bias
 at the far end alone, modelled as a constant and a slope, was taken for 0.8 mm of distance with 0.03 mm stated
-(`test_a_bias_of_far_matches_is_not_taken_for_distance`)."""
+(`test_a_bias_of_distant_matches_is_not_taken_for_distance`)."""
 _RADIUS_SHARE = 0.1
 """Prior 1 σ of radius and ovality, as a share of the radius: rings are far more precise."""
 _FINEST_WALL_MM = 0.02

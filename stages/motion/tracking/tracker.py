@@ -24,7 +24,7 @@ _FEWEST = 12
 """Fewest landmarks whose median gives a frame's displacement. Not measured."""
 _FEWEST_AGREEING = 0.25
 """Share of the landmarks in view that must move like their neighbour. On noise without texture up to 0.12 do
-by chance (`test_roll_is_not_invented_on_a_plain_wall`), in HEVC at crf 32 0.3 to 0.6, else nearly all."""
+by chance (`test_no_roll_is_found_on_a_plain_wall`), in HEVC at crf 32 0.3 to 0.6, else nearly all."""
 _AGREEING_PX = 1.5
 """Difference, strip samples, up to which neighbours move together: five times ``landmark_sigma_px``."""
 _LARGEST_SIGMA = 3.0
