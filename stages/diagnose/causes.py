@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Collection, Iterable
+from dataclasses import dataclass, replace
+
+from pipeline.physics.catalogue import CLASSES
 
 
 @dataclass(frozen=True)
@@ -50,6 +53,17 @@ class Causes:
     def of(self, name: str) -> Cause | None:
         """Return what is known of a law; None if it was not asked about or is not possible."""
         return next((c for c in self.laws if c.name == name), None)
+
+    def like(self, name: str, members: Collection[str]) -> Cause | None:
+        """Return what is known of a member of a class, or of the likeliest member that looks like it."""
+        mates = next((alike for alike in CLASSES if name in alike), (name,))
+        looks_like_it = (c for c in self.laws if c.name in mates and c.name in members)
+        return self.of(name) or next(looks_like_it, None)
+
+    def joined(self, others: Iterable[Cause]) -> Causes:
+        """Return these causes and others; of two with the same name the likelier."""
+        each = {c.name: c for c in sorted((*self.laws, *others), key=lambda c: c.probability)}
+        return replace(self, laws=tuple(sorted(each.values(), key=lambda c: -c.probability)))
 
 
 NONE = Causes()

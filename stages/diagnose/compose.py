@@ -12,7 +12,6 @@ from stages.diagnose.causes import NONE, Causes
 from stages.diagnose.channels import Seen
 from stages.diagnose.claims import Claim, claims_of, stretch
 from stages.diagnose.gauge import answer as of_gauge
-from stages.diagnose.gauge.causes import causes_of
 from stages.diagnose.gauge.examine import Examined
 from stages.diagnose.record_next import AGAIN, record_next
 from stages.diagnose.result import (
@@ -24,6 +23,7 @@ from stages.diagnose.result import (
     classes_of,
 )
 from stages.diagnose.travel.events import SLIP
+from stages.diagnose.weighed import weighed
 
 _SAME_FREQUENCY_HZ = 0.15
 _IN_PROFILE = Location(str(Channel.PROFILE), None, None)
@@ -57,7 +57,7 @@ def composed(
     asked = said.members if said.members else [e.name for e in said.effects]
     nameless = _IN_PROFILE if of_profile else of_travel[0].location if of_travel else None
     location = _location(examined, every, asked) or nameless
-    causes = causes_of(examined) if said.members and examined is not None else NONE
+    causes = weighed(examined, known) if said.members else NONE
     words = _identifiable(said, examined, any(c.may_have_other_course for c in known))
     identifiable = " ".join(s for s in (words, *of_profile, *(u.sentence for u in of_travel)) if s)
     partly = said.verdict is Verdict.PARTLY

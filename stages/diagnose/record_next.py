@@ -38,10 +38,10 @@ def record_next(names: Sequence[str], causes: Causes = NONE) -> str:
     """Return a sentence on what to record to tell these effects apart, or to confirm a single one.
 
     It asks for the few recordings that separate the most probability. Effects that ``causes`` say nothing
-    about count as much as the likeliest of the others.
+    about count as much as the likeliest that looks like them, or else as the likeliest of all.
     """
-    possible = [one for name in names for one in _courses(name, causes)]
-    possible = possible or [one for name in names for one in _courses(name, NONE)]
+    possible = [one for name in names for one in _courses(name, names, causes)]
+    possible = possible or [one for name in names for one in _courses(name, names, NONE)]
     if not possible:
         return ""
     if len(possible) == 1:
@@ -52,11 +52,14 @@ def record_next(names: Sequence[str], causes: Causes = NONE) -> str:
     return f"To {purpose}, record: {'; '.join(wanted)}." if wanted else ""
 
 
-def _courses(name: str, causes: Causes) -> list[_Possible]:
+def _courses(name: str, names: Sequence[str], causes: Causes) -> list[_Possible]:
     """Return a cause with each of its possible courses."""
-    known = causes.of(name)
+    known, like = causes.of(name), causes.like(name, names)
     if known is None:
-        return [_Possible(name, "", max((c.probability for c in causes.laws), default=1.0))]
+        likeliest = max((c.probability for c in causes.laws), default=1.0)
+        return [_Possible(name, "", likeliest if like is None else like.probability)]
+    if not known.courses:
+        return [_Possible(name, "", known.probability)] if known.probability > 0 else []
     return [_Possible(name, c.kind, known.probability * c.probability) for c in known.courses]
 
 

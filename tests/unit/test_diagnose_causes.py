@@ -9,11 +9,11 @@ import pytest
 
 from pipeline.api.diagnosis.causes import class_shown
 from pipeline.api.diagnosis.report import Shown, write_page
+from stages.diagnose import weighed as by
 from stages.diagnose.as_json import to_json
 from stages.diagnose.causes import Cause, Causes, CourseShare
 from stages.diagnose.effects.courses import with_courses
 from stages.diagnose.effects.library import LIBRARY
-from stages.diagnose.gauge import causes as of_gauge
 from stages.diagnose.gauge.hypotheses import Judged
 from stages.diagnose.gauge.judge import Unfitted, Verdicts
 from stages.diagnose.gauge.run import Term
@@ -64,12 +64,12 @@ def test_a_law_gathers_its_courses_and_gives_what_is_doubtful_to_what_makes_it_s
         (beside, pattern, sensor),
         25,
     )
-    monkeypatch.setattr(of_gauge, "chances", lambda seen: (0.38,))
+    monkeypatch.setattr(by, "chances", lambda seen: (0.38,))
     asked = [SimpleNamespace(name=n) for n in ("laser_tilt", "laser_cone", "baseline")]
     seen: Any = SimpleNamespace(
         best=judged(far), verdicts=verdicts, unsplit=(("sensor_tilt",),), feasibility=asked
     )
-    found = of_gauge.causes_of(seen)
+    found = by.weighed(seen, ())
     assert {c.name: round(c.probability, 9) for c in found.laws} == {
         "laser_tilt": 0.38, "sensor_tilt": 0.38, "laser_cone": 0.1, "baseline": 0.0,
     }  # fmt: skip
@@ -82,7 +82,7 @@ def test_a_law_gathers_its_courses_and_gives_what_is_doubtful_to_what_makes_it_s
     ]
     assert "in proportion to the distance" in tilt.courses[0].statement
     assert found.of("focal_scale") is None
-    assert of_gauge.causes_of(cast(Any, SimpleNamespace(best=None, verdicts=None))) == Causes()
+    assert by.weighed(cast(Any, SimpleNamespace(best=None, verdicts=None)), ()) == Causes()
 
 
 def test_the_page_groups_a_class_by_law_and_sums_up_what_is_unlikely(tmp_path):
@@ -113,6 +113,21 @@ def test_a_class_of_what_rings_were_not_asked_about_stands_without_probabilities
     write_page(beside, Shown(), tmp_path)
     page = (tmp_path / "diagnosis.html").read_text()
     assert "Something more remains, and these recordings cannot tell which of these it is" in page
+
+
+def test_what_rings_were_not_asked_about_is_as_likely_as_what_looks_like_it():
+    """A step of the focal length was to be told from an encoder's scale and from vignetting first of all."""
+    focal, baseline = (
+        Cause(n, p, (CourseShare("step", 1.0, f"{n} steps."),))
+        for n, p in (("focal_scale", 0.8), ("baseline", 0.1))
+    )
+    members = ("focal_scale", "baseline", "encoder_scale", "vignetting", "encoder_slip")
+    found = Diagnosis("f", "g", Verdict.CLASS, 1e-9, members=members, causes=Causes((focal, baseline)))
+    either = "baseline (or encoder scale or vignetting, which looks like it), 10 %"
+    assert [c.name for c in class_shown(found).causes] == ["focal scale, 80 %", either, "encoder slip"]
+    assert record_next(members[:4], found.causes).startswith("To tell focal_scale, baseline, ")
+    unlikely = replace(found, causes=Causes((focal, replace(baseline, probability=0.001))))
+    assert [c.name for c in class_shown(unlikely).causes] == ["focal scale, 80 %", "encoder slip"]
 
 
 def test_the_file_keeps_every_name_of_the_class_and_has_no_key_of_the_page():

@@ -95,6 +95,14 @@ def test_a_rival_that_one_recording_excludes_is_excluded(real_probe: Probe) -> N
     assert both.verdict is Verdict.NAMED
 
 
+def test_an_uncertain_claim_and_its_rivals_have_probabilities_on_the_page(real_probe: Probe) -> None:
+    doubted = replace(SCALE, alike=(("baseline", 1.0),))
+    alone = answer(real_probe, seen("field", estimates=(doubted,)), None)
+    chance = alone.effects[0].probability
+    assert {c.name: c.probability for c in alone.causes.laws} == {"encoder_scale": chance, "baseline": chance}
+    assert alone.causes.laws[-1].courses[0].statement == SCALE.statement
+
+
 def test_a_slip_is_named_only_if_the_encoder_reading_alone_shows_it_too(real_probe: Probe) -> None:
     alone = of_gauge(real_probe, slips=(SLIP,))
     assert alone.verdict is Verdict.CLASS

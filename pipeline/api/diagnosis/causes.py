@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from stages.diagnose.causes import Cause, CourseShare
@@ -37,24 +38,30 @@ class ClassShown:
 def class_shown(found: Diagnosis) -> ClassShown:
     """Return the class, or the class that remains beside what is certain, for the page.
 
-    Names of which rings and fiducials of a gauge run say nothing stand without a probability.
+    Names of which rings and fiducials of a gauge run say nothing stand with the likeliest that looks like
+    them, or else without a probability.
     """
     left = found.remainder
     members = found.members if left is None else left.members
     each = {name: found.causes.of(name) for name in members}
     shown = [c for c in each.values() if c is not None and c.probability >= _SHOWN]
     shown.sort(key=lambda c: -c.probability)
-    untold = tuple(CauseShown(_in_words(name)) for name, cause in each.items() if cause is None)
+    unasked = [name for name, cause in each.items() if cause is None]
+    mate = {name: found.causes.like(name, members) for name in unasked}
+    untold = tuple(CauseShown(_in_words(name)) for name in unasked if mate[name] is None)
     certain = {e.name for e in found.effects} if left is not None else set()
     hidden = [c for c in found.causes.laws if c not in shown and c.name not in certain]
     others = min(sum(c.probability for c in hidden), 1.0)
     rest = ((_OUTSIDE, found.causes.outside), (_OTHERS, others))
     sentences = tuple(f"{words}: {_percent(p)}." for words, p in rest if shown and p >= _SHOWN / 10)
-    return ClassShown((*map(_line, shown), *untold), sentences)
+    lines = (_line(c, [name for name in unasked if mate[name] == c]) for c in shown)
+    return ClassShown((*lines, *untold), sentences)
 
 
-def _line(cause: Cause) -> CauseShown:
-    name = f"{_in_words(cause.name)}, {_percent(cause.probability)}"
+def _line(cause: Cause, alike: Sequence[str]) -> CauseShown:
+    """Return a cause with its courses, and with what looks like it and could not be weighed."""
+    or_alike = f" (or {' or '.join(map(_in_words, alike))}, which looks like it)" if alike else ""
+    name = f"{_in_words(cause.name)}{or_alike}, {_percent(cause.probability)}"
     likely = [c for c in cause.courses if c.probability >= _SHOWN]
     if len(likely) < 2:
         return CauseShown(name, tuple(c.statement for c in likely))

@@ -1,11 +1,13 @@
-"""How likely each law is the cause of what a gauge run's rings and fiducials show, and with which course."""
+"""How likely each effect is the cause of what was found, and with which course."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from itertools import chain
 
 from pipeline.arrays import Float
 from stages.diagnose.causes import NONE, Cause, Causes, CourseShare
+from stages.diagnose.claims import Claim
 from stages.diagnose.effects.base import EffectModel, Shape
 from stages.diagnose.effects.nameless import Nameless
 from stages.diagnose.gauge.answer import chances
@@ -15,7 +17,20 @@ from stages.diagnose.gauge.judge import Verdicts
 _Sized = tuple[EffectModel, Shape, Float]
 
 
-def causes_of(examined: Examined) -> Causes:
+def weighed(examined: Examined | None, claims: Sequence[Claim]) -> Causes:
+    """Return what rings and fiducials of a gauge run and other channels' uncertain claims leave open."""
+    of_rings = _of_rings(examined) if examined is not None else NONE
+    return of_rings.joined(chain.from_iterable(_claimed(c) for c in claims if not c.sure))
+
+
+def _claimed(claim: Claim) -> Iterator[Cause]:
+    """Yield what a claim names, and its rivals, which are as likely."""
+    told = claim.found
+    yield from (Cause(name, told.probability) for name in claim.rivals)
+    yield Cause(told.name, told.probability, (CourseShare("", 1.0, told.statement),))
+
+
+def _of_rings(examined: Examined) -> Causes:
     """Return all laws that were asked about, with the probability that each is a cause.
 
     What makes a name of the likeliest hypothesis doubtful (see `chances`) is taken off its law: causes that
