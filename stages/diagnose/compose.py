@@ -118,9 +118,8 @@ def _said(
     if certain and nameless:
         return _Said(Verdict.PARTLY, certain, ())
     if certain:
-        return _Said(
-            Verdict.PARTLY, certain, classes_of(doubted), tuple(e for e in every if e not in certain)
-        )
+        left = classes_of(doubted, {e.name for e in certain})
+        return _Said(Verdict.PARTLY, certain, left, tuple(e for e in every if e not in certain))
     if doubted and rings is not Verdict.UNEXPLAINED:
         return _Said(Verdict.CLASS, every, classes_of(doubted), every)
     if nameless:

@@ -24,9 +24,13 @@ def class_of(name: str) -> tuple[str, ...]:
     return found[0] if found else (name,)
 
 
-def classes_of(names: Sequence[str]) -> tuple[str, ...]:
-    """Return the members of the classes of all these effects, in the catalogue's order."""
-    members = {member for name in names for member in class_of(name)}
+def classes_of(names: Sequence[str], certain: Collection[str] = ()) -> tuple[str, ...]:
+    """Return the members of the classes of all these effects, in the catalogue's order.
+
+    What is ``certain`` beside them is a member only by its own name: it may be there a second time.
+    """
+    alike = {member for name in names for member in class_of(name)}
+    members = alike - set(certain) | set(names)
     return tuple(name for name in EFFECTS if name in members)
 
 

@@ -11,7 +11,7 @@ from stages.diagnose.claims import Claim
 from stages.diagnose.effects.base import EffectModel, Shape
 from stages.diagnose.effects.nameless import Nameless
 from stages.diagnose.gauge.answer import chances
-from stages.diagnose.gauge.examine import Examined
+from stages.diagnose.gauge.examine import OF_A_PIPE, Examined
 from stages.diagnose.gauge.judge import Verdicts
 
 _Sized = tuple[EffectModel, Shape, Float]
@@ -35,6 +35,7 @@ def _of_rings(examined: Examined) -> Causes:
 
     What makes a name of the likeliest hypothesis doubtful (see `chances`) is taken off its law: causes that
     the run cannot distinguish from it are at least as likely as it, and the rest is outside the library.
+    A gauge is straight and round.
     """
     best, verdicts = examined.best, examined.verdicts
     if best is None or verdicts is None:
@@ -47,7 +48,7 @@ def _of_rings(examined: Examined) -> Causes:
         for name in alike:
             chance[name] = max(chance.get(name, 0.0), doubted)
         lost_outside = max(lost_outside, lost - len(alike) * doubted)
-    every = dict.fromkeys((*chance, *(f.name for f in examined.feasibility)))
+    every = dict.fromkeys((*chance, *(f.name for f in examined.feasibility), *OF_A_PIPE))
     laws = (Cause(law, min(max(chance.get(law, 0.0), 0.0), 1.0), courses.get(law, ())) for law in every)
     outside = min(lost_outside + _with_patterns(verdicts), 1.0)
     return Causes(tuple(sorted(laws, key=lambda c: -c.probability)), outside)

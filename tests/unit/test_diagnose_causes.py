@@ -71,7 +71,8 @@ def test_a_law_gathers_its_courses_and_gives_what_is_doubtful_to_what_makes_it_s
     )
     found = by.weighed(seen, ())
     assert {c.name: round(c.probability, 9) for c in found.laws} == {
-        "laser_tilt": 0.38, "sensor_tilt": 0.38, "laser_cone": 0.1, "baseline": 0.0,
+        "laser_tilt": 0.38, "sensor_tilt": 0.38, "laser_cone": 0.1,
+        "baseline": 0.0, "ovality": 0.0, "pipe_bend": 0.0,
     }  # fmt: skip
     assert found.outside == pytest.approx(0.95 - 2 * 0.38 + 0.05)
     tilt = found.of("laser_tilt")

@@ -19,6 +19,12 @@ def test_members_of_joined_classes_are_in_the_order_of_the_catalogue():
     assert list(joined) == [name for name in EFFECTS if name in joined]
 
 
+def test_what_is_certain_is_no_cause_of_what_remains_unless_it_may_be_there_twice():
+    """A narrower image was named, and then listed among the causes of the wave beside it."""
+    assert set(classes_of(["sheet_waviness"], ["pixel_aspect"])) == {"sheet_waviness", "ovality"}
+    assert "sheet_waviness" in classes_of(["sheet_waviness"], ["sheet_waviness"])
+
+
 def test_what_to_record_next_names_each_recording_once():
     sentence = record_next(["laser_tilt", "principal_point", "sensor_tilt"])
     assert sentence.startswith("To tell laser_tilt, principal_point and sensor_tilt apart, record: ")
