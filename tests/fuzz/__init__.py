@@ -1,1 +1,1 @@
-"""Hostile bytes for every parser: ``python -m tests.fuzz`` searches, the corpus is replayed by the tests."""
+"""Malformed bytes for every parser: ``python -m tests.fuzz`` searches, and the tests repeat the corpus."""

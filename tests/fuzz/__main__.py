@@ -18,13 +18,13 @@ ALONE = "--alone"
 
 
 def search(target: str, runs: int) -> int:
-    """Run one target in a process of its own; return its exit code, 0 when nothing broke."""
+    """Run one target in a separate process; return its exit code, 0 when nothing broke."""
     command = [sys.executable, "-m", "tests.fuzz", ALONE, target, str(runs)]
     return subprocess.run(command, capture_output=True).returncode
 
 
 def search_alone(target: str, runs: int) -> None:
-    """Let libFuzzer drive one target; does not return."""
+    """Let libFuzzer run one target; does not return."""
     import atheris
 
     with atheris.instrument_imports(include=["pipeline", "stages"], enable_loader_override=False):

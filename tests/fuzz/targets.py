@@ -1,4 +1,4 @@
-"""Every parser as a function of bytes: it takes them, or refuses them with an `InputError`."""
+"""Every parser as a function of bytes: it accepts them, or refuses them with an `InputError`."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ from tests.shared_data import PROJECT_ROOT
 from tests.truth_run import true_axis
 from tests.unit.camera_samples import SCARAMUZZA
 
-# What is opened of a folder that holds a bag.
+# The files opened in a folder with a bag.
 BAGS = {"ros1": "run.bag", "ros2": "run", "mcap": "run.mcap"}
 Take = Callable[[bytes], object]
 
@@ -61,7 +61,7 @@ class Target:
 
 @cache
 def scratch() -> Path:
-    """Return this process' own folder in memory, where there is one."""
+    """Return this process' own folder, in memory where possible."""
     memory = Path("/dev/shm")
     within = memory if memory.is_dir() and os.access(memory, os.W_OK) else None
     return Path(tempfile.mkdtemp(prefix="boresight-fuzz-", dir=within))
@@ -81,7 +81,7 @@ def made() -> Path:
 
 
 def _file(name: str, read: Callable[[Path], object]) -> Take:
-    """Return a taker that puts the bytes into a file of a folder of its own."""
+    """Return a function that writes the bytes into a file of a new folder and parses it."""
 
     def take(data: bytes) -> object:
         file = scratch() / "one" / read.__name__.strip("<>") / name
@@ -93,7 +93,7 @@ def _file(name: str, read: Callable[[Path], object]) -> Take:
 
 
 def _beside(kind: str, name: str) -> Take:
-    """Return a taker that replaces one file of a good recording and opens that."""
+    """Return a function that replaces one file of a good recording by the bytes and opens the recording."""
 
     def take(data: bytes) -> object:
         folder = made() / kind
@@ -123,7 +123,7 @@ def _smallest_model() -> bytes:
 
 
 def _pictures(data: bytes) -> object:
-    """Replace one picture of a sequence and read all: it may be unusable, the others are not."""
+    """Replace one picture of a sequence and read all: that one may be unusable, the others may not."""
     folder = made() / "images"
     target = folder / "frames" / "000001.png"
     good = target.read_bytes()

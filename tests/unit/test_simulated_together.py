@@ -18,7 +18,7 @@ def pair(folder: Path) -> list[Order]:
 
 
 def refuse_field(monkeypatch: pytest.MonkeyPatch, check: str, told: list[str]) -> None:
-    """Have the second recording that comes to a check refused by it."""
+    """Let the check of the second recording refuse it."""
     sound = getattr(production, check)
 
     def refusing(*arguments: object) -> object:
@@ -30,7 +30,7 @@ def refuse_field(monkeypatch: pytest.MonkeyPatch, check: str, told: list[str]) -
     monkeypatch.setattr(production, check, refusing)
 
 
-def test_both_are_there_when_both_can_be(tmp_path: Path) -> None:
+def test_both_recordings_are_rendered_if_both_are_valid(tmp_path: Path) -> None:
     done: list[str] = []
     found = produce(pair(tmp_path), lambda order, frames: done.append(order.scene.name))
     assert len(found) == 2
@@ -39,7 +39,7 @@ def test_both_are_there_when_both_can_be(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("check", ["require_scene", "require_recording"])
-def test_none_is_left_when_the_second_is_refused(
+def test_no_recording_is_left_if_the_second_is_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, check: str
 ) -> None:
     rendered: list[str] = []
@@ -47,5 +47,5 @@ def test_none_is_left_when_the_second_is_refused(
     with pytest.raises(UnusableError, match="would not show"):
         produce(pair(tmp_path), lambda order, frames: rendered.append(order.scene.name))
     assert list(tmp_path.iterdir()) == []
-    # what can be told before rendering is told before the first is rendered
+    # errors that can be found without rendering are reported before the first recording is rendered
     assert bool(rendered) == (check == "require_recording")

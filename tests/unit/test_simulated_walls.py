@@ -1,4 +1,4 @@
-"""Walls of simulated pipes: what the scene says is what the grid holds."""
+"""Walls of simulated pipes: the grid contains what the scene describes."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def row(made: Wall, distance_mm: float) -> int:
     return int(np.argmin(np.abs(made.shape.distance_mm - distance_mm)))
 
 
-def test_same_seed_same_wall_and_another_seed_another() -> None:
+def test_the_same_seed_gives_the_same_wall_and_another_seed_another() -> None:
     rough = {"relief": {"roughness_mm": 0.05}, "surface": {"rust": 0.3, "spots": 0.1, "streaks": 0.3}}
     first, again, other = (wall(seed, **rough) for seed in (1, 1, 2))
     assert first.radius_mm.tobytes() == again.radius_mm.tobytes()
@@ -50,7 +50,7 @@ def test_same_seed_same_wall_and_another_seed_another() -> None:
     assert np.abs(first.albedo_bgr - other.albedo_bgr).mean() > 0.02
 
 
-def test_a_defect_more_leaves_the_rest_of_the_wall_as_it_was() -> None:
+def test_one_more_defect_does_not_change_the_rest_of_the_wall() -> None:
     one = {"kind": "pit", "distance_mm": 20.0, "azimuth_deg": 0.0, "length_mm": 6.0, "width_mm": 6.0}
     rough = {"relief": {"roughness_mm": 0.05}, "surface": {"rust": 0.3}}
     without, with_pit = wall(**rough), wall(**rough, defects=[one | {"depth_mm": 1.0}])
@@ -62,7 +62,7 @@ def test_a_defect_more_leaves_the_rest_of_the_wall_as_it_was() -> None:
 
 
 @pytest.mark.parametrize("kind", ["pit", "dent", "gouge", "crack", "corrosion", "deposit"])
-def test_defects_reach_their_depth_and_size(kind: str) -> None:
+def test_defects_have_their_depth_and_size(kind: str) -> None:
     made = wall(
         cell_mm=0.1,
         defects=[
@@ -78,7 +78,7 @@ def test_defects_reach_their_depth_and_size(kind: str) -> None:
     assert np.degrees(np.abs(made.shape.azimuth_rad[psi].mean()) - np.radians(30)) < 5
 
 
-def test_an_angled_gouge_runs_where_it_says() -> None:
+def test_an_oblique_gouge_has_the_given_direction() -> None:
     made = wall(
         defects=[
             {"kind": "gouge", "distance_mm": 20.0, "azimuth_deg": 0.0, "length_mm": 16.0, "width_mm": 2.0,
@@ -90,7 +90,7 @@ def test_an_angled_gouge_runs_where_it_says() -> None:
     assert np.degrees(np.arctan(slope)) == pytest.approx(30, abs=3)
 
 
-def test_bore_steps_taper_oval_and_joint() -> None:
+def test_steps_taper_oval_and_joint_have_their_size() -> None:
     bore = [{"length_mm": 20.0, "diameter_mm": 40.0}, {"length_mm": 20.0, "diameter_mm": 30.0}]
     pipe = described(bore=bore, chamfer_mm=0.8)
     s = np.array([-15.0, 0.0, 19.0, 19.8, 20.0, 20.2, 21.0, 55.0])
@@ -106,7 +106,7 @@ def test_bore_steps_taper_oval_and_joint() -> None:
     assert made.radius_mm[row(made, 20.0)] == pytest.approx(20.0)
 
 
-def test_a_weld_stands_inward_and_a_branch_is_a_dark_hole() -> None:
+def test_a_weld_reduces_the_radius_and_a_branch_is_a_dark_hole() -> None:
     made = wall(
         welds=[{"distance_mm": 10.0, "width_mm": 6.0, "height_mm": 0.8}],
         branches=[{"distance_mm": 40.0, "azimuth_deg": -90.0, "diameter_mm": 12.0, "depth_mm": 9.0}],
@@ -130,7 +130,7 @@ def test_roughness_has_the_stated_size_and_no_seam() -> None:
     assert seam == pytest.approx(np.abs(np.diff(rough, axis=1)).mean(), rel=0.2)
 
 
-def test_noise_is_band_limited_and_shares_hold() -> None:
+def test_noise_is_band_limited_and_shares_are_right() -> None:
     grid = grid_over((0.0, 80.0), 20.0, 0.1)
     values = field(grid, np.random.default_rng(0), longest_mm=10.0, shortest_mm=2.0)
     power = np.abs(np.fft.rfft(values, axis=1)).mean(0) ** 2
@@ -139,7 +139,7 @@ def test_noise_is_band_limited_and_shares_hold() -> None:
     assert above_share(values, 0.3, 0.01).mean() == pytest.approx(0.3, abs=0.02)
 
 
-def test_rust_lies_where_the_relief_has_it() -> None:
+def test_rust_is_where_the_relief_has_it() -> None:
     made = wall(
         relief={"roughness_mm": 0.0, "rust_mm": 0.2}, surface=PLAIN | {"rust": 0.4, "rust_patch_mm": 20.0}
     )
@@ -159,7 +159,7 @@ def test_texture_is_as_fine_as_a_frame_shows() -> None:
     assert made.texture.step_mm <= 0.133
 
 
-def test_a_bent_axis_is_an_arc_and_starts_along_z() -> None:
+def test_a_bent_axis_is_an_arc_that_starts_along_z() -> None:
     made = wall(
         bends=[{"distance_mm": 0.0, "length_mm": 60.0, "curvature_per_mm": 0.01, "direction_deg": 90.0}]
     )
@@ -189,7 +189,7 @@ def test_two_bends_in_different_planes_keep_unit_frames() -> None:
 FIDUCIALS = {"size_mm": 6.0, "rings": [{"distance_mm": 20.0, "count": 8, "azimuth_deg": -157.5}]}
 
 
-def test_fiducials_decode_on_the_flat_wall_in_their_stated_places() -> None:
+def test_fiducials_can_be_decoded_on_the_unrolled_wall_at_their_stated_places() -> None:
     pipe = described(fiducials=FIDUCIALS)
     made = build_wall(pipe, 1, HERE)
     # columns of the picture run along +azimuth and rows along +distance, as the markers' own do
@@ -211,7 +211,7 @@ def test_fiducials_decode_on_the_flat_wall_in_their_stated_places() -> None:
         assert edge[1] * made.texture.step_mm == pytest.approx(6.0, abs=0.2)
 
 
-def test_a_marker_on_a_smaller_bore_keeps_its_size_there() -> None:
+def test_a_marker_on_a_smaller_bore_keeps_its_size() -> None:
     bore = [{"length_mm": 10.0, "diameter_mm": 40.0}, {"length_mm": 30.0, "diameter_mm": 30.0}]
     one = {"size_mm": 6.0, "quiet": 0.2, "rings": [{"distance_mm": 25.0, "count": 1, "azimuth_deg": 0.0}]}
     made = wall(bore=bore, fiducials=one, surface=PLAIN | {"albedo": 0.2})
@@ -239,7 +239,7 @@ def test_fiducials_without_room_are_refused(fiducials: dict[str, Any], said: str
         wall(bore=bore, fiducials={"size_mm": 6.0} | fiducials)
 
 
-def test_a_photograph_is_laid_without_a_seam(tmp_path: Path) -> None:
+def test_a_photograph_is_applied_without_a_seam(tmp_path: Path) -> None:
     picture = np.zeros((40, 60, 3), np.uint8)
     picture[:, :30] = 200
     cv2.imwrite(str(tmp_path / "wall.png"), picture)
@@ -253,7 +253,7 @@ def test_a_photograph_is_laid_without_a_seam(tmp_path: Path) -> None:
         wall(folder=tmp_path, photograph={"file": "other.png", "mm_per_px": 0.5})
 
 
-def test_cells_of_relief_do_not_change_the_shape() -> None:
+def test_the_resolution_of_the_relief_does_not_change_the_shape() -> None:
     fine, coarse = (wall(cell_mm=c, ovality={"amplitude_mm": 0.5}, taper=0.01) for c in (0.1, 0.5))
     grid = replace(coarse.shape)
     index = np.rint((grid.distance_mm - fine.shape.distance_from_mm) / fine.shape.step_mm).astype(int)
@@ -261,7 +261,7 @@ def test_cells_of_relief_do_not_change_the_shape() -> None:
     assert fine.radius_mm[index[inside]].mean(1) == pytest.approx(coarse.radius_mm[inside].mean(1), abs=1e-4)
 
 
-def test_stains_of_a_pipe_longer_than_a_picture_may_be_are_those_of_its_parts(
+def test_stains_of_a_pipe_longer_than_the_largest_picture_equal_those_of_its_parts(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     grid, seeds = grid_over((-20.0, 180.0), 20.0, 0.1), Seeds(3)
@@ -272,7 +272,7 @@ def test_stains_of_a_pipe_longer_than_a_picture_may_be_are_those_of_its_parts(
     assert np.abs(parts - whole).max() < np.abs(np.diff(whole, axis=0)).max() / 10
 
 
-def test_stains_are_laid_out_over_more_rows_than_a_picture_may_have() -> None:
+def test_stains_may_have_more_rows_than_the_largest_picture() -> None:
     grid = grid_over((0.0, 40_000.0), 2.5, 1.0)
     stains = coarse_field(grid, Seeds(3).of("rust"), 200.0)
     assert stains.shape == grid.shape

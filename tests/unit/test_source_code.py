@@ -1,4 +1,4 @@
-"""A key changes with the text of any module that the stage imports, however far away."""
+"""A key changes with the text of any module that the stage imports, directly or indirectly."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def house(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     ("name", "matters"),
     [(n, n != "stranger.py") for n in PACKAGE],
 )
-def test_the_text_of_what_is_imported_matters_and_no_other(house: Path, name: str, matters: bool) -> None:
+def test_the_text_of_imported_modules_counts_and_no_other(house: Path, name: str, matters: bool) -> None:
     work = import_module("toy_house.stage").work
     before = source_digest(work)
     assert source_digest(work) == before
@@ -46,6 +46,6 @@ def test_the_text_of_what_is_imported_matters_and_no_other(house: Path, name: st
     assert (source_digest(work) != before) == matters
 
 
-def test_modules_are_read_and_not_started(house: Path) -> None:
+def test_modules_are_read_but_not_executed(house: Path) -> None:
     (house / "sub" / "far.py").write_text("raise RuntimeError('started')\n")
     assert source_digest(import_module("toy_house.stage").work)

@@ -1,4 +1,4 @@
-"""Results come back exactly as they were, and what is not whole never comes back."""
+"""Results are read exactly as they were written, and incomplete ones are never returned."""
 
 from __future__ import annotations
 
@@ -70,7 +70,10 @@ trees = st.builds(
 
 
 def same(a: Any, b: Any) -> bool:
-    """Equality to the last bit: types, dtypes, NaN and the sign of zero included."""
+    """Return whether two values are equal to the last bit.
+
+    Types, dtypes, NaN and the sign of zero included.
+    """
     if type(a) is not type(b):
         return False
     if isinstance(a, np.ndarray):
@@ -101,7 +104,7 @@ def test_what_is_read_is_what_was_written(tmp_path: Path, artefact: Tree) -> Non
     assert digest(stored.artefact) == digest(artefact)
 
 
-def test_big_arrays_are_mapped_and_all_are_read_only(tmp_path: Path) -> None:
+def test_big_arrays_are_memory_mapped_and_all_are_read_only(tmp_path: Path) -> None:
     big = Leaf("big", 0.0, np.arange(1_000_000.0))
     Store(tmp_path).write(Tree(big, (), Mood.CALM, 0, False, (), np.arange(3)), PROVENANCE)
     stored = Store(tmp_path).read("grow", KEY, Tree)
@@ -113,7 +116,7 @@ def test_big_arrays_are_mapped_and_all_are_read_only(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("value", [{"a"}, {"a": [1]}, [1], b"x", np.array([object()]), 1j, Path("x")])
-def test_what_cannot_be_stored_is_refused_by_name(value: object) -> None:
+def test_what_cannot_be_stored_is_refused_with_its_name(value: object) -> None:
     with pytest.raises(TypeError, match=r"^leaf\.array"):
         encode(Tree(Leaf("a", 0.0, value), (), Mood.CALM, 0, True, (), np.arange(1)))  # type: ignore[arg-type]
 
@@ -125,13 +128,13 @@ def test_other_content_has_another_digest(change: dict[str, Any]) -> None:
     assert digest(replace(tree(), array=np.arange(1000, dtype=np.int32))) != digest(tree())
 
 
-def test_a_digest_from_before_a_class_had_a_field_is_known_again() -> None:
+def test_a_digest_made_before_a_class_had_a_field_is_still_recognised() -> None:
     older = make_dataclass("Grown", ["size"], frozen=True)
     newer = make_dataclass("Grown", ["size", ("more", object, None)], frozen=True)
     for recorded in (digest(older(1)), digest(newer(1))):
         assert is_digest_of(recorded, newer(1))
         assert not is_digest_of(recorded, newer(2))
-        assert not is_digest_of(recorded, newer(1, 2)), "what is set counts"
+        assert not is_digest_of(recorded, newer(1, 2)), "a value that is set counts"
 
 
 def truncate(path: Path) -> None:
@@ -170,16 +173,14 @@ def test_the_result_of_another_key_or_class_is_discarded(tmp_path: Path) -> None
 
 
 @pytest.mark.parametrize("gone", ["tests.unit.gone:Tree", "tests.unit.test_store:Gone"])
-def test_a_result_whose_class_has_moved_since_is_not_there_and_breaks_nothing(
-    tmp_path: Path, gone: str
-) -> None:
+def test_a_result_whose_class_has_moved_counts_as_absent_and_is_no_error(tmp_path: Path, gone: str) -> None:
     store = Store(tmp_path)
     store.write(tree(), PROVENANCE)
     file = next(tmp_path.rglob("manifest.json"))
     older = json.loads(file.read_text().replace(f"{Tree.__module__}:Tree", gone))
     del older["sha256"]
     file.write_text(json.dumps(older | {"sha256": hashlib.sha256(canonical(older)).hexdigest()}))
-    assert store.has("grow", KEY), "the control: but for its class it is whole"
+    assert store.has("grow", KEY), "control: except for its class it is complete"
     assert store.look("grow", KEY, Tree) is None
     assert store.borrow("grow", KEY, Tree) is None
     assert store.read("grow", KEY, Tree) is None
@@ -199,7 +200,7 @@ def test_a_result_with_fields_that_its_class_has_lost_is_read_without_them(tmp_p
 
 
 @pytest.mark.parametrize("limit", [0, 100, 5000])
-def test_a_full_disk_is_told_and_leaves_nothing_that_looks_whole(tmp_path: Path, limit: int) -> None:
+def test_a_full_disk_is_reported_and_leaves_nothing_that_looks_complete(tmp_path: Path, limit: int) -> None:
     store = Store(tmp_path)
     with file_size_limit(limit), pytest.raises(InputError, match="cannot be written"):
         store.write(tree(), PROVENANCE)
@@ -209,7 +210,7 @@ def test_a_full_disk_is_told_and_leaves_nothing_that_looks_whole(tmp_path: Path,
     assert store.read("grow", KEY, Tree) is not None
 
 
-def test_a_look_gives_what_is_whole_and_never_discards(tmp_path: Path) -> None:
+def test_looking_for_a_result_returns_complete_ones_and_never_discards(tmp_path: Path) -> None:
     store = Store(tmp_path)
     store.write(tree(), PROVENANCE)
     assert same(store.look("grow", KEY, Tree), tree())
@@ -219,18 +220,18 @@ def test_a_look_gives_what_is_whole_and_never_discards(tmp_path: Path) -> None:
     array.write_bytes(content[:-8])
     assert store.look("grow", KEY, Tree) is None
     array.write_bytes(content)
-    assert same(store.look("grow", KEY, Tree), tree()), "what is being written is left to whoever writes it"
+    assert same(store.look("grow", KEY, Tree), tree()), "files being written are left to their writer"
 
 
 @dataclass(frozen=True)
 class Watched:
-    """An artefact with something of its computation in it."""
+    """An artefact that also holds something of its computation."""
 
     leaf: Leaf
     watch: Callable[[], None] = field(default=print, metadata=NOT_STORED)
 
 
-def test_an_array_that_stands_in_several_places_is_written_once(tmp_path: Path) -> None:
+def test_an_array_at_several_places_is_written_once(tmp_path: Path) -> None:
     once = np.arange(6.0)
     leaf = Leaf("a", 1.0, once)
     tree = Tree(leaf, (leaf, Leaf("b", 2.0, once)), Mood.CALM, 1, True, (), once.copy())
@@ -241,14 +242,14 @@ def test_an_array_that_stands_in_several_places_is_written_once(tmp_path: Path) 
     assert digest(stored.artefact) == digest(tree)
 
 
-def test_what_belongs_to_the_computation_is_not_stored(tmp_path: Path) -> None:
+def test_values_of_the_computation_are_not_stored(tmp_path: Path) -> None:
     Store(tmp_path).write(Watched(Leaf("a", 1.0, np.zeros(2)), lambda: None), PROVENANCE)
     stored = Store(tmp_path).read("grow", KEY, Watched)
     assert stored is not None
     assert stored.artefact.watch is print
 
 
-def test_a_result_of_before_its_class_moved_is_read() -> None:
+def test_a_result_made_before_its_class_moved_is_read() -> None:
     frames = CheckedFrames(np.arange(3), np.arange(3.0), np.array(["led"] * 3))
     stored, arrays = encode(frames)
     older = json.loads(json.dumps(stored).replace("recording.checks:", "recording.checked_frames:"))

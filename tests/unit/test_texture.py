@@ -34,7 +34,7 @@ def texture_of(images, T_pc, kind="led", context=None, **parameters):
 
 
 def ratio_to_truth(texture):
-    """Return picture over true reflectance, (H, W) of green, scaled to median 1."""
+    """Return the picture over the true reflectance, (H, W) of green, scaled to median 1."""
     height, width = texture.bgra.shape[:2]
     s = texture.distance_from_mm + texture.mm_per_px * np.arange(height)
     psi = texture.azimuth_from_rad + texture.rad_per_px * np.arange(width)
@@ -58,7 +58,7 @@ def test_reflectance_is_recovered_up_to_one_gain(plain):
 
 @pytest.mark.parametrize("vignetting", [0.0, 6.0])
 def test_the_photo_is_as_bright_as_recorded_at_the_laser_ring(vignetting):
-    """A frame's own grey levels where its laser ring would be, against the photo's of the same wall."""
+    """A frame's grey levels where its laser ring would be are compared with the photo of the same wall."""
     probe, every, dark = small_probe(), poses(7), 0.6
     images = [draw(probe, t, exposure=dark, vignetting=vignetting) for t in every]
     T, plain = every[3], texture_of(images, every)
@@ -80,7 +80,7 @@ def test_colours_share_one_gain(plain):
     assert np.ptp(gains) / np.mean(gains) < 0.01
 
 
-def test_all_of_the_seen_wall_is_textured(plain):
+def test_all_of_the_measured_wall_gets_texture(plain):
     assert plain.bgra[..., 3].min() == 255
     assert plain.bgra.shape[1] * plain.rad_per_px == pytest.approx(2 * np.pi)
 
@@ -90,13 +90,14 @@ def test_exposure_steps_leave_no_seam():
     exposure = np.where(np.arange(FRAMES) % 3 == 0, 1.3, 0.8)
     images = [draw(small_probe(), t, exposure=e) for t, e in zip(T, exposure, strict=True)]
     rows = ratio_to_truth(texture_of(images, T)).mean(1)
-    # A trend of the exposures along the pipe cannot be told from one of the wall: only a ramp may be left.
+    # A trend of the exposures along the pipe cannot be distinguished from one of the wall: only a ramp may
+    # remain.
     ramp = np.polyval(np.polyfit(np.arange(len(rows)), rows, 1), np.arange(len(rows)))
     assert np.ptp(rows - ramp) < 0.02
     assert np.ptp(ramp) < 0.1
 
 
-def test_vignetting_that_the_probe_does_not_state_is_divided_out():
+def test_vignetting_that_the_probe_file_does_not_state_is_corrected():
     # cos^6(θ/2) falls by a third over the wall used.
     T = poses(FRAMES)
     ratio = ratio_to_truth(texture_of([draw(small_probe(), t, vignetting=6.0) for t in T], T))
@@ -104,7 +105,7 @@ def test_vignetting_that_the_probe_does_not_state_is_divided_out():
     assert np.std(ratio) < 0.015
 
 
-def test_the_laser_line_is_not_in_the_picture(plain):
+def test_the_laser_line_does_not_appear_in_the_photo(plain):
     T = poses(FRAMES)
     lined = texture_of([draw(small_probe(), t, laser=True) for t in T], T, kind="both", laser_band_mm=3.0)
     height = min(lined.bgra.shape[0], plain.bgra.shape[0])
@@ -112,15 +113,18 @@ def test_the_laser_line_is_not_in_the_picture(plain):
     assert np.percentile(green, 99.9) < 1.1
 
 
-def test_the_laser_line_would_show_if_it_were_not_expected():
-    """Negative control of the test above: the same frames said to be LED frames, with nothing outvoted."""
+def test_the_laser_line_would_appear_if_it_were_not_masked():
+    """Negative control of the test above.
+
+    The same frames labelled as LED frames, with no outlier rejection.
+    """
     T = poses(3, step_mm=8.0)
     images = [draw(small_probe(), t, laser=True) for t in T]
     green = (lambda b: b[..., 1] / np.maximum(b[..., 0], 1.0))(texture_of(images, T, kind="led").bgra)
     assert np.percentile(green, 99.9) > 1.3
 
 
-def test_a_frame_with_a_reflex_is_outvoted(plain):
+def test_a_frame_with_a_reflection_is_rejected_as_an_outlier(plain):
     T = poses(FRAMES)
     images = [draw(small_probe(), t) for t in T]
     images[10] = np.minimum(images[10].astype(int) + 60, 255).astype(np.uint8)
@@ -139,13 +143,13 @@ def test_dark_and_undecodable_frames_are_counted_and_left_out():
     assert np.std(ratio) < 0.015
 
 
-def test_without_lit_frames_nothing_is_textured():
+def test_without_lit_frames_there_is_no_texture():
     T = poses(4)
     texture = texture_of([draw(small_probe(), t) for t in T], T, kind="laser")
     assert texture.bgra.max() == 0
 
 
-def test_a_standing_probe_gives_no_error():
+def test_a_probe_at_rest_gives_no_error():
     T = np.repeat(poses(1), 4, axis=0)
     T_wall = poses(3)
     texture = photograph_wall(
@@ -155,7 +159,7 @@ def test_a_standing_probe_gives_no_error():
     assert texture.bgra[..., 3].min() == 255
 
 
-def test_a_wall_never_seen_by_the_ring_is_refused():
+def test_a_wall_that_no_ring_measured_is_refused():
     T = poses(4)
     wall = seen_wall(T)
     unseen = replace(wall.radius_map, radius_mm=np.full_like(wall.radius_map.radius_mm, np.nan))
@@ -167,7 +171,7 @@ def test_a_wall_never_seen_by_the_ring_is_refused():
 
 
 @pytest.mark.parametrize("sigma", [0.0, 3.0, 8.0])
-def test_the_noise_of_the_pictures_is_told(sigma):
+def test_the_noise_of_the_pictures_is_reported(sigma):
     T, random = poses(FRAMES), np.random.default_rng(0)
     images = [draw(small_probe(), t) for t in T]
     noise = random.normal(0, sigma, (len(images), *images[0].shape[:2], 1))
@@ -175,23 +179,23 @@ def test_the_noise_of_the_pictures_is_told(sigma):
     told = {}
     context = replace(quiet_context(), report=lambda name, value, unit="": told.setdefault(name, value))
     texture_of(noisy, T, context=context)
-    # Interpolation takes up to a third of white noise away; on waves of 4 px it errs by 1.6 grey levels.
+    # Interpolation removes up to a third of white noise; for waves of 4 px it errs by 1.6 grey levels.
     found = told["noise of lit pictures, from their differences"]
     assert 0.65 * sigma < found < np.hypot(1.1 * sigma, 1.7)
 
 
-def test_same_input_same_bytes(plain):
+def test_the_same_input_gives_the_same_bytes(plain):
     T = poses(FRAMES)
     again = texture_of([draw(small_probe(), t) for t in T], T, context=quiet_context(workers=1))
     assert np.array_equal(again.bgra, plain.bgra)
 
 
-def test_stage_is_wired_by_type():
+def test_the_stage_is_connected_by_type():
     assert TEXTURE.output() is WallTexture
     assert set(TEXTURE.inputs()) == {"recording", "frames", "probe", "trajectory", "wall"}
 
 
-def test_unrolled_picture_is_as_recorded_and_placed(tmp_path):
+def test_the_unrolled_picture_has_the_recorded_brightness_and_place(tmp_path):
     bgra = np.zeros((2, 3, 4), np.uint8)
     bgra[0, 1] = 64, 128, 255, 255
     write_unrolled(WallTexture(bgra, 12.5, 0.1, -np.pi, 2 * np.pi / 3), tmp_path)

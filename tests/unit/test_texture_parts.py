@@ -22,7 +22,7 @@ from tests.unit.drawn_pipe import BASELINE, RADIUS, poses, recording_of, small_p
 
 
 def plain_blend(luma, weights):
-    """The robust weights of one pixel's samples (views,) and their mean, in plain numpy."""
+    """Return the robust weights of one pixel's samples (views,) and their mean, in plain NumPy."""
     seen = weights > 0
     grey, w = luma[seen].astype(float), weights[seen].astype(float)
 
@@ -54,13 +54,13 @@ def test_blend_agrees_with_plain_numpy():
     assert np.abs(mean_colour - expected).max() <= 0.51
 
 
-def test_blend_leaves_pixels_without_samples_empty():
+def test_pixels_without_samples_stay_empty():
     luma, colour = np.ones((2, 4, 32), np.uint16), np.ones((2, 2, 3, 16), np.uint16)
     mean, mean_colour, count = blend_samples(luma, colour, np.zeros((2, 4, 32), np.uint8))
     assert mean.max() == mean_colour.max() == count.max() == 0
 
 
-def test_a_coloured_wall_comes_back_in_its_colours_and_its_luma_pixel_by_pixel():
+def test_colours_of_a_wall_are_recovered_and_its_luma_for_each_pixel():
     u, v = np.meshgrid(np.arange(20, 84, dtype=np.float32), np.arange(10, 26, dtype=np.float32))
     uv = np.stack([u, v], -1)
     bright = np.random.default_rng(2).uniform(0.5, 1.0, (48, 120, 1))
@@ -75,12 +75,12 @@ def test_a_coloured_wall_comes_back_in_its_colours_and_its_luma_pixel_by_pixel()
     assert np.all(count == 2)
     luma = [0.114, 0.587, 0.299]
     assert np.abs(told @ luma - true @ luma).max() < 1.0
-    away = np.r_[0:28, 36:64]  # from where one colour meets the other
+    away = np.r_[0:28, 36:64]  # away from the border between the colours
     assert np.abs(told - true)[:, away].mean() < 6.0
 
 
 @pytest.mark.parametrize("values", [[3.0], [2.0, -1.0], [5.0, 1.0, 1.0], list(np.sin(np.arange(50.0)))])
-def test_the_compiled_median_is_numpys(values):
+def test_the_compiled_median_equals_that_of_numpy(values):
     assert median(np.array(values)) == np.median(values)
 
 
@@ -94,7 +94,7 @@ def test_one_led_on_the_axis_follows_lambert_and_inverse_square():
     assert irradiance(lamp, point, np.array([1.0, 0.0, 0.0])).max() == 0
 
 
-def test_a_ring_of_leds_is_the_mean_of_its_leds():
+def test_the_light_of_a_ring_is_the_mean_of_its_leds():
     lamp = Lighting(leds=5, radius_mm=9.0, z_mm=-2.0)
     random = np.random.default_rng(3)
     point = random.normal(0, 30, (4, 6, 3))
@@ -109,7 +109,10 @@ def test_a_ring_of_leds_is_the_mean_of_its_leds():
 
 
 def drawn_samples(wall_slope, gain, views=40, wall_rows=80):
-    """Samples of a wall of random cells under a light that falls with θ; view v sees rows v to v + 30."""
+    """Return samples of a wall of random cells under a light that falls with θ.
+
+    View v sees rows v to v + 30.
+    """
     random = np.random.default_rng(5)
     wall = random.normal(0, 0.2, (wall_rows, 12)) + wall_slope * np.arange(wall_rows)[:, None]
     view, row, column = (
@@ -134,7 +137,7 @@ def test_photometry_separates_light_from_wall():
     assert light.residual == pytest.approx(0.02, rel=0.15)
 
 
-def test_a_wall_that_grows_brighter_is_not_taken_for_exposure():
+def test_a_wall_that_gets_brighter_is_not_taken_for_exposure():
     light = solve_light(drawn_samples(0.01, np.zeros(40)), 40, small_probe(), 1.0)
     assert np.ptp(np.log(light.gain)) < 0.02
 
@@ -145,19 +148,19 @@ def test_views_without_samples_have_no_gain():
     assert np.isfinite(light.gain[:40]).all()
 
 
-def test_enlarged_nodes_lie_on_the_pixels():
+def test_enlarged_nodes_coincide_with_the_pixels():
     grid = FlatGrid(10.0, 0.1, 40, 32, 16)
     down, right = np.meshgrid(grid._nodes(16), grid._nodes(32), indexing="ij")
     assert np.allclose(_enlarge(down)[:, 5], np.arange(16), atol=1e-4)
     assert np.allclose(_enlarge(right)[3], np.arange(32), atol=1e-4)
 
 
-def test_tiles_cover_every_row_once():
+def test_tiles_cover_every_row_exactly_once():
     tiles = FlatGrid(0.0, 0.1, 41, 32, 16).tiles()
     assert [(t.first_row, t.last_row) for t in tiles] == [(0, 16), (16, 32), (32, 41)]
 
 
-def test_footprint_is_that_of_the_equidistant_lens():
+def test_the_footprint_agrees_with_the_equidistant_lens():
     # Around: r / (f θ); along: (r² + l²) / (r f), both per pixel.
     probe = small_probe()
     focal, theta = probe.camera.focal_px[0], np.arctan2(RADIUS, BASELINE)
@@ -181,7 +184,7 @@ def test_grid_pixels_are_square_and_close_the_circle():
     assert grid.distance_from_mm + (grid.rows - 1) * grid.mm_per_px <= surface.seen_mm[1]
 
 
-def test_surface_normals_of_a_cone_lean_along_it():
+def test_surface_normals_of_a_cone_are_inclined_along_it():
     surface = wall_surface(straight_wall(lambda s, psi: RADIUS + 0.2 * s), 0.0, 0.5)
     patch = surface.patch(np.array([20.0, 30.0]), np.array([0.3, 2.0]))
     radial = np.array([[np.cos(a), np.sin(a), 0.0] for a in (0.3, 2.0)])
@@ -190,14 +193,14 @@ def test_surface_normals_of_a_cone_lean_along_it():
     assert np.allclose(patch.xyz_p[1, :, :2], (RADIUS + 6.0) * radial[:, :2], atol=1e-3)
 
 
-def test_surface_normals_of_an_ellipse_lean_around():
+def test_surface_normals_of_an_ellipse_are_inclined_around_it():
     surface = wall_surface(straight_wall(lambda s, psi: RADIUS + np.cos(2 * psi)), 0.0, 0.5)
     patch = surface.patch(np.array([20.0, 30.0]), np.array([0.4, 0.4001]))
     along_wall = patch.xyz_p[0, 1] - patch.xyz_p[0, 0]
     assert abs(patch.normal_p[0, 0] @ along_wall) / np.linalg.norm(along_wall) < 1e-3
 
 
-def test_gaps_are_filled_from_their_neighbours_also_across_the_seam():
+def test_gaps_are_filled_from_their_neighbours_even_across_the_seam():
     random = np.random.default_rng(0)
     radius = RADIUS + 0.01 * random.normal(size=(60, 90))
     radius[20:40, :8], radius[20:40, -8:] = np.nan, np.nan
@@ -217,7 +220,7 @@ def plan_of(distance, reach_mm=10.0, most=40):
     return grid, thinned(seen_by(grid, surface, views_at(distance), small_probe().laser, reach_mm), most)
 
 
-def test_views_near_the_sheet_are_chosen():
+def test_views_near_the_sheet_are_preferred():
     distance = np.arange(-30.0, 60.0, 2.0)
     grid, plan = plan_of(distance)
     for tile, chosen in zip(grid.tiles(), plan, strict=True):
@@ -225,17 +228,17 @@ def test_views_near_the_sheet_are_chosen():
         assert len(chosen.views) >= 10
 
 
-def test_rare_views_widen_the_reach():
+def test_with_few_views_farther_ones_are_used():
     _, plan = plan_of([-20.0, 10.0, 40.0])
     assert all(len(chosen.views) == 3 and chosen.reach_mm > 30 for chosen in plan)
 
 
-def test_at_most_so_many_views_spread_over_the_reach():
+def test_no_more_views_than_allowed_are_chosen_spread_evenly():
     _, plan = plan_of(np.linspace(-30, 60, 2000), most=20)
     assert max(len(chosen.views) for chosen in plan) == 20
 
 
-def test_of_two_passes_one_is_taken():
+def test_of_two_passes_only_one_is_used():
     there = np.arange(-40.0, 60.0, 2.0)
     _, plan = plan_of(np.concatenate([there, there[::-1]]))
     middle = plan[2].views
@@ -243,7 +246,7 @@ def test_of_two_passes_one_is_taken():
     assert middle.max() < len(there) or middle.min() >= len(there)
 
 
-def test_sheet_distance_is_zero_on_the_tilted_sheet():
+def test_the_distance_from_the_sheet_is_zero_on_the_tilted_sheet():
     laser = small_probe().laser.with_parameters(np.array([22.0, 0.01, 0.02, 0.003, 0.1, 0.2, *[0.001] * 6]))
     ray = np.array([[1.0, 0.3, 0.5], [-0.4, 1.0, 0.4]])
     assert np.allclose(sheet_distance_mm(laser, laser.intersect(ray)), 0, atol=1e-9)
@@ -265,8 +268,8 @@ def test_only_lit_frames_with_a_pose_become_views():
     assert np.allclose(views.T_cp[1] @ T[2], np.eye(4))
 
 
-def test_a_few_glints_do_not_darken_the_photo_and_white_wall_does():
-    """A photo came out nearly black: noise beside a hole in it was twelve times as bright as the wall."""
+def test_a_few_glints_do_not_darken_the_photo_but_white_wall_does():
+    """A photo was nearly black: noise beside a hole in it was twelve times as bright as the wall."""
     counts = np.zeros(1 << 16, np.int64)
     counts[500:700] = 50  # the wall
     counts[8000] = 60  # .6 % of the picture

@@ -1,4 +1,4 @@
-"""A pipe photographed in stretches: the same views, the same picture, and no step where two of them meet."""
+"""A pipe photographed in stretches: the same views, the same picture, and no step at the joints."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ FRAMES = 24
 
 
 @pytest.mark.parametrize("views_at_once", [20, 1500])
-def test_stretches_make_one_picture(views_at_once: int) -> None:
+def test_stretches_together_give_the_same_picture(views_at_once: int) -> None:
     T = poses(FRAMES)
     images = [draw(small_probe(), t) for t in T]
 
@@ -37,10 +37,10 @@ def test_stretches_make_one_picture(views_at_once: int) -> None:
     rows = ratio.mean((1, 2)) / np.median(ratio)
     assert np.ptp(rows) < 0.02
     assert np.array_equal(cut.bgra[..., 3], whole.bgra[..., 3])
-    assert (views_at_once == 20) == bool(np.any(cut.bgra != whole.bgra)), "the control: one was cut"
+    assert (views_at_once == 20) == bool(np.any(cut.bgra != whole.bgra)), "control: the pipe was cut"
 
 
-def test_stretches_cover_all_tiles_and_want_no_more_views_than_they_may() -> None:
+def test_stretches_cover_all_tiles_and_use_no_more_views_than_allowed() -> None:
     plan = [TileViews(np.arange(k, k + 12), 5.0) for k in range(0, 200, 3)]
     stretches = cut_plan(plan, 30)
     assert [t for s in stretches for t in s.tiles] == list(range(len(plan)))
@@ -63,7 +63,7 @@ def drawn_light(first: int, last: int, level: float) -> LightSamples:
     )
 
 
-def test_light_goes_on_as_bright_as_it_was() -> None:
+def test_the_brightness_is_continuous_from_stretch_to_stretch() -> None:
     chain = LightChain(80, small_probe(), 1.0)
     first = chain.add(drawn_light(0, 45, 0.0), np.arange(45), 1.0)
     second = chain.add(drawn_light(35, 80, 0.0), np.arange(35, 80), 1.0)
@@ -82,7 +82,7 @@ def test_light_goes_on_as_bright_as_it_was() -> None:
 
 
 def plainly_planned(grid: FlatGrid, distance: Float, baseline: float, reach_mm: float):
-    """Choose views by looking at all of them for every tile."""
+    """Choose views by a search over all of them for every tile."""
     half = grid.tile_rows * grid.mm_per_px / 2
     for tile in grid.tiles():
         offset = grid.centre_mm(tile) - distance - baseline
@@ -93,9 +93,9 @@ def plainly_planned(grid: FlatGrid, distance: Float, baseline: float, reach_mm: 
 
 
 @pytest.mark.parametrize("count", [2, 40, 300])
-def test_views_are_those_found_by_looking_at_all(count: int) -> None:
+def test_chosen_views_equal_those_of_a_full_search(count: int) -> None:
     random = np.random.default_rng(count)
-    distance = np.cumsum(random.normal(0.3, 0.6, count)) - 20  # there and back a little
+    distance = np.cumsum(random.normal(0.3, 0.6, count)) - 20  # a little forth and back
     grid = FlatGrid(0.0, 0.5, 240, 640, 24)
     surface, probe = wall_surface(straight_wall(), 0.0, 0.5), small_probe()
     got = seen_by(grid, surface, views_at(distance), probe.laser, 8.0)
@@ -106,7 +106,7 @@ def test_views_are_those_found_by_looking_at_all(count: int) -> None:
 
 
 @pytest.mark.parametrize("most", [1, 7, 16, 100])
-def test_tiles_keep_about_as_many_views_and_share_them(most: int) -> None:
+def test_tiles_have_similar_numbers_of_views_and_share_them(most: int) -> None:
     ends = np.sort(np.random.default_rng(most).integers(0, 400, (40, 2)), axis=1)
     plan = [TileViews(np.arange(a, b), 5.0) for a, b in ends]
     found = shared(plan, most)
@@ -118,14 +118,14 @@ def test_tiles_keep_about_as_many_views_and_share_them(most: int) -> None:
     assert all(14 <= len(t.views) <= 15 for t in alike)
 
 
-def test_views_average_noise_to_that_of_rounding() -> None:
+def test_views_average_noise_down_to_that_of_rounding() -> None:
     assert views_against(1.4, 48) == 24
     assert views_against(0.0, 48) == 16
     assert views_against(9.0, 48) == views_against(float("nan"), 48) == 48
     assert views_against(1.4, 10) == 10
 
 
-def test_surface_in_blocks_is_the_surface_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_surface_made_in_blocks_equals_one_made_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
     wall = straight_wall(lambda s, psi: 25 + 0.2 * np.sin(s / 3) + 0.1 * np.cos(2 * psi))
     wall.radius_map.radius_mm[5:9, 3:20] = np.nan
     whole = wall_surface(wall, 0.6, 0.8)
@@ -137,6 +137,6 @@ def test_surface_in_blocks_is_the_surface_at_once(monkeypatch: pytest.MonkeyPatc
 
 
 @pytest.mark.parametrize("quantile", [0.0, 0.37, 0.5, 0.9995, 1.0])
-def test_quantiles_of_counts_are_those_of_the_values(quantile: float) -> None:
+def test_quantiles_from_counts_equal_those_of_the_values(quantile: float) -> None:
     values = np.random.default_rng(1).integers(0, 60, 501)
     assert quantile_of_counts(np.bincount(values), quantile) == pytest.approx(np.quantile(values, quantile))

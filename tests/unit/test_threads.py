@@ -1,4 +1,4 @@
-"""Work shared among threads: order, errors in their place, and no more made ahead than a few."""
+"""Work shared among threads: order, errors at their place, and a limit on what is made ahead."""
 
 import threading
 
@@ -9,18 +9,18 @@ from tests.patience import patience
 
 
 @pytest.mark.parametrize("threads", [1, 2, 5])
-def test_results_come_in_order_and_are_made_elsewhere(threads: int) -> None:
+def test_results_come_in_order_and_from_other_threads(threads: int) -> None:
     found = list(in_threads(lambda k: (k * k, threading.get_ident()), range(50), threads))
     assert [square for square, _ in found] == [k * k for k in range(50)]
     assert threading.get_ident() not in {thread for _, thread in found}
 
 
-def test_two_are_made_at_once() -> None:
+def test_two_items_are_made_at_the_same_time() -> None:
     meeting = threading.Barrier(2, timeout=patience(60))
     assert sorted(in_threads(lambda k: meeting.wait(), range(2), 2)) == [0, 1]
 
 
-def test_an_error_is_raised_in_its_place_and_the_rest_is_not_taken() -> None:
+def test_an_error_is_raised_at_its_place_and_the_rest_is_not_started() -> None:
     taken = []
 
     def items():
@@ -43,7 +43,7 @@ def test_threads_end_with_the_caller() -> None:
     assert threading.active_count() == before
 
 
-def test_a_few_are_made_at_once_the_first_by_the_caller() -> None:
+def test_a_few_calls_run_at_the_same_time_the_first_in_the_calling_thread() -> None:
     meeting = threading.Barrier(2, timeout=patience(60))
     by = side_by_side(lambda k: (meeting.wait() >= 0, k, threading.get_ident()), (3, 7))
     assert [k for _, k, _ in by] == [3, 7]
@@ -51,6 +51,6 @@ def test_a_few_are_made_at_once_the_first_by_the_caller() -> None:
 
 
 @pytest.mark.parametrize("wrong", [0, 1])
-def test_an_error_of_either_is_raised(wrong: int) -> None:
+def test_an_error_of_any_of_them_is_raised(wrong: int) -> None:
     with pytest.raises(ZeroDivisionError):
         side_by_side(lambda k: 1 // (k - wrong), (0, 1))

@@ -1,4 +1,4 @@
-"""tileset/: every content is read back; boxes hold it, children refine, metadata keep to the schema."""
+"""tileset/: every content can be read; boxes contain it, children refine, metadata follow the schema."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def box_of(tile: Json) -> NDArray[Any]:
     return np.stack([box[:3] - np.diag(half), box[:3] + np.diag(half)])
 
 
-def test_tree_is_that_of_the_standard(written: Written) -> None:
+def test_the_tree_follows_the_standard(written: Written) -> None:
     tree = written.tree
     assert tree["asset"] == {"version": "1.1"}
     assert tree["root"]["refine"] == "REPLACE"
@@ -82,23 +82,23 @@ def holds(outer: NDArray[Any], inner: NDArray[Any]) -> bool:
     return bool(np.all(inner >= outer[0] - 1e-12) and np.all(inner <= outer[1] + 1e-12))
 
 
-def test_boxes_hold_their_contents_and_their_children(written: Written) -> None:
+def test_boxes_contain_their_contents_and_their_children(written: Written) -> None:
     for tile, parent in written.nodes():
         box, vertex = box_of(tile), written.content(tile).vertices_m()
         assert holds(box, vertex), tile["content"]["uri"]
         middle = box.mean(0)
-        assert not holds(middle + 0.99 * (box - middle), vertex), "the control: no box is larger than need be"
+        assert not holds(middle + 0.99 * (box - middle), vertex), "control: no box is larger than necessary"
         if parent is not None:
             assert holds(box_of(parent), box)
 
 
-def test_the_pipe_runs_along_y_with_twelve_up(written: Written) -> None:
+def test_the_pipe_runs_along_y_with_twelve_oclock_up(written: Written) -> None:
     vertex = written.content(written.tree["root"]).vertices_m()
     assert np.ptp(vertex[:, 1]) == pytest.approx(0.05, abs=1e-4)
     (leaf,) = (t for t, _ in written.nodes() if not t.get("children") and lies_in(PIT[0], t))
     vertex = written.content(leaf).vertices_m()
     deepest = vertex[np.argmax(np.hypot(vertex[:, 0], vertex[:, 2]))]
-    # Azimuth 1 rad of P, whose y is down: right of and below the middle.
+    # Azimuth 1 rad of P, whose y points down: right of and below the middle.
     assert deepest[0] > 0 > deepest[2]
 
 
@@ -129,7 +129,7 @@ def length(tile: Json) -> float:
     return float(stretch["distance_to_mm"] - stretch["distance_from_mm"])
 
 
-def test_metadata_keep_to_the_one_schema(written: Written) -> None:
+def test_metadata_follow_the_one_schema(written: Written) -> None:
     schema = written.tree["schema"]
     for tile, _ in written.nodes():
         extension = written.content(tile).document["extensions"]["EXT_structural_metadata"]
@@ -145,7 +145,7 @@ def test_metadata_keep_to_the_one_schema(written: Written) -> None:
             }  # fmt: skip
 
 
-def test_every_triangle_is_of_one_stretch_and_lies_on_it(written: Written) -> None:
+def test_every_triangle_belongs_to_one_stretch_and_lies_in_it(written: Written) -> None:
     for tile, _ in written.nodes():
         content = written.content(tile)
         kind, rows = content.table(0)
@@ -160,7 +160,7 @@ def test_every_triangle_is_of_one_stretch_and_lies_on_it(written: Written) -> No
         assert np.all((along > low - 0.3) & (along < high + 0.3))
 
 
-def test_stretches_tell_what_the_map_does(written: Written, wall: Wall) -> None:
+def test_the_properties_of_stretches_agree_with_the_map(written: Written, wall: Wall) -> None:
     s, radius = wall.radius_map.distance_mm, wall.radius_map.radius_mm
     leaves = [tile for tile, _ in written.nodes() if not tile.get("children")]
     for tile in leaves:
@@ -169,11 +169,11 @@ def test_stretches_tell_what_the_map_does(written: Written, wall: Wall) -> None:
         assert stretch["mean_radius_mm"] == pytest.approx(np.nanmean(radius[inside]), abs=1e-3)
         assert stretch["coverage"] == pytest.approx(np.isfinite(radius[inside]).mean(), abs=1e-6)
         assert stretch["sigma_mm"] == pytest.approx(0.05, abs=1e-3)
-    assert min(t["metadata"]["properties"]["coverage"] for t in leaves) < 0.95, "the hole"
+    assert min(t["metadata"]["properties"]["coverage"] for t in leaves) < 0.95, "the stretch with the hole"
     assert sum(t["metadata"]["properties"]["defects"] for t in leaves) >= 1
 
 
-def test_a_defect_is_found_where_it_lies(written: Written) -> None:
+def test_a_defect_is_found_at_its_place(written: Written) -> None:
     at, around, _, width = PIT
     found = 0
     for tile, _ in written.nodes():
@@ -194,7 +194,7 @@ def test_a_defect_is_found_where_it_lies(written: Written) -> None:
     assert found > 10
 
 
-def test_levels_lie_as_near_to_the_wall_as_they_say(written: Written, wall: Wall) -> None:
+def test_levels_are_as_near_to_the_wall_as_stated(written: Written, wall: Wall) -> None:
     radius_map = wall.radius_map
     for tile, _ in written.nodes():
         if not tile.get("children"):
@@ -215,7 +215,9 @@ def test_every_level_has_every_variant(written: Written) -> None:
         assert set(document["extensionsUsed"]) >= {"EXT_mesh_features", "EXT_structural_metadata"}
 
 
-def test_same_wall_same_bytes(written: Written, wall: Wall, mesh: TexturedMesh, tmp_path: Path) -> None:
+def test_the_same_wall_gives_the_same_bytes(
+    written: Written, wall: Wall, mesh: TexturedMesh, tmp_path: Path
+) -> None:
     write(wall, mesh, tmp_path)
     for file in written.folder.rglob("*.*"):
         again = tmp_path / "tileset" / file.relative_to(written.folder)

@@ -1,4 +1,4 @@
-"""Steps of the reading are found; drift, stray pictures and lost time are no slips."""
+"""Steps of the encoder reading are found; drift, misplaced pictures and lost time are not taken for slips."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def test_nothing_is_found_where_nothing_slips(drift_mm: float, reverses: bool) -
     assert sum(map(len, found)) == 0
 
 
-def test_smooth_drift_of_sight_is_no_slip() -> None:
+def test_a_smooth_drift_of_visual_distances_is_not_a_slip() -> None:
     random = np.random.default_rng(2)
     sight = seen(random, False)
     wavy = replace(sight, distance_mm=sight.distance_mm + 0.1 * np.tanh((sight.time_s - 4) / 0.4))
@@ -52,7 +52,7 @@ def test_a_slip_is_found_with_size_and_time(reverses: bool, gain_mm: float) -> N
 
 
 @pytest.mark.parametrize(("lasts_s", "gain_mm"), [(0.12, 2.0), (0.25, -3.4)])
-def test_a_wheel_that_slips_for_a_while_slips_once(lasts_s: float, gain_mm: float) -> None:
+def test_a_wheel_that_slips_for_a_while_gives_one_slip(lasts_s: float, gain_mm: float) -> None:
     sight, encoder = seen(np.random.default_rng(0), False), read(False)
     part = np.clip((encoder.time_s - 3.0) / lasts_s, 0.0, 1.0)
     (found,) = slips(sight, replace(encoder, distance_mm=encoder.distance_mm + gain_mm * part))
@@ -64,13 +64,13 @@ def test_a_wheel_that_slips_for_a_while_slips_once(lasts_s: float, gain_mm: floa
     assert found.agreements
 
 
-def test_two_slips_of_opposite_sign_are_two() -> None:
+def test_two_slips_of_opposite_sign_are_two_slips() -> None:
     sight = seen(np.random.default_rng(3))
     found = slips(sight, read(slips=((2.0, 8.0), (4.5, -5.0))))
     assert sorted(round(s.gain_mm) for s in found) == [-5, 8]
 
 
-def test_a_stray_picture_is_no_slip() -> None:
+def test_a_misplaced_picture_is_not_a_slip() -> None:
     sight = seen(np.random.default_rng(4))
     stray = sight.distance_mm.copy()
     stray[40] += 2.0
@@ -79,7 +79,7 @@ def test_a_stray_picture_is_no_slip() -> None:
 
 
 @pytest.mark.parametrize(("stray_at", "slips_at"), [(-1, -5), (0, 4)])
-def test_a_slip_beside_a_stray_picture_at_the_end_ends_there(stray_at: int, slips_at: int) -> None:
+def test_a_slip_beside_a_misplaced_picture_at_the_end_ends_there(stray_at: int, slips_at: int) -> None:
     sight = seen(np.random.default_rng(7), False)
     few = replace(
         sight, **{k: v[:40] for k, v in vars(sight).items() if np.shape(v)[:1] == sight.time_s.shape}
@@ -94,7 +94,7 @@ def test_a_slip_beside_a_stray_picture_at_the_end_ends_there(stray_at: int, slip
 
 @pytest.mark.parametrize("placed", [True, False])
 @pytest.mark.parametrize(("strays", "count"), [(slice(-3, None), 3), (slice(0, 3), 3)])
-def test_stray_pictures_at_an_end_are_no_sure_slip(placed: bool, strays: slice, count: int) -> None:
+def test_misplaced_pictures_at_an_end_are_not_a_sure_slip(placed: bool, strays: slice, count: int) -> None:
     sight = seen(np.random.default_rng(10), drift_mm=0.001)
     distance_mm = sight.distance_mm.copy()
     distance_mm[strays] += 1.0
@@ -115,7 +115,7 @@ def test_a_slip_in_the_last_pictures_is_sure_where_the_reading_itself_jumps() ->
     assert found.time_s == pytest.approx(7.78, abs=0.05)
 
 
-def test_missing_pictures_at_steady_speed_are_not_called_a_slip() -> None:
+def test_missing_pictures_at_constant_speed_are_not_called_a_slip() -> None:
     sight, encoder = seen(np.random.default_rng(5), False), read(False)
     noise = sight.distance_mm - way(sight.time_s, False)
     late = sight.time_s + np.where(sight.time_s > 4, 2 / 30, 0.0)
@@ -125,7 +125,7 @@ def test_missing_pictures_at_steady_speed_are_not_called_a_slip() -> None:
     assert [EventKind.LOST_TIME in s.rivals for s in found] == [True]
 
 
-def test_a_slip_of_the_size_of_missing_pictures_is_told_by_the_jump_of_the_reading() -> None:
+def test_a_slip_of_the_size_of_missing_pictures_is_recognised_by_the_jump_of_the_reading() -> None:
     sight, encoder = seen(np.random.default_rng(7), False), read(False)
     noise = sight.distance_mm - way(sight.time_s, False)
     even = replace(sight, distance_mm=18.0 * sight.time_s + noise)
@@ -135,7 +135,7 @@ def test_a_slip_of_the_size_of_missing_pictures_is_told_by_the_jump_of_the_readi
     assert found.gain_mm == pytest.approx(-1.2, abs=0.1)
 
 
-def test_a_slip_leaves_delay_and_scale_alone() -> None:
+def test_a_slip_does_not_change_delay_and_scale() -> None:
     sight = seen(np.random.default_rng(6))
     plain, slipped = (with_events(sight, read(slips=s)) for s in ((), ((3.0, 5.0),)))
     np.testing.assert_allclose(
@@ -144,12 +144,12 @@ def test_a_slip_leaves_delay_and_scale_alone() -> None:
     assert np.all(np.abs(plain.values[1:4] - slipped.values[1:4]) < 3 * slipped.sigma[1:4])
 
 
-def test_readings_that_are_rounded_alike_leave_a_size_as_unsure_as_that():
+def test_if_all_readings_are_rounded_the_same_way_the_sigma_of_a_size_includes_it():
     sizes = (0.33, 0.36, 0.39, 0.42, 0.45, 0.48)
     errors = []
     for seed, size in enumerate(sizes):
         sight = seen(np.random.default_rng(seed), False, drift_mm=0.002, every=3)
-        # At 15 mm/s every picture comes 30 counts after the one before.
+        # At 15 mm/s every picture comes 30 counts after the previous one.
         even = replace(sight, distance_mm=sight.distance_mm - way(sight.time_s, False) + 15.0 * sight.time_s)
         reading = 15.0 * read(False).time_s + np.where(read(False).time_s > 1.05, -size, 0.0)
         stepped = QUANTUM_MM * np.round(reading / QUANTUM_MM)
@@ -162,7 +162,7 @@ def test_readings_that_are_rounded_alike_leave_a_size_as_unsure_as_that():
 
 
 @pytest.mark.parametrize(("lasts_s", "at_s", "gain_mm"), [(0.13, 5.13, -1.7), (0.03, 3.64, 0.64)])
-def test_a_slip_where_the_probe_turns_is_no_play(lasts_s: float, at_s: float, gain_mm: float) -> None:
+def test_a_slip_where_the_probe_turns_back_is_not_play(lasts_s: float, at_s: float, gain_mm: float) -> None:
     encoder = read()
     part = np.clip((encoder.time_s - at_s) / lasts_s + 0.5, 0.0, 1.0)
     slipped = replace(encoder, distance_mm=encoder.distance_mm + gain_mm * part)
@@ -173,7 +173,7 @@ def test_a_slip_where_the_probe_turns_is_no_play(lasts_s: float, at_s: float, ga
         assert found.gain_mm == pytest.approx(gain_mm, abs=4 * found.sigma_mm)
 
 
-def test_what_a_slow_slip_gains_at_its_ends_is_not_lost() -> None:
+def test_what_a_slow_slip_gains_at_its_ends_counts_too() -> None:
     errors = []
     for case in (3, 5, 7):
         random = np.random.default_rng([5, case])

@@ -1,4 +1,7 @@
-"""Lines in the probe's place across the pipe: found, measured, and told from a sheet that rocks."""
+"""Spectral lines in the probe's motion across the pipe.
+
+Found, measured, and distinguished from a rocking sheet.
+"""
 
 from __future__ import annotations
 
@@ -34,7 +37,7 @@ def test_a_probe_that_only_wanders_has_no_lines() -> None:
 
 @pytest.mark.parametrize(("frequency", "alias"), [(5.3, 5.3), (11.0, 11.0), (24.7, 5.3), (33.0, 3.0)])
 @pytest.mark.parametrize("amplitude", [0.03, 0.2])
-def test_a_vibration_is_found_with_its_alias_size_and_direction(
+def test_a_vibration_is_found_with_its_aliases_size_and_direction(
     frequency: float, alias: float, amplitude: float
 ) -> None:
     (line,) = find_lines(TIME_S, wander(1) + swing(frequency, amplitude), LIT)
@@ -45,7 +48,7 @@ def test_a_vibration_is_found_with_its_alias_size_and_direction(
     assert line.explained_by == ("probe_vibration",)
 
 
-def test_what_only_laser_pictures_show_is_the_sheet() -> None:
+def test_a_line_in_laser_pictures_only_is_the_sheets() -> None:
     lines = find_lines(TIME_S, wander(2) + swing(5.3, 0.2) * ~LIT[:, None], LIT)
     assert lines
     assert lines[0].frequency_hz == pytest.approx(5.3, abs=0.03)
@@ -54,23 +57,23 @@ def test_what_only_laser_pictures_show_is_the_sheet() -> None:
     assert lines[0].lit_mm < 0.01
 
 
-def test_with_the_laser_always_on_the_two_are_not_told_apart() -> None:
+def test_with_the_laser_always_on_the_two_cannot_be_distinguished() -> None:
     lines = find_lines(TIME_S, wander(3) + swing(5.3, 0.1), np.ones(len(TIME_S), bool))
     assert [line.explained_by for line in lines] == [("probe_vibration", "laser_rocking")]
 
 
-def test_too_few_pictures_tell_nothing() -> None:
+def test_too_few_pictures_give_no_result() -> None:
     assert find_lines(TIME_S[:20], wander(4)[:20] + swing(5.3, 1.0)[:20], LIT[:20]) == ()
 
 
 @pytest.mark.parametrize("every", [3, 4, 10, 30, None])
-def test_lit_pictures_that_lie_aside_of_laser_pictures_neither_make_nor_hide_a_vibration(
+def test_an_offset_between_lit_and_laser_pictures_neither_makes_nor_hides_a_vibration(
     every: int | None,
 ) -> None:
     """A sound probe was a class of vibration and rocking sheet, .019 mm at the rhythm of its lights.
 
-    Without all frequencies at which the lights have lines, a swing of .05 mm was lost: lit in every tenth
-    picture, a quarter of the frequencies, in any, all.
+    When all frequencies of the rhythm of the lights were excluded, a swing of .05 mm was lost. These are a
+    quarter of the frequencies if every tenth picture is lit, and all of them with an irregular rhythm.
     """
     random = np.random.default_rng(5)
     lit = random.random(len(TIME_S)) < 0.5 if every is None else np.arange(len(TIME_S)) % every == every - 1
@@ -83,8 +86,8 @@ def test_lit_pictures_that_lie_aside_of_laser_pictures_neither_make_nor_hide_a_v
 
 
 @pytest.mark.parametrize("frequency", [9.3, 10.0])
-def test_a_swing_in_the_rhythm_of_the_lights_is_about_as_large_as_it_is(frequency: float) -> None:
-    """Every third picture is lit, and a camera that swings at a third of the frame rate was not seen to."""
+def test_the_size_of_a_swing_in_the_rhythm_of_the_lights_is_about_right(frequency: float) -> None:
+    """With every third picture lit, a swing at a third of the frame rate was not found."""
     (line,) = find_lines(TIME_S, wander(6) + swing(frequency, 0.2), np.arange(len(TIME_S)) % 3 == 0)
     assert line.frequency_hz == pytest.approx(frequency, abs=0.05)
     assert line.amplitude_mm == pytest.approx(0.2, abs=0.02)

@@ -1,4 +1,4 @@
-"""Scale, delay and play of the encoder are found within their σ, where the motion lets tell them."""
+"""Scale, delay and play of the encoder are estimated within their σ, where the motion allows it."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def test_a_fault_is_found_and_nothing_else(name: str, fault: str, size: float) -
     assert all(e.p_value > 1e-3 for e in found.values() if e.effect != name)
 
 
-def test_errors_are_as_large_as_stated() -> None:
+def test_errors_have_the_stated_size() -> None:
     true = np.array([0.003, 0.01, 0.4])
     random, scores = np.random.default_rng(2), []
     # Frames are stamped to about a millisecond, readings to half their quantum.
@@ -69,14 +69,14 @@ def test_a_sound_encoder_shows_no_fault(reverses: bool) -> None:
     assert min(smallest) > 1e-4
 
 
-def test_without_a_reversal_play_cannot_be_told() -> None:
+def test_without_a_reversal_play_cannot_be_determined() -> None:
     found = estimates(3, reverses=False, play_mm=1.0)
     assert not np.isfinite(found["encoder_backlash"].sigma)
     assert not np.isfinite(found["encoder_backlash"].detectable)
     assert all(e.p_value > 1e-3 for e in found.values())
 
 
-def test_at_one_speed_to_and_fro_delay_and_play_are_one() -> None:
+def test_at_one_speed_forth_and_back_delay_and_play_cannot_be_separated() -> None:
     sight = seen(np.random.default_rng(4), False)
     back = np.where(sight.time_s < 4, 20 * sight.time_s, 160 - 20 * sight.time_s)
     encoder = read(False)
@@ -88,14 +88,14 @@ def test_at_one_speed_to_and_fro_delay_and_play_are_one() -> None:
     assert "encoder_backlash" in alike or not np.isfinite(found["time_offset"].sigma)
 
 
-def test_the_readings_quantum_and_ends() -> None:
+def test_the_readings_have_their_quantum_and_ends() -> None:
     encoder = read(False)
     assert quantum_mm(encoder) == pytest.approx(0.05)
     beyond = readings_at(encoder, np.array([encoder.time_s[-1] + 0.1]))
     assert beyond[0] - encoder.distance_mm[-1] == pytest.approx(1.7, abs=0.4)
 
 
-def test_a_delay_that_no_encoder_has_is_no_find() -> None:
+def test_an_impossible_delay_is_not_a_finding() -> None:
     encoder = read(False)
     fit = with_events(seen(np.random.default_rng(5), False), encoder)
     values = fit.values.copy()
@@ -113,7 +113,7 @@ def test_a_delay_that_no_encoder_has_is_no_find() -> None:
     ("name", "fault", "size", "column"),
     [("encoder_scale", "scale", 0.02, SCALE), ("encoder_backlash", "play_mm", 2.0, PLAY)],
 )
-def test_what_is_not_known_is_neither_fitted_nor_taken_for_noise(name, fault, size, column):
+def test_an_effect_missing_from_the_library_is_neither_fitted_nor_taken_for_noise(name, fault, size, column):
     placed = replace(seen(np.random.default_rng(6), drift_mm=0.0), placed=True)
     faulty, left = read(**{fault: size}), {}
     for without in ((), (name, "time_offset", "encoder_slip")):
@@ -125,15 +125,15 @@ def test_what_is_not_known_is_neither_fitted_nor_taken_for_noise(name, fault, si
     assert all(e.kind is not EventKind.STEP for e in fit.events)
 
 
-# What is not known beside the slip: a delay or a play that is found takes a part of it.
+# Effects missing from the library beside the slip: a delay or play that is fitted absorbs a part of it.
 LAGS = ("time_offset", "encoder_backlash")
 
 
 @pytest.mark.parametrize("placed", [True, False])
 @pytest.mark.parametrize("at_s", [1.0, 3.0, 4.2, 7.7])
-def test_a_slip_that_nobody_knows_is_unexplained_from_its_time_on(placed, at_s, monkeypatch):
-    """Near the ends the fit takes it for stray pictures, beside which nothing is left."""
-    # More stray pictures are looked for in vain, which takes time.
+def test_a_slip_missing_from_the_library_is_unexplained_from_its_time_on(placed, at_s, monkeypatch):
+    """Near the ends the fit takes it for misplaced pictures, beside which nothing remains."""
+    # More misplaced pictures are searched in vain, which takes time.
     monkeypatch.setattr("stages.diagnose.travel.events._MOST", 4)
     sight = replace(seen(np.random.default_rng(10), drift_mm=0.001, every=4), placed=placed)
     slipped = read(slips=((at_s, 1.36),))
@@ -148,7 +148,7 @@ def test_a_slip_that_nobody_knows_is_unexplained_from_its_time_on(placed, at_s, 
 
 
 @pytest.mark.parametrize("placed", [True, False])
-def test_a_delay_and_a_play_found_in_its_place_take_nothing_of_what_is_left(placed):
+def test_a_delay_and_play_fitted_instead_do_not_reduce_the_reported_remainder(placed):
     sight = replace(seen(np.random.default_rng(10), drift_mm=0.001, every=4), placed=placed)
     slipped = read(slips=((3.0, 1.36),))
     fit = fitted(sight, slipped, (), None, ("encoder_slip",))
@@ -160,8 +160,8 @@ def test_a_delay_and_a_play_found_in_its_place_take_nothing_of_what_is_left(plac
 
 
 @pytest.mark.parametrize("seed", [4, 56, 98])
-def test_two_pictures_placed_a_little_wrong_behind_a_turn_leave_nothing(seed):
-    """Beside a delay and a play of nothing, .2 mm came out as .7 mm: a slip was told of a sound encoder."""
+def test_two_slightly_misplaced_pictures_after_a_turn_leave_no_remainder(seed):
+    """Beside a delay and a play of zero, .2 mm became .7 mm: a slip was reported for a sound encoder."""
     knots_s = [0.0, 0.2, 3.667, 4.2, 4.6, 5.0, 5.267, 5.533, 6.0]
     way = PchipInterpolator(knots_s, [-22.0, -17.26, 64.16, 71.0, 70.0, 66.53, 63.45, 62.41, 62.3])
     time_s = np.r_[0.2 + np.arange(14) * 4 / 15, 5.0 + np.arange(3) * 4 / 15]
@@ -176,7 +176,7 @@ def test_two_pictures_placed_a_little_wrong_behind_a_turn_leave_nothing(seed):
 
 
 @pytest.mark.parametrize("placed", [True, False])
-def test_a_slip_that_is_known_leaves_nothing(placed):
+def test_a_slip_that_the_library_has_leaves_no_remainder(placed):
     sight = replace(seen(np.random.default_rng(10), drift_mm=0.001), placed=placed)
     slipped = read(slips=((4.2, 1.36),))
     fit = with_events(sight, slipped)
@@ -184,7 +184,7 @@ def test_a_slip_that_is_known_leaves_nothing(placed):
 
 
 @pytest.mark.parametrize("placed", [True, False])
-def test_a_play_that_only_a_few_pictures_show_is_no_row_of_stray_ones(placed):
+def test_play_shown_by_only_a_few_pictures_is_not_a_row_of_misplaced_ones(placed):
     sight = replace(seen(np.random.default_rng(10), drift_mm=0.001), placed=placed)
     fit = with_events(sight.select((sight.time_s > 2.6) & (sight.time_s < 3.85)), read(play_mm=0.5))
     assert fit.values[PLAY] == pytest.approx(0.5, abs=0.1)
@@ -192,7 +192,7 @@ def test_a_play_that_only_a_few_pictures_show_is_no_row_of_stray_ones(placed):
 
 
 def strayed(places: dict[int, float], **of_sight: Any) -> Sight:
-    """Return the way seen, some pictures being placed wrongly."""
+    """Return the visual distances with some pictures misplaced."""
     sight = replace(seen(np.random.default_rng(11), drift_mm=0.001), **of_sight)
     distance_mm = sight.distance_mm.copy()
     distance_mm[list(places)] += list(places.values())
@@ -201,7 +201,7 @@ def strayed(places: dict[int, float], **of_sight: Any) -> Sight:
 
 @pytest.mark.parametrize("placed", [True, False])
 @pytest.mark.parametrize(("first", "count"), [(50, 2), (50, 4), (0, 2)])
-def test_stray_pictures_in_a_row_are_told_and_at_an_end_as_a_slip_too(placed, first, count):
+def test_misplaced_pictures_in_a_row_are_reported_and_at_an_end_as_a_possible_slip_too(placed, first, count):
     row = range(first, first + count)
     sight = strayed(dict.fromkeys(row, 1.0), placed=placed)
     fit = with_events(sight, read(), LAGS)
@@ -218,7 +218,7 @@ def test_stray_pictures_in_a_row_are_told_and_at_an_end_as_a_slip_too(placed, fi
         assert "no effect of an encoder explains" in told
 
 
-def test_slips_that_cancel_at_once_are_told_as_what_no_one_effect_explains():
+def test_slips_that_cancel_at_once_are_reported_as_unexplained_by_any_one_effect():
     sight = strayed({})
     slipped = read(slips=((4.2, 1.36), (4.5, -1.36)))
     fit = with_events(sight, slipped)
@@ -230,7 +230,7 @@ def test_slips_that_cancel_at_once_are_told_as_what_no_one_effect_explains():
 
 
 @pytest.mark.parametrize("placed", [True, False])
-def test_stray_pictures_apart_leave_nothing(placed):
+def test_single_misplaced_pictures_leave_no_remainder(placed):
     sight = strayed({20: 1.0, 50: -0.8, 90: 1.2}, placed=placed)
     fit = with_events(sight, read())
     assert [e.kind for e in fit.events] == [EventKind.OUTLIER] * 3
@@ -238,15 +238,15 @@ def test_stray_pictures_apart_leave_nothing(placed):
 
 
 @pytest.mark.parametrize("placed", [True, False])
-def test_a_stray_picture_beside_one_that_is_off_a_little_leaves_nothing(placed):
+def test_a_misplaced_picture_beside_a_slightly_misplaced_one_leaves_no_remainder(placed):
     """Two of the same sign were taken for a row: "unless 1 pictures in a row are stray"."""
     sight = strayed({20: 2.0, 21: 0.2}, placed=placed)
     fit = with_events(sight, read())
     assert left_over(fit, steps_found(fit, read()), 0.05) is None
 
 
-def test_noise_leaves_what_its_p_value_says(monkeypatch):
-    """Drawn ways that are noise alone: the chance told of the strongest stretch is no less than it is."""
+def test_noise_leaves_remainders_as_often_as_their_p_value_says(monkeypatch):
+    """For drawn distances of noise alone, the stated p of the strongest stretch is not too small."""
     monkeypatch.setattr("stages.diagnose.travel.left_over._NOISE", 2.0)
     told = []
     for seed in range(20):
@@ -260,7 +260,7 @@ def test_noise_leaves_what_its_p_value_says(monkeypatch):
 
 
 @pytest.mark.parametrize("placed", [True, False])
-def test_one_stray_picture_and_a_sound_encoder_leave_nothing(placed):
+def test_one_misplaced_picture_and_a_sound_encoder_leave_no_remainder(placed):
     sight = replace(seen(np.random.default_rng(11), drift_mm=0.001), placed=placed)
     stray = sight.distance_mm.copy()
     stray[40] += 1.0
@@ -269,7 +269,7 @@ def test_one_stray_picture_and_a_sound_encoder_leave_nothing(placed):
         assert left_over(fit, steps_found(fit, read()), 0.05) is None
 
 
-def test_a_picture_is_missed_by_its_noise_when_all_others_predict_it():
+def test_each_picture_is_predicted_by_all_others_within_its_noise():
     fit = with_events(seen(np.random.default_rng(7)), read(scale=0.01))
     missed, sigma = fit.left_out_mm
     assert len(missed) == len(fit.sight.time_s)
@@ -278,13 +278,13 @@ def test_a_picture_is_missed_by_its_noise_when_all_others_predict_it():
 
 
 @pytest.mark.parametrize("faults", [{}, {"delay_s": 0.02}, {"play_mm": 0.5}])
-def test_what_right_effects_leave_is_noise_and_no_other_course_does_as_well(faults):
+def test_the_residual_with_right_effects_is_noise_and_no_other_course_fits_as_well(faults):
     fit = with_events(seen(np.random.default_rng(3)), read(**faults))
     assert fit.fits_p > 0.05
     assert all(e.other_courses < 1e-6 for e in _estimates("gauge", fit, STATED, 0.0) if e.p_value < 1e-5)
 
 
-def test_what_wrong_effects_leave_is_no_noise_though_their_own_size_is_sure():
+def test_the_residual_with_wrong_effects_is_not_noise_though_their_size_is_sure():
     without = ("time_offset", "encoder_slip")
     fit = with_events(seen(np.random.default_rng(8)), read(delay_s=0.06), without)
     play = next(e for e in _estimates("gauge", fit, STATED, 0.0) if e.effect == "encoder_backlash")
@@ -292,7 +292,7 @@ def test_what_wrong_effects_leave_is_no_noise_though_their_own_size_is_sure():
     assert fit.fits_p < 1e-3
 
 
-def test_what_goes_with_direction_beats_a_play_that_does_not():
+def test_an_error_that_depends_on_direction_is_not_fitted_by_constant_play():
     fit = with_events(seen(np.random.default_rng(3)), read(play_mm=0.5))
     columns = fit.columns.copy()
     columns[:, PLAY] = np.random.default_rng(9).standard_normal(len(columns))
@@ -302,17 +302,17 @@ def test_what_goes_with_direction_beats_a_play_that_does_not():
     assert _other_courses(wrong, PLAY) > 1
 
 
-def test_what_is_kept_of_a_fit_grows_with_the_run_and_not_with_its_square() -> None:
-    """For 3000 pictures a matrix of 72 MB was kept in the stored evidence."""
+def test_stored_evidence_grows_linearly_with_the_length_of_the_run() -> None:
+    """For 3000 pictures a matrix of 72 MB was stored."""
     fit = fitted(seen(np.random.default_rng(4)), read(scale=0.01), (), None)
     count = len(fit.sight.time_s)
     arrays = [a for a in (*vars(fit.whitened).values(), fit.whitened.precision.factor) if hasattr(a, "size")]
     assert sum(a.size for a in arrays) < 20 * count
 
 
-def test_a_walk_beside_white_noise_is_weighed_as_its_whole_covariance_says() -> None:
+def test_a_random_walk_with_white_noise_is_weighted_by_its_whole_covariance() -> None:
     random = np.random.default_rng(5)
-    # The probe stands in between.
+    # The probe stands still in between.
     path_mm = np.cumsum(np.maximum(random.normal(0.3, 0.5, 40), 0.0))
     walk = np.minimum(path_mm[:, None], path_mm) - path_mm[0]
     covariance = 0.02**2 * np.eye(40) + 0.01**2 * walk
@@ -325,7 +325,7 @@ def test_a_walk_beside_white_noise_is_weighed_as_its_whole_covariance_says() -> 
     assert information == pytest.approx(np.diag(beyond), rel=1e-6)
 
 
-def test_the_strongest_stretch_is_the_best_of_all() -> None:
+def test_the_strongest_stretch_is_the_best_of_all_stretches() -> None:
     random, count = np.random.default_rng(6), 300
     off = np.zeros(count)
     off[120:190] = 0.03
@@ -345,8 +345,8 @@ def test_the_strongest_stretch_is_the_best_of_all() -> None:
     assert abs(found.end - 190) < 5
 
 
-def test_neither_the_search_of_events_nor_what_is_left_out_takes_the_square_of_the_run() -> None:
-    """For 3000 pictures all steps, and all stray pictures, together were matrices of 72 MB and more."""
+def test_memory_of_the_search_for_events_grows_linearly_with_the_length_of_the_run() -> None:
+    """For 3000 pictures the matrices of all steps and of all misplaced pictures took 72 MB and more."""
     count = 2400
     fit = fitted(seen(np.random.default_rng(4)), read(scale=0.01), (), None)
     way = np.linspace(0, 2000.0, count)

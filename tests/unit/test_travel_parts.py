@@ -1,4 +1,7 @@
-"""One part of the travel predicts the other: true causes agree, others of the same total do not."""
+"""One part of a run predicts the other.
+
+For the true cause they agree, for others of the same total they do not.
+"""
 
 from __future__ import annotations
 
@@ -18,12 +21,12 @@ from tests.travel_cases import read, seen, way
 TIME_S = np.arange(240) / 30
 EARLY = TIME_S < 4
 LIT = np.arange(240) % 4 == 3
-# Where `way` first turns back.
+# Where `way` turns back for the first time.
 TURN_S = 3.6
 
 
 def agreed(encoder: Encoder, column: int, seed: int = 1) -> list[bool]:
-    """Return for each second prediction whether it agrees, no event being allowed for."""
+    """Return for each second prediction whether it agrees, without any events."""
     fit = fitted(seen(np.random.default_rng(seed)), encoder, (), None)
     return [a.confirmation.agrees for a in second_predictions(fit, column)]
 
@@ -33,22 +36,24 @@ def agreed(encoder: Encoder, column: int, seed: int = 1) -> list[bool]:
     ("column", "fault", "size"),
     [(SCALE, "scale", 0.02), (DELAY, "delay_s", -0.04), (PLAY, "play_mm", 1.0), (PLAY, "play_mm", 0.4)],
 )
-def test_a_true_cause_is_the_same_in_every_part(column: int, fault: str, size: float, seed: int) -> None:
+def test_a_true_cause_has_the_same_size_in_every_part(
+    column: int, fault: str, size: float, seed: int
+) -> None:
     found = agreed(read(**{fault: size}), column, seed)  # type: ignore[arg-type]
     assert found
     assert all(found)
 
 
 @pytest.mark.parametrize(("column", "fault", "size"), [(DELAY, "delay_s", 0.0005), (PLAY, "play_mm", 0.02)])
-def test_parts_that_tell_too_little_confirm_nothing(column: int, fault: str, size: float) -> None:
+def test_parts_with_too_little_information_confirm_nothing(column: int, fault: str, size: float) -> None:
     assert agreed(read(**{fault: size}), column) == []  # type: ignore[arg-type]
 
 
-def test_a_slip_where_the_probe_turns_is_not_confirmed_as_play() -> None:
+def test_a_slip_where_the_probe_turns_back_is_not_confirmed_as_play() -> None:
     assert True not in agreed(read(slips=((TURN_S, 1.0),)), PLAY)
 
 
-def test_a_wheel_that_wears_halfway_is_not_confirmed_as_a_scale() -> None:
+def test_a_scale_that_changes_halfway_is_not_confirmed_as_a_scale() -> None:
     worn = read(scale=0.03)
     sound = read()
     reading = np.where(worn.time_s < 4, worn.distance_mm, 0.0)
@@ -64,8 +69,8 @@ def test_a_clock_that_jumps_is_not_confirmed_as_a_delay() -> None:
     assert True not in agreed(Encoder(late.time_s, jumped), DELAY)
 
 
-def test_the_probe_turns_between_pictures_as_far_as_the_reading_went() -> None:
-    # One picture in 0.2 s sees the turn to a few mm only.
+def test_the_turning_point_between_pictures_is_taken_from_the_reading() -> None:
+    # One picture in 0.2 s shows the turning point only to a few mm.
     sight = seen(np.random.default_rng(3), every=6)
     encoder = read(play_mm=1.0)
     fine = way(encoder.time_s)
@@ -77,14 +82,14 @@ def test_the_probe_turns_between_pictures_as_far_as_the_reading_went() -> None:
 
 
 @pytest.mark.parametrize("gain_mm", [-3.0, 0.8])
-def test_a_slip_is_a_jump_of_the_reading_alone(gain_mm: float) -> None:
+def test_a_slip_is_a_jump_of_the_reading_only(gain_mm: float) -> None:
     encoder = read(slips=((2.303, gain_mm),))
     fit = with_events(seen(np.random.default_rng(5)), encoder)
     (step,) = steps_found(fit, encoder)
     assert [a.confirmation.agrees for a in step.agreements] == [True]
 
 
-def test_a_step_without_a_jump_of_its_size_is_no_confirmed_slip() -> None:
+def test_a_step_without_a_jump_of_its_size_is_not_confirmed_as_a_slip() -> None:
     encoder = read(slips=((2.303, 1.0),))
     at = int(np.searchsorted(encoder.time_s, 2.303)) - 1
     jump, sigma = reading_jump(encoder, at)
@@ -108,19 +113,19 @@ def halves(places: Float) -> list[bool]:
     return [a.confirmation.agrees for a in swing_agreements(TIME_S, places + noise, LIT, 5.3)]
 
 
-def test_a_vibration_goes_on_in_step_in_both_halves_and_both_kinds_of_pictures() -> None:
+def test_a_vibration_has_the_same_phase_in_both_halves_and_both_kinds_of_pictures() -> None:
     assert halves(swing(5.3)) == [True, True]
 
 
-def test_a_vibration_that_comes_late_is_not_confirmed() -> None:
+def test_a_vibration_that_begins_late_is_not_confirmed() -> None:
     assert True not in halves(np.where(EARLY[:, None], 0.0, swing(5.3)))
 
 
-def test_a_vibration_that_loses_its_step_is_not_confirmed() -> None:
+def test_a_vibration_that_changes_its_phase_is_not_confirmed() -> None:
     assert halves(np.where(EARLY[:, None], swing(5.3), -swing(5.3))) == [False]
 
 
-def test_pictures_that_do_not_place_the_camera_do_not_make_a_swing_smaller() -> None:
+def test_pictures_with_an_unknown_camera_position_do_not_reduce_a_swing() -> None:
     shown = np.ones(len(TIME_S), bool)
     shown[40:50] = False
     carried = np.where(shown[:, None], swing(5.3), 0.0)

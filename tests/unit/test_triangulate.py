@@ -1,4 +1,4 @@
-"""Triangulation: exact, its noise and its derivatives by the instrument true."""
+"""Triangulation: points are exact; their noise and their derivatives by the instrument are right."""
 
 from dataclasses import replace
 
@@ -36,7 +36,7 @@ def samples(radius, sigma=0.1):
 
 
 def rings(frames=20):
-    """Rings of every size, off the middle."""
+    """Return rings of several sizes, off the middle."""
     random = np.random.default_rng(0)
     size, off, phase = (random.uniform(*span, (frames, 1)) for span in ((280, 430), (0, 10), (-3, 3)))
     return samples(size + off * np.cos(AZIMUTH - phase))
@@ -61,7 +61,7 @@ def test_untilted_sheet_is_a_plane_parallel_to_the_image():
     assert np.abs(flat(ray) - triangulated(rings()).xyz_c).max() > 0.1
 
 
-def test_noise_direction_is_one_sigma_of_radius():
+def test_the_stated_noise_vector_is_one_sigma_of_radius():
     ring = rings()
     points = triangulated(ring)
     moved = [triangulated(replace(ring, radius_px=ring.radius_px + np.float32(s))).xyz_c for s in (-0.5, 0.5)]
@@ -69,7 +69,7 @@ def test_noise_direction_is_one_sigma_of_radius():
     assert np.allclose(points.noise_direction, 0.1 * slope, rtol=0.01, atol=1e-4)
 
 
-def test_calibration_covariance_is_that_of_drawn_probes():
+def test_the_calibration_covariance_agrees_with_drawn_probes():
     ring = samples(np.full((1, AZIMUTH.size), 400.0))
     random = np.random.default_rng(1)
     by_parameters = PROBE.triangulate_jacobian(ring.pixels()[0])[1]
@@ -110,7 +110,7 @@ def test_counts_are_reported():
     assert told["median point noise"] == pytest.approx(0.03, rel=0.5)
 
 
-def test_the_stage_is_wired_by_type():
+def test_the_stage_is_connected_by_type():
     assert list(TRIANGULATE.inputs()) == ["rings", "probe"]
 
 
@@ -118,7 +118,10 @@ WIDE = np.linspace(-np.pi, np.pi, 1440, endpoint=False)
 
 
 def ring_of(*bumps, frames=3):
-    """A ring 25 mm in radius about a point 6 mm off the axis; ``bumps`` are (sector, width, departure)."""
+    """Return a ring of radius 25 mm about a point 6 mm off the axis.
+
+    ``bumps`` are (sector, width, departure).
+    """
     rho = np.tile(6 * np.cos(WIDE) + np.sqrt(25**2 - (6 * np.sin(WIDE)) ** 2), (frames, 1))
     for at, width, departure in bumps:
         rho[:, np.arange(at, at + width) % 1440] *= 1 + departure
@@ -139,14 +142,14 @@ def ring_of(*bumps, frames=3):
     ],
     ids=["edge", "narrow", "seam", "inward", "pit", "branch", "opening", "step"],
 )
-def test_only_what_is_narrow_and_far_off_is_rejected(bump, rejected):
-    """In every ring alike, as edges of texture are: the ring before bears nothing out."""
+def test_only_narrow_samples_far_off_are_rejected(bump, rejected):
+    """They are in every ring, like edges of texture: the previous ring does not confirm them."""
     off = off_the_ring(ring_of(bump).astype(np.float32), 0.2)
     assert off.sum(1).tolist() == [rejected] * 3
     assert not off_the_ring(ring_of(bump).astype(np.float32), 100).any()
 
 
-def test_lone_samples_are_held_against_the_nearest_there_are():
+def test_single_samples_are_compared_with_the_nearest_ones():
     rho = ring_of((593, 1, 2.4), (640, 1, 0.05)).astype(np.float32)
     rho[:, 560:590] = rho[:, 600:636] = np.nan
     rho[1] = np.nan
@@ -155,7 +158,7 @@ def test_lone_samples_are_held_against_the_nearest_there_are():
     assert np.argwhere(off).tolist() == [[0, 593], [2, 593]]
 
 
-def test_a_sample_far_off_is_counted_and_nothing_of_it_is_left():
+def test_a_sample_far_off_is_counted_and_all_its_values_are_removed():
     ring, told = rings(3), {}
     good = triangulated(ring)
     context = replace(quiet_context(), report=lambda name, value, unit="": told.update({name: value}))
@@ -178,7 +181,7 @@ WATER_MM = 9.0
 
 
 def half_filled(rings, above_water=0):
-    """Points (rings, A, 3) of a half-filled pipe; the first ``above_water`` rings see no water."""
+    """Return points (rings, A, 3) of a half-filled pipe; the first ``above_water`` rings see no water."""
     wet = seen_above_water(WIDE, 50.0, -2.0, WATER_MM)
     dry = seen_above_water(WIDE, 50.0, -2.0, 99.0)
     xy = np.stack([dry if k < above_water else wet for k in range(rings)])
@@ -186,7 +189,7 @@ def half_filled(rings, above_water=0):
     return np.concatenate([xy, np.full((*xy.shape[:2], 1), 23.0)], -1).astype(np.float32)
 
 
-def test_what_water_mirrors_is_not_wall():
+def test_the_reflection_in_water_is_not_wall():
     points = half_filled(6)
     mirrored = outside_the_pipe(points)
     below = points[..., 1] > WATER_MM
@@ -197,7 +200,7 @@ def test_what_water_mirrors_is_not_wall():
     assert off[kept].max() < 1
 
 
-def test_a_ring_whose_circle_the_mirrored_line_draws_is_no_wall():
+def test_a_ring_whose_fitted_circle_follows_the_reflected_line_is_rejected():
     points = half_filled(6)
     points[2, :, :2] *= 1.4
     assert outside_the_pipe(points)[2].all()
@@ -212,5 +215,5 @@ def test_a_ring_whose_circle_the_mirrored_line_draws_is_no_wall():
     ],
     ids=["a chamber on part of the way", "oval by a fifth", "filled with mud to 30 mm"],
 )
-def test_wall_that_is_not_round_stays_wall(points):
+def test_wall_that_is_not_round_is_kept(points):
     assert not outside_the_pipe(points).any()

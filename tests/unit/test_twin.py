@@ -1,4 +1,4 @@
-"""The twin's parts on made pictures: where rays meet the wall, noise, dirt, exposure, and what is written."""
+"""Parts of the twin on synthetic pictures: rays and wall, noise, dirt, exposure, and the written results."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -32,7 +32,7 @@ def _rays(count=200):
 
 
 @pytest.mark.parametrize("bump_mm", [0.0, 1.5])
-def test_rays_meet_the_wall_where_it_is(bump_mm):
+def test_rays_meet_the_wall_at_its_place(bump_mm):
     T_pc = np.eye(4)
     T_pc[:3, 3] = 2.0, -1.0, 80.0
     surface, rays = plain_bore(bump_mm=bump_mm), _rays()
@@ -46,7 +46,7 @@ def test_rays_meet_the_wall_where_it_is(bump_mm):
     np.testing.assert_allclose(np.cross(seen.xyz_c, rays), 0, atol=1e-6)
 
 
-def test_a_ray_that_is_not_there_meets_nothing():
+def test_an_invalid_ray_meets_nothing():
     rays = _rays(3)
     rays[1] = np.nan
     np.testing.assert_array_equal(wall_seen(plain_bore(), np.eye(4), rays).seen, [True, False, True])
@@ -64,7 +64,10 @@ def _level():
 
 
 def _samples(change, frames=8, still=False):
-    """Blocks of a camera that moves by two blocks a frame; ``change`` of frame, row, column, wall row."""
+    """Blocks of a camera that moves by two blocks a frame.
+
+    ``change`` is a function of frame, row, column, wall row.
+    """
     random = np.random.default_rng(6)
     frame, row, column = (a.ravel() for a in np.mgrid[0:frames, 0:40, 0:60])
     along = row + (0 if still else 2 * frame)
@@ -79,7 +82,7 @@ def _near(a, b, c, d):
     return 0.2 * (np.hypot(a - b, c - d) < 2.5)
 
 
-def test_what_stays_in_the_image_on_the_wall_and_in_rows_is_told_apart():
+def test_errors_fixed_to_image_wall_and_rows_are_distinguished():
     place = (ImagePlace(20.5 * BLOCK_PX, 20.5 * BLOCK_PX, 16.0, 0.2, 0.01, 0.0),)
     on_window = _samples(lambda f, r, c, s: _near(r, 20, c, 20))
     assert in_image(on_window, place) == ("image",)
@@ -94,8 +97,8 @@ def test_what_stays_in_the_image_on_the_wall_and_in_rows_is_told_apart():
     assert (bands.name, bands.fixed_to) == ("banding", "rows")
 
 
-def test_the_size_of_bands_holds_no_noise_of_the_rows():
-    """Bands of .071 were told as .076 ± .0005: what the wall's photo errs by in a row counted as bands."""
+def test_the_size_of_bands_does_not_include_noise_of_the_rows():
+    """Bands of .071 were .076 ± .0005: errors of the wall's photo within a row counted as bands."""
     noise = np.repeat(0.08 * np.random.default_rng(8).standard_normal((8, 40, 30)), 2, 2).ravel()
     bands = _samples(lambda f, r, c, s: 0.03 * np.sqrt(2) * np.sin(r / 3 + 2.1 * f) + noise)
     (found,) = unnamed(bands, plain_bore(), 0.5, 1.1)
@@ -104,26 +107,26 @@ def test_the_size_of_bands_holds_no_noise_of_the_rows():
     assert abs(size.value - 0.03) < 3 * size.sd < 0.004
 
 
-def test_a_drop_whose_fragments_change_from_frame_to_frame_is_not_fixed_to_rows():
+def test_a_drop_whose_appearance_varies_from_frame_to_frame_is_not_fixed_to_rows():
     place = (ImagePlace(20.5 * BLOCK_PX, 20.5 * BLOCK_PX, 16.0, 0.2, 0.01, 0.0),)
     fragments = _samples(lambda f, r, c, s: _near(r, 20, c, 20) * np.where(f % 2, 1, -1))
     assert in_image(fragments, place) == ("",)
 
 
-def test_what_stands_still_cannot_be_told_apart():
+def test_without_motion_image_and_wall_cannot_be_distinguished():
     place = (ImagePlace(20.5 * BLOCK_PX, 20.5 * BLOCK_PX, 16.0, 0.2, 0.01, 0.0),)
     still = _samples(lambda f, r, c, s: _near(r, 20, c, 20), still=True)
     assert in_image(still, place) == ("image or wall",)
 
 
-def test_noise_is_fixed_to_nothing():
+def test_noise_is_fixed_neither_to_image_nor_to_wall():
     place = (ImagePlace(20.5 * BLOCK_PX, 20.5 * BLOCK_PX, 16.0, 0.2, 0.01, 0.0),)
     noise = _samples(lambda f, r, c, s: 0.0)
     assert unnamed(noise, plain_bore(), 0.5, 1.1) == ()
     assert in_image(noise, place) == ("",)
 
 
-def test_exposure_and_blocks_are_relative_to_the_twin():
+def test_exposure_and_blocks_are_relative_to_the_rendered_frame():
     level, random = _level(), np.random.default_rng(1)
     recorded = (1.1 * level + 2 * random.standard_normal(level.shape)).astype(np.float32)
     assert exposure_of(recorded, _frame(level)) == pytest.approx(np.log(1.1), abs=1e-3)
@@ -132,7 +135,7 @@ def test_exposure_and_blocks_are_relative_to_the_twin():
 
 
 def test_pixels_that_a_codec_leaves_above_full_scale_count_as_clipped():
-    """Frames rendered again to judge names had counted what it scatters there as light."""
+    """Frames rendered again to judge names counted what the codec scatters there as light."""
     one = Figure(1.0, 0.0)
     camera = CameraNoise(Figure(16.0, 0.0), 235.0, one, one, one, one)
     seen = camera.above_black(np.array([[16, 120, 235, 241]], np.uint8))
@@ -153,7 +156,7 @@ def test_chi_square_is_one_for_noise_and_more_for_a_difference():
     assert comparison.psnr_db(False) == pytest.approx(20 * np.log10(255 / 2), abs=0.1)
 
 
-def test_the_edge_is_left_out_and_the_dark_where_its_noise_is_cut_off():
+def test_the_edge_is_left_out_and_so_is_the_dark_where_its_noise_is_cut_off():
     level = np.zeros((40, 50), np.float32)
     above = np.abs(2 * np.random.default_rng(2).standard_normal(level.shape)).astype(np.float32)
     above[0, :5] = 30.0
@@ -177,8 +180,8 @@ def test_light_in_the_dark_is_counted():
 
 
 @pytest.mark.parametrize(("noise", "silent"), [(2.0, False), (0.0, True)])
-def test_where_dark_pixels_are_still_faint_light_is_said_to_be_lost(noise, silent):
-    """The half grey level that a wall throws back of the line was looked for, and nothing said of it."""
+def test_where_dark_pixels_are_clipped_the_loss_of_faint_light_is_reported(noise, silent):
+    """Reflected light of the line of half a grey level was searched, and the loss was not mentioned."""
     above = np.rint(noise * np.random.default_rng(2).standard_normal((40, 50))).astype(np.float32)
     comparison, frame = Comparison(), _frame(np.zeros_like(above), Region.DARK)
     comparison.add(7, Illumination.LASER, above, frame, frame, NOISE)
@@ -187,7 +190,7 @@ def test_where_dark_pixels_are_still_faint_light_is_said_to_be_lost(noise, silen
     assert any("rounded away" in said for said in cannot_tell(state, comparison.silent)) == silent
 
 
-def test_clipping_is_counted_and_a_wide_line_held_against_a_lens_in_focus():
+def test_clipping_is_counted_and_a_wide_line_is_compared_with_a_focused_lens():
     rings = SimpleNamespace(validity=np.array([RingValidity.SATURATED] * 2 + [RingValidity.VALID] * 8))
     line, wall = clipped(rings, 0.0, 0.3)
     assert (line.fixed_to, line.parameters[0].value) == ("line", 0.2)
@@ -203,7 +206,7 @@ def test_clipping_is_counted_and_a_wide_line_held_against_a_lens_in_focus():
         assert len(_not_sharp(line_light, whole)) == told
 
 
-def test_a_line_that_is_clipped_tells_nothing_of_the_laser_and_that_is_said():
+def test_a_clipped_line_shows_nothing_of_the_laser_and_this_is_reported():
     cells = SimpleNamespace(cells=lambda: "some")
     for share, seen in ((0.1, "some"), (0.8, None)):
         state = PhotometricState(
@@ -213,7 +216,7 @@ def test_a_line_that_is_clipped_tells_nothing_of_the_laser_and_that_is_said():
         assert any("80 %" in said for said in cannot_tell(state)) == (seen is None)
 
 
-def test_a_photo_that_holds_the_black_level_tells_no_response():
+def test_a_photo_that_contains_the_black_level_shows_no_response():
     ramp = np.arange(100, dtype=np.uint8).reshape(10, 10).repeat(4, 0).repeat(4, 1)[..., None].repeat(3, 2)
     assert black_of_photo([(0, ramp), (1, None)]) == 4.5, "the median of 0 to 9, the darkest tenth"
     assert black_of_photo([(0, ramp), (1, ramp + 9), (2, ramp + 8)]) == 12.5
@@ -223,14 +226,14 @@ def test_a_photo_that_holds_the_black_level_tells_no_response():
     assert not replace(state, photo_black=0.4).black_in_photo
 
 
-def test_a_black_level_that_no_frame_tells_may_be_in_the_photo():
+def test_a_black_level_that_no_frame_shows_may_be_in_the_photo():
     black = black_of_photo([(0, None)])
     state = PhotometricState(None, None, None, *(np.zeros(1) for _ in range(5)), photo_black=black)
     assert state.black_in_photo
     assert any("black level" in said and "is unknown" in said for said in cannot_tell(state))
 
 
-def test_a_line_clips_where_its_strongest_channel_does_whatever_its_grey():
+def test_a_line_clips_where_its_strongest_channel_does_whatever_its_grey_level():
     row = column = np.arange(40)
     sight = SimpleNamespace(row=row, column=column, offset_px=np.where(row < 20, 0.0, 9.0))
     scene = SimpleNamespace(pose=lambda frame: None, line=lambda pose: sight)
@@ -240,7 +243,7 @@ def test_a_line_clips_where_its_strongest_channel_does_whatever_its_grey():
     assert clipped_line(scene, []) == 0.0
 
 
-def test_what_nobody_named_is_a_map_only_where_frames_in_between_fit_better():
+def test_an_unnamed_map_is_reported_only_if_it_improves_other_frames():
     uneven = _samples(lambda f, r, c, s: 0.03 * np.sin(r / 4) * np.cos(c / 5))
     fall, figures = left_over(uneven)
     assert fall > 0
@@ -249,7 +252,7 @@ def test_what_nobody_named_is_a_map_only_where_frames_in_between_fit_better():
     assert left_over(_samples(lambda f, r, c, s: 0.03 * np.sin(r / 4 + 2.1 * f))) == (0.0, ())
 
 
-def test_what_the_window_takes_away_is_no_map_of_its_own():
+def test_light_lost_at_the_window_is_not_reported_again_as_a_map():
     gain = np.ones((40 * BLOCK_PX, 60 * BLOCK_PX), np.float32)
     gain[: 20 * BLOCK_PX] = 0.5
     dark = _samples(lambda f, r, c, s: np.where(r < 20, -0.5, 0.0))
@@ -260,7 +263,7 @@ def test_what_the_window_takes_away_is_no_map_of_its_own():
     assert dark.seen_through(None) is dark
 
 
-def test_clipped_wall_is_told_behind_a_codec_and_bright_wall_is_none():
+def test_clipped_wall_is_recognised_behind_a_codec_and_bright_wall_is_not():
     random = np.random.default_rng(4)
     light = np.clip(120 + 60 * random.standard_normal((400, 300)), 0, 400)
     exact = np.minimum(light, 219).astype(np.float32) + 16

@@ -1,4 +1,7 @@
-"""Causes over time and along the line, on made sums of frames: named where they are, and nothing else."""
+"""Causes over time and along the line, on synthetic sums of frames.
+
+Named where they act, and nothing else.
+"""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -21,7 +24,7 @@ AZIMUTH_DEG = np.degrees(sector_azimuth_rad())
 
 
 def _cells(change, seed=0, of_photo=0.01):
-    """Cells with noise of 1 σ per pixel, an error of the photo in each cell, and a logarithmic change."""
+    """Return cells with noise of 1 σ per pixel, a photo error in each cell, and a logarithmic change."""
     random = np.random.default_rng(seed)
     pixels, level = 500.0, 20.0
     photo = of_photo * random.standard_normal((FRAMES, SECTORS))
@@ -52,7 +55,7 @@ def test_nothing_is_found_where_nothing_changes():
     ("lit", "line", "name"),
     [(0.2, 0.2, "exposure_step"), (0.2, 0.0, "lamp_step"), (0.0, -0.3, "laser_step")],
 )
-def test_a_step_belongs_to_the_exposure_or_to_one_light(lit, line, name):
+def test_a_step_is_attributed_to_the_exposure_or_to_one_light(lit, line, name):
     (step,) = _found(lit * _step(8), line * _step(8))
     assert (step.name, step.fixed_to) == (name, "time")
     assert step.place[0].value == 75
@@ -61,41 +64,41 @@ def test_a_step_belongs_to_the_exposure_or_to_one_light(lit, line, name):
 
 
 @pytest.mark.parametrize("azimuth_deg", [-170, -60, 10, 80])
-def test_wall_that_is_darker_on_one_side_of_the_last_frames_is_no_step_of_the_laser(azimuth_deg):
-    """Corrosion that two frames at the end saw on one side had been a laser that is 7 % darker."""
+def test_darker_wall_on_one_side_of_the_last_frames_is_not_a_step_of_the_laser(azimuth_deg):
+    """Corrosion on one side that two frames at the end saw was reported as a laser 7 % darker."""
     away = np.abs((AZIMUTH_DEG - azimuth_deg + 180) % 360 - 180)
     wall = -0.17 * (away < 80) * (np.arange(FRAMES) >= FRAMES - 2)[:, None]
     assert not any("step" in m.name for seed in range(4) for m in _found(0.0, wall, seed))
 
 
 def test_frames_without_any_difference_have_no_cause():
-    """The step's own size, 0, was a divisor."""
+    """The size of the step, 0, was a divisor."""
     same = np.full((FRAMES, SECTORS), 500.0)
     assert causes(Cells(NUMBER, 2 * same, same, same, same, same), None, Lighting(), RING) == ()
 
 
 def _of_line(change, predicted=1.0, hidden=0):
-    """Names of what is found in the line, some sectors hidden, beside lit frames without a change."""
+    """Return the names found in the line, with some sectors hidden, beside lit frames without a change."""
     cells = _cells(np.zeros((FRAMES, SECTORS)) + change, 1000, of_photo=0.05)
     pixels = np.where(np.arange(SECTORS) < hidden, 30.0, cells.pixels)
     cells = replace(cells, pixels=pixels, predicted=cells.predicted * predicted)
     return [m.name for m in causes(_cells(np.zeros((FRAMES, SECTORS))), cells, Lighting(), RING)]
 
 
-def test_a_step_is_told_though_half_of_the_picture_is_not_seen():
-    """A half without usable sectors did not step, and so no step was told."""
+def test_a_step_is_found_though_half_of_the_picture_is_not_seen():
+    """A half without usable sectors did not step, so that no step was reported."""
     assert _of_line(-0.3 * _step(8), hidden=18) == ["laser_step"]
     assert _of_line(-0.3 * _step(8), hidden=22) == ["laser_step or other_wall"]
 
 
-def test_wall_that_is_darker_on_two_thirds_of_the_picture_is_no_step_of_the_laser():
-    """It had been one in 2 of 3 cases: the other third was compared with the mean, not with its opposite."""
+def test_darker_wall_on_two_thirds_of_the_picture_is_not_a_step_of_the_laser():
+    """In 2 of 3 cases it was one: the other third was compared with the mean, not with its opposite."""
     wall = -0.3 * (np.abs(AZIMUTH_DEG - 20) < 120) * _step(FRAMES - 3)
     assert not any("step" in m.name for seed in range(3) for m in _found(0.0, wall, seed))
 
 
 def test_a_step_of_the_laser_where_the_photo_steps_too_may_be_other_wall():
-    """Wall that is darker all round from a frame on was a laser that loses power, with certainty."""
+    """Wall darker all round from a frame on was reported with certainty as a laser that loses power."""
     random = np.random.default_rng(2)
     texture = np.exp(
         0.03 * random.standard_normal((FRAMES, 1)) + 0.1 * random.standard_normal((FRAMES, SECTORS))
@@ -105,7 +108,7 @@ def test_a_step_of_the_laser_where_the_photo_steps_too_may_be_other_wall():
         assert _of_line(-0.3 * _step(12), texture * np.exp(wall * _step(12))) == ["laser_step or other_wall"]
 
 
-def test_a_step_beside_an_error_that_changes_slowly_is_as_large_as_its_sigma_says():
+def test_the_sigma_of_a_step_is_right_beside_an_error_that_changes_slowly():
     inside = 0
     for phase in np.linspace(0, 2 * np.pi, 12, endpoint=False):
         slow = 0.003 * np.sin(np.arange(FRAMES) / 2.5 + phase)[:, None]
@@ -115,7 +118,7 @@ def test_a_step_beside_an_error_that_changes_slowly_is_as_large_as_its_sigma_say
     assert inside >= 11
 
 
-def test_an_led_that_fails_is_told_from_a_step():
+def test_an_led_that_fails_is_distinguished_from_a_step():
     away = np.radians(AZIMUTH_DEG - 60)
     share = (1 + 0.3 * np.cos(away) + 0.05 * np.cos(2 * away)) / 8
     (led,) = _found(np.log1p(-share) * _step(10))
@@ -126,7 +129,7 @@ def test_an_led_that_fails_is_told_from_a_step():
 
 
 @pytest.mark.parametrize(("lost", "half_deg", "first"), [(0.3, 60, 6), (0.6, 100, 6), (0.9, 60, 9)])
-def test_a_side_that_darkens_otherwise_than_an_led_makes_it_has_no_name(lost, half_deg, first):
+def test_a_side_that_darkens_in_another_way_than_by_an_led_has_no_name(lost, half_deg, first):
     """Such sides were called flicker, a step of all lamps, or an LED that lost 204 % of its light."""
     away = np.abs((AZIMUTH_DEG - 4 + 180) % 360 - 180)
     lobe = np.cos(np.radians(np.minimum(away * 90 / half_deg, 90))) ** 2
@@ -139,15 +142,15 @@ def test_a_side_that_darkens_otherwise_than_an_led_makes_it_has_no_name(lost, ha
 
 @pytest.mark.parametrize("azimuth_deg", [-170, 4, 60])
 @pytest.mark.parametrize("lost", [0.5, 0.9])
-def test_a_side_that_gets_nearly_dark_is_told_as_well_as_one_that_darkens(lost, azimuth_deg):
-    """An LED that loses five times its light fitted it about as well; no law was then told at all."""
+def test_a_side_that_gets_nearly_dark_is_reported_like_one_that_darkens(lost, azimuth_deg):
+    """An LED that loses five times its light fitted about as well; then no law at all was reported."""
     side = np.maximum(np.cos(np.radians(AZIMUTH_DEG - azimuth_deg)), 0) ** 2
     (found,) = _found(np.log1p(-lost * side) * _step(9))
     assert (found.name, found.fixed_to) == ("", "time")
     assert found.parameters[0].value == pytest.approx(lost, abs=0.1)
 
 
-def test_few_frames_call_an_led_that_fails_either_that_or_flicker(monkeypatch):
+def test_in_few_frames_a_failing_led_may_be_that_or_flicker(monkeypatch):
     monkeypatch.setattr("tests.unit.test_twin_causes.FRAMES", 6)
     monkeypatch.setattr("tests.unit.test_twin_causes.NUMBER", NUMBER[:6])
     share = (1 + 0.3 * np.cos(np.radians(AZIMUTH_DEG - 60))) / 8
@@ -160,7 +163,7 @@ def test_few_frames_call_an_led_that_fails_either_that_or_flicker(monkeypatch):
     assert flicker.name == "flicker"
 
 
-def test_a_dim_sector_is_found_where_it_is():
+def test_a_dim_sector_is_found_at_its_place():
     away = np.abs(AZIMUTH_DEG - 45)
     dim = np.log1p(-0.6 / (1 + np.exp((away - 20) / 2)))
     (sector,) = _found(line=dim[None])
@@ -170,7 +173,7 @@ def test_a_dim_sector_is_found_where_it_is():
     assert sector.parameters[0].value == pytest.approx(0.6, abs=0.1)
 
 
-def test_flicker_of_one_light_is_told():
+def test_flicker_of_one_light_is_found():
     each = 0.04 * np.random.default_rng(2).standard_normal(FRAMES)[:, None]
     (flicker,) = _found(each)
     assert flicker.name == "flicker"
@@ -179,13 +182,13 @@ def test_flicker_of_one_light_is_told():
     assert laser.name == "laser_flicker"
 
 
-def test_welds_that_a_few_frames_see_are_no_flicker():
+def test_welds_seen_by_a_few_frames_are_not_flicker():
     random, few = np.random.default_rng(2), np.zeros(FRAMES)
     few[[4, 5, FRAMES // 2, FRAMES // 2 + 1]] = 0.2, 0.15, -0.25, -0.2
     assert not _found(0.0, (few + 0.004 * random.standard_normal(FRAMES))[:, None])
 
 
-def test_a_change_of_single_sectors_is_no_flicker():
+def test_a_change_of_single_sectors_is_not_flicker():
     random = np.random.default_rng(3)
     assert not _found(0.04 * random.standard_normal((FRAMES, SECTORS)))
 
@@ -195,7 +198,7 @@ def test_sectors_begin_at_minus_pi():
     np.testing.assert_array_equal(sectors_of(phi), np.arange(SECTORS))
 
 
-def test_a_displaced_line_is_no_darker():
+def test_a_displaced_line_is_not_darker():
     across = np.arange(-12.0, 13.0)[:, None] + np.zeros(360)
     sector = np.tile(np.arange(360) // 10, (25, 1))
     level = (100 * np.exp(-0.5 * across**2)).astype(np.float32)
@@ -209,8 +212,8 @@ def test_a_displaced_line_is_no_darker():
     np.testing.assert_allclose(taken.cells().log_ratio, np.log(0.8), atol=1e-3)
 
 
-def test_a_dim_sector_is_as_deep_and_wide_as_it_is_though_the_line_was_rendered_with_it():
-    """One of .8 over 20° was .988 ± .085 over 10°: its twin's power falls between the sectors' middles."""
+def test_a_dim_sector_has_the_right_depth_and_width_though_the_rendered_line_contains_it():
+    """One of .8 over 20° was .988 ± .085 over 10°: the rendered power falls between the sectors' middles."""
     degree = np.arange(-180.0, 180.0, 0.5) + 0.25
     sector = np.tile((degree + 180).astype(int) // 10, (3, 1))
     left = np.where(np.abs(degree - 60) < 10, 0.2, 1.0)

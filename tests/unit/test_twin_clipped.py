@@ -1,4 +1,4 @@
-"""Pixels of which one colour alone is clipped: told by colour pictures, and kept out of what is free."""
+"""Pixels in which only one colour is clipped: recognised in colour pictures, and excluded."""
 
 from types import SimpleNamespace
 
@@ -11,7 +11,7 @@ from stages.twin.sums import Sums
 
 
 def test_a_green_line_clips_though_its_grey_does_not():
-    """Its grey stays below 160, so that nothing had been known of what leaks from it."""
+    """Its grey level stays below 160, so that its leaking light was not recognised."""
     colour = np.full((6, 8, 3), 20, np.uint8)
     colour[2:4, :, 1] = 255
     clipped = clipped_pixels([(3, colour), (4, None)])

@@ -1,4 +1,7 @@
-"""An LED that is dim throughout, though the wall's photo was made in its light: told by wall seen twice."""
+"""An LED that is dim during the whole run, so that the wall's photo contains it.
+
+Found from wall seen twice.
+"""
 
 from types import SimpleNamespace
 
@@ -27,7 +30,10 @@ AT_DEG = 67.5
 
 
 def _samples(light):
-    """Blocks of a probe that goes on by 4 mm a frame; the photo holds ``light`` of angle and azimuth."""
+    """Return blocks of a probe that moves on by 4 mm a frame.
+
+    The photo contains ``light`` of angle and azimuth.
+    """
     random, (theta, phi) = np.random.default_rng(3), (a[4::8, 4::8] for a in POLAR[:2])
     seen, cell_mm = (theta > 0.5) & (theta < 1.5), 2 * np.pi * RADIUS_MM / WALL_COLUMNS
     row, column = np.nonzero(seen)
@@ -67,8 +73,8 @@ def _dirt(theta, phi):
         lambda theta, phi: 0.05 * np.cos(3 * phi) * (theta - 1),
     ],
 )
-def test_what_looks_like_a_dim_led_is_said_and_never_named(light, monkeypatch):
-    """Dirt and an oval bore had borne the name, at chances of 1e-9 and with sizes off by six σ."""
+def test_what_looks_like_a_dim_led_is_reported_but_never_named(light, monkeypatch):
+    """Dirt and an oval bore got this name, at chances of 1e-9 and with sizes off by six σ."""
     monkeypatch.setattr(sums, "uneven_lamps", lambda *_: ())
     monkeypatch.setattr(sums, "separated_from_wall", lambda *_: ((), ()))
     frames = SimpleNamespace(whole=WholePictures(SCENE), _state=SimpleNamespace(lamp=None), _scene=SCENE)
@@ -77,14 +83,14 @@ def test_what_looks_like_a_dim_led_is_said_and_never_named(light, monkeypatch):
     assert all("Dirt or shade on the window" in one.statement and not one.parameters for one in untold)
 
 
-def test_where_an_led_may_be_dim_is_said():
+def test_the_place_of_a_possibly_dim_led_is_reported():
     (found,) = dead_led(_samples(_dim(1.0)), SCENE)
     where = float(found.statement.split("image azimuth ")[1].split("°")[0])
     assert where == pytest.approx(AT_DEG, abs=360 / LED_AZIMUTHS)
 
 
-def test_uneven_lamps_that_are_borne_out_are_told_beside_a_dim_led(monkeypatch):
-    """They and what the wall's photo holds had been thrown away."""
+def test_confirmed_uneven_lamps_are_reported_beside_a_dim_led(monkeypatch):
+    """They, and what the wall's photo contains of them, were dropped."""
     lamps, of_wall = (SimpleNamespace(mismatch=SimpleNamespace(names=("uneven_lamps",))) for _ in range(2))
     monkeypatch.setattr(sums, "uneven_lamps", lambda *_: ())
     monkeypatch.setattr(sums, "separated_from_wall", lambda *_: ((lamps,), (of_wall,)))
@@ -94,7 +100,7 @@ def test_uneven_lamps_that_are_borne_out_are_told_beside_a_dim_led(monkeypatch):
     assert untold[0] is of_wall
 
 
-def test_a_large_camera_has_no_more_blocks_fitted_and_all_views_of_their_wall(monkeypatch):
+def test_for_a_large_camera_no_more_blocks_are_fitted_with_all_views_of_their_wall(monkeypatch):
     monkeypatch.setattr("stages.twin.dead_led._MOST_BLOCKS", 3000)
     whole = _samples(_dim(1.0))
     few = _thinned(whole)
@@ -107,15 +113,15 @@ def test_a_large_camera_has_no_more_blocks_fitted_and_all_views_of_their_wall(mo
     "light",
     [
         lambda theta, phi: 0 * theta,
-        lambda theta, phi: 0.2 * np.cos(phi - 1) / theta,  # lamps that lean
-        lambda theta, phi: 0.1 * np.cos(2 * phi) / theta,  # a bore that is no circle
+        lambda theta, phi: 0.2 * np.cos(phi - 1) / theta,  # lamps that are inclined
+        lambda theta, phi: 0.1 * np.cos(2 * phi) / theta,  # a bore that is not round
         lambda theta, phi: -_dim(1.0)(theta, phi),  # an LED that is brighter
         _dim(0.1),
     ],
 )
-def test_what_is_no_dim_led_is_none(light):
+def test_other_errors_are_not_a_dim_led(light):
     assert dead_led(_samples(light), SCENE) == ()
 
 
-def test_few_frames_tell_nothing():
+def test_few_frames_give_no_result():
     assert dead_led(None, SCENE) == ()

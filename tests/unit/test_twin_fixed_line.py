@@ -1,4 +1,4 @@
-"""What moves the line at one place of the image is told by the rings, where lit frames show nothing."""
+"""Displacements of the line at one place of the image, found from rings where lit frames show nothing."""
 
 import numpy as np
 import pytest
@@ -21,7 +21,7 @@ def _fixed(*more, on_probe=True):
 
 
 def _rings(lost_deg=()):
-    """Rings of a sample a degree, most of which lost the line between two azimuths."""
+    """Return rings of one sample a degree, most of which lost the line between two azimuths."""
     psi = np.radians(np.arange(-180.0, 180.0))
     validity = np.full((10, 360), RingValidity.VALID, np.uint8)
     if lost_deg:
@@ -36,24 +36,24 @@ def _at(u, v, radius):
     return Mismatch("droplet", "intensity", "image", tuple(place), (), 0.0, 2.0, 1.0, "")
 
 
-def test_a_place_of_the_image_that_moves_the_line_is_told_without_a_name():
+def test_a_place_of_the_image_that_moves_the_line_is_reported_without_a_name():
     (found,) = on_line(_fixed(), _rings(), _RING, ())
     assert (found.name, found.channel, found.fixed_to) == ("", "line", "image")
     assert [p.value for p in found.place] == pytest.approx([400, 500, 20], abs=2)
-    # An eighth of the departure was said to be its σ, which nobody had measured.
+    # An eighth of the departure was stated as its σ, which nobody had measured.
     assert (found.parameters[0].value, found.parameters[0].sd) == (-0.8, 0.02)
     assert "-0.80 mm" in found.statement
 
 
-def test_a_groove_along_the_pipe_and_what_is_told_already_are_not():
+def test_a_groove_along_the_pipe_and_places_already_reported_are_not_reported():
     assert not on_line(None, _rings(), _RING, ())
     assert not on_line(_fixed(on_probe=False), _rings(), _RING, ())
     assert not on_line(_fixed(), _rings(), _RING, [_at(410.0, 490.0, 15.0)])
     assert on_line(_fixed(), _rings(), _RING, [_at(200.0, 300.0, 15.0)])
 
 
-def test_a_drop_amid_which_the_line_is_not_seen_is_one_place_from_rim_to_rim():
-    """A drop of 43 px was nothing at all: the line left the rings at both rims and was not found between."""
+def test_a_drop_in_which_the_line_is_not_seen_is_one_place_from_rim_to_rim():
+    """A drop of 43 px was not found: the line left the rings at both rims and was not found in between."""
     other = FixedPlace(np.radians(116.0), 0.04, 0.7, 0.02, 60.0, 0, 90, on_probe=True)
     (found,) = on_line(_fixed(other), _rings(lost_deg=(90.0, 116.0)), _RING, ())
     u, v, radius = (p.value for p in found.place)
@@ -64,7 +64,7 @@ def test_a_drop_amid_which_the_line_is_not_seen_is_one_place_from_rim_to_rim():
     assert len(on_line(_fixed(other), _rings(lost_deg=(-60.0, -40.0)), _RING, ())) == 2
 
 
-def test_wall_from_elsewhere_that_a_drop_shows_is_no_glint():
+def test_other_wall_seen_through_a_drop_is_not_a_glint():
     spots = SpotsOfFrames(Illumination.LED, _RING)
     for frame in range(8):
         spots.frame.append(frame)
@@ -77,7 +77,7 @@ def test_wall_from_elsewhere_that_a_drop_shows_is_no_glint():
 
 
 def test_a_displaced_line_remains_beside_a_sector_that_the_same_drop_dims():
-    """It was withdrawn as if its photo had made it, and with it the sign that something is on the window."""
+    """It was withdrawn as if its photo had caused it, and with it the evidence of something on the window."""
     bent = on_line(_fixed(), _rings(), _RING, ())
     place = (NamedFigure("azimuth_deg", 91.0, 1.0), NamedFigure("width_deg", 8.0, 2.0))
     sector = Mismatch("laser_sector or window_scatter", "line", "line", place, (), 0.0, 2.0, 1.0, "")

@@ -1,4 +1,4 @@
-"""The pixels' own offsets and gains, from frames of a wall that moves."""
+"""Offsets and gains of single pixels, from frames of a wall that moves."""
 
 import numpy as np
 import pytest
@@ -20,18 +20,18 @@ def _frames(dark, gain, wrong_photo=0.0, frames=6):
 
 
 @pytest.mark.parametrize(("dark", "gain"), [(0.0, 0.0), (3.0, 0.0), (0.0, 0.02), (2.0, 0.01)])
-def test_dark_signals_and_gains_are_told_apart_by_brightness(dark, gain):
+def test_offsets_and_gains_are_distinguished_by_brightness(dark, gain):
     found = fixed_pattern(list(_frames(dark, gain, wrong_photo=2.0)))
     assert found.dark.value == pytest.approx(dark, abs=max(0.25, 0.05 * dark))
     assert found.gain.value == pytest.approx(gain, abs=max(0.003, 0.05 * gain))
 
 
-def test_a_hot_pixel_is_no_pattern():
+def test_a_hot_pixel_is_not_a_pattern():
     frames = list(_frames(0.0, 0.0))
     for rest, _, _ in frames:
         rest[100, 100] = 200.0
     assert fixed_pattern(frames).dark.value < 0.3
 
 
-def test_few_frames_tell_no_pattern():
+def test_few_frames_show_no_pattern():
     assert fixed_pattern(list(_frames(1.0, 0.01, frames=2))) is None

@@ -1,4 +1,7 @@
-"""A gauge run's line held against instruments, on made pixels; what a diagnosis switches on."""
+"""A gauge run's line compared with instruments, on synthetic pixels.
+
+The effects that a diagnosis switches on.
+"""
 
 import json
 from dataclasses import replace
@@ -23,7 +26,7 @@ NOISE = 2.0
 
 
 def _line(white=np.inf):
-    """Return a line as a sensor of known noise sees it: its blocks differ in brightness and background."""
+    """Return a line seen by a sensor of known noise: its blocks differ in brightness and background."""
     random = np.random.default_rng(4)
     count = FRAMES * BLOCKS
     block = np.repeat(np.arange(count), PIXELS)
@@ -41,7 +44,7 @@ def _line(white=np.inf):
 
 
 @pytest.mark.parametrize("white", [np.inf, 110.0])
-def test_a_line_where_it_was_measured_leaves_noise_and_a_displaced_one_more(white):
+def test_a_line_at_its_measured_place_leaves_noise_and_a_displaced_one_more(white):
     line = _line(white)
     nowhere = np.zeros(FRAMES * BLOCKS)
     measured = line.chi2(nowhere)
@@ -52,7 +55,7 @@ def test_a_line_where_it_was_measured_leaves_noise_and_a_displaced_one_more(whit
     assert displaced[2] > 10 * measured.mean()
 
 
-def test_a_wrong_diagnosis_of_the_same_size_is_a_figure_of_the_report():
+def test_the_fit_of_a_wrong_diagnosis_of_the_same_size_is_in_the_report():
     frames = SimpleNamespace(frames=SimpleNamespace(frame=np.arange(FRAMES)))
     line = replace(_line(), recording=frames)
     nowhere, azimuth = np.zeros(FRAMES * BLOCKS), line.blocks.azimuth_rad
@@ -75,7 +78,7 @@ def test_a_wrong_answer_is_as_far_off_as_none(switch, other):
     assert the_other_way(switch).values == pytest.approx(other)
 
 
-def test_the_nearer_of_two_instruments_fits_better_and_no_difference_is_none():
+def test_the_nearer_of_two_instruments_fits_better_and_equal_ones_do_not_differ():
     line = _line()
     azimuth = line.blocks.azimuth_rad
     near, far = (line.chi2(size * np.cos(azimuth)) for size in (0.1, 0.4))
@@ -84,12 +87,12 @@ def test_the_nearer_of_two_instruments_fits_better_and_no_difference_is_none():
     assert sigmas(near - near) == 0
 
 
-def test_a_line_that_is_predicted_nowhere_is_left_unexplained():
+def test_a_line_without_any_prediction_is_unexplained():
     line = _line()
     assert line.chi2(np.full(FRAMES * BLOCKS, np.nan)).min() > 10
 
 
-def test_a_point_is_seen_where_the_viewing_ray_behind_glass_passes_through_it():
+def test_a_point_behind_glass_is_seen_where_the_viewing_ray_passes_through_it():
     model = KannalaBrandt((1600, 1200), (360.0, 360.0), (800.0, 600.0), (-0.011, 0.001, 0.0, 0.0))
     random = np.random.default_rng(2)
     azimuth = random.uniform(-3, 3, 40)
@@ -115,7 +118,7 @@ def _effect(name, probability=1.0, course=None, **sizes):
     return {"name": name, "probability": probability, "parameters": numbers, "course": course}
 
 
-def test_what_a_diagnosis_found_is_switched_on_with_its_size_and_course(tmp_path):
+def test_effects_of_a_diagnosis_are_switched_on_with_their_size_and_course(tmp_path):
     step = {"kind": "step", "time_s": {"value": 4.6, "sd": 0.1}, "probability": 1.0}
     tilt = _effect("laser_tilt", course=step, tilt_deg=0.35, direction_deg=25.0)
     unsure, unknown = _effect("laser_cone", 0.1, cone_deg=0.2), _effect("gremlins")
@@ -124,11 +127,11 @@ def test_what_a_diagnosis_found_is_switched_on_with_its_size_and_course(tmp_path
     assert [s.text for s in said.found] == ["laser_tilt~step=0.35@25.0/4.6s", "encoder_slip=3.0/4.0s"]
     assert [s.name for s in said.of_line] == ["laser_tilt"]
     assert len(said.inexpressible) == 2
-    assert said.by_chance == 1e-9, "the probability of a name is none of a mismatch by chance"
+    assert said.by_chance == 1e-9, "the probability of a name is not the chance of a mismatch"
 
 
-def test_an_exposure_is_left_to_who_can_tell_and_not_withdrawn(tmp_path):
-    """Poses are measured in the same late pictures: with them the line lies where it did."""
+def test_an_exposure_is_not_judged_by_the_line_and_not_withdrawn(tmp_path):
+    """Poses are measured in the same late pictures: with them the line is where it was."""
     folder = _diagnosis(tmp_path, [_effect("motion_blur", exposure_s=0.016)])
     assert switches_of(folder / "diagnosis.json").of_line == ()
     tried = try_diagnosis(folder, tmp_path / "gauge", SilentDisplay())
@@ -136,7 +139,7 @@ def test_an_exposure_is_left_to_who_can_tell_and_not_withdrawn(tmp_path):
     assert "cannot show motion blur" in tried.cannot_tell[0]
 
 
-def test_without_a_gauge_run_pictures_decide_nothing_and_that_is_said(tmp_path):
+def test_without_a_gauge_run_pictures_decide_nothing_and_this_is_reported(tmp_path):
     folder = _diagnosis(tmp_path, [_effect("laser_tilt", tilt_deg=0.3, direction_deg=0.0)])
     tried = try_diagnosis(folder, tmp_path / "gauge", SilentDisplay())
     assert tried.gauge is None
@@ -144,7 +147,7 @@ def test_without_a_gauge_run_pictures_decide_nothing_and_that_is_said(tmp_path):
     assert "no gauge run" in tried.cannot_tell[-1]
 
 
-def test_an_effect_whose_law_holds_its_course_is_not_given_a_second_one(tmp_path):
+def test_an_effect_whose_law_includes_its_course_gets_no_second_one(tmp_path):
     course = {"kind": "exponential", "time_s": {"value": 3.5, "sd": 0.1}}
     drift = _effect("baseline_drift", course=course, drift_mm=0.3, time_s=3.5)
     (switch,) = switches_of(_diagnosis(tmp_path, [drift]) / "diagnosis.json").of_line

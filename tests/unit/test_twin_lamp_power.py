@@ -1,4 +1,4 @@
-"""The power to which brightness follows the lamps' light, told by blocks of a probe that wanders."""
+"""The exponent of brightness over the lamps' light, estimated from blocks of a probe that moves sideways."""
 
 from types import SimpleNamespace
 
@@ -21,9 +21,10 @@ RING = Ring((96.0, 64.0), 40.0, 50.0, 20.0)
 
 
 def _samples(power, photo_wrong=0.0, wandering=0.12, slopes_err=0.0):
-    """Return blocks of a wall lit from a probe off the axis; the photo may hold the light's error, too.
+    """Return blocks of a wall lit from a probe off the axis; the photo may contain the light's error, too.
 
-    Slopes of the radius map may err: the light that is foretold then does, too, from block to block.
+    Slopes of the radius map may have errors; then the predicted light has errors that vary from block to
+    block.
     """
     random = np.random.default_rng(3)
     frame, row, column = (a.ravel() for a in np.mgrid[0:FRAMES, 0:16, 0:24])
@@ -34,7 +35,7 @@ def _samples(power, photo_wrong=0.0, wandering=0.12, slopes_err=0.0):
     along = row + 3 * frame
     log = (power - 1) * nearer + photo_wrong * np.sin(along) + 0.01 * random.standard_normal(len(frame))
     error = slopes_err * random.standard_normal(len(frame))
-    light, log = light + error, log - error  # the twin is as bright as the foretold light
+    light, log = light + error, log - error  # the twin is as bright as the predicted light
     return BlockSamples(
         np.expm1(log), 4 + 0 * log, 32 + 0 * log, frame, row, column, along, column, 0.0, 2.5,
         10 * np.arange(FRAMES), row / 40, light,
@@ -42,7 +43,7 @@ def _samples(power, photo_wrong=0.0, wandering=0.12, slopes_err=0.0):
 
 
 @pytest.mark.parametrize(("power", "name"), [(0.45, "response or interreflection"), (1.6, "response")])
-def test_a_response_is_told_by_how_the_wall_brightens_where_lamps_come_nearer(power, name):
+def test_a_response_is_found_where_the_wall_gets_brighter_as_lamps_come_nearer(power, name):
     (found,) = power_of_lamps(_samples(power, photo_wrong=0.05), RING)
     (size,) = found.mismatch.parameters
     assert found.mismatch.name == name
@@ -52,39 +53,39 @@ def test_a_response_is_told_by_how_the_wall_brightens_where_lamps_come_nearer(po
 
 
 @pytest.mark.parametrize("power", [1.0, 0.85])
-def test_light_as_the_lamps_throw_it_or_a_little_of_it_bounced_is_no_response(power):
+def test_exact_light_of_the_lamps_or_a_little_reflected_light_is_not_a_response(power):
     assert power_of_lamps(_samples(power), RING) == ()
 
 
 @pytest.mark.parametrize("power", [1.0, 0.7])
-def test_slopes_of_the_wall_that_err_do_not_draw_the_power(power):
+def test_errors_of_the_wall_slopes_do_not_pull_the_exponent(power):
     (figure,) = lamp_power(_samples(power, slopes_err=0.02))
     assert figure.value == pytest.approx(power, abs=0.02)
 
 
 @pytest.mark.parametrize("raised_by", [1.0, 1.032, 1.052])
-def test_the_power_is_as_unsure_as_the_lobe_of_lamps_makes_it(raised_by):
-    """LEDs that shine as the cosine raise it by so much; half had been taken off that of any probe."""
+def test_sigma_of_the_exponent_includes_the_uncertain_lobe_of_the_lamps(raised_by):
+    """LEDs that shine as the cosine raise it by so much; half of that was subtracted for every probe."""
     (figure,) = lamp_power(_samples(raised_by))
     assert abs(figure.value - 1) < 1.5 * figure.sd
     assert figure.value == pytest.approx(raised_by, abs=0.005)
 
 
-def test_the_power_that_is_told_is_the_one_that_frames_are_judged_by():
+def test_the_reported_exponent_is_the_one_by_which_frames_are_judged():
     (found,) = power_of_lamps(_samples(1.6), RING)
     assert found.size_of(found.sizes.mean(0))[0] == pytest.approx(found.mismatch.parameters[0].value)
 
 
 @pytest.mark.parametrize("wandering", [0.0, 1e-6])
-def test_a_probe_that_keeps_to_its_place_tells_nothing(wandering):
+def test_a_probe_that_does_not_move_sideways_gives_no_result(wandering):
     assert lamp_power(_samples(0.45, wandering=wandering)) == ()
 
 
-def test_few_frames_tell_nothing():
+def test_few_frames_give_no_result():
     assert power_of_lamps(None, RING) == ()
 
 
-def test_frames_rendered_again_with_the_power_bear_it_out():
+def test_frames_rendered_again_with_the_exponent_confirm_it():
     samples = _samples(0.45)
     (found,) = power_of_lamps(samples, RING)
     level = np.full((16 * BLOCK_PX, 24 * BLOCK_PX), 100, np.float32)
@@ -103,10 +104,10 @@ def test_frames_rendered_again_with_the_power_bear_it_out():
 
 
 @pytest.mark.parametrize(("clipped", "other_power"), [(False, False), (False, True), (True, True)])
-def test_neither_response_nor_uneven_lamps_are_named_where_something_else_looks_alike(
+def test_neither_response_nor_uneven_lamps_are_named_where_something_else_looks_the_same(
     clipped, other_power, monkeypatch
 ):
-    """Clipped lit wall was called a response, and under a response lamps were called uneven."""
+    """Clipped lit wall was called a response, and with a response lamps were called uneven."""
 
     def of(name):
         return SimpleNamespace(mismatch=Mismatch(name, "intensity", "image", (), (), 0.0, 2.0, 1.0, "It is."))

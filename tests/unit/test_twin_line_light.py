@@ -1,4 +1,4 @@
-"""The light of the laser's line, told by the pixels along it, on made lines."""
+"""The light of the laser's line, estimated from the pixels along it, on synthetic lines."""
 
 import numpy as np
 import pytest
@@ -17,7 +17,7 @@ def _sight(random, count=8000):
 
 
 @pytest.mark.parametrize("colour", [(0.1, 0.7, 0.2), (0.6, 0.1, 0.3)])
-def test_the_line_follows_the_colours_of_the_wall_by_the_shares_that_it_has(colour):
+def test_the_shares_of_the_walls_colours_in_the_line_are_estimated(colour):
     random, samples = np.random.default_rng(7), LineSamples(None, 0.0, np.inf, 0.15, 1.1)
     for frame in range(6):
         sight = _sight(random)

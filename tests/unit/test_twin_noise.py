@@ -1,4 +1,4 @@
-"""The camera's noise, from windows of drawn frames."""
+"""The camera's noise, estimated from windows of drawn frames."""
 
 from dataclasses import replace
 
@@ -26,7 +26,7 @@ def _noisy_frames(read, electrons, frames=4):
         yield windows_of(first, second, level, whole)
 
 
-def test_photon_transfer_finds_the_noise_that_was_put_in():
+def test_photon_transfer_finds_the_true_noise():
     noise = photon_transfer(list(_noisy_frames(1.5, 40.0)), BLACK, 255.0)
     assert noise.electrons_per_level.value == pytest.approx(40.0, rel=0.12)
     assert noise.read_electrons.value == pytest.approx(60.0, rel=0.15)
@@ -44,7 +44,7 @@ def _dim_frames(random, read, electrons, rows=96):
 
 
 def test_read_noise_in_electrons_is_no_surer_than_their_number():
-    """Its σ had left the conversion's out: one true value in four lay within two of them."""
+    """Its σ neglected that of the conversion: one true value in four was within 2 σ."""
     made = [
         photon_transfer(list(_dim_frames(np.random.default_rng(k), 1.0, 40.0)), BLACK, 255.0)
         for k in range(20)
@@ -53,24 +53,24 @@ def test_read_noise_in_electrons_is_no_surer_than_their_number():
     assert len(read) > 12
     assert np.mean([abs(f.value - np.sqrt(1 - 1 / 12) * 40) < 2 * f.sd for f in read]) >= 0.85
     unknown = replace(made[0], variance_per_level=Figure(0.0, 0.01)).read_electrons
-    assert np.isinf(unknown.value), "in electrons nothing is known without shot noise"
+    assert np.isinf(unknown.value), "without shot noise nothing is known in electrons"
 
 
 @pytest.mark.parametrize("rows", [12, 60])
-def test_few_windows_tell_little_of_the_noise_and_say_so(rows):
-    """With some hundred windows each part alone was too few, all parts told the same nothing, and σ was 0."""
+def test_few_windows_show_little_of_the_noise_and_say_so(rows):
+    """With some hundred windows each part alone had too few; all gave the same empty result with a σ of 0."""
     windows = list(_dim_frames(np.random.default_rng(1), 1.0, 10.0, rows=rows))
     noise = photon_transfer(windows, BLACK, 255.0)
     assert noise.variance_per_level.sd > 0.01
     assert noise.variance_per_level.sd == np.inf or abs(noise.variance_per_level.value - 0.1) < 0.05
 
 
-def test_other_noise_gives_another_answer():
+def test_other_noise_gives_another_estimate():
     quiet, loud = (photon_transfer(list(_noisy_frames(1.0, e)), BLACK, 255.0) for e in (200.0, 20.0))
     assert loud.variance_per_level.value > 5 * quiet.variance_per_level.value
 
 
-def test_pictures_whose_dark_shows_no_noise_have_that_of_rounding():
+def test_pictures_without_noise_in_the_dark_have_that_of_rounding():
     black = np.zeros((120, 240), np.float32)
     noise = photon_transfer([windows_of(black, black, black, black == 0)] * 2, BLACK, 255.0)
     assert noise.read_variance.value == pytest.approx(1 / 12)
@@ -78,15 +78,15 @@ def test_pictures_whose_dark_shows_no_noise_have_that_of_rounding():
 
 @pytest.mark.parametrize("frames", [1, 2])
 def test_read_noise_of_few_frames_has_a_sigma(frames):
-    """It had been 0 ± NaN of one frame, and 0 ± 0 of two where rounding is more than the read noise."""
+    """From one frame it was 0 ± NaN, and from two 0 ± 0 where rounding exceeds the read noise."""
     noise = photon_transfer(list(_noisy_frames(0.2, 40.0, frames=frames)), BLACK, 255.0)
     read = noise.read_electrons
     assert abs(read.value - 0.2 * 40) < 2 * read.sd
     assert frames == 2 or read.sd == np.inf
 
 
-def test_parts_of_the_noise_are_as_unsure_as_they_differ():
-    """Of parts that were 0 in every fit, or nearly so, σ had been 0 or far too small."""
+def test_the_sigma_of_parts_of_the_noise_is_their_scatter():
+    """For parts that were 0 in every fit, or nearly so, σ was 0 or far too small."""
     made = [
         photon_transfer(list(_dim_frames(np.random.default_rng(k), 1.0, 40.0, rows=48)), BLACK, 255.0)
         for k in range(40)
@@ -97,8 +97,8 @@ def test_parts_of_the_noise_are_as_unsure_as_they_differ():
         assert np.mean([abs(f.value - true) <= 2.001 * f.sd for f in figures]) >= 0.9, part
 
 
-def test_windows_of_one_grey_level_tell_the_sum_of_the_noise_alone():
-    """Read noise had been that of rounding, and shot noise 0, both of σ 0."""
+def test_windows_of_one_grey_level_show_only_the_sum_of_the_noise():
+    """Read noise was that of rounding, and shot noise 0, both with a σ of 0."""
     random, level = np.random.default_rng(0), np.full((96, 240), 100, np.float32)
     windows = [
         windows_of(*(2 * random.standard_normal((2, *level.shape))).astype(np.float32), level, level > 0)
@@ -110,8 +110,8 @@ def test_windows_of_one_grey_level_tell_the_sum_of_the_noise_alone():
 
 
 @pytest.mark.parametrize("levels", [(20, 100), (0, 60)])
-def test_windows_of_two_grey_levels_do_not_part_the_noise(levels):
-    """Equal levels left two cells, to which three parts were fitted: wrong values of σ nearly 0."""
+def test_windows_of_two_grey_levels_do_not_separate_the_noise(levels):
+    """Equal levels left two cells, to which three parts were fitted: wrong values with a σ of nearly 0."""
     random = np.random.default_rng(0)
     each = [random.choice(levels, 400).astype(float) for _ in range(6)]
     windows = [NoiseWindows(x, (1 + 0.02 * x + 0.0004 * x**2) * random.chisquare(24, 400) / 24) for x in each]

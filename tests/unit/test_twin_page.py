@@ -1,4 +1,4 @@
-"""The twin's page and document: what is not known is said, and all frames are there."""
+"""The twin's page and document: unknown values are marked, and all frames are there."""
 
 import json
 from dataclasses import replace
@@ -24,7 +24,7 @@ def _twin():
     )  # fmt: skip
 
 
-def test_what_is_not_known_is_null_and_the_page_holds_all_frames(tmp_path):
+def test_unknown_values_are_null_and_the_page_has_all_frames(tmp_path):
     tilt = Mismatch("laser_tilt", "line", "laser", (), (), 1.0, 9.0, 0.9, "Laser tilt: pictures fit better.")
     gauge = GaugeTwin(np.array([2]), ("laser_tilt=0.6@40",), 9, 9.0, 0.9, 0.8, 2.0, 0.1, 0.09, 16.0, (True,))
     tried = DiagnosisTried(gauge, (tilt,))
@@ -53,7 +53,7 @@ def test_what_is_not_known_is_null_and_the_page_holds_all_frames(tmp_path):
         (np.nan, np.nan, "not compared", "not compared"),
     ],
 )
-def test_how_far_the_wall_differs_is_said_in_words_where_no_number_can(
+def test_the_difference_of_the_wall_is_described_where_no_number_is_known(
     whole, beyond, said, tile, tmp_path, capsys
 ):
     found = replace(_twin(), psnr_db=whole, psnr_noise_free_db=beyond)
@@ -75,7 +75,7 @@ def test_the_page_says_once_that_the_probe_is_that_of_a_diagnosis(diagnosed, dif
 
 
 @pytest.mark.parametrize("found", [True, False])
-def test_a_line_that_still_differs_is_unexplained_only_where_no_cause_was_found(found, tmp_path):
+def test_a_line_that_still_differs_is_unexplained_only_if_no_cause_was_found(found, tmp_path):
     worse = replace(_twin(), regions=(RegionFit("line_core", 9, 10.0, 2.5),), found=())
     tilt = Mismatch("laser_tilt", "line", "laser", (), (), 1e-9, 9.0, 0.9, "Laser tilt: pictures fit better.")
     gauge = GaugeTwin(np.array([2]), ("laser_tilt=0.6@40",), 9, 9.0, 0.9, 0.8, 2.0, 0.1, 0.09, 16.0, (True,))

@@ -1,4 +1,4 @@
-"""Laws of whole pictures, on made pictures: named where they act, and nothing where nothing does."""
+"""Laws of whole pictures, on synthetic pictures: named where they act, and nowhere else."""
 
 from types import SimpleNamespace
 
@@ -57,7 +57,7 @@ def _noisy(picture, random):
 
 
 def _named(lit=lambda p, r: p, laser=lambda p, r: p, of_sharpness=0.0, judge=None):
-    """Names that stand and names that are withdrawn; ``judge`` changes the frames that are rendered again."""
+    """Return confirmed and withdrawn names; ``judge`` changes the frames that are rendered again."""
     random, whole, blocks = np.random.default_rng(2), WholePictures(SCENE), BlocksOfFrames(RING)
     shown = {}
     for frame in range(FRAMES):
@@ -106,17 +106,17 @@ def _clipped(picture, random):
     return np.where(np.hypot(U - 160, V - 50) < 15, WHITE + 50, picture)
 
 
-def test_nothing_is_named_where_noise_alone_differs():
+def test_with_noise_alone_nothing_is_named():
     assert _named() == []
     assert _named(_clipped) == []
 
 
-def test_motion_blur_is_told_from_defocus():
+def test_motion_blur_is_distinguished_from_defocus():
     assert _named(_moved) == ["motion_blur"]
     assert _named(lambda p, r: cv2.GaussianBlur(p, (0, 0), 2), of_sharpness=2.0) == ["defocus"]
 
 
-def test_a_name_that_frames_rendered_again_do_not_bear_out_is_withdrawn():
+def test_a_name_that_frames_rendered_again_do_not_confirm_is_withdrawn():
     for change, name in (
         (_moved, "motion_blur"),
         (lambda p, r: 100 * (p / 100) ** 0.7, "response"),
@@ -133,7 +133,7 @@ def _ring(width):
 
 
 @pytest.mark.parametrize(("recorded", "stands"), [(2.4, True), (1.2, False)])
-def test_a_wide_line_stands_if_recorded_frames_fit_no_line_of_a_lens_in_focus(recorded, stands):
+def test_a_wide_line_is_kept_if_recorded_frames_fit_no_line_of_a_focused_lens(recorded, stands):
     random, region = np.random.default_rng(3), np.where(abs(AWAY - 70) < 9, Region.LINE_CORE, Region.DARK)
     line = SimpleNamespace(blur_px=Figure(2.4, 0.1))
     whole = SimpleNamespace(frames_of=lambda law: np.arange(8), scene=SCENE)
@@ -157,12 +157,12 @@ def test_a_wide_line_stands_if_recorded_frames_fit_no_line_of_a_lens_in_focus(re
 
 
 def _blind(whole):
-    """A run whose lit frames say nothing of blur."""
+    """A run whose lit frames show nothing of blur."""
     whole.even_blur, whole.loses_texture = lambda sharpness: np.zeros(8), False
     return whole
 
 
-def test_frames_that_follow_each_other_count_as_fewer():
+def test_consecutive_frames_count_as_fewer_independent_ones():
     random = np.random.default_rng(5)
     apart = 1 + random.standard_normal(16)
     alike = 1 + np.repeat(random.standard_normal(4), 4)
@@ -172,7 +172,7 @@ def test_frames_that_follow_each_other_count_as_fewer():
     assert significance_over_frames(-apart)[1] > 0.5
 
 
-def test_a_displaced_photo_is_no_motion_blur():
+def test_a_displaced_photo_is_not_motion_blur():
     def displaced(picture, random):
         shift = np.float32([[1, 0, random.normal(0, 0.6)], [0, 1, random.normal(0, 0.6)]])
         return cv2.warpAffine(picture, shift, SHAPE[::-1], borderMode=cv2.BORDER_REFLECT)
@@ -181,12 +181,12 @@ def test_a_displaced_photo_is_no_motion_blur():
 
 
 @pytest.mark.parametrize("power", [0.7, 1.3])
-def test_a_response_is_named_and_light_that_falls_off_is_none(power):
+def test_a_response_is_named_and_light_that_falls_off_is_not(power):
     assert _named(lambda p, r: 100 * (p / 100) ** power) == ["response"]
     assert _named(lambda p, r: p * (1 - 0.3 * (AWAY / 200) ** 2)) == []
 
 
-def test_a_photo_that_is_displaced_within_itself_is_no_response():
+def test_a_photo_with_internal_displacements_is_not_a_response():
     def torn(picture, random):
         shift = [
             cv2.GaussianBlur(random.standard_normal(SHAPE).astype(np.float32), (0, 0), 4) for _ in range(2)
@@ -197,11 +197,11 @@ def test_a_photo_that_is_displaced_within_itself_is_no_response():
     assert _named(torn) == []
 
 
-def test_bloom_runs_along_columns_only():
+def test_bloom_is_found_along_columns_only():
     assert _named(_bloomed) == ["bloom"]
 
 
-def test_stray_light_is_named_for_what_it_falls_on():
+def test_stray_light_is_named_by_what_it_falls_on():
     glow = 8 * np.exp(-0.5 * ((AWAY - 70) / 25) ** 2)
     (name,) = _named(laser=lambda p, r: p + glow)
     assert "interreflection" in name
@@ -209,9 +209,9 @@ def test_stray_light_is_named_for_what_it_falls_on():
 
 
 def _stray_names(light, scene=SCENE, dark=OUTSIDE):
-    """Names that stand of light that the wall's reflectance, 1 on average, throws back with the LEDs off.
+    """Return the confirmed names of light that wall of mean reflectance 1 reflects with the LEDs off.
 
-    The wall ends where it is ``dark``; the scene tells how far the LEDs light it.
+    The wall ends where it is ``dark``; the scene defines how far the LEDs light it.
     """
     random, whole, shown = np.random.default_rng(2), WholePictures(scene), {}
     for frame in range(FRAMES):
@@ -225,13 +225,13 @@ def _stray_names(light, scene=SCENE, dark=OUTSIDE):
     return [m.name for m in kept]
 
 
-def test_even_light_on_wall_that_the_lamps_light_unevenly_is_ambient_light():
-    """Its law had been the lamps' own light, which falls off: it was named interreflection."""
+def test_uniform_light_on_unevenly_lit_wall_is_ambient_light():
+    """It was expected to follow the light of the lamps, which falls off: it was named interreflection."""
     assert _stray_names(lambda pale: 22 * pale) == ["ambient_light"]
 
 
-def test_even_light_on_wall_that_no_lamp_reaches_is_told_by_what_is_darker_still():
-    """Wall behind the LEDs had stood for black: other light on it hid the light on all of the wall."""
+def test_uniform_light_on_wall_that_no_lamp_reaches_is_found_from_darker_places():
+    """Wall behind the LEDs was taken for black: light on it hid the light on all of the wall."""
     reached = SimpleNamespace(**{**vars(SCENE), "outside": AWAY > 110})
     assert _stray_names(lambda pale: 22 * pale, reached) == ["ambient_light"]
     assert _stray_names(lambda pale: 6 * (pale - 1), reached) == []
@@ -239,23 +239,23 @@ def test_even_light_on_wall_that_no_lamp_reaches_is_told_by_what_is_darker_still
 
 
 @pytest.mark.parametrize("haze", [0.0, 20.0, -6.0])
-def test_texture_that_a_codec_keeps_of_lit_frames_is_no_light(haze):
-    """A pattern whose mean is 0, or not its own, had been ambient light at a chance of 1e-15."""
+def test_texture_of_lit_frames_kept_by_a_codec_is_not_light(haze):
+    """A pattern with mean 0, or another mean, was ambient light at a chance of 1e-15."""
     assert _stray_names(lambda pale: 6 * (pale - 1) + haze) == []
 
 
-def test_a_pattern_is_no_light_because_the_pictures_flicker():
-    """The wall's mean, too unsure to contradict, had counted as agreement: this was ambient light."""
+def test_a_pattern_is_not_light_because_the_pictures_flicker():
+    """The wall's mean, too uncertain to contradict, counted as agreement: this was ambient light."""
     random = np.random.default_rng(4)
     assert _stray_names(lambda pale: 6 * (pale - 1) + random.normal(0, 8)) == []
 
 
-def test_without_a_place_that_sees_no_wall_even_light_is_not_told():
+def test_without_a_place_that_sees_no_wall_uniform_light_is_not_reported():
     assert _stray_names(lambda pale: 22 * pale, SimpleNamespace(**{**vars(SCENE), "outside": None})) == []
 
 
-def test_frames_that_see_black_tell_of_light_for_those_that_do_not():
-    """One frame without black withdrew the evidence of all others: for ambient light, against the rest."""
+def test_frames_that_see_black_are_evidence_of_light_for_those_that_do_not():
+    """One frame without black invalidated the evidence of all others, for ambient light or against it."""
     mean, bright = np.full(8, 4.0), np.array([0.1, -0.1, 0, 0.1, -0.1, 0.1, 0, np.nan])
     assert all(_brings_light(law, mean, bright) for law in range(3))
     assert not any(_brings_light(law, mean, bright - 4) for law in range(3))
@@ -266,7 +266,7 @@ SIZES = np.array([1.0, 0.7, 1.3, 0.9, 1.1, 0.8, 1.2, 1.0])
 
 
 def _frames_of_law(law, more):
-    """Frames in which one law fits, and the wall is so many grey levels brighter than it foretells."""
+    """Return frames that one law fits, with wall so many grey levels brighter than it predicts."""
     whole = WholePictures(SCENE)
     whole.stray = [np.tile([0.1, 100, 0, 9, more], (3, 1)) for _ in SIZES]
     for frame, s in zip(whole.stray, SIZES, strict=True):
@@ -280,20 +280,20 @@ def test_the_best_of_three_laws_has_three_times_the_chance():
 
 
 @pytest.mark.parametrize("law", [0, 1, 2])
-def test_without_a_place_that_sees_no_wall_no_light_is_told(law):
-    """Light bounced once was told from its pattern alone, which what a codec keeps may have as well."""
+def test_without_a_place_that_sees_no_wall_no_light_is_reported(law):
+    """Light reflected once was reported from its pattern alone, which the residue of a codec may share."""
     assert _frames_of_law(law, 0.0)._stray().mismatch.name == STRAY_NAMES[law]
     assert _frames_of_law(law, np.nan)._stray() is None
 
 
-def test_a_second_ring_is_found_and_a_glint_is_none():
+def test_a_second_ring_is_found_and_a_glint_is_not_taken_for_one():
     second = 150 * 0.1 * np.exp(-0.5 * ((AWAY - 92) / 1.5) ** 2)
     assert _named(laser=lambda p, r: p + second) == ["second_line"]
     glint = 60 * np.exp(-0.5 * (((U - 240) / 6) ** 2 + ((V - 120) / 6) ** 2))
     assert "second_line" not in _named(laser=lambda p, r: p + glint)
 
 
-def test_an_effect_that_frames_show_unequally_is_borne_out_where_it_acts():
+def test_an_effect_that_frames_show_unequally_is_confirmed_where_it_acts():
     random = np.random.default_rng(8)
     foretold = np.array([4.0, 9, 900, 30, 60, 14, 25])
     alike = foretold * (0.8 + 0.1 * random.standard_normal(7))
@@ -303,9 +303,9 @@ def test_an_effect_that_frames_show_unequally_is_borne_out_where_it_acts():
     assert _borne_out(np.zeros(0), np.zeros(0)) == (0.0, 1.0)
 
 
-def test_two_looks_at_falls_alarm_no_more_often_than_their_chance_says():
+def test_two_tests_of_the_same_improvements_give_alarms_no_more_often_than_stated():
     random = np.random.default_rng(9)
     foretold = np.exp(0.8 * random.standard_normal((2000, 8)))
     chance = [_borne_out(f * random.standard_normal(8), f)[1] for f in foretold]
-    # The two looks are alike, so that together they alarm less often than twice; one alone does at .05.
+    # The two tests are correlated, so that together they alarm less often than twice; one alone does at .05.
     assert np.mean(np.array(chance) < 0.05) < 0.04

@@ -1,4 +1,4 @@
-"""Defective pixels: told from wall that moves, from noise, and from dirt that is larger."""
+"""Defective pixels: distinguished from moving wall, from noise, and from larger dirt."""
 
 import cv2
 import numpy as np
@@ -36,21 +36,21 @@ def test_hot_and_dead_pixels_are_counted():
     assert found.parameters[0].value == 3 / SEEN.size
 
 
-def test_moving_wall_noise_and_dirt_are_no_defective_pixels():
+def test_moving_wall_noise_and_dirt_are_not_defective_pixels():
     assert defective_pixels(*_frames()) == ()
     assert defective_pixels(*_frames(dirt=(slice(40, 43), slice(50, 60)))) == ()
 
 
-def test_the_tail_of_a_dark_pattern_is_no_defect_and_a_hot_pixel_in_it_is():
-    """Of pixels whose offsets spread by five grey levels one in a thousand had been called defective."""
+def test_the_tail_of_a_dark_pattern_is_not_a_defect_but_a_hot_pixel_in_it_is():
+    """With offsets that spread by five grey levels, one pixel in a thousand was called defective."""
     assert defective_pixels(*_frames(pattern=5.0)) == ()
     (found,) = defective_pixels(*_frames([(20, 30)], pattern=5.0))
     assert found.statement.startswith("1 single pixels are too bright in all frames, 0 too dark")
 
 
 @pytest.mark.parametrize("azimuth_deg", [4, 20, 88, 120])
-def test_a_thin_scratch_on_the_window_is_no_row_of_dead_pixels(azimuth_deg):
-    """A scratch as narrow as a defect differs from five pixels about it in some places only: single ones."""
+def test_a_thin_scratch_on_the_window_is_not_a_row_of_dead_pixels(azimuth_deg):
+    """A scratch as narrow as a defect differs from the five pixels around it only at single places."""
     v, u = np.mgrid[0 : SHAPE[0], 0 : SHAPE[1]]
     along = np.radians(azimuth_deg)
     across = (u - 80) * np.sin(along) - (v - 60) * np.cos(along)

@@ -1,4 +1,4 @@
-"""Frames rendered again: what is compared of frames in which both lights shine."""
+"""Frames rendered again: the compared part of frames in which both lights are on."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -33,7 +33,7 @@ SCENE = SimpleNamespace(
 )  # fmt: skip
 
 
-def test_a_line_of_which_nothing_is_known_is_left_out_of_frames_with_both_lights():
+def test_in_frames_with_both_lights_a_line_of_unknown_place_is_excluded():
     for light, left_out in ((Illumination.BOTH, 60), (Illumination.LED, 0)):
         twin = Renderer(SCENE, STATE).frame(0, light)
         assert (twin.region == Region.UNSEEN).sum() == left_out
@@ -50,7 +50,7 @@ def test_a_response_acts_on_the_contrast_of_the_wall():
     np.testing.assert_allclose(twin.level[:, 30:].mean() / twin.level[:, :30].mean(), np.sqrt(2), rtol=0.01)
 
 
-def test_pixels_between_nodes_see_the_photo_at_their_place_and_level():
+def test_pixels_between_nodes_get_the_photo_at_their_place_and_level():
     random, step = np.random.default_rng(3), 4
     levels = random.uniform(20, 200, (2, 50, 90)).astype(np.float32)
     photo = Reflectance(levels, np.array([0.4, 0.9]), levels[:1], 100.0, 0.5, -np.pi, 2 * np.pi / 90)
@@ -68,12 +68,12 @@ def test_pixels_between_nodes_see_the_photo_at_their_place_and_level():
     assert np.isnan(seen[0]).any()
     for got, expected in zip(seen[1:], (light, distance, phi + turn), strict=True):
         np.testing.assert_allclose(got, expected, atol=1e-5)
-    # Rows are told to 1e-5 by single precision, and neighbours differ by up to 180 grey levels.
+    # Rows are known to 1e-5 in single precision, and neighbours differ by up to 180 grey levels.
     np.testing.assert_allclose(seen[0], grey, atol=0.01)
 
 
-def test_wall_that_a_drop_shows_elsewhere_has_the_noise_of_that_wall():
-    """Bright wall seen at the place of dark wall had kept its noise: with more light, a negative variance."""
+def test_displaced_wall_seen_through_a_drop_has_the_noise_of_that_wall():
+    """Bright wall seen at the place of dark wall kept its noise: with more light, a negative variance."""
     noise = CameraNoise(
         Figure(16.0, 0.1), np.inf, Figure(0.2, 0.1), Figure(0.05, 0.01), Figure(0.0, 0.01), Figure(1.0, 0.1)
     )

@@ -1,4 +1,4 @@
-"""Which rays of a picture are followed, whatever its size."""
+"""Which rays of a picture are traced, for any picture size."""
 
 from types import SimpleNamespace
 
@@ -10,8 +10,8 @@ from stages.twin.scene import Scene
 
 @pytest.mark.parametrize("width", [40, 41, 42, 43])
 @pytest.mark.parametrize("height", [36, 37, 39])
-def test_pictures_of_any_size_follow_the_rays_that_see_wall(width, height):
-    """A picture whose side is one more than a multiple of four ended the twin."""
+def test_in_pictures_of_any_size_the_rays_that_see_wall_are_traced(width, height):
+    """A picture whose side is one more than a multiple of four ended the twin with an error."""
 
     def unproject(uv):
         ray = np.concatenate([uv / 50, np.ones((*uv.shape[:2], 1))], -1)

@@ -1,4 +1,4 @@
-"""Dirt that the photo holds, too, is not told a second time where frames show the wall beside it."""
+"""Dirt that the photo contains as well is not reported a second time where frames show the wall beside it."""
 
 import numpy as np
 import pytest
@@ -21,13 +21,13 @@ def _place(name, u, v, share):
     ("bright", "left"),
     [
         (_place("", 530.0, 513.0, -0.098), True),  # at 58.8°, as dust of 29 % at 60.3° left it in its photo
-        (_place("", 530.0, 513.0, -0.5), False),  # by more than the dirt takes
+        (_place("", 530.0, 513.0, -0.5), False),  # by more than the dirt removes
         (_place("", 530.0, 513.0, 0.098), False),  # darker
         (_place("", 270.0, 513.0, -0.098), False),  # at another azimuth
         (_place("window_dirt", 530.0, 513.0, 0.098), False),
     ],
 )
-def test_what_the_photo_holds_of_dirt_is_withdrawn_at_its_azimuth(bright, left):
+def test_dirt_contained_in_the_photo_is_withdrawn_at_its_azimuth(bright, left):
     dust = _place("window_dirt", 497.0, 468.0, 0.294)
     kept, withdrawn = separated_from_photo((dust, bright), _RING)
     assert kept == ((dust,) if left else (dust, bright))
@@ -39,7 +39,7 @@ def test_what_the_photo_holds_of_dirt_is_withdrawn_at_its_azimuth(bright, left):
 @pytest.mark.parametrize(
     ("name", "at_deg", "left"), [("", -97.0, True), ("", -60.0, False), ("glint", -97.0, False)]
 )
-def test_a_region_of_the_wall_where_the_window_may_dim_the_line_cannot_be_told(name, at_deg, left):
+def test_a_wall_region_where_the_window_may_dim_the_line_cannot_be_decided(name, at_deg, left):
     """Scatter across the line at −100° left wall in its photo that seemed to shine at −97°."""
     place = (NamedFigure("azimuth_deg", -100.0, 3.0), NamedFigure("width_deg", 20.0, 5.0))
     turn, other = np.radians(at_deg), (0.0, 2.0, 1.0)

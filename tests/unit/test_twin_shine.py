@@ -1,4 +1,4 @@
-"""Glints, wet wall and uneven lamps, on made pictures: told where they are, and nowhere else."""
+"""Glints, wet wall and uneven lamps, on synthetic pictures: found where they are, and nowhere else."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -51,7 +51,7 @@ def _spots(spot_of, light=Illumination.LED):
     return spots.found()
 
 
-def test_a_lamp_that_is_mirrored_at_one_place_of_the_image_is_a_glint():
+def test_a_lamp_reflected_at_one_place_of_the_image_is_a_glint():
     (found,) = _spots(lambda n, r: _spot(100 + r.normal(0, 3), 60 + r.normal(0, 3)))
     assert (found.name, found.fixed_to) == ("glint", "image")
     u, v, _ = (p.value for p in found.place)
@@ -60,8 +60,8 @@ def test_a_lamp_that_is_mirrored_at_one_place_of_the_image_is_a_glint():
 
 
 @pytest.mark.parametrize(("away_px", "glints"), [(0, 0), (14, 1)])
-def test_what_joins_the_line_is_no_glint(away_px, glints):
-    """A line drawn aside at a defect, or wide where it clips, had been told as a glint or a droplet."""
+def test_light_connected_to_the_line_is_not_a_glint(away_px, glints):
+    """A line displaced at a defect, or wide where it clips, was reported as a glint or a droplet."""
     spots = SpotsOfFrames(Illumination.LASER, RING)
     for number in range(FRAMES):
         twin = _twin(number, Region.DARK)
@@ -71,7 +71,7 @@ def test_what_joins_the_line_is_no_glint(away_px, glints):
 
 
 @pytest.mark.parametrize(("name", "glints"), [("ambient_light or interreflection", 0), ("bloom", 1)])
-def test_pale_wall_in_other_light_is_no_glint(name, glints):
+def test_pale_wall_in_other_light_is_not_a_glint(name, glints):
     spots = [SpotsOfFrames(kind, RING) for kind in (Illumination.LED, Illumination.LASER)]
     for number in range(FRAMES):
         twin = _twin(number, Region.DARK)
@@ -86,22 +86,22 @@ def test_a_spot_of_the_laser_that_stays_in_the_image_may_be_a_drop():
     assert (found.name, found.fixed_to) == ("glint or droplet", "image")
 
 
-def test_a_glint_that_moves_with_the_wall_is_fixed_to_it():
+def test_a_glint_that_moves_with_the_wall_is_fixed_to_the_wall():
     (found,) = _spots(lambda n, r: _spot(200, 200 - STEP_PX * n))
     assert (found.name, found.fixed_to) == ("glint", "wall")
     assert found.place[0].value == pytest.approx(200 * 50 / 90, abs=2)
 
 
-def test_spots_that_come_back_nowhere_are_counted_without_a_name():
+def test_spots_that_do_not_reappear_are_counted_without_a_name():
     (found,) = _spots(lambda n, r: _spot(r.uniform(20, 300), r.uniform(20, 220)), Illumination.LASER)
     assert (found.name, found.fixed_to, found.channel) == ("", "time", "line")
     assert found.parameters[0].value == pytest.approx(1.0)
 
 
-def test_noise_and_one_spot_are_no_glints():
+def test_noise_and_a_single_spot_are_not_glints():
     assert not _spots(lambda n, r: 0)
     assert not _spots(lambda n, r: _spot(100, 100) * (n == 4))
-    assert not _spots(lambda n, r: np.float32(90.0))  # all of it too bright: no spot
+    assert not _spots(lambda n, r: np.float32(90.0))  # all of it too bright: not a spot
 
 
 def _wall(change, surface=None, seed=3, rings_mm=0.5):
@@ -115,7 +115,7 @@ def _wall(change, surface=None, seed=3, rings_mm=0.5):
     return unnamed(blocks.samples(), surface or plain_bore(), rings_mm, 1.1)
 
 
-def test_wall_that_shines_or_is_dark_is_told_and_has_no_name():
+def test_wall_that_shines_or_is_dark_is_reported_without_a_name():
     (wet,) = _wall(lambda patch, aside: 0.7 * patch * (aside - 0.8))
     assert (wet.name, wet.fixed_to, wet.parameters[0].name) == ("", "wall", "shine")
     assert "wet or polished" in wet.statement
@@ -129,14 +129,14 @@ def test_wall_that_shines_or_is_dark_is_told_and_has_no_name():
 
 
 @pytest.mark.parametrize("far_px", [30, 300])
-def test_what_stays_in_the_image_makes_no_wall_shine(far_px):
-    """Beside a drop, or where the photo holds what scatters, all wall that passes brightens outwards."""
+def test_effects_fixed_to_the_image_do_not_make_wall_shine(far_px):
+    """Beside a drop, or where the photo contains a scatterer, all passing wall gets brighter outwards."""
     at_place = (abs(U - 72) < 25) & (abs(V - 60) < far_px)
     found = _wall(lambda patch, aside: 0.7 * at_place * (aside - 0.8))
     assert not [m for m in found if m.fixed_to == "wall" and m.parameters[0].name == "shine"]
 
 
-def test_steep_wall_is_as_bright_as_its_slope_is_known():
+def test_the_predicted_brightness_of_steep_wall_is_as_sure_as_its_slope():
     plain = plain_bore()
     s, psi = np.meshgrid(plain.distance_mm - 100, np.radians(np.arange(360) - 180) - 0.8, indexing="ij")
     pit = 1.4 * np.exp(-(s**2 + (50 * psi) ** 2) / 2 / 1.3**2)
@@ -147,8 +147,8 @@ def test_steep_wall_is_as_bright_as_its_slope_is_known():
 
 
 @pytest.mark.parametrize(("shine", "told"), [(0.5, 0), (1.2, 1)])
-def test_a_slope_that_errs_makes_wall_seem_to_shine_by_more_than_its_error(shine, told):
-    """Beside the lamps it shows hardly, and far ahead much: a sound weld had been told to shine."""
+def test_an_error_of_slope_makes_wall_seem_to_shine_by_more_than_that_error(shine, told):
+    """Beside the lamps its effect is small, and far ahead large: a sound weld was reported to shine."""
     plain = plain_bore()
     s = np.broadcast_to(plain.distance_mm[:, None] - 100, plain.radius_mm.shape)
     weld = replace(plain, along=(0.85 * s * np.exp(-0.5 * s**2)).astype(np.float32))
@@ -156,7 +156,7 @@ def test_a_slope_that_errs_makes_wall_seem_to_shine_by_more_than_its_error(shine
     assert len(_wall(lambda patch, aside: shine * patch * (aside - 0.8), plain)) == 1
 
 
-def test_wall_between_rings_far_apart_is_as_bright_as_straight_lines_between_them():
+def test_the_brightness_of_wall_between_distant_rings_is_that_of_linear_interpolation():
     plain = plain_bore()
     s = np.broadcast_to(plain.distance_mm[:, None] - 100, plain.radius_mm.shape)
     weld = replace(plain, along=(0.3 * s / 4 * np.exp(-0.5 * (s / 4) ** 2)).astype(np.float32))
@@ -164,7 +164,7 @@ def test_wall_between_rings_far_apart_is_as_bright_as_straight_lines_between_the
     assert found == [1, 0]
 
 
-def test_rings_lie_as_far_apart_as_the_camera_went_between_them():
+def test_the_distance_between_rings_is_that_of_the_cameras_motion():
     T_pc = np.tile(np.eye(4), (7, 1, 1))
     T_pc[:, 2, 3] = [0, 1, 3, 4, 6, 7, 9]
     trajectory = SimpleNamespace(frame=np.arange(7), T_pc=T_pc)
@@ -172,9 +172,9 @@ def test_rings_lie_as_far_apart_as_the_camera_went_between_them():
     assert ring_step_mm(SimpleNamespace(frame=np.array([2])), trajectory) == 0
 
 
-def test_cells_of_noise_that_lie_near_each_other_are_no_region():
+def test_neighbouring_cells_of_noise_are_not_a_region():
     beyond = np.zeros((12, 12), bool)
-    beyond[2, 2] = beyond[2, 4] = beyond[4, 3] = True  # within the reach of the dilation, none touching
+    beyond[2, 2] = beyond[2, 4] = beyond[4, 3] = True  # within the reach of the dilation, but none touching
     assert touching(beyond).max() == 1
     beyond[3, 3] = True
     assert touching(beyond).max() == 4
@@ -185,14 +185,14 @@ SCENE = SimpleNamespace(probe=SimpleNamespace(lighting=LIGHTING), ring=RING)
 
 
 def _lamp(change):
-    """A lamp whose pattern is that of a change (S,) of the logarithm of light around the picture."""
+    """A lamp whose pattern is a change (S,) of the logarithm of light around the picture."""
     azimuth = -np.pi + 2 * np.pi * (np.arange(36) + 0.5) / 36
     pattern = np.array([f(m * azimuth) @ change / 18 for m in (1, 2) for f in (np.cos, np.sin)])
     course = Course(np.array([0]), np.zeros(1), np.zeros(1))
     return LampLight(1.0, np.array([0.88, 0.92]), np.zeros(2), np.zeros(2), pattern, np.full(4, 1e-3), course)
 
 
-def test_a_dim_led_is_told_from_lamps_that_shine_unevenly():
+def test_a_dim_led_is_distinguished_from_lamps_that_shine_unevenly():
     frames, azimuth = np.arange(8), -np.pi + 2 * np.pi * (np.arange(36) + 0.5) / 36
     for lost in (0.5, 1.0):
         share = dim_share(LIGHTING, 2.0, 50.0, np.array([0.9])).mean((0, 1))
@@ -206,7 +206,7 @@ def test_a_dim_led_is_told_from_lamps_that_shine_unevenly():
 
 
 def _seen_by_a_probe(rolled_deg, change, light=lambda at: 0 * at):
-    """A scene, and the blocks of frames of a probe that moves on and rolls.
+    """Return a scene, and the blocks of frames of a probe that moves on and rolls.
 
     ``change`` is that of the logarithm of brightness by azimuth in the image, on the wall, and polar angle.
     """
@@ -230,14 +230,15 @@ def _seen_by_a_probe(rolled_deg, change, light=lambda at: 0 * at):
     ("rolled_deg", "of", "kept"),
     [(40, "lamps", 1), (40, "photo", 0), (40, "response", 0), (0, "lamps", 0)],
 )
-def test_lamps_are_uneven_only_where_wall_seen_twice_says_so(rolled_deg, of, kept):
+def test_lamps_are_uneven_only_where_wall_seen_twice_shows_it(rolled_deg, of, kept):
     lamp = _lamp(0.05 * np.cos(np.linspace(-np.pi, np.pi, 37)[:-1] + np.pi / 36))
 
     def light(at):  # a probe off the axis lights one side more
+        """a probe off the axis lights one side more"""
         return -0.6 * np.cos(at) if of == "response" else 0 * at
 
     def change(at, on_wall, theta):
-        # Either the lamps are as the twin has them, or its photo holds what they are not.
+        # Either the lamps are as the twin assumes, or its photo contains the difference.
         of_photo = 0 * at if of == "lamps" else lamp.around(on_wall) - lamp.around(at)
         return of_photo + (0.92 - 1) * light(at)  # a response of .92 makes as much of that light as lamps do
 
@@ -249,8 +250,8 @@ def test_lamps_are_uneven_only_where_wall_seen_twice_says_so(rolled_deg, of, kep
 
 
 @pytest.mark.parametrize("of", ["lamps", "photo"])
-def test_a_dim_led_is_told_without_a_roll_where_the_wall_comes_nearer(of):
-    """An LED sends another share of the light to the same wall when that lies at another polar angle."""
+def test_a_dim_led_is_found_without_roll_where_the_wall_comes_nearer(of):
+    """An LED gives another share of the light to the same wall when that is at another polar angle."""
     wide = replace(LIGHTING, radius_mm=30.0)  # an LED that is near shows its second harmonic
     lamp = _lamp(np.log1p(-0.999 * dim_share(wide, 2.0, 50.0, np.array([0.9])).mean((0, 1))))
     scene, _ = _seen_by_a_probe(0, lambda at, on_wall, theta: 0 * at)
@@ -268,7 +269,7 @@ def test_a_dim_led_is_told_without_a_roll_where_the_wall_comes_nearer(of):
     assert all("too dark" in w.statement for w in withdrawn)
 
 
-def test_lights_that_flicker_in_step_with_the_compared_frames_are_told_by_the_measured_ones():
+def test_lights_that_flicker_in_step_with_the_compared_frames_are_found_in_the_measured_ones():
     random = np.random.default_rng(2)
 
     def told(spread, found=(), drift=0.0):
@@ -283,20 +284,20 @@ def test_lights_that_flicker_in_step_with_the_compared_frames_are_told_by_the_me
     assert flicker.parameters[0].value == pytest.approx(0.06, abs=2 * flicker.parameters[0].sd)
     assert not told(0.004)
     assert not told(0.06, (flicker,))
-    assert not told(0.002, drift=0.5), "a slow change is no flicker"
+    assert not told(0.002, drift=0.5), "a slow change is not flicker"
     sizes = [p for _ in range(300) for m in told(0.06) for p in m.parameters]
     assert np.mean([abs(p.value - 0.06) < 2 * p.sd for p in sizes]) > 0.88
 
 
 @pytest.mark.parametrize("clipped", [False, True])
-def test_a_line_that_is_clipped_tells_no_flicker_of_the_laser(clipped):
+def test_a_clipped_line_shows_no_flicker_of_the_laser(clipped):
     log = 0.2 * np.random.default_rng(2).standard_normal(12)
     line = SimpleNamespace(course=Course(np.arange(12), log, np.full(12, 1e-3)))
     told = flicker_of_measured(SimpleNamespace(lamp=None, line=line, line_is_clipped=clipped), (), RING)
     assert [m.name for m in told] == ([] if clipped else ["laser_flicker"])
 
 
-def test_a_laser_that_slowly_dims_is_told_without_a_name_and_first_frames_without_photo_do_not_tell_it():
+def test_a_laser_that_dims_slowly_is_reported_without_a_name_and_first_frames_without_photo_do_not_show_it():
     random = np.random.default_rng(3)
 
     def told(change, found=(), first=0.35):
@@ -308,7 +309,7 @@ def test_a_laser_that_slowly_dims_is_told_without_a_name_and_first_frames_withou
     (fade,) = told(-0.5)
     assert (fade.name, fade.channel, fade.fixed_to) == ("", "line", "time")
     assert "loses" in fade.statement
-    assert not told(-0.5, (replace(fade, name="laser_step"),)), "a step was told already"
+    assert not told(-0.5, (replace(fade, name="laser_step"),)), "a step was already reported"
     assert not any(m for _ in range(100) for m in (*told(0.0), *told(0.0, first=-0.5)))
     sizes = [p for _ in range(300) for m in told(-0.5) for p in m.parameters]
     assert len(sizes) > 290

@@ -1,4 +1,7 @@
-"""What is on the window: found where it lies, named by the law that frames bear out, on made pictures."""
+"""Dirt and drops on the window.
+
+Found at their place, named by the law that frames confirm, on synthetic pictures.
+"""
 
 import cv2
 import numpy as np
@@ -41,7 +44,7 @@ def _dirty_picture(level, name):
 
 
 @pytest.mark.parametrize("name", ["window_dirt", "window_scatter", "droplet", ""])
-def test_what_is_on_the_window_is_told_by_frames_or_withdrawn(name):
+def test_effects_on_the_window_are_confirmed_by_frames_or_withdrawn(name):
     random = np.random.default_rng(3)
     place = WindowPlace(ImagePlace(120.0, 100.0, 18.0, -0.3, 0.02, 1e-6))
     for frame in range(9):
@@ -58,7 +61,7 @@ def test_what_is_on_the_window_is_told_by_frames_or_withdrawn(name):
     assert found.chi2_after < found.chi2_before
 
 
-def test_texture_that_is_stronger_than_the_photo_has_it_is_no_scatter():
+def test_texture_with_more_contrast_than_the_photo_is_not_scatter():
     random = np.random.default_rng(3)
     place = WindowPlace(ImagePlace(120.0, 100.0, 18.0, -0.3, 0.02, 1e-6))
     for frame in range(9):
@@ -81,7 +84,7 @@ def test_texture_that_is_stronger_than_the_photo_has_it_is_no_scatter():
         (0.02, 0.001, False),
     ],
 )
-def test_a_share_that_may_be_nothing_is_not_told(share, sd, told, monkeypatch):
+def test_a_share_that_may_be_zero_is_not_reported(share, sd, told, monkeypatch):
     law = FittedLaw(np.linspace(9, 11, 9), NamedFigure("share", share, sd))
     monkeypatch.setattr("stages.twin.window.fall_of_spot", lambda *_: law)
     random, place = np.random.default_rng(3), WindowPlace(ImagePlace(120.0, 100.0, 18.0, -0.3, 0.02, 1e-6))
@@ -92,8 +95,8 @@ def test_a_share_that_may_be_nothing_is_not_told(share, sd, told, monkeypatch):
 
 
 @pytest.mark.parametrize(("share", "name"), [(0.9, "window_scatter or window_dirt"), (1.74, "window_dirt")])
-def test_what_would_scatter_more_than_all_light_is_no_scatter(share, name, monkeypatch):
-    """A thin, dark scratch had been scatter of 174 ± 14 % of the light, or else dirt."""
+def test_scatter_of_more_than_all_light_is_not_scatter(share, name, monkeypatch):
+    """A thin, dark scratch was scatter of 174 ± 14 % of the light, or else dirt."""
     scatter = FittedLaw(np.linspace(9, 11, 9), NamedFigure("share", share, 0.14))
     dirt = FittedLaw(np.linspace(11, 8, 9), NamedFigure("share", 0.3, 0.02))
     monkeypatch.setattr("stages.twin.window.fall_of_spot", lambda *of: scatter if of[2] else dirt)
@@ -106,7 +109,7 @@ def test_what_would_scatter_more_than_all_light_is_no_scatter(share, name, monke
     assert "takes away" in found.statement
 
 
-def test_wall_that_a_few_neighbouring_frames_see_is_no_proof_of_a_spot():
+def test_wall_that_a_few_neighbouring_frames_see_does_not_prove_a_spot():
     size = NamedFigure("share", 0.05, 0.01)
     passing = np.repeat([9.0, 8.0, -1.0, 1.0, 0.5], 3)
     by_turns = passing.reshape(5, 3).T.ravel()
@@ -114,7 +117,7 @@ def test_wall_that_a_few_neighbouring_frames_see_is_no_proof_of_a_spot():
 
 
 @pytest.mark.parametrize("texture", [1.0, 0.92, 1.06])
-def test_what_is_scattered_is_told_whatever_texture_the_photo_has(texture):
+def test_scatter_is_found_whatever_the_texture_of_the_photo(texture):
     random = np.random.default_rng(3)
     place = WindowPlace(ImagePlace(120.0, 100.0, 18.0, -0.3, 0.02, 1e-6))
     for frame in range(9):
@@ -128,11 +131,11 @@ def test_what_is_scattered_is_told_whatever_texture_the_photo_has(texture):
 
 
 @pytest.mark.parametrize("drawn_px", [3.0, 0.0])
-def test_a_weak_drop_is_found_by_where_texture_lies_and_named(drawn_px):
+def test_a_weak_drop_is_found_by_the_displacement_of_texture_and_named(drawn_px):
     random, shifts = np.random.default_rng(3), []
     v, u = np.mgrid[0:200, 0:240].astype(np.float32)
     away = np.hypot(u - 70, v - 130) / 20
-    aside = drawn_px * np.exp(0.5 - 0.5 * away**2)  # most at 20 px
+    aside = drawn_px * np.exp(0.5 - 0.5 * away**2)  # at most, 20 px from its middle
     seen = [(x + aside * (x - m) / 20).astype(np.float32) for x, m in ((u, 70), (v, 130))]
     pictures = []
     for _ in range(6):
@@ -158,8 +161,8 @@ def test_a_weak_drop_is_found_by_where_texture_lies_and_named(drawn_px):
 
 
 @pytest.mark.parametrize(("aside_px", "bends"), [(0.46, False), (1.5, True)])
-def test_texture_aside_by_less_than_its_own_error_is_no_drop(aside_px, bends):
-    """Radii that err, by a laser sheet whose tilt nobody states, displace texture by .4 px in places."""
+def test_texture_displaced_by_less_than_its_error_is_not_a_drop(aside_px, bends):
+    """Errors of radii, from an unstated tilt of the laser sheet, displace texture by .4 px in places."""
     random, aside = np.random.default_rng(7), np.zeros((2, 200, 240), np.float32)
     aside[0, 110:150, 50:90] = aside_px
     place = WindowPlace(ImagePlace(70.0, 130.0, 20.0, 0.0, 0.1, 1e-4), aside_px=aside_px)
@@ -172,8 +175,8 @@ def test_texture_aside_by_less_than_its_own_error_is_no_drop(aside_px, bends):
     assert (named is not None and named.name == "droplet") == bends
 
 
-def test_dirt_that_a_drop_explains_a_little_of_is_no_drop():
-    """The photo holds a part of what lies on the window: a drop would make it larger, as frames do."""
+def test_dirt_that_a_drop_explains_only_in_part_is_not_a_drop():
+    """The photo contains a part of what is on the window: a drop would amplify it, as frames do."""
     random = np.random.default_rng(3)
     place = WindowPlace(ImagePlace(120.0, 100.0, 12.0, -0.5, 0.02, 1e-6), aside_px=1.25)
     v, u = np.mgrid[0:200, 0:240].astype(np.float32)
@@ -195,7 +198,7 @@ def test_dirt_that_a_drop_explains_a_little_of_is_no_drop():
         ((1, 2, 0, 1, 2, 1, 0, 2, 1), "droplet"),
     ],
 )
-def test_a_drop_stands_beside_dirt_that_fits_better_but_not_surely(dirt, name, monkeypatch):
+def test_a_drop_is_kept_beside_dirt_that_fits_better_but_not_surely(dirt, name, monkeypatch):
     dirt_falls = FittedLaw(np.array(dirt, float), NamedFigure("share", 0.5, 0.01))
     no_scatter = FittedLaw(np.full(9, -5.0), NamedFigure("share", 0.0, 0.01))
     drop = FittedLaw(np.linspace(9, 11, 9), NamedFigure("aside", 1.25, 0.5), np.linspace(0.9, 1.1, 9))
@@ -210,7 +213,7 @@ def test_a_drop_stands_beside_dirt_that_fits_better_but_not_surely(dirt, name, m
     assert place.judged("image").name == name
 
 
-def test_faint_texture_is_found_where_brightness_is_even():
+def test_faint_texture_is_found_where_brightness_is_uniform():
     random = np.random.default_rng(3)
     shares = []
     for _ in range(6):
@@ -222,7 +225,7 @@ def test_faint_texture_is_found_where_brightness_is_even():
     assert share[3, 3] == pytest.approx(1, abs=0.1)
 
 
-def test_one_spot_is_told_once_and_two_are_told_twice():
+def test_one_spot_is_reported_once_and_two_are_reported_twice():
     def spot(u, fall):
         place = tuple(
             NamedFigure(n, v, 4.0, "px") for n, v in (("u_px", u), ("v_px", 50.0), ("radius_px", 9.0))
@@ -238,7 +241,7 @@ def test_one_spot_is_told_once_and_two_are_told_twice():
 
 
 @pytest.mark.parametrize("flatness", [1.0, 2.0])
-def test_the_size_of_a_spot_holds_whatever_its_rim(flatness):
+def test_the_size_of_a_spot_is_right_for_any_shape_of_its_rim(flatness):
     random = np.random.default_rng(5)
     place = WindowPlace(ImagePlace(124.0, 97.0, 16.0, -0.3, 0.02, 1e-6))
     v, u = np.mgrid[0:200, 0:240].astype(np.float32)
@@ -251,14 +254,14 @@ def test_the_size_of_a_spot_holds_whatever_its_rim(flatness):
     assert found.name == "window_dirt"
     (share,) = found.parameters
     assert share.value == pytest.approx(0.3, abs=0.015)
-    # The photo may be darker by the dirt, too, but by no more than it is darker in frames beyond the photo.
+    # The photo may be darker by the dirt, too, but by no more than in frames beyond the photo.
     in_photo = 0.3 * random.uniform(0, 1, 4000)
     away = np.abs(1 - (1 - 0.3) * (1 - in_photo) - share.value)
     assert np.mean(away < 2 * share.sd) > 0.99
     assert np.mean(away < share.sd) == pytest.approx(1 / np.sqrt(3), abs=0.07)  # of a uniform error
 
 
-def test_a_spot_is_fitted_by_its_derivatives():
+def test_a_spot_is_fitted_with_its_derivatives():
     u, v = np.mgrid[3:60:7, 4:50:5].reshape(2, -1)
     spot = np.array([0.4, 31.0, 24.0, 12.0, 1.7, 0.02])
     for k, step in enumerate(1e-5 * np.maximum(spot, 1.0)):
@@ -268,7 +271,7 @@ def test_a_spot_is_fitted_by_its_derivatives():
 
 
 @pytest.mark.parametrize("share", [-0.2, 1.2])
-def test_what_the_photo_may_hold_of_no_share_is_nothing(share):
+def test_a_photo_cannot_contain_a_share_of_a_zero_effect(share):
     assert _with_photo(NamedFigure("share", share, 0.04)).sd == pytest.approx(0.04)
 
 
@@ -286,7 +289,7 @@ def test_clean_windows_show_no_dirt():
     assert [len(places) for places, _ in found] == [0] * 30
 
 
-def test_dirt_is_found_where_it_lies():
+def test_dirt_is_found_at_its_place():
     (place,), gain = places_in_image(_ratios(np.random.default_rng(3), (40, 30, 0.3)))
     middle = (np.array([40, 30]) + 0.5) * BLOCK_PX - 0.5
     assert np.hypot(place.u_px - middle[0], place.v_px - middle[1]) < BLOCK_PX
@@ -298,18 +301,18 @@ def test_dirt_is_found_where_it_lies():
     assert np.median(whole) == 1
 
 
-def test_wall_that_differs_from_frame_to_frame_is_no_dirt():
+def test_wall_that_differs_from_frame_to_frame_is_not_dirt():
     random, ratios = np.random.default_rng(6), _ratios(np.random.default_rng(3))
     assert len(ratios) < 20
     wall = np.zeros(ratios[0].shape, np.float32)
     wall[30:33, 40:43] = 1
-    differs = np.linspace(-0.16, 0.04, len(ratios))  # as corroded wall did that moved past: -6 % in the mean
+    differs = np.linspace(-0.16, 0.04, len(ratios))  # like corroded wall that moved past: -6 % in the mean
     random.shuffle(differs)
     assert not places_in_image([r + np.float32(d) * wall for r, d in zip(ratios, differs, strict=True)])[0]
     assert places_in_image([r - np.float32(0.06) * wall for r in ratios])[0]
 
 
-def test_a_photo_that_is_poor_far_ahead_is_no_dirt():
+def test_a_poor_photo_far_ahead_is_not_dirt():
     random = np.random.default_rng(4)
     ratios = _ratios(random, (80, 30, 0.4))
     v, u = np.mgrid[0:75, 0:100]
@@ -322,15 +325,15 @@ def test_a_photo_that_is_poor_far_ahead_is_no_dirt():
 @pytest.mark.parametrize(
     ("shown", "told"), [((0.6, 1.0, 0.9, 0.8, 0.6), True), ((0.4, -0.4, 0.6, 0, 0.1), False)]
 )
-def test_a_drop_is_told_by_frames_that_show_it_as_foretold_however_much_each_changes(shown, told):
-    """Texture that a drop draws aside differs from frame to frame, and so do the falls of χ²."""
+def test_a_drop_is_confirmed_by_frames_that_show_it_as_predicted_however_much_each_varies(shown, told):
+    """Texture that a drop displaces differs from frame to frame, and so do the decreases of χ²."""
     own = np.array([23e3, 320e3, 180e3, 14e3, 7e3])
     sums = np.stack([own * np.array(shown), own], 1)[..., None]
     assert (_fall_of_drop(sums, 1.5).chance < 0.01) == told
 
 
-def test_a_ring_that_no_twin_lights_is_no_dirt():
-    """Light from wall to wall, where that of the lamps ends, had been listed as 21 places of the window."""
+def test_a_ring_that_no_lamp_of_the_twin_lights_is_not_dirt():
+    """Light reflected from wall to wall, beyond that of the lamps, was listed as 21 window places."""
     random = np.random.default_rng(4)
     v, u = np.mgrid[0:75, 0:100]
     ring = np.abs(np.hypot(v - 37, u - 49.5) - 24.5) < 1
@@ -341,7 +344,7 @@ def test_a_ring_that_no_twin_lights_is_no_dirt():
 
 
 def test_a_dim_sector_may_always_be_on_the_window():
-    """Scatter across the line was called a sector of the laser alone: lit frames showed nothing of it."""
+    """Scatter across the line was called a sector of the laser: lit frames showed nothing of it."""
     at, other = (NamedFigure("azimuth_deg", -100.0, 3.0),), (np.nan, np.nan, np.nan, "", None)
     sectors = [
         Mismatch(n, "line", "line", at, (), *other) for n in ("laser_sector", "laser_sector or laser_step")

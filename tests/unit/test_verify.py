@@ -1,4 +1,4 @@
-"""Verification: what a run cannot know is taken out, radius and shape stay, and the figures are true."""
+"""Verification: what a run cannot know is removed, radius and shape stay, and the figures are right."""
 
 import json
 
@@ -32,7 +32,7 @@ SIGMA = 0.03
 
 
 def surface_radius(s, psi):
-    """A wall with dents and pits enough to fix shift and roll."""
+    """Return the radius of a wall with enough dents and pits to determine shift and roll."""
     r = 50.8 + 0.2 * np.cos(2 * psi - 0.7)
     for at, width, angle, depth in (
         (12, 4, 0.5, 1.0),
@@ -46,7 +46,7 @@ def surface_radius(s, psi):
 
 
 def wall(s, sigma=0.0, shift=0.0, roll=0.0, scale=0.0, pose=(0.0,) * 6, bias=0.0, seed=0):
-    """A map of the same wall in a frame of its own."""
+    """Return a map of the same wall in another frame."""
     psi = -np.pi + 2 * np.pi * np.arange(180) / 180
     grid_s, grid_psi = np.meshgrid(s, psi, indexing="ij")
     middle = (s[0] + s[-1]) / 2
@@ -66,7 +66,7 @@ def saved(path, m, *, sigma=True):
     np.savez(path, **arrays, **({"sigma_mm": m.sigma_mm} if sigma else {}))
 
 
-def test_known_bore_figures():
+def test_figures_for_a_known_bore_are_right():
     run = wall(np.arange(0, 50, 0.5))
     noise = np.random.default_rng(0).normal(0.02, SIGMA, run.radius_mm.shape)
     stated = np.full_like(noise, SIGMA)
@@ -80,7 +80,7 @@ def test_known_bore_figures():
     assert found.within_95 == pytest.approx(0.8977, abs=0.006)
 
 
-def test_what_a_run_cannot_know_is_taken_out_and_the_rest_stays():
+def test_what_a_run_cannot_know_is_removed_and_the_rest_stays():
     pose = (0.3, -0.2, 0.15, 0.1, -0.05, 0.08)
     run = wall(np.arange(0, 90, 0.5), SIGMA, 1.7, np.radians(2.3), 0.01, pose, bias=0.04)
     alignment = align_maps(run, TRUTH, 8.0, 5.0)
@@ -90,11 +90,11 @@ def test_what_a_run_cannot_know_is_taken_out_and_the_rest_stays():
     assert alignment.scale_error == pytest.approx(0.01, abs=2.5e-3)
     assert alignment.pose_mm == pytest.approx(pose, abs=4e-3)
     found = accuracy(map_differences(run, TRUTH, alignment))
-    assert found.bias_mm == pytest.approx(0.04, abs=1e-3), "a wrong radius is not aligned away"
+    assert found.bias_mm == pytest.approx(0.04, abs=1e-3), "a wrong radius is not removed by the alignment"
     assert found.mad_sigma_mm == pytest.approx(SIGMA, rel=0.03)
 
 
-def test_honest_intervals_hold_and_boastful_ones_do_not():
+def test_right_intervals_pass_and_too_small_ones_do_not():
     run = wall(np.arange(0, 90, 0.5), SIGMA)
     alignment = align_maps(run, TRUTH, 4.0, 2.0)
     assert accuracy(map_differences(run, TRUTH, alignment)).within_95 == pytest.approx(0.95, abs=0.006)
@@ -102,7 +102,7 @@ def test_honest_intervals_hold_and_boastful_ones_do_not():
     assert accuracy(map_differences(boast, TRUTH, alignment)).within_95 < 0.75
 
 
-def test_a_local_defect_of_the_run_is_seen():
+def test_a_local_error_of_the_run_is_found():
     run = wall(np.arange(0, 90, 0.5), SIGMA)
     run.radius_mm[60:66, 20:30] += 0.5
     differences = map_differences(run, TRUTH, align_maps(run, TRUTH, 4.0, 2.0))
@@ -138,7 +138,7 @@ def test_wall_of_an_open_recording_against_itself_displaced():
 
 
 def run_folder(folder, *, sigma=SIGMA, seed=0, offset=0.0):
-    """A run folder with a map and a cloud of the wall, in its own frame."""
+    """Return a run folder with a map and a cloud of the wall, in another frame."""
     folder.mkdir(parents=True, exist_ok=True)
     s = np.arange(0, 90, 0.5)
     m = wall(s, sigma, seed=seed, bias=offset)
@@ -160,7 +160,7 @@ def run_folder(folder, *, sigma=SIGMA, seed=0, offset=0.0):
 
 
 def reference_mesh(path, *, triangles=True, pose=None):
-    """The true wall as a mesh or cloud, in a frame of its own."""
+    """Write the true wall as a mesh or cloud in another frame."""
     s, psi = np.arange(-5, 95, 0.5), -np.pi + 2 * np.pi * np.arange(360) / 360
     grid_s, grid_psi = np.meshgrid(s, psi, indexing="ij")
     r = surface_radius(grid_s, grid_psi)
@@ -181,7 +181,7 @@ def reference_mesh(path, *, triangles=True, pose=None):
 
 
 @pytest.mark.parametrize("triangles", [True, False])
-def test_a_reference_surface_in_its_own_frame(tmp_path, triangles):
+def test_a_reference_surface_may_be_in_another_frame(tmp_path, triangles):
     run = run_folder(tmp_path / "run", offset=0.05)
     pose = from_parts(rotation_from_vector(np.array([0.7, -0.4, 1.1])), np.array([120.0, -40.0, 300.0]))
     file = reference_mesh(tmp_path / "wall.ply", triangles=triangles, pose=pose)
@@ -199,20 +199,20 @@ def command(*arguments):
     return CliRunner().invoke(app, [str(a) for a in arguments])
 
 
-def test_repeatability_is_that_of_one_run(tmp_path):
+def test_repeatability_is_the_scatter_of_one_run(tmp_path):
     first, second = run_folder(tmp_path / "a", seed=1), run_folder(tmp_path / "b", seed=2)
     result = command(first, "--reference", second, "--max-shift-mm", 2, "--max-roll-deg", 1, "--json")
     document = json.loads(result.stdout)
     assert document["kind"] == "repeatability"
     assert document["repeatability_sd_mm"] == pytest.approx(SIGMA, rel=0.03)
-    # noise must not pull the alignment to between the cells
+    # noise must not pull the alignment into the middle between cells
     assert document["alignment"]["shift_mm"] == pytest.approx(0.0, abs=0.08)
     assert document["alignment"]["roll_deg"] == pytest.approx(0.0, abs=0.08)
     assert document["accuracy"]["within_95"] == pytest.approx(0.95, abs=0.006)
     assert not (first / "verify").exists(), "--json alone writes no files"
 
 
-def test_certificate_is_one_page_and_data_that_agree(tmp_path):
+def test_the_certificate_is_one_page_and_data_that_agree(tmp_path):
     run = run_folder(tmp_path / "run")
     result = command(run, "--bore-diameter-mm", 101.6, "-o", tmp_path / "out")
     assert result.exit_code == 0, result.output
@@ -226,14 +226,14 @@ def test_certificate_is_one_page_and_data_that_agree(tmp_path):
     assert f"{document['accuracy']['rms_mm']:.3f} mm RMS against bore of 101.6 mm" in page
 
 
-def test_a_bore_known_to_so_much_of_its_diameter_is_known_to_half_of_that_in_radius():
+def test_the_relative_uncertainty_of_a_diameter_gives_half_of_it_in_radius():
     shape, none = (3, 4), np.zeros((3, 4))
     wall = WallMap(np.arange(3.0), np.arange(4.0), np.full(shape, 50.8), none, none)
     radius = 50.8 + np.random.default_rng(0).uniform(-0.2, 0.2, 100_000) / 2
     assert bore_differences(wall, 101.6, 0.2).sigma_mm == pytest.approx(radius.std(), rel=0.01)
 
 
-def test_another_bore_gives_another_certificate_and_the_same_one_is_kept(tmp_path):
+def test_another_bore_gives_another_certificate_and_the_same_one_is_reused(tmp_path):
     run, out = run_folder(tmp_path / "run"), tmp_path / "out"
     for diameter, tolerance in ((101.6, 0.0), (101.6, 0.0), (102.6, 0.0)):
         result = command(run, "--bore-diameter-mm", diameter, "--bore-tolerance-mm", tolerance, "-o", out)
@@ -245,7 +245,7 @@ def test_another_bore_gives_another_certificate_and_the_same_one_is_kept(tmp_pat
     assert log.count("stage verify starts") == 2, "the second call computes nothing"
 
 
-def test_a_surface_in_metres_gives_the_figures_of_one_in_millimetres(tmp_path):
+def test_a_surface_in_metres_gives_the_same_figures_as_one_in_millimetres(tmp_path):
     run, file = run_folder(tmp_path / "run", offset=0.05), reference_mesh(tmp_path / "wall.ply")
     in_mm = json.loads(command(run, "--reference", file, "--json").stdout)
     assert in_mm["accuracy"]["bias_mm"] == pytest.approx(0.05, abs=3e-3)
@@ -264,14 +264,14 @@ def test_a_surface_in_metres_gives_the_figures_of_one_in_millimetres(tmp_path):
         (["--reference", "wall.ply", "--reference-unit", "inch"], "inch"),
     ],
 )
-def test_bad_input_is_named(tmp_path, arguments, named):
+def test_bad_input_is_named_in_the_error(tmp_path, arguments, named):
     run = run_folder(tmp_path / "run")
     result = command(run, "--json", *arguments)
     assert result.exit_code != 0
     assert named in str(result.exception)
 
 
-def test_a_run_is_no_reference_for_itself(tmp_path):
+def test_a_run_is_refused_as_its_own_reference(tmp_path):
     run = run_folder(tmp_path / "run")
     assert "same map" in str(command(run, "--json", "--reference", run).exception)
 

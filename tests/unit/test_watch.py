@@ -1,11 +1,11 @@
-"""At what a run is, as the benchmarks read it from its log."""
+"""The present stage of a run, as the benchmarks read it from its log."""
 
 from pathlib import Path
 
 from tests.benchmarks.watch import Progress
 
 
-def test_what_files_take_is_not_laid_to_the_stage_beside(tmp_path: Path) -> None:
+def test_time_of_exported_files_is_not_counted_for_the_stage_that_runs_with_them(tmp_path: Path) -> None:
     log = tmp_path / "run.log"
     at, told = Progress(log), []
     for line in (

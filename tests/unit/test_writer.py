@@ -1,4 +1,4 @@
-"""Files are written while stages go on: once, in order, and what fails is raised under its name."""
+"""Files are written while stages go on: once, in order, and a failure is raised with its name."""
 
 import logging
 import threading
@@ -13,7 +13,7 @@ LOGGER = logging.getLogger("test")
 
 
 def write_first(text: str, folder: Path) -> None:
-    assert GATE.wait(20), "nobody went on while this was written"
+    assert GATE.wait(20), "nobody continued while this was written"
     (folder / "first.txt").write_text(text)
 
 
@@ -26,7 +26,7 @@ def write_none(text: str, folder: Path) -> None:
     raise RuntimeError("out of ink")
 
 
-def test_the_caller_goes_on_while_files_are_written_in_order(tmp_path: Path) -> None:
+def test_the_caller_continues_while_files_are_written_in_order(tmp_path: Path) -> None:
     artefacts: dict[type, object] = {str: "words", int: 7}
     GATE.clear()
     with claimed(tmp_path) as folder, Writer(folder, LOGGER) as writer:
@@ -40,7 +40,7 @@ def test_the_caller_goes_on_while_files_are_written_in_order(tmp_path: Path) -> 
     assert (tmp_path / "second.txt").read_text() == "words 7"
 
 
-def test_what_fails_is_raised_and_named_at_the_latest_in_the_end(tmp_path: Path) -> None:
+def test_a_failure_is_raised_and_named_at_the_end_at_the_latest(tmp_path: Path) -> None:
     with claimed(tmp_path) as folder:
         writer = Writer(folder, LOGGER)
         with pytest.raises(RuntimeError, match="out of ink"), writer:

@@ -1,4 +1,4 @@
-"""A tileset on the disk, read with nothing but the formats' own definitions."""
+"""A tileset on the disk, read only by the definitions of the formats."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class Written:
 
 
 class Content:
-    """A GLB."""
+    """The parts of a GLB file."""
 
     def __init__(self, data: bytes) -> None:
         magic, version, total, length, kind = struct.unpack_from("<4s4I", data)
@@ -68,7 +68,7 @@ class Content:
         return np.frombuffer(self.view(accessor["bufferView"]), kind).reshape(accessor["count"], width)
 
     def vertices_m(self) -> NDArray[Any]:
-        """Return places as a viewer has them: node, then glTF's y up to the tileset's z up."""
+        """Return vertices as a viewer has them: node, then glTF's y up to the tileset's z up."""
         (node,) = self.document["nodes"]
         assert node["rotation"] == [1, 0, 0, 0], "half a turn about x"
         local = self.array(self.primitive["attributes"]["POSITION"]).astype(float) * [1, -1, -1]

@@ -31,7 +31,7 @@ class Bore:
     along_c: tuple[float, float, float] = (0.0, 0.0, 1.0)
 
     def away(self, xyz_c: Float) -> Float:
-        """(M, 3) from the axis to points."""
+        """Return the vectors (M, 3) from the axis to points."""
         along = np.array(self.along_c) / np.linalg.norm(self.along_c)
         from_axis = xyz_c - np.array(self.on_axis_c)
         return from_axis - (from_axis @ along)[:, None] * along
@@ -40,7 +40,7 @@ class Bore:
 def ring_radius_px(
     triangulate: Callable[[Float], Float], bore: Bore, azimuth_rad: Float, centre: Sequence[float] = CENTRE
 ) -> Float:
-    """(M,) distance from the stated centre at which the line shows, for an instrument that maps pixels so."""
+    """Return distances (M,) of the line from the stated centre, for an instrument with this triangulation."""
     low, high = np.full(len(azimuth_rad), 60.0), np.full(len(azimuth_rad), 520.0)
     for _ in range(60):
         middle = (low + high) / 2
@@ -55,7 +55,7 @@ def pixels(rho_px: Float, azimuth_rad: Float, centre: Sequence[float]) -> Float:
 
 
 def ring_points(probe: Probe, bore: Bore, count: int = 360, time_s: float = 5.0) -> ImagePoints:
-    """The line's points in a bore as ``probe`` states them."""
+    """Return the line's points in a bore for the parameters of ``probe``."""
     azimuth = np.linspace(-np.pi, np.pi, count, endpoint=False)
     centre = probe.camera.centre_px
     rho = ring_radius_px(probe.triangulate, bore, azimuth, centre)
@@ -64,7 +64,7 @@ def ring_points(probe: Probe, bore: Bore, count: int = 360, time_s: float = 5.0)
 
 
 def texture_points(probe: Probe, bore: Bore, distance_mm: float = 40.0, count: int = 60) -> ImagePoints:
-    """Wall points in the plane z = ``distance_mm`` of C, which the line does not touch."""
+    """Return wall points in the plane z = ``distance_mm`` of C, which the line does not touch."""
     azimuth = np.linspace(-np.pi, np.pi, count, endpoint=False)
     flat = np.stack([np.cos(azimuth), np.sin(azimuth), np.zeros(count)], axis=1) * bore.radius_mm
     centre = np.array(bore.on_axis_c) + distance_mm * np.array(bore.along_c)
