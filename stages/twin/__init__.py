@@ -210,7 +210,7 @@ def compared_with(
     if not comparison.views:
         raise UnusableError("twin", "no frame could be decoded", hint="copy the video again")
     state, samples = photometry.state, sums.blocks.samples()
-    over_time = or_on_window(causes(*sums.cells(), scene.probe.lighting, scene.ring))
+    over_time = or_on_window(causes(*sums.cells(), scene.probe.lighting, scene.ring, samples))
     for also in (flicker_of_measured, faded):
         over_time = (*over_time, *also(photometry.state, over_time, scene.ring))
     failed = any("led_dead" in m.name for m in over_time)
@@ -222,9 +222,9 @@ def compared_with(
     apart_mm, clear = ring_step_mm(rings, scene.trajectory), (*on_window, *glints, *of_photo)
     line_rad = float(np.arctan2(scene.ring.radius_mm, scene.ring.ahead_mm))
     of_wall = unnamed(samples and samples.clear_of(clear), scene.surface, apart_mm, line_rad)
-    placed, beside = beside_sectors((*on_window, *of_wall), over_time, scene.ring)
+    placed, beside = beside_sectors((*on_window, *of_wall, *glints), over_time, scene.ring)
     found: tuple[Mismatch, ...] = (
-        *over_time, *placed, *photometry.pixels, *whole, *glints,
+        *over_time, *placed, *photometry.pixels, *whole,
         *clipped(rings, state.line_clipped, comparison.clipped_share),
     )  # fmt: skip
     fall, unnamed_map = left_over(None if samples is None else samples.seen_through(state.gain_map))
@@ -291,7 +291,7 @@ PHOTOMETRY = Stage(
 )
 TWIN = Stage(
     "twin",
-    "48",
+    "49",
     TwinParameters,
     compare_with_twin,
     "recorded frames beside the same frames, re-rendered from what the run has measured",

@@ -30,6 +30,8 @@ from stages.twin.cells import (
 from stages.twin.flicker import flicker
 from stages.twin.laws import LED_AZIMUTHS, SECTOR_STEP_DEG, line_laws, lit_laws
 from stages.twin.locate import FALSE_ALARM
+from stages.twin.photo_course import share_of_frames
+from stages.twin.reference import BlockSamples
 from stages.twin.scene import Ring
 from stages.twin.steps import (
     FEWEST_FRAMES,
@@ -57,14 +59,22 @@ times width is measured, and widths are tried in steps of a quarter: relative 1 
 over √3."""
 
 
-def causes(lit: Cells | None, line: Cells | None, lighting: Lighting, ring: Ring) -> tuple[Mismatch, ...]:
-    """Return causes of changes over time and along the line, from the cells of each light's frames."""
+def causes(
+    lit: Cells | None, line: Cells | None, lighting: Lighting, ring: Ring, samples: BlockSamples | None = None
+) -> tuple[Mismatch, ...]:
+    """Return causes of changes over time and along the line, from the cells of each light's frames.
+
+    ``samples`` tell from which frames the wall's photo was made.
+    """
     found: list[Mismatch] = []
     steps: dict[str, tuple[Fitted, Cells]] = {}
     for light, cells in (("LEDs", lit), ("laser", line)):
         if cells is None or len(cells.frame) < FEWEST_FRAMES:
             continue
-        base, laws = lit_laws(cells, lighting, ring) if light == "LEDs" else line_laws(cells)
+        if light == "LEDs":
+            base, laws = lit_laws(cells, lighting, ring, share_of_frames(samples, ring, cells.frame))
+        else:
+            base, laws = line_laws(cells)
         chosen, base, unsure = _chosen(cells, base, laws, light)
         for best, rivals in chosen:
             if best.law.name == "step":
@@ -86,12 +96,10 @@ def _chosen(
     unsure = None
     for _ in range(_ROUNDS):
         tries = [try_law(cells, base, law, len(laws) * _places(law)) for law in laws]
-        tries = [f for f in tries if f.law.name != "step" or of_a_light(f, cells, base)]
+        tries = [f for f in tries if _may_be(f, cells, base)]
         tries.sort(key=lambda f: -f.fall.sum())
         best = _by_other_sectors(_simplest(tries), cells, base)
-        size, led = size_of(best), best.law.name == "led_dead"
-        most = 1.0 + _SURE * _size_sd(best) if led else np.inf  # no LED can lose more than all its light
-        if not _LEAST[best.law.name] < size < most:
+        if size_of(best) <= _LEAST[best.law.name]:
             break
         if best.probability > FALSE_ALARM:
             unsure = best
@@ -113,12 +121,19 @@ def _chosen(
     return chosen, base, unsure
 
 
+def _may_be(found: Fitted, cells: Cells, base: Float) -> bool:
+    """Return whether a law may be what its name says: no LED can lose more than all its light."""
+    if found.law.name == "step":
+        return of_a_light(found, cells, base)
+    return found.law.name != "led_dead" or size_of(found) < 1.0 + _SURE * _size_sd(found)
+
+
 def _simplest(tries: Sequence[Fitted]) -> Fitted:
     """Return the law that fits best; one without a name only where no named law fits about as well.
 
     A law that has no certain size does not, where the other one has.
     """
-    named = next(o for o in tries if o.law.name != "lamp_sector")
+    named = next((o for o in tries if o.law.name != "lamp_sector"), tries[0])
     by_chance = named.probability > FALSE_ALARM >= tries[0].probability
     return tries[0] if by_chance or sigmas(tries[0].fall - named.fall) >= _SURE else named
 

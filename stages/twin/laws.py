@@ -32,8 +32,11 @@ def sectors_and_drift(frames: int) -> Float:
     return np.concatenate([of_sectors(frames, np.eye(SECTORS)), drift(frames)])
 
 
-def lit_laws(cells: Cells, lighting: Lighting, ring: Ring) -> tuple[Float, list[Law]]:
-    """Return base columns (K, F, S) for lit frames, and the laws of a step and of an LED that fails."""
+def lit_laws(cells: Cells, lighting: Lighting, ring: Ring, in_photo: Float) -> tuple[Float, list[Law]]:
+    """Return base columns (K, F, S) for lit frames, and the laws of a step and of a side that darkens.
+
+    ``in_photo`` (F, F) is the share of the photo in each frame that was made from each of the frames.
+    """
     frames = len(cells.frame)
     base = sectors_and_drift(frames)
     azimuth = 2 * np.pi * np.arange(LED_AZIMUTHS) / LED_AZIMUTHS
@@ -43,11 +46,20 @@ def lit_laws(cells: Cells, lighting: Lighting, ring: Ring) -> tuple[Float, list[
     places = np.stack(
         [np.repeat(azimuth, len(first)), np.tile(first, LED_AZIMUTHS), np.repeat(share.max(1), len(first))], 1
     )
-    return base, [
-        Law("step", steps, first[:, None]),
-        Law("led_dead", columns.reshape(-1, frames, SECTORS), places),
-        _lamp_sector(azimuth, steps, first),
-    ]
+    led = Law("led_dead", columns.reshape(-1, frames, SECTORS), places)
+    sides = [_with_photo(law, in_photo) for law in (led, _lamp_sector(azimuth, steps, first))]
+    return base, [Law("step", steps, first[:, None]), *sides]
+
+
+def _with_photo(law: Law, in_photo: Float) -> Law:
+    """Return a law whose change the photo may hold as well, as far as it was made from the frames (F, F).
+
+    A step of all lamps is taken out of the photo as exposure; one of a side is not.
+    """
+    if not in_photo.any():
+        return law
+    beyond = law.columns - np.einsum("tf,cfs->cts", in_photo, law.columns, optimize=True)
+    return Law(law.name, np.concatenate([law.columns, beyond]), np.concatenate([law.places, law.places]))
 
 
 def _lamp_sector(azimuth_rad: Float, steps: Float, first: Float) -> Law:

@@ -17,6 +17,8 @@ from stages.twin.laws import SECTOR_STEP_DEG
 from stages.twin.scene import Ring
 
 _DIMS = ("window_dirt", "window_scatter", "droplet")
+_SIDE_DEG = 90.0
+"""Half the width of a side: a lamp lights at least half of the picture."""
 
 
 def separated_from_photo(
@@ -36,21 +38,31 @@ def separated_from_photo(
 def beside_sectors(
     found: Sequence[Mismatch], sectors: Sequence[Mismatch], ring: Ring
 ) -> tuple[tuple[Mismatch, ...], tuple[Mismatch, ...]]:
-    """Return the findings that remain, and unnamed ones at the azimuth of a sector that the window may dim.
+    """Return the findings that remain, and unnamed ones where the photo was made in other light.
 
-    Their photo was then made through what is there: wall that frames show beside it differs from its photo.
-    A displaced line remains: no photo shows it, and a drop both displaces the line and dims it.
+    That is so at the azimuth of a sector that the window may dim, and on a side that darkens during the run:
+    wall that frames show beside it, or before it, differs from its photo. A displaced line remains: no photo
+    shows it, and a drop both displaces the line and dims it.
     """
-    reach = [
-        (at["azimuth_deg"], (at["width_deg"] + SECTOR_STEP_DEG) / 2)
-        for at in ({p.name: p.value for p in m.place} for m in sectors if "window_scatter" in m.names)
-        if "width_deg" in at
-    ]
+    reach = [r for r in map(_dimmed, sectors) if r is not None]
     by_photo = [m for m in found if not m.name and m.channel != "line"]
     left = [m for m in by_photo if any(_looks_at(m, *r, ring) for r in reach)]
-    said = "{} But the photo may have been made through what dims the line at that azimuth."
+    said = (
+        "{} But the photo may have been made in other light, or through what dims the line at that azimuth."
+    )
     withdrawn = tuple(replace(m, statement=said.format(m.statement)) for m in left)
     return tuple(m for m in found if m not in left), withdrawn
+
+
+def _dimmed(found: Mismatch) -> tuple[float, float] | None:
+    """Return azimuth and half the width, degrees, over which a change of light may be in the photo."""
+    at = {p.name: p.value for p in found.place}
+    if "azimuth_deg" not in at:
+        return None
+    if "window_scatter" in found.names and "width_deg" in at:
+        return at["azimuth_deg"], (at["width_deg"] + SECTOR_STEP_DEG) / 2
+    side = found.fixed_to == "time" and found.channel == "intensity"
+    return (at["azimuth_deg"], _SIDE_DEG) if side else None
 
 
 def _looks_at(found: Mismatch, azimuth_deg: float, half_deg: float, ring: Ring) -> bool:

@@ -210,15 +210,16 @@ class WindowPlace:
         )  # fmt: skip
 
     def _said(self, names: list[str], size: float) -> str:
-        at = f"About ({self.place.u_px:.0f}, {self.place.v_px:.0f})"
+        at, shown = f"About ({self.place.u_px:.0f}, {self.place.v_px:.0f})", len(self.frame)
+        when = f"in the {shown} compared frames that show wall there"
         if names[0] == "window_dirt" and size < 0:
-            return f"{at} the image is {100 * -size:.0f} % brighter in all frames."
+            return f"{at} the image is {100 * -size:.0f} % brighter {when}."
         if names[0] == "window_scatter" and size < 0:
-            return f"{at} texture is {100 * -size:.0f} % stronger in all frames than in the photo."
+            return f"{at} texture is {100 * -size:.0f} % stronger than in the photo {when}."
         share = "the light" if names[0] == "droplet" else f"{100 * min(size, 1.0):.0f} % of the light"
         share = f"at least {share}" if names[0] == "window_dirt" else share
         others = "".join(f", or {_STATED[n].format('as much')}" for n in names[1:])
-        return f"{at}, in all frames, {_STATED[names[0]].format(share)}{others}."
+        return f"{at}, {when}, {_STATED[names[0]].format(share)}{others}."
 
 
 def separated_from_blur(

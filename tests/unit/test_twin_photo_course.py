@@ -1,0 +1,98 @@
+"""A side of the picture that darkens during a run, and is therefore in a part of the wall's photo as well."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from pipeline.artefacts.twin import Look, Mismatch, NamedFigure
+from pipeline.instrument.probe import Lighting
+from stages.twin.causes import causes
+from stages.twin.cells import SECTORS, Cells, sector_azimuth_rad
+from stages.twin.photo_course import share_of_frames
+from stages.twin.reference import WALL_COLUMNS
+from stages.twin.scene import Ring
+from stages.twin.seen_in_photo import beside_sectors
+
+RING, RADIUS_MM = Ring((400.0, 300.0), 200.0, 50.0, 23.0), 50.0
+FRAMES, STEP_MM = 14, 5.0
+AHEAD_MM = np.arange(6.0, 70.0, 2.5)
+"""Distances of the wall ahead of the camera that frames show."""
+AWAY = np.arctan2(RADIUS_MM, AHEAD_MM) / np.arctan2(RADIUS_MM, RING.ahead_mm)
+
+
+def _samples():
+    """Blocks of frames 5 mm apart, each of which shows rings of wall; brighter near the sheet."""
+    frame, place = np.indices((FRAMES, len(AHEAD_MM))).reshape(2, -1)
+    along = ((AHEAD_MM[place] + STEP_MM * frame) / 2.5).astype(int)
+    log_level = 4.0 - 0.02 * np.abs(AHEAD_MM[place] - RING.ahead_mm)
+    return SimpleNamespace(
+        frame=frame, number=8 * np.arange(FRAMES), away=AWAY[place], log_level=log_level,
+        weight=np.ones(len(frame)), orders={"wall": along * WALL_COLUMNS},
+    )  # fmt: skip
+
+
+def _in_photo(course):
+    """Mean over the wall in each frame of the photo's mean of a course, made from frames 1 mm apart."""
+    place_mm = np.arange(0.0, 200.0, 1.0)
+    camera_mm = np.arange(0.0, STEP_MM * FRAMES, 1.0)
+    from_sheet = place_mm[:, None] - camera_mm - RING.ahead_mm
+    made = np.maximum(1 - (from_sheet / (0.5 * RADIUS_MM)) ** 2, 0) ** 2
+    photo = made @ course(camera_mm / STEP_MM) / np.maximum(made.sum(1), 1e-9)
+    seen = [AHEAD_MM + STEP_MM * k for k in range(FRAMES)]
+    known = made.sum(1) > 0
+    return np.array([np.interp(at[at < place_mm[known].max()], place_mm, photo).mean() for at in seen])
+
+
+def _cells(lost, first, seed=0):
+    """Cells whose photo was made from frames before and after a side darkened."""
+    random, pixels, level = np.random.default_rng(seed), 500.0, 20.0
+    side = np.log1p(-lost * np.maximum(np.cos(sector_azimuth_rad() - 0.1), 0) ** 2)
+
+    def course(frame):
+        return (frame >= first).astype(float)
+
+    beyond = course(np.arange(FRAMES)) - _in_photo(course)
+    ratio = np.exp(beyond[:, None] * side + 0.01 * random.standard_normal((FRAMES, SECTORS)))
+    own = np.full((FRAMES, SECTORS), pixels * level**2)
+    square = pixels * (1 + (ratio * level) ** 2)
+    full = np.full_like(own, pixels)
+    return Cells(8 * np.arange(FRAMES), square, ratio * own, own, full, level * full)
+
+
+@pytest.mark.parametrize("first", [5, 7, 9])
+@pytest.mark.parametrize("lost", [0.5, 0.9])
+def test_a_side_that_darkens_is_told_though_the_photo_holds_it(lost, first):
+    """Nothing was told: the photo's part of it rises and falls about the step, which no law contained."""
+    (side,) = causes(_cells(lost, first), None, Lighting(), RING, _samples())
+    assert (side.name, side.fixed_to) == ("", "time")
+    assert side.place[0].value == 8 * first - 4
+    assert side.place[1].value == pytest.approx(np.degrees(0.1), abs=12)
+    assert side.parameters[0].value == pytest.approx(lost, abs=0.12)
+
+
+def test_nothing_is_told_beside_a_photo_where_nothing_darkens():
+    assert all(causes(_cells(0.0, 7, seed), None, Lighting(), RING, _samples()) == () for seed in range(8))
+
+
+def test_the_photo_in_a_frame_is_made_from_the_frames_about_it():
+    share = share_of_frames(_samples(), RING, 8 * np.arange(FRAMES))
+    assert share.sum(1) == pytest.approx(1.0)
+    middle = share @ np.arange(FRAMES)
+    assert np.all(np.diff(middle) > 0)
+    assert share_of_frames(None, RING, np.arange(3)).any() == 0
+
+
+def _unnamed(at_deg):
+    turn = np.radians(at_deg)
+    look = Look(8, 400 + 150 * np.cos(turn), 300 + 150 * np.sin(turn), 60.0)
+    return Mismatch("", "intensity", "image", (), (), 0.0, 2.0, 1.0, "It is 263 % brighter.", look)
+
+
+@pytest.mark.parametrize(("at_deg", "left"), [(-26.0, True), (80.0, True), (150.0, False)])
+def test_no_place_is_told_where_the_photo_was_made_before_the_side_darkened(at_deg, left):
+    """A place 263 % brighter was told of a recording whose LEDs lost 90 % of their light on that side."""
+    at = (NamedFigure("frame_from", 51.0, 2.0), NamedFigure("azimuth_deg", 0.0, 7.0))
+    side = Mismatch("", "intensity", "time", at, (), 0.0, 2.0, 1.0, "Darker.")
+    kept, withdrawn = beside_sectors((_unnamed(at_deg),), (side,), RING)
+    assert (len(kept), len(withdrawn)) == (not left, left)
