@@ -1,4 +1,4 @@
-"""Detect an LED that may have been dim throughout a recording, although the photo was made in its light.
+"""Locate a side where an LED may have been dim throughout a recording, although the photo was made in its light.
 
 The run's own photo is darker where the dim LED shone: predicted frames are equally dark, and no difference
 around the picture remains. But the LED's share of the light depends on the polar angle: a near ring of wall
@@ -7,7 +7,7 @@ at many polar angles as the probe advances, which shows the difference. Lamps th
 that is not circular make first and second harmonics around the picture; these are fitted freely at every
 polar angle.
 
-This does not justify a name, however: no more than a thousandth of an LED's light is narrower than these
+This justifies a place, but no name: no more than a thousandth of an LED's light is narrower than these
 harmonics, and dirt on the window, shade or a third harmonic have effects of the same size.
 """
 
@@ -19,7 +19,7 @@ import numpy as np
 from scipy.stats import t
 
 from pipeline.arrays import Float, Float32, Int
-from pipeline.artefacts.twin import Mismatch
+from pipeline.artefacts.twin import Mismatch, NamedFigure
 from stages.twin.cells import centred, half_turn
 from stages.twin.compare import BLOCK_PX
 from stages.twin.laws import LED_AZIMUTHS
@@ -31,6 +31,8 @@ from stages.twin.switched import share_at
 
 _LEAST, _SURE = 0.25, 3.0
 """Smallest loss that is mentioned, chosen; and its significance, σ."""
+_LOBE = 0.15
+"""Relative 1 σ of an LED's share of the light because its lobe is unknown, as for an LED that fails."""
 _MOST_BLOCKS = 100_000
 """Approximate number of blocks in the fit: 50 columns of them take 40 MB, of all blocks of 12 MP 2 GB."""
 _PARTS, _FEWEST_FRAMES = 6, 6
@@ -51,22 +53,25 @@ def seen_from(samples: BlockSamples, scene: Scene) -> tuple[Float32, Float32]:
 
 
 def dead_led(samples: BlockSamples | None, scene: Scene) -> tuple[Mismatch, ...]:
-    """Return the LED that may be dim in all frames, if the same wall at several polar angles suggests one.
+    """Return the side that is dark in all frames as by a dim LED, if the same wall at several angles shows it.
 
-    It is not a finding and has no size, since other patterns that stay still in the picture look the same.
+    It has no name and no size, since other patterns that stay still in the picture look the same. Its azimuth
+    is chosen among all by what is wider than the first harmonic; what is narrower than the second must agree.
     """
     if samples is None or len(samples.number) < _FEWEST_FRAMES:
         return ()
     few = _thinned(samples)
     angles, step = seen_from(few, scene), 2 * np.pi / LED_AZIMUTHS
     wide, narrow = (_Beside.harmonics(few, *angles, k) for k in (1, 2))
-    law = max(
-        (_law_at(few, scene, angles, k * step) for k in range(LED_AZIMUTHS)),
-        key=lambda one: wide.fall(one.log_light),
-    )
-    lost, (alone, sd) = law.lost(wide.size(law.log_light)[0]), narrow.size(law.log_light)
-    chance = LED_AZIMUTHS * float(2 * t.sf(alone / max(sd, 1e-9), _PARTS - 1))
-    if chance > FALSE_ALARM or min(lost, alone) < max(_LEAST, _SURE * sd):
+    laws = [_law_at(few, scene, angles, k * step) for k in range(LED_AZIMUTHS)]
+    falls = [wide.fall(one.log_light) for one in laws]
+    law, bright = laws[int(np.argmax(falls))], laws[int(np.argmin(falls))]
+    if narrow.fall(law.log_light) < -narrow.fall(bright.log_light):
+        return ()  # an LED that is too bright has the same second harmonic a quarter turn away
+    (size, size_sd), (alone, sd) = (beside.size(law.log_light) for beside in (wide, narrow))
+    chance = max(LED_AZIMUTHS * _chance(size, size_sd), _chance(alone, sd))
+    apart = _SURE * float(np.linalg.norm([size_sd, sd, _LOBE * size]))
+    if chance > FALSE_ALARM or min(law.lost(size), alone) < max(_LEAST, _SURE * sd) or size - alone > apart:
         return ()
     where, nan = half_turn(float(np.degrees(law.azimuth_rad))), float("nan")
     said = (
@@ -74,8 +79,14 @@ def dead_led(samples: BlockSamples | None, scene: Scene) -> tuple[Mismatch, ...]
         "wall seen farther ahead, as if an LED there were dim in all frames. Dirt or shade on the window, or "
         "another pattern that stays still in the picture, looks the same. What to do: check the LEDs."
     )
+    at = NamedFigure("azimuth_deg", where, 180 / LED_AZIMUTHS, "deg")
     look = scene.ring.at(int(samples.number[0]), law.azimuth_rad)
-    return (Mismatch("led_dead", "intensity", "image", (), (), min(chance, 1.0), nan, nan, said, look),)
+    return (Mismatch("", "intensity", "image", (at,), (), min(chance, 1.0), nan, nan, said, look),)
+
+
+def _chance(size: float, sd: float) -> float:
+    """Return the probability that parts of the frames agree so well by chance on a size of either sign."""
+    return float(2 * t.sf(abs(size) / max(sd, 1e-9), _PARTS - 1))
 
 
 def _thinned(samples: BlockSamples) -> BlockSamples:

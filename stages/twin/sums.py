@@ -133,9 +133,10 @@ class Sums:
         """
         again = partial(self._shown, recording)
         power = power_of_lamps(samples, self._scene.ring)
-        lamps, of_wall = self._lamps(samples, led_failed)
+        lamps, dark, of_wall = self._lamps(samples, led_failed)
         if power:  # how uneven lamps are was estimated by light that brightness does not follow
-            of_wall, lamps = (*of_wall, *(beside_response(one.mismatch) for one in lamps)), ()
+            uneven = (*(one.mismatch for one in lamps), *dark)
+            of_wall, lamps, dark = (*of_wall, *map(beside_response, uneven)), (), ()
         contrast = () if self._state.black_in_photo else response_of(samples, self._scene.ring)
         first = (*self.whole.suspected(self._state.sharpness), *contrast, *power, *lamps)
         kept, withdrawn = judged(first, again)
@@ -143,24 +144,24 @@ class Sums:
             kept, unsure = beside_clipping(kept)
             withdrawn = (*withdrawn, *unsure)
         focus, not_focus = judged(focus_of(self._state, self.whole, kept), again)
-        return (*kept, *focus), (*withdrawn, *not_focus, *of_wall)
+        return (*kept, *focus, *dark), (*withdrawn, *not_focus, *of_wall)
 
     def _lamps(
         self, samples: BlockSamples | None, led_failed: bool
-    ) -> tuple[tuple[Suspected, ...], tuple[Mismatch, ...]]:
-        """Return the cause of lamps that are uneven in all frames, and what wall seen twice does not confirm.
+    ) -> tuple[tuple[Suspected, ...], tuple[Mismatch, ...], tuple[Mismatch, ...]]:
+        """Return the cause of lamps that are uneven in all frames, a dark side, and what is not confirmed.
 
         The run's own photo contains most of an unevenness, which then shows only in its change over polar
-        angle; other patterns look the same.
+        angle: the dark side, which has no name. Wall seen twice does not confirm the last.
         """
         if led_failed:
-            return (), ()
+            return (), (), ()
         lamp = self._state.lamp
         uneven = uneven_lamps(lamp, self._scene, self.whole.frames_of("blur"))
         uneven, of_wall = separated_from_wall(uneven, lamp, self._scene, samples)
         if any("led_dead" in one.mismatch.names for one in uneven):
-            return uneven, of_wall
-        return uneven, (*of_wall, *dead_led(samples, self._scene))
+            return uneven, (), of_wall
+        return uneven, dead_led(samples, self._scene), of_wall
 
     def _shown(self, recording: Recording, frames: Int) -> Iterator[tuple[int, Shown]]:
         """Yield compared frames again, each with functions that render it under other assumptions."""
