@@ -1,4 +1,4 @@
-"""Locate a side where an LED may have been dim throughout a recording, although the photo was made in its light.
+"""Locate an LED that may have been dim throughout a recording, although the photo was made in its light.
 
 The run's own photo is darker where the dim LED shone: predicted frames are equally dark, and no difference
 around the picture remains. But the LED's share of the light depends on the polar angle: a near ring of wall
@@ -53,7 +53,7 @@ def seen_from(samples: BlockSamples, scene: Scene) -> tuple[Float32, Float32]:
 
 
 def dead_led(samples: BlockSamples | None, scene: Scene) -> tuple[Mismatch, ...]:
-    """Return the side that is dark in all frames as by a dim LED, if the same wall at several angles shows it.
+    """Return the side that is dark in all frames as by a dim LED, if wall seen at several angles shows it.
 
     It has no name and no size, since other patterns that stay still in the picture look the same. Its azimuth
     is chosen among all by what is wider than the first harmonic; what is narrower than the second must agree.

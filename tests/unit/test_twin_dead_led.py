@@ -104,7 +104,7 @@ def test_confirmed_uneven_lamps_are_reported_beside_a_dim_led(monkeypatch):
 
 
 def test_a_dim_led_is_told_in_light_that_hardly_shows_its_third_harmonic():
-    """Its size agreed within 7 σ over six parts, times 24 azimuths: too little; the second harmonic chose one.
+    """Six parts agreed within 7 σ, too little for 24 azimuths, though the second harmonic had chosen one.
 
     It was an LED of eight, dimmed by 82 %, in a rendered recording.
     """
