@@ -19,6 +19,7 @@ from pipeline.recording.base import Illumination, Recording
 from pipeline.recording.checks import CheckedFrames
 from stages.twin.causes import causes
 from stages.twin.compare import Comparison, block_ratios, block_textures
+from stages.twin.dark_side import beside_dark_side
 from stages.twin.fixed_line import on_line
 from stages.twin.fixed_pattern import pattern_figures
 from stages.twin.glints import window_and_glints
@@ -223,6 +224,7 @@ def compared_with(
     line_rad = float(np.arctan2(scene.ring.radius_mm, scene.ring.ahead_mm))
     of_wall = unnamed(samples and samples.clear_of(clear), scene.surface, apart_mm, line_rad)
     placed, beside = beside_sectors((*on_window, *of_wall, *glints), over_time, scene.ring)
+    placed, of_side = beside_dark_side(placed, over_time, samples, scene)
     found: tuple[Mismatch, ...] = (
         *over_time, *placed, *photometry.pixels, *whole,
         *clipped(rings, state.line_clipped, comparison.clipped_share),
@@ -238,7 +240,7 @@ def compared_with(
         comparison.psnr_db(False), comparison.psnr_db(True), comparison.chi2_camera, comparison.stray_share,
         comparison.seen / max(comparison.view, 1.0), cannot_tell(state, comparison.silent),
         tuple(comparison.views), maps_of(samples), comparison.levels(), worst_places(samples),
-        (*withdrawn, *unsure, *of_photo, *beside),
+        (*withdrawn, *unsure, *of_photo, *beside, *of_side),
     )  # fmt: skip
 
 

@@ -17,7 +17,7 @@ from stages.twin.laws import SECTOR_STEP_DEG
 from stages.twin.scene import Ring
 
 _DIMS = ("window_dirt", "window_scatter", "droplet")
-_SIDE_DEG = 90.0
+SIDE_DEG = 90.0
 """Half the width of a side: a lamp lights at least half of the picture."""
 
 
@@ -44,9 +44,9 @@ def beside_sectors(
     wall that frames show beside it, or before it, differs from its photo. A displaced line remains: no photo
     shows it, and a drop both displaces the line and dims it.
     """
-    reach = [r for r in map(_dimmed, sectors) if r is not None]
+    reach = [r for r in map(dimmed, sectors) if r is not None]
     by_photo = [m for m in found if not m.name and m.channel != "line"]
-    left = [m for m in by_photo if any(_looks_at(m, *r, ring) for r in reach)]
+    left = [m for m in by_photo if any(looks_at(m, *r, ring) for r in reach)]
     said = (
         "{} But the photo may have been made in other light, or through what dims the line at that azimuth."
     )
@@ -54,7 +54,7 @@ def beside_sectors(
     return tuple(m for m in found if m not in left), withdrawn
 
 
-def _dimmed(found: Mismatch) -> tuple[float, float] | None:
+def dimmed(found: Mismatch) -> tuple[float, float] | None:
     """Return azimuth and half the width, degrees, over which a change of light may be in the photo."""
     at = {p.name: p.value for p in found.place}
     if "azimuth_deg" not in at:
@@ -62,10 +62,10 @@ def _dimmed(found: Mismatch) -> tuple[float, float] | None:
     if "window_scatter" in found.names and "width_deg" in at:
         return at["azimuth_deg"], (at["width_deg"] + SECTOR_STEP_DEG) / 2
     side = found.fixed_to == "time" and found.channel == "intensity"
-    return (at["azimuth_deg"], _SIDE_DEG) if side else None
+    return (at["azimuth_deg"], SIDE_DEG) if side else None
 
 
-def _looks_at(found: Mismatch, azimuth_deg: float, half_deg: float, ring: Ring) -> bool:
+def looks_at(found: Mismatch, azimuth_deg: float, half_deg: float, ring: Ring) -> bool:
     """Return whether a mismatch is within some degrees of an azimuth of the image."""
     if found.look is None:
         return False
