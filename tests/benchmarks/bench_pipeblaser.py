@@ -33,10 +33,7 @@ SEEN = 1e-8
 
 @dataclass(frozen=True)
 class Told:
-    """One effect: amplitude and 1 σ from all frames, χ², p, and the r.m.s.
-
-    In px on frames not used for it.
-    """
+    """One effect: amplitude and 1 σ from all frames, χ², p, and the rms, px, on frames not used."""
 
     name: str
     model: EffectModel

@@ -60,7 +60,7 @@ class Case:
 
     @property
     def true_figure(self) -> float | None:
-        """True value of the figure that tells it."""
+        """True value of the figure that shows the effect."""
         return None if self.figure is None else self.figure[1](self.numbers[0])
 
     def drawn(self, seed: int) -> Case:

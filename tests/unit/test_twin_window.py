@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from pipeline.artefacts.twin import Mismatch, NamedFigure
-from stages.twin.compare import BLOCK_PX, block_textures
-from stages.twin.locate import ImagePlace, full_size, places_displaced, places_in_image, without_duplicates
+from stages.twin.compare import block_textures
+from stages.twin.locate import ImagePlace, full_size, places_displaced, without_duplicates
 from stages.twin.render import Region, TwinFrame
 from stages.twin.spot import FittedLaw, _slopes_at, _spot_at
 from stages.twin.window import WindowPlace, _fall_of_drop, _with_photo, or_on_window, separated_from_blur
@@ -273,74 +273,6 @@ def test_a_spot_is_fitted_with_its_derivatives():
 @pytest.mark.parametrize("share", [-0.2, 1.2])
 def test_a_photo_cannot_contain_a_share_of_a_zero_effect(share):
     assert _with_photo(NamedFigure("share", share, 0.04)).sd == pytest.approx(0.04)
-
-
-def _ratios(random, spot=None, frames=8):
-    shape = (75, 100)
-    v, u = np.mgrid[0 : shape[0], 0 : shape[1]]
-    fixed = 1 + 0.002 * random.standard_normal(shape)
-    if spot is not None:
-        fixed -= spot[2] * np.exp(-0.5 * ((u - spot[0]) ** 2 + (v - spot[1]) ** 2) / 2.0**2)
-    return [(fixed + 0.004 * random.standard_normal(shape)).astype(np.float32) for _ in range(frames)]
-
-
-def test_clean_windows_show_no_dirt():
-    found = [places_in_image(_ratios(np.random.default_rng(k))) for k in range(30)]
-    assert [len(places) for places, _ in found] == [0] * 30
-
-
-def test_dirt_is_found_at_its_place():
-    (place,), gain = places_in_image(_ratios(np.random.default_rng(3), (40, 30, 0.3)))
-    middle = (np.array([40, 30]) + 0.5) * BLOCK_PX - 0.5
-    assert np.hypot(place.u_px - middle[0], place.v_px - middle[1]) < BLOCK_PX
-    assert place.change == pytest.approx(-0.3, abs=0.02)
-    assert place.probability < 1e-6
-    whole = full_size(gain, (600, 800))
-    assert whole.shape == (600, 800)
-    assert whole.min() == pytest.approx(0.7, abs=0.03)
-    assert np.median(whole) == 1
-
-
-def test_wall_that_differs_from_frame_to_frame_is_not_dirt():
-    random, ratios = np.random.default_rng(6), _ratios(np.random.default_rng(3))
-    assert len(ratios) < 20
-    wall = np.zeros(ratios[0].shape, np.float32)
-    wall[30:33, 40:43] = 1
-    differs = np.linspace(-0.16, 0.04, len(ratios))  # like corroded wall that moved past: -6 % in the mean
-    random.shuffle(differs)
-    assert not places_in_image([r + np.float32(d) * wall for r, d in zip(ratios, differs, strict=True)])[0]
-    assert places_in_image([r - np.float32(0.06) * wall for r in ratios])[0]
-
-
-def test_a_poor_photo_far_ahead_is_not_dirt():
-    random = np.random.default_rng(4)
-    ratios = _ratios(random, (80, 30, 0.4))
-    v, u = np.mgrid[0:75, 0:100]
-    far = np.hypot(v - 37, u - 49.5)
-    poor = np.where(far < 8, 0.1 * np.sin(0.7 * (u + 2 * v)), 0)
-    (place,), _ = places_in_image([r + poor.astype(np.float32) for r in ratios])
-    assert place.u_px == pytest.approx(80.5 * BLOCK_PX, abs=BLOCK_PX)
-
-
-@pytest.mark.parametrize(
-    ("shown", "told"), [((0.6, 1.0, 0.9, 0.8, 0.6), True), ((0.4, -0.4, 0.6, 0, 0.1), False)]
-)
-def test_a_drop_is_confirmed_by_frames_that_show_it_as_predicted_however_much_each_varies(shown, told):
-    """Texture that a drop displaces differs from frame to frame, and so do the decreases of χ²."""
-    own = np.array([23e3, 320e3, 180e3, 14e3, 7e3])
-    sums = np.stack([own * np.array(shown), own], 1)[..., None]
-    assert (_fall_of_drop(sums, 1.5).chance < 0.01) == told
-
-
-def test_a_ring_that_no_lamp_of_the_twin_lights_is_not_dirt():
-    """Light reflected from wall to wall, beyond that of the lamps, was listed as 21 window places."""
-    random = np.random.default_rng(4)
-    v, u = np.mgrid[0:75, 0:100]
-    ring = np.abs(np.hypot(v - 37, u - 49.5) - 24.5) < 1
-    bounced = ring * (0.35 + 0.1 * random.standard_normal(ring.shape))
-    ratios = [r + bounced.astype(np.float32) for r in _ratios(random, (80, 30, 0.4))]
-    (place,), _ = places_in_image(ratios)
-    assert place.u_px == pytest.approx(80.5 * BLOCK_PX, abs=BLOCK_PX)
 
 
 def test_a_dim_sector_may_always_be_on_the_window():
