@@ -31,15 +31,14 @@ from stages.motion.measuring import measure_run, places_of
 from stages.motion.parameters import MotionParameters
 from stages.motion.rings import looking_at_wall
 from stages.motion.route.laying import lay_route
+from stages.motion.stated_probe import report_instrument, with_doubtful_instrument
 from stages.motion.tracking.strips import WallView
 from stages.motion.trajectory import (
     SeenCentres,
     camera_trembles,
-    report_instrument,
     report_motion,
     report_steps,
     trajectory_of,
-    with_doubtful_instrument,
 )
 from stages.motion.windows.measured_run import MeasuredRun
 from stages.motion.windows.sliding_window import adjust_run, joined_at_once
@@ -205,7 +204,7 @@ def _motion_of_run(
 
 MOTION = Stage(
     "motion",
-    "56",
+    "57",
     MotionParameters,
     _motion_of_run,
     "camera pose in every frame and the pipe's axis, from texture, rings and encoder together",

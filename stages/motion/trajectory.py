@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from pipeline.machine.stage import Context
 from pipeline.recording.base import FrameTable
 from stages.motion.bundle_adjustment.equations import MATCH_BIASES
 from stages.motion.bundle_adjustment.solver import trembles
-from stages.motion.mirrored import mirrored_way
+from stages.motion.stated_probe import MOST_LASTING
 from stages.motion.tracking.landmarks import TrackedPoses
 from stages.motion.tracking.tracker import TrackedTexture
 from stages.motion.windows.sliding_window import RunEstimate
@@ -24,21 +24,11 @@ from stages.motion.windows.submap_joining import JoinedRun
 
 _START_MM = 60.0
 """Length of pipe whose direction is the z-axis of P: two knots of the axis. Not measured."""
-_TOO_FAR = 5.0
-"""A correct probe moves farther than so many σ along one of its ten or so directions once in 10⁵
-recordings."""
 _MOST_LOST = 0.05
 """Share of the lit frames without enough texture that is warned of; good recordings have none. Not
 measured."""
-_RING = 72
-"""Points around the pipe at which its radius is computed, 5° apart, as for a calibration's errors
-elsewhere."""
 _FEWEST_CENTRES = 16
 """Fewest rings from which the trembling of their centres is estimated, as for poses."""
-_MOST_LASTING = 0.57
-"""Reprojection error, in σ of matching, shared by a landmark's neighbouring matches, that is warned of: .44
-to .51 in open-1, open-2, at half their size, shaken, and in a scene of ours; .18 in open-3, of much noise;
-.63 in open-1 as HEVC of crf 32, .69 at crf 30, .85 with glints, dust and blur as well."""
 
 
 @dataclass(frozen=True)
@@ -95,73 +85,6 @@ def trajectory_of(run: JoinedRun, frames: FrameTable, probe: Probe, has_encoder:
         instrument=probe.parameters + unsure @ found,
         instrument_covariance=unsure @ covariance @ unsure.T,
     )
-
-
-def with_doubtful_instrument(
-    trajectory: Trajectory, probe: Probe, lasting: float, shakes: bool
-) -> Trajectory:
-    """Return the trajectory, with the instrument's correction added to its σ if the correction is doubtful.
-
-    A correction is doubtful if matches contradict the motion (``lasting``), since their common error may have
-    caused it: a lamp mirrored in a polished wall made radii 0.3 mm too large. It is also doubtful if the
-    camera ``shakes`` or the probe does not fit, since the picture may have moved and not the probe: pictures
-    shaken by 2 px at random made radii 0.06 mm too small. Distances get the same relative σ as the radius,
-    because a wrong probe scales both equally.
-    """
-    if trajectory.instrument is None or trajectory.instrument_covariance is None:
-        return trajectory
-    moved = trajectory.instrument - probe.parameters
-    if not (shakes or lasting > _MOST_LASTING or _farthest(moved, probe) > _TOO_FAR):
-        return trajectory
-    wider = _wider_by(moved, probe, trajectory.radius_mm)
-    way = np.zeros((len(trajectory.T_pc), 6))
-    way[:, :3] = wider * (trajectory.T_pc[:, :3, 3] - trajectory.T_pc[0, :3, 3])
-    length_mm = float(np.ptp(distance_along(trajectory.axis, trajectory.T_pc)))
-    return replace(
-        trajectory,
-        covariance=trajectory.covariance + way[:, :, None] * way[:, None, :],
-        distance_sigma_mm=float(np.hypot(trajectory.distance_sigma_mm, wider * length_mm)),
-        instrument_covariance=trajectory.instrument_covariance + np.outer(moved, moved),
-    )
-
-
-def _wider_by(moved: Float, probe: Probe, radius_mm: float) -> float:
-    """Return the relative change of the pipe's measured radius if a probe's parameters are ``moved`` (P,)."""
-    psi = np.linspace(-np.pi, np.pi, _RING, endpoint=False)
-    ring = np.stack([radius_mm * np.cos(psi), radius_mm * np.sin(psi), 0 * psi + probe.laser.baseline_mm], -1)
-    uv, found = (
-        probe.camera.project(ring).uv,
-        probe.with_parameters(probe.parameters + moved, probe.covariance),
-    )
-    stated, with_it = (np.nanmean(np.linalg.norm(p.triangulate(uv)[:, :2], axis=1)) for p in (probe, found))
-    return float(with_it / stated - 1)
-
-
-def report_instrument(probe: Probe, trajectory: Trajectory, context: Context) -> None:
-    """Report how far the probe was moved, in its stated σ, and warn if it cannot have been right."""
-    if trajectory.instrument is None:
-        return
-    change = trajectory.instrument - probe.parameters
-    farthest = _farthest(change, probe)
-    context.report("instrument moved by the adjustment, at most", farthest, "stated σ")
-    if farthest > _TOO_FAR:
-        sigma = np.sqrt(np.diagonal(probe.covariance))
-        most = int(np.argmax(np.divide(np.abs(change), sigma, out=np.zeros_like(change), where=sigma > 0)))
-        context.warn(
-            f"the stated probe does not fit this recording: it had to be moved by {farthest:.0f} times its "
-            f"stated σ, most of all {probe.parameter_names[most]} by {change[most]:+.3g}"
-            f"; radii and distances may be wrong by more than their σ. {_remedy(probe, trajectory)}"
-        )
-
-
-def _remedy(probe: Probe, trajectory: Trajectory) -> str:
-    """Return what to do about a probe that does not fit."""
-    if way := mirrored_way(probe, trajectory):
-        return (
-            f"It fits pictures that are {way}; clock positions are then {way} as well. What to do: switch "
-            "this off in camera and recorder, or undo it in the pictures, and run again"
-        )
-    return "What to do: run boresight diagnose, or calibrate the probe again"
 
 
 def report_motion(
@@ -222,7 +145,7 @@ def _warn_of_texture(lasting: float, tracked: TrackedPoses, observations: int, c
             "alone, and roll is not measured. What to do: pull more slowly, record lit frames more often, or "
             "light the wall better"
         )
-    if lasting > _MOST_LASTING:
+    if lasting > MOST_LASTING:
         context.warn(
             f"matches of texture contradict the motion by {lasting:.1f} times their σ, in the same way in "
             "neighbouring pictures (good recordings: 0.5 at most): reflections, compression or lights that "
@@ -268,12 +191,6 @@ def _warn_of_trembling(trajectory: Trajectory, texture: TrackedPoses, shakes: bo
             "distances may be wrong by more than their σ; the recording cannot show which. What to do: check "
             "that the camera is tight, switch stabilisation off, and compare a diameter with a known one"
         )
-
-
-def _farthest(change: Float, probe: Probe) -> float:
-    """Return the largest component, σ, of a change (P,) along the principal directions of its uncertainty."""
-    moved, *_ = np.linalg.lstsq(probe.principal_uncertainties(), change, rcond=None)
-    return float(np.max(np.abs(moved), initial=0.0))
 
 
 def _pipe_of_origin(T_oc: Float, axis: PipeAxis) -> Float:

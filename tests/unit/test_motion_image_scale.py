@@ -20,8 +20,8 @@ from stages.motion.bore import ONE_BORE, Bore
 from stages.motion.bundle_adjustment.equations import Measurements
 from stages.motion.bundle_adjustment.image_scale import ScaleDrift, drift_of_scale
 from stages.motion.bundle_adjustment.solver import Estimate, estimate_state
+from stages.motion.stated_probe import with_doubtful_instrument
 from stages.motion.tracking.landmarks import TrackedPoses
-from stages.motion.trajectory import with_doubtful_instrument
 from stages.motion.windows import steady_scale
 from stages.motion.windows.steady_scale import SteadyRun, with_steady_scale
 from stages.motion.windows.submaps import Window

@@ -13,7 +13,7 @@ from pipeline.instrument.camera.fisheye import KannalaBrandt
 from pipeline.instrument.laser import LaserSheet
 from pipeline.instrument.probe import Probe
 from stages.motion.mirrored import _mirrored, mirrored_way
-from stages.motion.trajectory import report_instrument
+from stages.motion.stated_probe import report_instrument
 from tests.quiet import quiet_context
 from tests.unit.camera_samples import CAMERAS
 

@@ -15,8 +15,9 @@ from pipeline.instrument.camera.fisheye import KannalaBrandt
 from pipeline.instrument.laser import LaserSheet
 from pipeline.instrument.probe import Probe
 from stages.motion.cuts import beyond_cuts
+from stages.motion.stated_probe import report_instrument
 from stages.motion.tracking.landmarks import TrackedPoses
-from stages.motion.trajectory import SeenCentres, camera_trembles, report_instrument
+from stages.motion.trajectory import SeenCentres, camera_trembles
 from tests.quiet import quiet_context
 
 COUNT = 20
@@ -27,11 +28,23 @@ def probe(covariance: np.ndarray) -> Probe:
     return Probe(camera, LaserSheet(22.0), covariance)
 
 
-def told(stated: Probe, change: np.ndarray | None) -> dict[str, object]:
+def told(stated: Probe, change: np.ndarray | None, left: np.ndarray | None = None) -> dict[str, object]:
+    """Return numbers and warning of a run that changed the probe and ``left`` this covariance of it."""
     axis = PipeAxis(np.array([-9.0, 99.0]), np.zeros((2, 3)), np.tile(np.eye(3), (2, 1, 1)))
     poses, found = np.tile(np.eye(4), (3, 1, 1)), None if change is None else stated.parameters + change
     trajectory = Trajectory(
-        np.arange(3), np.arange(3) / 30, poses, np.zeros((3, 6, 6)), axis, 50.0, 1.0, 0.001, 0.0005, (), found
+        np.arange(3),
+        np.arange(3) / 30,
+        poses,
+        np.zeros((3, 6, 6)),
+        axis,
+        50.0,
+        1.0,
+        0.001,
+        0.0005,
+        (),
+        found,
+        instrument_covariance=left,
     )
     numbers: dict[str, object] = {}
     context = replace(
@@ -55,11 +68,11 @@ def at(name: str, value: float) -> np.ndarray:
 
 def test_a_probe_changed_by_36_sigma_gives_a_warning_with_the_number() -> None:
     numbers = told(probe(loose(baseline_mm=0.008, fx=0.05)), at("baseline_mm", -0.288))
-    assert numbers["instrument moved by the adjustment, at most"] == pytest.approx(36)
+    assert numbers["contradiction of pictures and stated probe, at most"] == pytest.approx(36)
     text = str(numbers["warning"])
     assert "the stated probe does not fit this recording" in text
-    assert "36 times" in text
-    assert "baseline_mm by -0.288" in text
+    assert "contradict it by 36 σ" in text
+    assert "baseline_mm, most of all, would change by -0.288" in text
     assert "boresight diagnose" in text
 
 
@@ -79,10 +92,39 @@ def test_a_change_against_a_known_correlation_has_the_size_that_this_implies() -
     assert "warning" not in told(probe(covariance), at("fx", 0.1) + at("fy", 0.1))
 
 
+@pytest.mark.parametrize(("moved", "warned"), [(0.03, False), (0.09, False), (0.2, True), (0.8, True)])
+def test_a_direction_that_pictures_hardly_show_counts_against_what_they_show(
+    moved: float, warned: bool
+) -> None:
+    """Pictures shifted by 160 σ of the stated centre moved it by 0.8 σ alone, and nothing was said."""
+    stated = probe(loose(cx=0.03, baseline_mm=0.008))
+    gain = 0.001  # so that a correct probe moves by 0.03 of its σ
+    left = stated.covariance * np.where(at("cx", 1.0) > 0, 1 - gain, 1.0)
+    numbers = told(stated, at("cx", 0.03 * moved), left)
+    assert numbers["contradiction of pictures and stated probe, at most"] == pytest.approx(
+        moved / np.sqrt(gain)
+    )
+    assert ("warning" in numbers) is warned
+    if warned:
+        assert f"cx, most of all, would change by {0.03 * moved / gain:+.3g}" in str(numbers["warning"])
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_correct_probe_moves_by_what_the_pictures_show(seed: int) -> None:
+    """Of drawn adjustments of two parameters none is contradicted, whether pictures show much or little."""
+    random, stated = np.random.default_rng(seed), probe(loose(cx=0.03, baseline_mm=0.008))
+    for error in (0.01, 1.0, 100.0):
+        true = 0.03 * random.standard_normal()
+        seen = true + 0.03 * error * random.standard_normal()
+        gain = 1 / (1 + error**2)
+        left = stated.covariance * np.where(at("cx", 1.0) > 0, 1 - gain, 1.0)
+        assert "warning" not in told(stated, at("cx", gain * seen), left)
+
+
 def test_a_probe_that_was_not_adjusted_gives_no_warning() -> None:
     assert told(probe(loose(fx=0.05)), None) == {}
     assert told(probe(np.zeros((COUNT, COUNT))), np.zeros(COUNT)) == {
-        "instrument moved by the adjustment, at most": 0.0
+        "contradiction of pictures and stated probe, at most": 0.0
     }
 
 
