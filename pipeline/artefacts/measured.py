@@ -162,6 +162,9 @@ class Trajectory:
     cut_sigma_mm : float
         Part of ``distance_sigma_mm`` from the unknown distance travelled at cuts of the recording; 0 without
         cuts.
+    displaced_mm : float
+        1 σ of the radius from smooth displacements of the picture, over places of some millimetres; 0 if the
+        wall in texture and the wall in the rings agree.
     """
 
     frame: Int
@@ -183,6 +186,7 @@ class Trajectory:
     radius_doubt: float = 0.0
     knock: LaserKnock | None = None
     cut_sigma_mm: float = 0.0
+    displaced_mm: float = 0.0
 
 
 @dataclass(frozen=True)

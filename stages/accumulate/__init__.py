@@ -115,6 +115,8 @@ _IMPOSSIBLE, _MOST_IMPOSSIBLE = 0.5, 0.5
 # Share from which such wall is reported. Chosen: a branch of half of the diameter in a metre of pipe has
 # more.
 _FEW_IMPOSSIBLE = 0.002
+# A part that is this share of the whole σ raises it by a tenth.
+_MATTERS = 0.42
 # Places fixed to the image that are warned of one by one; the largest first.
 _TOLD_PLACES = 4
 
@@ -168,7 +170,7 @@ def accumulate_wall(
     smoothing_mm, gap_mm = parameters.smoothing_mm, parameters.largest_gap_mm
     stretches = cut_stretches(grid, survey, smoothing_mm, gap_mm)
     for done, stretch in enumerate(stretches, 1):
-        systematic = spread.on(grid.rows(stretch.from_row, stretch.to_row))
+        systematic = np.hypot(spread.on(grid.rows(stretch.from_row, stretch.to_row)), trajectory.displaced_mm)
         for departure in (None if fixed is None else fixed.departure_mm, shared):
             if departure is not None:
                 systematic = np.hypot(systematic, departure[stretch.from_row : stretch.to_row])
@@ -177,6 +179,7 @@ def accumulate_wall(
         context.progress(done, len(stretches))
     _judge_radii(wall, trajectory, context)
     _report(context, wall, spread)
+    _warn_of_displaced(trajectory.displaced_mm, wall, context)
     warn_of_held(held, context)
     _warn_of_fixed(fixed, context)
     warn_of_unmeasured(wall.radius_map, trajectory.radius_mm, gap_mm, survey.middle_mm, context)
@@ -233,6 +236,21 @@ def _fixed_in_words(place: FixedPlace) -> str:
     )
 
 
+def _warn_of_displaced(displaced_mm: float, wall: Wall, context: Context) -> None:
+    """Warn of pictures displaced smoothly, if this raises the σ of radii by more than a tenth."""
+    sigma = wall.radius_map.sigma_mm[:: max(len(wall.radius_map.distance_mm) // _REPORTED_ROWS, 1)]
+    known = sigma[np.isfinite(sigma)]
+    if known.size and displaced_mm > _MATTERS * float(np.median(known)):
+        context.warn(
+            "the pictures do not follow the stated lens: photo and laser line show the same places of the "
+            f"wall at different radii, and line and photo are displaced by some {displaced_mm:.2g} mm (1 σ), "
+            "differently from place to place. Water, grease or uneven glass in front of the lens distorts "
+            "the picture, the lens is not as stated, or strong compression displaces it. σ of the radii "
+            "includes it. What to do: dry and clean the window, run boresight diagnose on a gauge run, "
+            "record with less compression"
+        )
+
+
 def _judge_radii(wall: Wall, trajectory: Trajectory, context: Context) -> None:
     """Warn of wall whose radius differs from the pipe's by half; end the run if half of the wall does."""
     rows = slice(None, None, max(len(wall.radius_map.distance_mm) // _REPORTED_ROWS, 1))
@@ -272,7 +290,7 @@ def _report(context: Context, wall: Wall, spread: CalibrationSpread) -> None:
 
 ACCUMULATE = Stage(
     "accumulate",
-    "18",
+    "19",
     AccumulateParameters,
     accumulate_wall,
     "point cloud and radius map around the pipe's own axis, with σ",

@@ -98,7 +98,7 @@ def estimate_motion(
     report_instrument(probe, trajectory, context)
     return replace(
         believed, events=events, image_scale=steady.scale, image_scale_sigma=steady.scale_sigma,
-        radius_doubt=doubt,
+        radius_doubt=doubt, displaced_mm=estimate.wall_twice.line_mm,
         knock=steady.run.knock,
     )  # fmt: skip
 

@@ -103,3 +103,8 @@ class MotionParameters(Parameters):
         le=1000,
         description="largest number of places at which a wall passed again is compared; 0: no loops",
     )
+
+    @property
+    def patch_size(self) -> int:
+        """Return the size of a tracked patch, strip samples."""
+        return 2 * self.patch_half_px + 1

@@ -107,6 +107,7 @@ def report_motion(
     context.report("median reprojection error", estimate.reprojection_px, "px")
     context.report("reprojection error against the σ of matching", estimate.excess, "times")
     context.report("part of it that lasts from picture to picture", estimate.lasting, "times")
+    context.report("difference of wall in photo and rings, shared", estimate.wall_twice.shared_mm, "mm")
     _warn_of_texture(estimate.lasting, texture.poses, texture.store.spool.count, context)
     _warn_of_trembling(trajectory, texture.poses, shakes, context)
     context.report("pipe radius", trajectory.radius_mm, "mm")

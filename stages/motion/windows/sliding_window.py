@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import partial
+from functools import partial, reduce
 
 import numpy as np
 
@@ -20,6 +20,7 @@ from stages.motion.bundle_adjustment.solver import (
     lasting_excess,
 )
 from stages.motion.bundle_adjustment.unknowns import State
+from stages.motion.bundle_adjustment.wall_twice import WallTwice, wall_twice
 from stages.motion.parameters import MotionParameters
 from stages.motion.tracking.normalisation import correlated_samples
 from stages.motion.windows.first_window import EncoderCheck, FirstWindow, adjust_first
@@ -63,6 +64,8 @@ class RunEstimate:
         Course of the image scale in the first window.
     knock : KnockTest or None
         Test for a knock of the laser, if rings jump.
+    wall_twice : WallTwice
+        Comparison of the wall in texture with that in the rings.
     """
 
     joined: JoinedRun
@@ -74,6 +77,7 @@ class RunEstimate:
     encoder: EncoderCheck
     steady: SteadyRun
     knock: KnockTest | None
+    wall_twice: WallTwice
 
 
 @dataclass(frozen=True)
@@ -94,16 +98,18 @@ class _End:
     reprojection_px: float
     excess: float
     lasting: float
+    wall_twice: WallTwice
 
     @staticmethod
-    def of(estimate: Estimate, measured: Measurements, step_mm: float) -> _End:
+    def of(estimate: Estimate, measured: Measurements, step_mm: float, parameters: MotionParameters) -> _End:
         adjusted = estimate.adjusted
         away_px = np.linalg.norm(measured.tracks.uv - measured.probe.camera.centre_px, axis=1)
         alike = correlated_samples(away_px * step_mm / estimate.state.nominal_radius_mm)
         sigma_px = measured.tracks.sigma_px * np.sqrt(alike)
         in_sigma = adjusted.equations.texture.residual / sigma_px[:, None]
         errors = excess_of(in_sigma), lasting_excess(in_sigma, measured.tracks.landmark)
-        return _End(adjusted.trials, adjusted.settled, adjusted.equations.reprojection_px, *errors)
+        twice = wall_twice(estimate, measured, parameters.patch_size * step_mm)
+        return _End(adjusted.trials, adjusted.settled, adjusted.equations.reprojection_px, *errors, twice)
 
 
 def adjust_run(
@@ -127,7 +133,9 @@ def adjust_run(
     check(estimate)
     if len(windows) == 1:
         joined = joined_at_once(estimate).with_scale_sigma(first.distance_sigma)
-        return _run_estimate(joined, [_End.of(estimate, measured, run.texture.grid.step_mm)], first)
+        return _run_estimate(
+            joined, [_End.of(estimate, measured, run.texture.grid.step_mm, parameters)], first
+        )
     alone = [_alone(estimate, measured)]
     for window in windows[1:]:
         watch = partial(progress, len(alone), steps)
@@ -144,7 +152,8 @@ def adjust_run(
             own.state, measured, shared.value, own.smooth_sigma, parameters, watch
         )
         check(estimate)
-        found.append((_submap(estimate, windows, k), _End.of(estimate, measured, run.texture.grid.step_mm)))
+        end = _End.of(estimate, measured, run.texture.grid.step_mm, parameters)
+        found.append((_submap(estimate, windows, k), end))
     joined = join_submaps([f[0] for f in found], shared).with_scale_sigma(first.distance_sigma)
     return _run_estimate(joined, [f[1] for f in found], first)
 
@@ -162,7 +171,8 @@ def _run_estimate(joined: JoinedRun, ends: Sequence[_End], first: FirstWindow) -
     error, excess, lasting = (float(np.median([getattr(end, name) for end in ends])) for name in names)
     trials, unsettled = sum(e.trials for e in ends), sum(not e.settled for e in ends)
     parts = first.encoder, first.steady, first.knock
-    return RunEstimate(joined, trials, unsettled, error, excess, lasting, *parts)
+    twice = reduce(WallTwice.with_more, (e.wall_twice for e in ends))
+    return RunEstimate(joined, trials, unsettled, error, excess, lasting, *parts, twice)
 
 
 def _adjusted(

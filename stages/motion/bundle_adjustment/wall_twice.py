@@ -1,0 +1,177 @@
+"""Compares the wall as the laser line shows it with the wall as texture alone shows it, place by place.
+
+Water on the window, uneven glass, a lens that is not as stated, or a codec displace the picture smoothly.
+Poses and landmarks follow, so that residuals hardly show it, and what displaces the line is taken for the
+wall's shape. But texture passes a place of the wall elsewhere in the picture, and at another time, than the
+line does. If both measure the same wall, their difference is noise, and noise of neighbouring landmarks is
+independent: what neighbours share is an error of the picture.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from pipeline.adjustment.robust import GemanMcClure, robust_spread
+from pipeline.arrays import Bool, Float, Int
+from pipeline.geometry.axis import to_pipe
+from stages.motion.bundle_adjustment.equations import Measurements
+from stages.motion.bundle_adjustment.extra_columns import RingsInPipe
+from stages.motion.bundle_adjustment.solver import Estimate
+
+_NEAREST, _FARTHEST = 1.0, 2.5
+"""Distance of neighbours, in sizes of a patch. Nearer ones share samples and therefore noise; farther ones
+are displaced differently. Up to 1.5 or 3.5 sizes the result is the same within a twentieth."""
+_SURE = 5.0
+"""Standard errors from which it is believed."""
+_OF_LINE = 0.7
+"""Error of the line over the shared difference. Line and texture are displaced alike, so that about half of
+the difference's variance is the line's. For drawn displacements of 1/25 to 1/3 of the picture in size,
+standing or flowing, the equations of open-1 gave .5 to .85."""
+_ITERATIONS, _REDESCENT, _CLIPPED = 8, 3.0, 3.0
+"""Reweightings, and robust spreads at which differences lose weight or are clipped: edges, false matches."""
+
+
+@dataclass(frozen=True)
+class WallTwice:
+    """Weighted sums over pairs of neighbouring landmarks.
+
+    Attributes
+    ----------
+    product_mm2, square_mm4, weight : float
+        Sums of the products of their differences from the line, of these products squared, and of the
+        weights.
+    """
+
+    product_mm2: float = 0.0
+    square_mm4: float = 0.0
+    weight: float = 0.0
+
+    def with_more(self, other: WallTwice) -> WallTwice:
+        """Return the sums over the pairs of both."""
+        return WallTwice(
+            self.product_mm2 + other.product_mm2,
+            self.square_mm4 + other.square_mm4,
+            self.weight + other.weight,
+        )
+
+    @property
+    def in_errors(self) -> float:
+        """Return the shared variance over its standard error; by chance it has any sign, and a size of 1."""
+        return self.product_mm2 / np.sqrt(self.square_mm4) if self.square_mm4 > 0 else 0.0
+
+    @property
+    def shared_mm(self) -> float:
+        """Return the difference, 1 σ, that neighbours certainly share; 0 if they share none."""
+        return float(np.sqrt(self.product_mm2 / self.weight)) if self.in_errors > _SURE else 0.0
+
+    @property
+    def line_mm(self) -> float:
+        """Return the part of it, 1 σ, by which the line is displaced."""
+        return _OF_LINE * self.shared_mm
+
+
+def wall_twice(estimate: Estimate, measured: Measurements, patch_mm: float) -> WallTwice:
+    """Compare texture and line at an estimate; ``patch_mm`` is the size of a tracked patch on the wall."""
+    state = estimate.state
+    off_mm, sigma_mm = _texture_alone(estimate)
+    span, azimuth, _ = to_pipe(state.axis, state.xyz_p)
+    rings, radius_mm = RingsInPipe.of(state, measured), state.nominal_radius_mm
+    place = _on_cylinder(span, azimuth, radius_mm)
+    line_mm = _mean_near(
+        place,
+        _on_cylinder(rings.span_mm, rings.azimuth_rad, radius_mm),
+        estimate.adjusted.equations.rings.residual,
+        patch_mm,
+    )
+    known = np.isfinite(line_mm + sigma_mm)
+    difference = _beyond_pose(
+        span[known], azimuth[known], (off_mm - line_mm)[known], sigma_mm[known], 2 * radius_mm
+    )
+    return _of_pairs(place[known], difference, sigma_mm[known], patch_mm)
+
+
+def _texture_alone(estimate: Estimate) -> tuple[Float, Float]:
+    """Return each landmark's distance from the smooth pipe (L,) by its matches alone, and its σ.
+
+    The adjustment holds landmarks to the pipe. At its poses, this is undone. σ is NaN where it is unknown.
+    """
+    texture = estimate.adjusted.equations.texture
+    weight, normal = texture.weight, texture.surface_by_point
+    information = _sums(
+        np.einsum("mci,mcj,m->mij", texture.by_point, texture.by_point, weight), texture.start
+    )
+    right = _sums(np.einsum("mci,mc,m->mi", texture.by_point, texture.residual, weight), texture.start)
+    good = _regular(information)
+    covariance = np.full_like(information, np.nan)
+    covariance[good] = np.linalg.inv(information[good])
+    along = np.einsum("lij,lj->li", covariance, normal)
+    off_mm = texture.surface_residual - np.einsum("li,li->l", along, right)
+    return off_mm, np.sqrt(np.einsum("li,li->l", along, normal))
+
+
+def _sums(values: Float, start: Int) -> Float:
+    """Return the sums (L, ...) of the rows (M, ...) from each start (L + 1,) to the next."""
+    total = np.concatenate([np.zeros_like(values[:1]), np.cumsum(values, axis=0)])
+    return np.asarray(total[start[1:]] - total[start[:-1]])
+
+
+def _regular(information: Float) -> Bool:
+    """Return which matrices (L, 3, 3) can be inverted: a landmark seen along one ray has no place on it."""
+    value = np.linalg.eigvalsh(information)
+    return np.asarray(value[:, 0] > 1e-8 * value[:, 2])
+
+
+def _on_cylinder(span_mm: Float, azimuth_rad: Float, radius_mm: float) -> Float:
+    across = radius_mm * np.cos(azimuth_rad), radius_mm * np.sin(azimuth_rad)
+    return np.stack([span_mm, *across], -1)
+
+
+def _mean_near(place: Float, rings: Float, residual_mm: Float, within_mm: float) -> Float:
+    """Return the rings' mean residual (L,) around places (L, 3); NaN where there is no ring."""
+    if not len(rings):
+        return np.full(len(place), np.nan)
+    near = cKDTree(rings).query_ball_point(place, within_mm)
+    return np.array([residual_mm[k].mean() if k else np.nan for k in near])
+
+
+def _beyond_pose(
+    span_mm: Float, azimuth_rad: Float, difference_mm: Float, sigma_mm: Float, length_mm: float
+) -> Float:
+    """Return the differences (L,) without mean and first harmonic along each length, outliers clipped.
+
+    Their mean is a matter of the probe's scale, which has its own σ; the first harmonic is one of the pose,
+    and is taken out of the wall.
+    """
+    out, part = np.zeros(len(span_mm)), np.floor((span_mm - span_mm.min(initial=0.0)) / length_mm)
+    for k in np.unique(part):
+        of = part == k
+        out[of] = _without_harmonic(span_mm[of], azimuth_rad[of], difference_mm[of], sigma_mm[of])
+    return out
+
+
+def _without_harmonic(span_mm: Float, azimuth_rad: Float, difference_mm: Float, sigma_mm: Float) -> Float:
+    along = (span_mm - span_mm.mean()) / max(float(np.ptp(span_mm)), 1e-9)
+    around = np.stack([np.ones_like(along), np.cos(azimuth_rad), np.sin(azimuth_rad)], -1)
+    design = np.concatenate([around, along[:, None] * around], 1) / sigma_mm[:, None]
+    left = in_sigma = difference_mm / sigma_mm
+    for _ in range(_ITERATIONS):
+        loss = GemanMcClure(_REDESCENT * max(robust_spread(left), 1e-9))
+        weight = np.sqrt(loss.weight(left, np.ones_like(left)))
+        fit = np.linalg.lstsq(design * weight[:, None], in_sigma * weight, rcond=None)[0]
+        left = in_sigma - design @ fit
+    limit = _CLIPPED * robust_spread(left)
+    return np.asarray(np.clip(left, -limit, limit) * sigma_mm)
+
+
+def _of_pairs(place: Float, difference_mm: Float, sigma_mm: Float, patch_mm: float) -> WallTwice:
+    if len(place) < 2:
+        return WallTwice()
+    one, other = cKDTree(place).query_pairs(_FARTHEST * patch_mm, output_type="ndarray").T
+    apart = np.linalg.norm(place[one] - place[other], axis=1) >= _NEAREST * patch_mm
+    one, other = one[apart], other[apart]
+    weight = (sigma_mm[one] * sigma_mm[other]) ** -2.0
+    product = difference_mm[one] * difference_mm[other] * weight
+    return WallTwice(float(product.sum()), float(np.sum(product**2)), float(weight.sum()))
