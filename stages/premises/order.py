@@ -13,6 +13,11 @@ from stages.premises.pictures import CLOSED, Pictures
 # bounds lie half-way between these and one step, or none. A picture half a step off its place lies in that of
 # another.
 _ON, _BACK, _ASTRAY = 1.5, -0.5, 0.5
+# Steps over two exchanged neighbours of one light.
+_PAIR = 2
+# Error of a leap over a block, as a share: leaps of 11 steps came out 2 too short and 2 too long (open-1 at
+# half its size).
+_LEAPS_ERR = 0.2
 # Exchanged neighbours in two lights look like two losses in the rhythm, but the wall advances by its usual
 # step and not, as over losses, by at least 1.5 times that; the bound is half-way.
 _NO_LOSS = 1.25
@@ -38,15 +43,20 @@ _SMOOTH, _LIKE_OTHERS = 0.01, 0.75
 def out_of_order(pictures: Pictures, light: Int) -> Bool:
     """Return (F,) true for pictures exchanged with one of the same light, or with a neighbour of the other.
 
-    It does not find pictures of the laser line exchanged with each other, any pictures if the lights are not
-    distinguished, nor the first and last picture of the wall, for whose place there is no evidence.
+    It does not find single pictures of the laser line exchanged with each other, any pictures if the lights
+    are not distinguished, nor the first and last picture of the wall, for whose place there is no evidence.
+    Of whole blocks that were exchanged, all pictures are returned, with those beside them whose block is not
+    known.
     """
     out = np.zeros(len(light), bool)
     place = np.flatnonzero((light == Light.WALL) & (pictures.partner >= 0) & np.isfinite(pictures.step))
     if len(place) < _FEWEST:
         return out
     size = pictures.step[place]
-    out[place] = _off_their_place(_in_usual_steps(size))
+    step = _in_usual_steps(size)
+    out[place] = _off_their_place(step)
+    for first, behind in _exchanged_blocks(step):
+        out[place[first - 1] + 1 : place[behind]] = True
     return out | _lights_exchanged(light, place, size)
 
 
@@ -70,6 +80,23 @@ def _off_their_place(step: Float) -> Bool:
         again = np.flatnonzero((step[near] > _ON) & went_back & ~astray)
         if again.size:
             out[first : first + again[0]] = astray[: again[0]]
+    return out
+
+
+def _exchanged_blocks(step: Float) -> list[tuple[int, int]]:
+    """Return where blocks of pictures that were exchanged begin, and the first step (of K) behind them.
+
+    ``step`` (K,) is in usual steps. The wall leaps ahead over one block, goes back by both, and leaps ahead
+    again to where it would have been. All steps between these three are usual ones, unlike those of a probe
+    pulled by hand.
+    """
+    out, odd = [], np.flatnonzero(np.abs(step - 1) > _ASTRAY)
+    for first, back, last in zip(odd, odd[1:], odd[2:], strict=False):
+        ahead = step[[first, back, last]] - 1
+        again = abs(ahead.sum()) < max(_ASTRAY, _LEAPS_ERR * -ahead[1])
+        blocks = first > 0 and last - first > _PAIR
+        if blocks and again and ahead[0] > _ASTRAY and ahead[1] < _BACK - 1 and ahead[2] > _ASTRAY:
+            out.append((int(first), int(last)))
     return out
 
 

@@ -6,8 +6,15 @@ import numpy as np
 import pytest
 
 from stages.premises.light import Light
-from stages.premises.order import _in_usual_steps, _lights_exchanged, _off_their_place, out_of_order
+from stages.premises.order import (
+    _exchanged_blocks,
+    _in_usual_steps,
+    _lights_exchanged,
+    _off_their_place,
+    out_of_order,
+)
 from stages.premises.pictures import Pictures
+from tests.hand_pulled import pulled
 
 
 def told_by_motion(order, way, noise_mm):
@@ -103,3 +110,8 @@ def test_a_probe_that_stands_for_most_of_a_run_causes_no_exchange(seed):
         100
     )
     assert not _off_their_place(_in_usual_steps(size)).any()
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_a_probe_pulled_by_hand_exchanges_no_blocks(seed):
+    assert _exchanged_blocks(_in_usual_steps(pulled(seed).steps.size)) == []

@@ -139,6 +139,21 @@ def test_steps_that_a_codec_holds_back_are_not_a_loss(mm_a_frame, lost):
     assert row[-1] - 119 == lost
 
 
+@pytest.mark.parametrize("first", [20, 21])
+def test_all_pictures_of_exchanged_blocks_are_left_out_and_none_is_lost(first, good, run):
+    """20 pictures "were lost" where two blocks of ten had been stored in exchanged order."""
+    middle, last = first + 10, first + 20
+    order = np.r_[0:first, middle:last, first:middle, last:COUNT]
+    shown = {k: good.source.images[order[k]] for k in range(COUNT)}
+    spoiled = replace(good, source=MemorySource(shown, run.probe.camera.image_size))
+    found, told = checked(spoiled, run.probe)
+    left_out = np.setdiff1d(np.arange(COUNT), found.frame)
+    assert set(range(first, last)) <= set(left_out) <= set(range(first - 1, last + 1))
+    np.testing.assert_allclose(found.time_s, good.frames.time_s[found.frame])
+    assert len(told) == 1
+    assert "left out: stored in another order than taken" in told[0]
+
+
 @pytest.mark.parametrize("knocked", [False, True])
 def test_a_camera_knocked_during_a_run_is_not_a_loss(knocked):
     """Its pictures moved by 4 px, the wall seemed to jump, and times were taken from other rows."""
