@@ -67,7 +67,7 @@ class LaserSheet:
         return replace(self, **lead, waviness=tuple(float(p) for p in parameters[6:]))
 
     def untilted(self) -> LaserSheet:
-        """Return the seed paper's assumption of this sheet: the plane z = baseline, parallel to the image."""
+        """Return this sheet as the seed paper assumes it: the plane z = baseline, parallel to the image."""
         return LaserSheet(
             self.baseline_mm, line_sigma_mm=self.line_sigma_mm, wavelength_nm=self.wavelength_nm
         )
@@ -77,7 +77,7 @@ class LaserSheet:
         psi = np.asarray(azimuth_rad, float)
         slope = self.tilt_x * np.cos(psi) + self.tilt_y * np.sin(psi) + np.tan(self.cone_rad)
         for m, along, across in zip(_WAVES, self.waviness[::2], self.waviness[1::2], strict=True):
-            if along or across:  # most sheets are stated without waves, and sines take long
+            if along or across:  # most sheets are stated without waves, and sines are slow
                 slope = slope + along * np.cos(m * psi) + across * np.sin(m * psi)
         return np.asarray(slope)
 
@@ -186,8 +186,8 @@ class LaserPlane:
         Raises
         ------
         UnusableError
-            When the plane leans by 45° or more or crosses the optical axis behind the camera: then it is
-            no sheet that surrounds the axis of a ring probe.
+            When the plane leans by 45° or more or crosses the optical axis behind the camera: then it does
+            not surround the axis as the sheet of a ring probe does.
         """
         baseline_mm, tilt_x, tilt_y = self._sheet_parameters()
         slope = float(np.hypot(tilt_x, tilt_y))

@@ -25,7 +25,7 @@ AZIMUTHS = 720
 
 @dataclass(frozen=True)
 class MisalignedScan:
-    """A straight pipe parallel to the probe, seen with a sheet believed to be the plane z = ``baseline_mm``.
+    """A straight pipe parallel to the probe, seen with a sheet assumed to be the plane z = ``baseline_mm``.
 
     Attributes
     ----------

@@ -34,7 +34,7 @@ class Lighting:
 
 @dataclass(frozen=True)
 class ImuMount:
-    """How the inertial measurement unit sits on the camera, and how it errs.
+    """The mounting of the inertial measurement unit on the camera, and its errors.
 
     The defaults are those of consumer chips of 2015 to 2025 (MPU-6050, BMI160, ICM-20948; their data sheets
     state 0.005 to 0.015 °/s/√Hz and 100 to 400 µg/√Hz). Names and units are Kalibr's.
@@ -42,7 +42,7 @@ class ImuMount:
     Attributes
     ----------
     R_ci : (3, 3)
-        Turns directions in I (IMU) to C (camera).
+        Rotates directions in I (IMU) to C (camera).
     gyroscope_noise_density : float
         rad/s/√Hz.
     gyroscope_random_walk : float
@@ -50,7 +50,7 @@ class ImuMount:
     accelerometer_noise_density : float
         m/s²/√Hz.
     accelerometer_bias : float
-        1 σ, m/s², of what remains constant.
+        1 σ, m/s², of the constant part of its bias.
     """
 
     R_ci: Float
@@ -62,7 +62,7 @@ class ImuMount:
 
 @dataclass(frozen=True)
 class Probe:
-    """What is believed of the instrument.
+    """The assumed parameters of the instrument, stated or calibrated, and their uncertainty.
 
     Attributes
     ----------
@@ -109,7 +109,7 @@ class Probe:
         return self.with_parameters(trajectory.instrument, trajectory.instrument_covariance)
 
     def after(self, knock: LaserKnock) -> Probe:
-        """Return the probe with its laser knocked, its covariance raised by that of the knock."""
+        """Return the probe after a knock of its laser, with the covariance of the knock added."""
         first, count = len(self.camera.parameter_names), len(knock.change)
         parameters, covariance = self.parameters, self.covariance.copy()
         parameters[first : first + count] += knock.change
@@ -119,7 +119,8 @@ class Probe:
     def principal_uncertainties(self) -> Float:
         """Return (P, Q) the independent directions of the covariance, each 1 σ long, largest first.
 
-        Scaled to correlations first, so that a direction is not lost for its unit.
+        The covariance is scaled to correlations before its decomposition, so that no direction is lost
+        because of its unit.
         """
         sigma = np.sqrt(np.diagonal(self.covariance))
         scale = np.where(sigma > 0, sigma, 1.0)

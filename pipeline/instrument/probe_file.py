@@ -1,9 +1,9 @@
 """probe.yaml: stated or measured parameters of the instrument, and their covariance.
 
 In the section ``standard_uncertainty``, ``focal_px`` is common to fx and fy; ``centre_px``, ``tilt_deg`` and
-``decentre_mm`` hold for each axis on its own; ``distortion`` lists the camera's other parameters in their
-order; ``opening_angle_deg`` is twice the cone's; ``waviness_rad`` holds for each of its coefficients. What is
-not stated is 0, but ``encoder_scale``, which is then that of `Probe`.
+``decentre_mm`` hold for each axis independently; ``distortion`` lists the camera's other parameters in their
+order; ``opening_angle_deg`` is twice the cone's; ``waviness_rad`` holds for each of its coefficients. A σ
+that is not stated is 0, except ``encoder_scale``, whose default is that of `Probe`.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ UNCERTAINTY_KEYS = (
 )  # fmt: skip
 _FOCAL, _CENTRE = ("fx", "fy"), ("cx", "cy")
 _DEGREE = math.radians(1)
-# Key of one number: the parameters it holds for, each on its own, and its factor to their unit.
+# For each key: the parameters whose σ it gives, each independently, and the factor to their unit.
 _SINGLE: tuple[tuple[str, tuple[str, ...], float], ...] = (
     ("centre_px", _CENTRE, 1.0),
     ("baseline_mm", ("baseline_mm",), 1.0),
@@ -49,12 +49,12 @@ _LASER_KEYS = (
     "decentre_mm", "decentre_direction_deg", "waviness_rad",
 )  # fmt: skip
 _WAVES = len(LaserSheet(1.0).waviness)
-# Rows written with four digits are orthonormal to this.
+# Rows of a rotation written with four digits are orthonormal to this accuracy.
 _ROTATION = 1e-3
 
 
 def covariance_from_stated(stated: Section, names: Sequence[str]) -> Float:
-    """Return the covariance (P, P) of the parameters ``names``; see the module for its terms."""
+    """Return the covariance (P, P) of the parameters ``names``; the keys are those of the module's text."""
     covariance = np.zeros((len(names), len(names)))
     for members, sigma in _terms(stated, names):
         direction = np.isin(names, members).astype(float)
@@ -146,7 +146,7 @@ def read_with_source(file: Path) -> tuple[Probe, ProbeSource]:
     document = read_yaml(file)
     probe = probe_from(document)
     made_by = document.section("made_by").values if document.has("made_by") else None
-    # What YAML knows and JSON does not, such as dates, becomes text.
+    # Types that YAML has and JSON lacks, such as dates, become text.
     return probe, ProbeSource(file, probe.calibrated_from, json.loads(json.dumps(made_by, default=str)))
 
 
@@ -202,7 +202,7 @@ def _laser(section: Section) -> LaserSheet:
 
 
 def _polar(section: Section, size_key: str, direction_key: str) -> tuple[float, float]:
-    """Return the x and y parts of a size and a direction; an angle of tilt becomes a slope."""
+    """Return the x and y parts of a size and a direction; the angle of a tilt becomes a slope."""
     if not section.has(size_key) and size_key != "tilt_deg":
         return 0.0, 0.0
     size = section.number(size_key)
@@ -250,7 +250,7 @@ def _lighting(section: Section) -> Lighting:
 
 
 def _imu(section: Section) -> ImuMount:
-    """Return the mount that a section states: rows of ``R_ci``, and noise densities as Kalibr has them."""
+    """Return the mount that a section states: rows of ``R_ci``, and noise densities in Kalibr's terms."""
     names = tuple(ImuMount.__dataclass_fields__)
     section.refuse_unknown(names)
     rows = section.require("R_ci", "three rows of three numbers")
@@ -266,7 +266,7 @@ def _imu(section: Section) -> ImuMount:
 
 
 def _covariance(section: Section, names: tuple[str, ...]) -> Float:
-    """Return the covariance in the order of ``names``; a parameter that is not listed is held exact."""
+    """Return the covariance in the order of ``names``; a parameter that is not listed is taken as exact."""
     section.refuse_unknown(("names", "matrix"))
     listed = section.require("names", "a list of parameter names")
     if not isinstance(listed, list) or len(set(map(str, listed))) != len(listed):

@@ -1,1 +1,4 @@
-"""Renders complete recordings from a scene: instrument, pipe, motion, lights, sensor; truth apart."""
+"""Renders complete recordings from a scene: instrument, pipe, motion, lights, sensor.
+
+The truth is kept apart.
+"""

@@ -34,19 +34,19 @@ _INSTRUMENT_STREAM = 1
 
 
 def build_truth(scene: Scene, file: Path) -> SceneTruth:
-    """Return the worked-out scene; ``file`` is where it was read from.
+    """Return the truth of a scene; ``file`` is where it was read from.
 
     Raises
     ------
     InputError
-        When the probe or an effect is not well formed, or the wall cannot be laid out.
+        When the probe or an effect is invalid, or the wall cannot be made.
     """
     truth = plain_truth(scene, file)
     return switch_on(truth, switches_from_mapping(scene.effects, file))
 
 
 def plain_truth(scene: Scene, file: Path) -> SceneTruth:
-    """Return the worked-out scene without its effects. See `build_truth`."""
+    """Return the truth of a scene without its effects. See `build_truth`."""
     stated = probe_from(Section(file, scene.probe, "probe"))
     wall = build_wall(scene.pipe, scene.seed, file.parent)
     time_s = np.arange(scene.frames) / scene.frame_rate
@@ -75,7 +75,7 @@ def _motion(scene: Scene, wall: Wall, last_s: float, folder: Path) -> Motion:
 
 
 def true_instrument(scene: Scene, stated: Probe, wall: Wall) -> TrueInstrument:
-    """Return the true instrument: the stated one, or a draw from its stated uncertainty; lights set."""
+    """Return the true instrument: the stated one or a draw from its stated uncertainty, with its lights."""
     seed = scene.seed if scene.probe_seed is None else scene.probe_seed
     probe = stated if scene.truth == "stated" else drawn(stated, seed)
     profile = LineProfile(stated.laser.line_sigma_mm, scene.laser.skewness)
@@ -101,13 +101,13 @@ def drawn(stated: Probe, seed: int) -> Probe:
 
 
 def _power(peak: float, profile: LineProfile, wall: Wall) -> float:
-    """Return the power whose line peaks at ``peak`` on the mean wall at the mean radius."""
+    """Return the power with which the line's peak is ``peak`` on the mean wall at the mean radius."""
     highest = float(profile.density(np.linspace(*profile.reach_mm(), 2001)).max())
     return peak * _radius(wall) / (REFERENCE_MM * _albedo(wall) * highest)
 
 
 def _light(scene: LightScene, stated: Probe, wall: Wall) -> LedRing:
-    """Return LEDs under which the mean wall is ``level`` where it is brightest."""
+    """Return LEDs with which the mean wall has the scene's ``level`` where it is brightest."""
     lighting = stated.lighting
     ring = LedRing(
         lighting.leds, lighting.radius_mm, lighting.z_mm, 1.0, scene.lobe, scene.even, scene.colour_bgr

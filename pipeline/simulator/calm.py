@@ -1,4 +1,4 @@
-"""Hits from a good first guess, where the wall is so smooth that a ray can meet it only once."""
+"""A fast search for hits from a good start value, where the wall is so smooth that rays meet it only once."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def clear_mm(surface: Surface, T_wc: Float, distance_mm: float, aside_mm: float)
     distance_mm : float
         Of the camera.
     aside_mm : float
-        How far from the camera, besides, the lines may begin.
+        Largest distance from the camera at which the lines may begin.
     """
     o, R = np.zeros(3), np.eye(3)
     if len(surface.axis_s) > 2:
@@ -65,7 +65,7 @@ def clear_mm(surface: Surface, T_wc: Float, distance_mm: float, aside_mm: float)
 
 
 def _sagitta_mm(surface: Surface, along_mm: Float) -> Float:
-    """Return the largest distance of a chord of the axis from it, mm."""
+    """Return the largest distance between the axis and a chord of it, mm."""
     if len(surface.axis_s) == 2:
         return np.zeros(len(along_mm))
     turned = np.linalg.norm(np.diff(surface.axis_turn[:, :, 2], axis=0), axis=1).max()
@@ -145,7 +145,10 @@ def hit_near(
 def _in_section(
     surface: Surface, ray: Float, s: float, o: Float, R: Float
 ) -> tuple[float, float, float, float, float, float]:
-    """Return a ray's origin and direction in the frame of the section at distance s; leaves that frame."""
+    """Return a ray's origin and direction in the frame of the section at distance s.
+
+    Writes that frame to o and R.
+    """
     frame_at(surface, s, o, R)
     x, y, z = ray[0] - o[0], ray[1] - o[1], ray[2] - o[2]
     return (

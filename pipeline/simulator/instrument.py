@@ -1,6 +1,6 @@
-"""The true instrument of a scene: the stated probe plus everything that makes the true one differ.
+"""The true instrument of a scene: the stated probe and all that makes the true one differ from it.
 
-Light is counted in full scales of the sensor: 1 is the light at which a pixel clips.
+Light is measured in full scales of the sensor: 1 is the light at which a pixel clips.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ class LineProfile:
     skewness : float
         Of the sheet itself, −1.9 to 1.9: a normal and an exponential added (exponentially modified Gaussian).
     transport_mm : float
-        Mean way of a one-sided exponential tail that the wall's material adds; it moves the mean.
+        Mean length of a one-sided exponential tail that the wall's material adds; it moves the mean.
     copy_relative, copy_mm : float
         Height of a faint copy over that of the line, and its distance.
     """
@@ -72,7 +72,7 @@ class LineProfile:
 
     def _own(self, height_mm: Float) -> Float:
         tau = self._exponential_mm()
-        # Skewness goes with the cube of tau / sigma: 1e-9 here, far below what a picture shows.
+        # Skewness is proportional to (tau / sigma)³: 1e-9 here, far below what a picture shows.
         if abs(tau) < 1e-3 * self.sigma_mm:
             bell = np.exp(-0.5 * (height_mm / self.sigma_mm) ** 2)
             return np.asarray(bell / (self.sigma_mm * np.sqrt(2 * np.pi)))
@@ -121,14 +121,17 @@ class SheetWave:
 
 @dataclass(frozen=True)
 class Sector:
-    """A sector of the sheet that has lost light: the share lost, its middle and its width at half of that."""
+    """A dimmed sector of the sheet.
+
+    The share of light lost, its middle, and its width at half of that loss.
+    """
 
     lost: float
     azimuth_rad: float
     width_rad: float
 
     def left(self, azimuth_rad: Float) -> Float:
-        """Return the share of light (...) that is left at azimuths (...)."""
+        """Return the remaining share of light (...) at azimuths (...)."""
         away = np.angle(np.exp(1j * (np.asarray(azimuth_rad) - self.azimuth_rad)))
         return np.asarray(1 - self.lost * 0.5 ** ((2 * away / self.width_rad) ** 8))
 
@@ -223,7 +226,7 @@ class Flicker:
 
 @dataclass(frozen=True)
 class Dust:
-    """A spot on the front glass that takes away ``attenuation`` of the light; place and 1 σ in pixels."""
+    """A spot on the front glass that absorbs the share ``attenuation``; place and 1 σ in pixels."""
 
     attenuation: float
     centre_px: tuple[float, float]

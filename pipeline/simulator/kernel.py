@@ -16,18 +16,18 @@ _OPTIONS: dict[str, Any] = {
 
 
 def kernel(function: Function) -> Function:
-    """Compile a kernel that makes no arrays, into whatever calls it.
+    """Compile a kernel that makes no arrays, inlined into its callers.
 
-    Called as functions, kernels would spend most of their time on handing over their many arrays. Counting
-    references to these is left out too: with it a frame takes three times as long. Numba has no public name
-    for that, so the lock pins the version this was tried with.
+    Called as functions, kernels would spend most of their time on passing their many arrays. Reference
+    counting of these is left out too: with it a frame takes three times as long. Numba has no public name for
+    that, so the lock file pins the version with which this was tested.
     """
     compiled: Function = njit(**_OPTIONS)(function)
     return compiled
 
 
 def summing_kernel(function: Function) -> Function:
-    """Compile a kernel whose sums may be added up in any order, so that several terms go at once."""
+    """Compile a kernel whose sums may be added in any order, so that several terms are computed at once."""
     compiled: Function = njit(**(_OPTIONS | {"fastmath": {"reassoc", "nsz", "contract"}}))(function)
     return compiled
 

@@ -96,7 +96,7 @@ class Motion:
 
 @dataclass(frozen=True)
 class Slip:
-    """A slip at ``time_s`` by which the reading gains ``slip_mm``."""
+    """A slip at ``time_s`` by which the reading grows by ``slip_mm``."""
 
     time_s: float
     slip_mm: float
@@ -151,14 +151,14 @@ class Odometer:
         return at
 
 
-# Knots of the spline in an easing time.
+# Number of spline knots in an easing time.
 _KNOTS_AN_EASING = 8
 # Steps of the integration between two knots.
 _FINE = 16
 
 
 def motion_of(scene: MotionScene, until_s: float) -> Motion:
-    """Return the motion over 0 … ``until_s``; after the last leg the camera stands."""
+    """Return the motion over 0 … ``until_s``; after the last leg the camera stands still."""
     return Motion(
         distance_mm=_way(scene, until_s),
         x_mm=_sway(scene.x_mm, until_s),
@@ -170,7 +170,7 @@ def motion_of(scene: MotionScene, until_s: float) -> Motion:
 
 
 def _way(scene: MotionScene, until_s: float) -> Signal:
-    """Return the distance: speeds averaged over the easing time, and integrated."""
+    """Return the distance: the speed, averaged over the easing time, is integrated."""
     easing = scene.easing_s
     fine = easing / (_KNOTS_AN_EASING * _FINE)
     time = np.arange(-easing, until_s + easing + fine, fine)

@@ -28,23 +28,23 @@ class Pairing(Parameters):
 
     gauge: str = Field(min_length=1, description="scene file of the gauge run")
     field: str = Field(min_length=1, description="scene file of the inspection")
-    weight: float = Field(1.0, gt=0, description="how often, relative to the others")
+    weight: float = Field(1.0, gt=0, description="relative frequency among the choices")
 
 
 class Variation(Parameters):
-    """One number of the scenes that differs from draw to draw."""
+    """One number of the scenes that varies from draw to draw."""
 
-    key: str = Field(min_length=1, description="dotted key in the scene, list places as numbers")
-    low: float = Field(description="least")
-    high: float = Field(description="most")
+    key: str = Field(min_length=1, description="dotted key in the scene, list positions as numbers")
+    low: float = Field(description="smallest value")
+    high: float = Field(description="largest value")
     of: Literal["both", "gauge", "field"] = Field("both", description="both: one draw for the two scenes")
 
 
 class Concealable(Parameters):
     """An effect that may be concealed, and its range of sizes."""
 
-    name: str = Field(description="of the catalogue")
-    weight: float = Field(1.0, gt=0, description="how often, relative to the others")
+    name: str = Field(description="name of the effect in the catalogue")
+    weight: float = Field(1.0, gt=0, description="relative frequency among the choices")
     size: Range = Field((1.0, 6.0), description="its first quantity over the typical, drawn log-uniformly")
     course: Annotated[CourseKind, Strict(False)] = Field(
         CourseKind.CONSTANT, description="how the size changes during a recording"
@@ -66,12 +66,12 @@ class Concealable(Parameters):
 
     @property
     def quantities(self) -> tuple[Quantity, ...]:
-        """Of the effect and, after these, of its course."""
+        """The quantities of the effect, followed by those of its course."""
         return (*effect(self.name).quantities, *COURSES[self.course])
 
 
 class Prior(Parameters):
-    """What scenes are drawn from."""
+    """The distribution from which scenes are drawn."""
 
     name: str = Field(min_length=1, pattern=r"^[\w-]+$", description="first part of the recordings' names")
     pairs: tuple[Pairing, ...] = Field(min_length=1, description="scenes to start from")
@@ -79,12 +79,12 @@ class Prior(Parameters):
     concealed: tuple[float, ...] = Field(
         (0.25, 0.6, 0.15), min_length=1, max_length=4, description="probability of 0, 1, 2 … effects"
     )
-    effects: tuple[Concealable, ...] = Field((), description="what may be concealed")
+    effects: tuple[Concealable, ...] = Field((), description="effects that may be concealed")
 
 
 @dataclass(frozen=True)
 class DrawnPair:
-    """Two scenes of one probe; ``folder`` is where a photograph of either is looked for."""
+    """Two scenes of one probe; ``folder`` is where a photograph of either is searched."""
 
     gauge: Scene
     field: Scene
@@ -185,7 +185,7 @@ def _weighted(random: np.random.Generator, weights: Sequence[float]) -> int:
 
 
 def _set(values: dict[str, Any], key: str, value: float, file: Path) -> None:
-    """Set a number at a dotted key of a scene's mapping, in lists by place; missing mappings are made."""
+    """Set a number at a dotted key of a scene's mapping, in lists by index; missing mappings are added."""
     *way, last = key.split(".")
     at: Any = values
     for part in way:

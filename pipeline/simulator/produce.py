@@ -1,4 +1,4 @@
-"""Writes the recording of a scene and, in a folder of its own, its truth."""
+"""Writes the recording of a scene and, in a separate folder, its truth."""
 
 from __future__ import annotations
 
@@ -146,7 +146,10 @@ def beside(recording: Path) -> Path:
 
 @dataclass(frozen=True)
 class Order:
-    """A scene, where it was read from (a photograph is looked for beside it), and where it is to go."""
+    """A scene, the file that it was read from, and its output folders.
+
+    A photograph of the scene is searched beside that file.
+    """
 
     scene: Scene
     file: Path
@@ -184,7 +187,7 @@ def produce(orders: Sequence[Order], progress: Callable[[Order, int], None]) -> 
 
 @dataclass(frozen=True)
 class _Checked:
-    """A scene that can be rendered, and what was checked of it."""
+    """A scene that can be rendered, with the results of its checks."""
 
     truth: SceneTruth
     renderer: Renderer
@@ -202,7 +205,7 @@ def _checked(order: Order) -> _Checked:
 def _rendered(
     order: Order, one: _Checked, new: Places, progress: Callable[[Order, int], None]
 ) -> tuple[Premise, ...]:
-    """Render a scene, check the recording, write its truth, seal it."""
+    """Render a scene, check the recording, write its truth, and seal it."""
     scene = order.scene
     write_recording(
         one.renderer, new.recording, scene.codec, scene.quality, lambda done, _: progress(order, done)

@@ -8,7 +8,7 @@ from pipeline.arrays import Float
 from pipeline.simulator.kernel import kernel
 from pipeline.simulator.surface import NEAR_BLOCKS, WIDE_BLOCKS, Surface
 
-# A step of a ray ends so many mm before the end of the stretch for which a floor (the least radius) holds.
+# A step of a ray ends this many mm before the end of the stretch for which a floor (the least radius) holds.
 _SPARE = 0.1
 # Longest step near the wall: about a cell of the relief (0.25 mm), so that no feature is stepped over.
 _FINE_MM = 0.3
@@ -65,7 +65,7 @@ def _locate(
 
 @kernel
 def cell_at(surface: Surface, s: float, psi: float) -> tuple[int, int, float, float]:
-    """Return row and column of the sample before a place, and the way to the next as shares."""
+    """Return row and column of the sample before a place, and the fractions of the way to the next."""
     rows, columns = surface.radius.shape[0], surface.radius.shape[1] - 2
     y = min(max((s - surface.from_mm) * surface.rows_per_mm, 0.0), rows - 1.0)
     x = (psi + np.pi) * (columns * (0.5 / np.pi)) + 0.5
@@ -117,7 +117,7 @@ def first_hit(surface: Surface, ray: Float, s: float, close: float, o: Float, R:
     s : float
         A guess of the origin's distance.
     close : float
-        How near to the wall's radius a hit must lie, mm.
+        Largest distance of a hit from the wall, mm.
     o, R : (3,), (3, 3)
         Work space; on return the axis point and the section's frame at the hit.
     hit : (6,)
@@ -175,7 +175,7 @@ def straight_frame(s: float, o: Float, R: Float) -> None:
 
 @kernel
 def _reach(a: float, b: float, da: float, db: float, radius: float) -> float:
-    """Return the way from (a, b) in a section to a radius about its axis; 0 from beyond it."""
+    """Return the distance from (a, b) in a section to a radius about its axis; 0 from outside it."""
     square, along, left = da * da + db * db, a * da + b * db, a * a + b * b - radius * radius
     if left >= 0.0:
         return 0.0
@@ -213,7 +213,7 @@ def _refine(
     R: Float,
     hit: Float,
 ) -> None:
-    """Close in on the crossing between two ways: regula falsi with the Illinois rule."""
+    """Narrow down the crossing between two distances along the ray: regula falsi with the Illinois rule."""
     if f_low <= 0.0:
         f_low = _gap(surface, ray, low, s, o, R, hit)
     if f_low <= 0.0:
@@ -240,7 +240,7 @@ def _refine(
 def normal_at(surface: Surface, hit: Float, R: Float, normal: Float) -> None:
     """Write the wall's inward unit normal in W at a hit, from slopes linear between samples.
 
-    The foreshortening of distance in a bend, 1 − κ r cos, is left out of the slope along the pipe.
+    The foreshortening of distance in a bend, 1 − κ r cos, is neglected in the slope along the pipe.
     """
     slope = surface.slope
     i, j, wy, wx = cell_at(surface, hit[1], hit[2])

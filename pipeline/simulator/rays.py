@@ -73,7 +73,7 @@ def viewing_rays(camera: TrueCamera, uv: Float) -> tuple[Float, Float]:
 
 
 def _without_distortion(camera: TrueCamera, uv: Float) -> Float:
-    """Return where the model alone would put what decentring and pixel sides put at ``uv``."""
+    """Return the pixel at which the central model alone would show what is seen at ``uv``."""
     centre = camera.model.centre_px
     seen = centre + (uv - centre) / np.array([1 + camera.aspect / 2, 1 - camera.aspect / 2])
     if not any(camera.decentring):
@@ -82,14 +82,14 @@ def _without_distortion(camera: TrueCamera, uv: Float) -> Float:
     for _ in range(_DECENTRING_STEPS):
         ray = camera.model.unproject(place).ray
         across = np.hypot(ray[..., 0], ray[..., 1])
-        # The angle and its azimuth, not the image radius, which a model's distortion makes another one.
+        # The angle and its azimuth are used, not the image radius, which depends on the model's distortion.
         m = ray[..., :2] * (np.arctan2(across, ray[..., 2]) / np.maximum(across, 1e-12))[..., None]
         place = seen - (np.sum(m * m, -1, keepdims=True) * p + 2 * m * np.sum(m * p, -1, keepdims=True))
     return np.asarray(place)
 
 
 def focal_px(camera: TrueCamera) -> float:
-    """Return pixels a radian on the axis."""
+    """Return pixels per radian on the axis."""
     ray = np.array([[1e-6, 0.0, 1.0], [-1e-6, 0.0, 1.0]])
     uv = camera.model.project(ray).uv
     return float(np.linalg.norm(uv[0] - uv[1]) / 2e-6)

@@ -1,9 +1,9 @@
-"""Renders frames: of a worked-out scene with noise, or one from a wall, an instrument, a pose and its lights.
+"""Renders the frames of a scene with noise, or one frame from a wall, an instrument, a pose and its lights.
 
 ``picture(scenery_of(wall), still(instrument, "led", T_pc))`` returns the grey levels that the camera should
 see. The photometric state is in the instrument: `TrueSensor` (exposure, response, black level, blur, dirt),
-`LedRing` (LED pattern) and `TrueLaser` (power around the ring, line profile). Whoever renders many frames
-of one wall lays it out once with `scenery_of`; rays and shade of a camera are kept from frame to frame.
+`LedRing` (LED pattern) and `TrueLaser` (power around the ring, line profile). For many frames
+of one wall, call `scenery_of` only once; rays and shade of a camera are cached from frame to frame.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ class Scenery:
 
 
 def scenery_of(wall: Wall) -> Scenery:
-    """Lay a wall out for rendering; takes about a second, once for all frames."""
+    """Prepare a wall for rendering; this takes about a second, once for all frames."""
     thrown_back = wall.interreflection * wall.albedo_bgr.mean((0, 1), dtype=float)
     radius = float(wall.radius_mm.mean(dtype=float))
     return Scenery(wall.axis, surface_of(wall), texture_of(wall), radius, thrown_back)
@@ -99,7 +99,7 @@ class Shot:
 def still(
     instrument: TrueInstrument, illumination: str, T_pc: Float, rendering: Rendering | None = None
 ) -> Shot:
-    """Return the shot of a camera that stands at ``T_pc`` (4, 4) while it exposes."""
+    """Return the shot of a camera that stands still at ``T_pc`` (4, 4) during the exposure."""
     finely = Rendering.model_validate({}) if rendering is None else rendering
     pose, moment = np.asarray(T_pc, float)[None, None], np.zeros((1, 1))
     return Shot(instrument, illumination, pose, moment, (instrument.laser,), finely)
@@ -108,13 +108,13 @@ def still(
 def picture(scenery: Scenery, shot: Shot) -> Float32:
     """Return the mean grey levels (H, W, 3), BGR, 0 to 255, of a shot: lens and response, but no noise.
 
-    Rounding to whole grey levels is left out too.
+    They are not rounded to whole grey levels.
     """
     return mean_grey(seen(scenery, shot), shot.instrument.sensor)
 
 
 def mean_grey(light: Float32, sensor: TrueSensor) -> Float32:
-    """Return grey levels (...) of light (...): clipped, bent by gamma, over the black level."""
+    """Return grey levels (...) of light (...): clipped, with gamma, above the black level."""
     share = np.clip(light, 0, 1)
     if sensor.gamma != 1.0:
         share = share**sensor.gamma
@@ -203,7 +203,7 @@ def _rays(camera: TrueCamera) -> RayTable:
 
 @lru_cache(maxsize=2)
 def _shade(camera: TrueCamera, sensor: TrueSensor) -> Float32 | None:
-    """Return what vignetting and dust leave, from the table's rays scaled up."""
+    """Return the share of light that vignetting and dust leave, from an enlarged table of rays."""
     table = _rays(camera)
     width, height = camera.model.image_size
     u = ((np.arange(width) - table.first) / table.step).astype(np.float32)

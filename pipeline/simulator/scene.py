@@ -64,36 +64,36 @@ class SensorScene(Parameters):
 class WaveScene(Parameters):
     """One sinusoid of a motion."""
 
-    amplitude: float = Field(description="in the unit of what moves")
-    period_s: float = Field(gt=0, description="s")
-    phase_deg: float = Field(0.0, description="deg")
+    amplitude: float = Field(description="amplitude, in the unit of the value that moves")
+    period_s: float = Field(gt=0, description="period, s")
+    phase_deg: float = Field(0.0, description="phase, deg")
 
 
 class SwayScene(Parameters):
     """A value that sways about a mean."""
 
-    mean: float = Field(0.0, description="mean")
-    trend_per_s: float = Field(0.0, description="steady change")
+    mean: float = Field(0.0, description="mean value")
+    trend_per_s: float = Field(0.0, description="constant rate of change, per s")
     waves: tuple[WaveScene, ...] = Field((), description="sinusoids added")
 
 
 class LegScene(Parameters):
-    """A stretch of the way at one speed; a dwell has speed 0."""
+    """A stretch of the drive at one speed; a stop has speed 0."""
 
-    duration_s: float = Field(gt=0, description="s")
+    duration_s: float = Field(gt=0, description="duration, s")
     speed_mm_s: float = Field(description="mm/s, backward negative")
 
 
 class MotionScene(Parameters):
-    """The camera's way: legs of speed along the axis, joined smoothly, and how it sways."""
+    """The camera's motion: legs along the axis at given speeds, joined smoothly, and its sway."""
 
     start_mm: float = Field(0.0, description="distance at the first frame")
-    legs: tuple[LegScene, ...] = Field((), description="in order; none with a measured way")
+    legs: tuple[LegScene, ...] = Field((), description="legs in order; none with a measured route")
     measured: str | None = Field(
         None, description="way of a run (NPZ of simulate --like), relative to the scene's folder"
     )
-    speed: float = Field(1.0, gt=0, le=100, description="factor on the speed of a measured way")
-    easing_s: float = Field(0.2, gt=0, le=10, description="time in which one speed passes into the next, s")
+    speed: float = Field(1.0, gt=0, le=100, description="factor on the speed of a measured route")
+    easing_s: float = Field(0.2, gt=0, le=10, description="duration of the transition between two speeds, s")
     x_mm: SwayScene = Field(default_factory=lambda: SwayScene.model_validate({}))
     y_mm: SwayScene = Field(default_factory=lambda: SwayScene.model_validate({}))
     yaw_deg: SwayScene = Field(default_factory=lambda: SwayScene.model_validate({}))
@@ -129,12 +129,12 @@ class Scene(Parameters):
     name: str = Field(min_length=1, description="name of the recording")
     summary: str = Field("", description="purpose in one sentence")
     kind: Literal["inspection", "gauge"] = Field("inspection", description="kind of run")
-    seed: int = Field(0, ge=0, description="of everything random")
+    seed: int = Field(0, ge=0, description="seed of all random values")
     probe_seed: int | None = Field(
         None, ge=0, description="seed of the true instrument's draw; absent: as seed"
     )
     frames: int = Field(gt=0, le=1_000_000, description="number of frames")
-    frame_rate: float = Field(30.0, gt=0, le=10_000, description="1/s")
+    frame_rate: float = Field(30.0, gt=0, le=10_000, description="frames per second")
     pattern: tuple[Pattern, ...] = Field(("laser", "led"), min_length=1, description="illumination, repeated")
     probe: dict[str, Any] = Field(description="stated parameters of the instrument, as in probe.yaml")
     truth: Literal["stated", "drawn"] = Field(
@@ -146,7 +146,9 @@ class Scene(Parameters):
     pipe: Pipe
     motion: MotionScene
     odometer: OdometerScene | None = Field(default_factory=lambda: OdometerScene.model_validate({}))
-    effects: dict[str, dict[str, float] | None] = Field(default_factory=dict, description="switched on")
+    effects: dict[str, dict[str, float] | None] = Field(
+        default_factory=dict, description="effects that are switched on"
+    )
     rendering: Rendering = Field(default_factory=lambda: Rendering.model_validate({}))
     codec: Literal["h264", "ffv1", "png"] = Field("h264", description="how frames are stored")
     quality: int = Field(14, ge=0, le=51, description="constant rate factor of H.264")
@@ -164,7 +166,7 @@ def read_scene(file: Path) -> Scene:
 
 
 def scene_from(values: dict[str, Any], file: Path) -> Scene:
-    """Return the scene of a mapping; ``file`` is named in complaints. See `read_scene`."""
+    """Return the scene of a mapping; ``file`` is named in errors. See `read_scene`."""
     try:
         return Scene.model_validate_json(json.dumps(values))
     except TypeError as error:

@@ -13,9 +13,9 @@ from pipeline.simulator.instrument import Dust, TrueSensor
 from pipeline.simulator.kernel import in_bands, kernel
 from pipeline.simulator.view import hashed
 
-# Glare spreads over tens of px: a picture 8 times smaller holds it.
+# Glare spreads over tens of px: a picture 8 times smaller represents it.
 _VEIL_SHRINK = 8
-# Blurs between which a blur that differs over the picture is mixed: the variance is exact, the shape nearly.
+# Blurs between which a blur that varies over the picture is mixed: the variance is exact, the shape nearly.
 _BLURS = 5
 # Number of the random stream of the pixels' dark signals and defects.
 _PIXEL_STREAM = 3
@@ -83,7 +83,7 @@ def _bloomed(light: Float32, sensor: TrueSensor) -> Float32:
 
 
 def _through_drop(light: Float32, drop: Dust) -> Float32:
-    """Return light bent by a drop: a pixel at Δ from its middle sees Δ (1 − power (1 − Δ²/R²))."""
+    """Return light refracted by a drop: a pixel at Δ from its middle sees Δ (1 − power (1 − Δ²/R²))."""
     v, u = np.mgrid[: light.shape[0], : light.shape[1]].astype(np.float32)
     du, dv = u - np.float32(drop.centre_px[0]), v - np.float32(drop.centre_px[1])
     inside = np.clip(1 - (du / drop.sigma_px[0]) ** 2 - (dv / drop.sigma_px[1]) ** 2, 0, None)
@@ -99,7 +99,7 @@ def _spot(spot: Dust, shape: tuple[int, ...]) -> Float32:
 
 
 def with_dark_signal(light: Float32, sensor: TrueSensor, seed: int) -> Float32:
-    """Return light (H, W, 3) with what pixels add or lose by themselves, the same in all frames of a seed."""
+    """Return light (H, W, 3) with the pixels' dark signals and defects, the same in all frames of a seed."""
     if sensor.dark_pattern == 0 and sensor.defective_share == 0:
         return light
     random = np.random.default_rng([seed, _PIXEL_STREAM])
@@ -112,7 +112,10 @@ def with_dark_signal(light: Float32, sensor: TrueSensor, seed: int) -> Float32:
 
 
 def shade_of(sensor: TrueSensor, cosine: Float32) -> Float32 | None:
-    """Return the share of light (H, W) that vignetting and dust leave, given cos θ; None where all."""
+    """Return the share of light (H, W) that vignetting and dust leave, given cos θ.
+
+    None where they leave all.
+    """
     if sensor.vignetting == 0 and not sensor.dust:
         return None
     shade = np.clip(cosine, 0, 1) ** sensor.vignetting if sensor.vignetting else np.ones_like(cosine)
@@ -142,7 +145,7 @@ def _grey(share: Float32, black: float, gamma: float) -> Image:
 
 
 def _widely(light: Float32, sigma_px: float) -> Float32:
-    """Return light blurred widely, by way of a smaller picture."""
+    """Return light with a wide blur, computed on a smaller picture."""
     size = light.shape[1] // _VEIL_SHRINK, light.shape[0] // _VEIL_SHRINK
     small = cv2.resize(light, size, interpolation=cv2.INTER_AREA)
     small = cv2.GaussianBlur(small, (0, 0), sigma_px / _VEIL_SHRINK)

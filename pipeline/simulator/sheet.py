@@ -22,7 +22,7 @@ from pipeline.simulator.truth import SceneTruth, row_late_s
 from pipeline.simulator.wall.grid import Wall
 from pipeline.simulator.window import refracted
 
-# Sheet rays around the turn: linear between nodes 0.25° apart errs by (0.25°)²/8 = 2.4e-6 of a first
+# Number of sheet rays: linear interpolation between nodes 0.25° apart errs by (0.25°)²/8 = 2.4e-6 of a first
 # harmonic.
 _NODES = 1440
 # Nodes over about 11 σ: linear interpolation errs by (11/4000)²/8 = 1e-6 of the peak.
@@ -54,7 +54,7 @@ class ProfileTable(NamedTuple):
 
 
 def profile_table(profile: LineProfile) -> ProfileTable:
-    """Return the profile tabled finely enough for linear interpolation."""
+    """Return the profile as a table fine enough for linear interpolation."""
     low, high = profile.reach_mm()
     height = np.linspace(low, high, _PROFILE_NODES)
     return ProfileTable(profile.density(height), low, float(height[1] - height[0]))
@@ -80,10 +80,10 @@ def sheet_table(lasers: tuple[TrueLaser, ...]) -> SheetTable:
 
 
 def ghost_table(surface: Surface, laser: TrueLaser, T_wc: Float, distance_mm: float) -> SheetTable | None:
-    """Return the light that the wall mirrors across the bore, for a camera at ``T_wc`` (3, 4).
+    """Return the light that the wall reflects across the bore, for a camera at ``T_wc`` (3, 4).
 
-    Each ray of the sheet is mirrored where it hits the wall. Its weight is the line's, times the share
-    mirrored and the density of mirrored rays in azimuth. None where nothing is mirrored.
+    Each ray of the sheet is reflected where it hits the wall. Its weight is that of the line, times the
+    reflected share and the density of reflected rays in azimuth. None where nothing is reflected.
     """
     if laser.ghost_relative <= 0:
         return None
@@ -141,7 +141,7 @@ def _write_mirrored(
     """Write first hit, second hit and direction between them (N, 9) of rays (N, 6) mirrored at the wall."""
     o, R, normal = room[0], room[1:4], room[4]
     for n in range(rays.shape[0]):
-        for k in range(6):  # a slice may overlap, and numba would make an array for it
+        for k in range(6):  # a slice might overlap, and numba would make an array for it
             ray[k] = rays[n, k]
         if not np.isfinite(ray.sum()) or not first_hit(surface, ray, s, _CLOSE_MM, o, R, hit):
             continue
@@ -229,7 +229,7 @@ def _on_sheet(instrument: TrueInstrument, origin: Float, ray: Float) -> Float:
 
 
 def _distance_to_sheet(origin: Float, ray: Float, height: Float, slope: Float) -> Float:
-    """Return the way at which rays reach z = height + slope q, by steps of q."""
+    """Return the distance at which rays reach z = height + slope q, by iteration of q."""
     t = (height - origin[:, 2]) / ray[:, 2]
     for _ in range(_NEWTON):
         q = np.hypot(origin[:, 0] + t * ray[:, 0], origin[:, 1] + t * ray[:, 1])

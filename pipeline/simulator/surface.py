@@ -15,10 +15,10 @@ from pipeline.simulator.wall.grid import Wall
 
 # The near and the wide floor are the least radius over so many blocks of 1 mm to both sides.
 NEAR_BLOCKS, WIDE_BLOCKS = 2, 32
-# The wall's steepness is tabled by sectors of azimuth, so that a pit slows the rays of its own sector alone.
+# The wall's slope is tabled by sectors of azimuth, so that a pit slows only the rays of its sector.
 SECTORS = 32
-# Spacing of a bent axis' points: at a bend of 50 mm the frames between them, mixed linearly and not made
-# square again, are wrong by (0.25/50)²/8 = 3e-6.
+# Spacing of a bent axis' points: at a bend of 50 mm the frames between them, interpolated linearly and not
+# orthonormalised again, are wrong by (0.25/50)²/8 = 3e-6.
 _AXIS_STEP_MM = 0.25
 
 
@@ -65,7 +65,7 @@ class Surface(NamedTuple):
 
 
 def surface_of(wall: Wall) -> Surface:
-    """Lay a wall out for the kernels."""
+    """Prepare a wall for the kernels."""
     radius = np.concatenate([wall.radius_mm[:, -1:], wall.radius_mm, wall.radius_mm[:, :1]], 1)
     axis = _fine(wall.axis)
     return Surface(
@@ -95,7 +95,10 @@ def _fine(axis: PipeAxis) -> PipeAxis:
 
 
 def _slopes(wall: Wall) -> Float32:
-    """Return the radius' changes (rows, columns + 2, 2); on the first and last row as on the next."""
+    """Return the changes of radius (rows, columns + 2, 2).
+
+    First and last row have those of their neighbours.
+    """
     grid, radius = wall.shape, wall.radius_mm
     slope = np.empty((grid.rows, grid.columns + 2, 2), np.float32)
     along, around = slope[:, 1:-1, 0], slope[:, 1:-1, 1]
@@ -180,7 +183,7 @@ class Texture(NamedTuple):
 
 
 def texture_of(wall: Wall) -> Texture:
-    """Lay a wall's reflectance out for the kernels."""
+    """Prepare a wall's reflectance for the kernels."""
     wide = np.concatenate([wall.albedo_bgr[:, -1:], wall.albedo_bgr, wall.albedo_bgr[:, :1]], 1)
     levels = [np.ascontiguousarray(wide, np.float32)]
     while len(levels) < _LEVELS and len(levels[-1]) >= 4:

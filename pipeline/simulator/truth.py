@@ -19,7 +19,7 @@ from pipeline.simulator.wall.grid import Wall
 
 
 class Change(Protocol):
-    """What happens to the instrument with time: a drift, a rocking."""
+    """A change of the instrument with time: a drift, a rocking."""
 
     def __call__(self, instrument: TrueInstrument, time_s: float) -> TrueInstrument:
         """Return the instrument at ``time_s``, given the one without this change."""
@@ -72,7 +72,7 @@ class SceneTruth:
         return instrument
 
     def late_s(self, instrument: TrueInstrument) -> float:
-        """Return the delay of frames, s: a longer exposure with the same start has its middle later."""
+        """Return the delay of frames, s: a longer exposure with the same start has a later middle."""
         return 0.5 * (instrument.shutter.exposure_s - self.stated.shutter.exposure_s)
 
     def poses(self) -> Float:

@@ -26,7 +26,7 @@ from pipeline.simulator.wall.albedo import markers_of
 from pipeline.simulator.wall.description import Defect, Pipe, Weld
 from pipeline.simulator.wall.grid import Wall
 
-# Quality of the stored albedo: it is looked at, not computed with.
+# JPEG quality of the stored albedo, which is for people, not for computing.
 _JPEG_QUALITY = 95
 # A JPEG has at most 65535 px a side.
 _JPEG_LARGEST = 65000
@@ -75,12 +75,15 @@ def effects_of(scene: Scene) -> list[list[object]]:
 
 
 def defects_of(pipe: Pipe) -> list[Json]:
-    """Return defects and welds; depths are positive, their kind says whether inward or into the wall."""
+    """Return defects and welds; depths are positive, and the kind says whether inward or into the wall."""
     return [_defect(d) for d in pipe.defects] + [_weld(w) for w in pipe.welds]
 
 
 def pipe_of(scene: Scene) -> Json:
-    """Return the pipe's shape: radius, sections of bore, ovality, bend, all angles in rad but fiducials'."""
+    """Return the pipe's shape: radius, sections of bore, ovality, bend.
+
+    Angles in rad except those of fiducials.
+    """
     pipe = scene.pipe
     bend = pipe.bends[0] if pipe.bends else None
     return {
@@ -125,7 +128,7 @@ def write_albedo(wall: Wall, file: Path) -> Json:
 
 
 def _sections(pipe: Pipe) -> list[list[float]]:
-    """Return [from, to, radius] of each bore, the first reaching back and the last on."""
+    """Return [from, to, radius] of each bore; the first and the last extend without limit."""
     if not pipe.bore:
         return []
     edges = np.cumsum([b.length_mm for b in pipe.bore])[:-1].tolist()
@@ -255,5 +258,5 @@ def _hash(path: Path, nonce: str) -> str:
 
 
 def _files(folder: Path) -> list[Path]:
-    """Return the files that lie directly in a folder, sorted by name; sub-folders are not looked into."""
+    """Return the files that lie directly in a folder, sorted by name; sub-folders are ignored."""
     return sorted(p for p in folder.iterdir() if p.is_file())

@@ -1,4 +1,7 @@
-"""What a frame sees: rays, poses within the exposure, wall; which tiles hold the laser line; its light."""
+"""What a frame sees: rays, poses within the exposure, and wall.
+
+Which tiles contain the laser line; its light.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +19,7 @@ from pipeline.simulator.surface import Surface, Texture, albedo_at, sheen_at
 
 # Side of the tiles that are tested for the line before any of their pixels is.
 TILE_PX = 8
-# Precision of a hit where only tiles are chosen.
+# Precision of a hit where only tiles are selected.
 _TILE_CLOSE_MM = 1e-3
 # Distance at which light is stated (see `TrueLaser.power_mm`): about the radius of a 4 inch pipe.
 REFERENCE_MM = 50.0
@@ -106,7 +109,7 @@ def line_tiles(view: View, lines: tuple[Line, ...], size: tuple[int, int]) -> Bo
 
 
 def _crossed(height: Float, low: float, high: float) -> Bool:
-    """Return the tiles between whose corners the height above the sheet comes into the profile's reach."""
+    """Return the tiles within whose corners the height above the sheet comes into the profile's reach."""
     corner = np.stack([height[:-1, :-1], height[:-1, 1:], height[1:, :-1], height[1:, 1:]])
     finite = np.isfinite(corner)
     least = np.where(finite, corner, np.inf).min(0)
@@ -122,7 +125,7 @@ def _write_heights(view: View, sheet: SheetTable, k: int, work: Work, out: Float
     for i in range(out.shape[0]):
         for j in range(out.shape[1]):
             ray_at(view.rays, j * TILE_PX - 0.5, i * TILE_PX - 0.5, c_ray)
-            # light goes a little backward at most: rays far behind cannot see the line
+            # light is emitted only a little backward: rays far behind cannot see the line
             if not (c_ray[5] > -0.5):
                 continue
             to_wall(view, i * TILE_PX, k, c_ray, w_ray)
@@ -236,7 +239,7 @@ def _line_light(
 
 @kernel
 def _sheen(texture: Texture, normal: Float, way: Float, ray: Float) -> float:
-    """Return the ratio of light that a partly glossy and a dull wall send to the camera."""
+    """Return the ratio of light that a partly glossy and a matt wall send to the camera."""
     a, b, c = -way[0] - ray[3], -way[1] - ray[4], -way[2] - ray[5]
     across = max(a * normal[0] + b * normal[1] + c * normal[2], 0.0)
     return float(sheen_at(texture, across * across / (a * a + b * b + c * c + 1e-24)))

@@ -1,4 +1,4 @@
-"""Light of the LEDs, and even stray light, that the wall sends to each pixel."""
+"""Light of the LEDs, and uniform stray light, that the wall sends to each pixel."""
 
 from __future__ import annotations
 
@@ -15,10 +15,11 @@ from pipeline.simulator.rays import part_ray_at
 from pipeline.simulator.surface import Surface, albedo_at, sheen_at
 from pipeline.simulator.view import REFERENCE_MM, View, Work, to_wall
 
-# How near to the wall a hit must lie, mm: less than a hundredth of a pixel even where the wall is grazed.
+# Largest distance of a hit from the wall, mm: less than a hundredth of a pixel even at grazing incidence.
 _CLOSE_MM = 5e-4
-# How far from a hit the wall that could shade it is looked for, mm: wall farther off would have to stand in
-# by more than 10 mm to hide an LED. And by how much it must stand in, mm: ten times the error of the map's
+# Distance from a hit within which wall is tested for shading, mm: wall farther off would have to protrude by
+# more than 10 mm to hide an LED. And the least protrusion that is tested, mm: ten times the error of the
+# map's
 # cells.
 _SHADOW_MM, _STANDS_IN_MM = 40.0, 0.01
 # Spacing of the table of light from wall to wall: far below a bore's radius, its scale.
@@ -66,7 +67,7 @@ def lamps_of(ring: LedRing) -> Lamps:
 
 
 def stray_light(level: float) -> Lamps:
-    """Return no lamps but even stray light."""
+    """Return no lamps but uniform stray light."""
     return Lamps(np.zeros((3, 0)), np.zeros(0), 1.0, 0.0, level, 0.0, np.zeros((0, 3)), 0.0)
 
 
@@ -74,7 +75,7 @@ def stray_light(level: float) -> Lamps:
 def least_ahead(lamps: Lamps) -> float:
     """Return the cosine to the optical axis below which nothing is lit.
 
-    LEDs face forward and sit about at the viewpoint; stray light comes from everywhere.
+    LEDs face forward and are near the viewpoint; stray light comes from everywhere.
     """
     return -0.05 if lamps.ambient == 0.0 and lamps.glow.shape[0] == 0 else -1.0
 
@@ -96,7 +97,7 @@ def light_of_ray(
 ) -> None:  # fmt: skip
     """Add the light, by colour (3,), that part ``n`` of a pixel sees of the lamps at moment ``k``.
 
-    ``lit`` (3, L) is room for what each lamp contributes.
+    ``lit`` (3, L) is work space for the contribution of each lamp.
     """
     part_ray_at(view.rays, u, v, n, samples, work.c_ray)
     _ray_light(view, lamps, v, k, samples, work, lit, total)
@@ -128,7 +129,10 @@ def _ray_light(
 
 @kernel
 def _lamp_light(view: View, lamps: Lamps, T: Float, facing: float, work: Work, lit: Float) -> float:
-    """Return the light of all lamps at the work's hit; ``lit`` (3, L) is room for what each contributes."""
+    """Return the light of all lamps at the hit in ``work``.
+
+    ``lit`` (3, L) is work space for each contribution.
+    """
     at, way, normal, place = work.at, work.way, work.normal, lamps.place
     for a in range(3):
         at[a] = work.c_ray[a] + work.hit[0] * work.c_ray[3 + a]
@@ -158,7 +162,7 @@ def _lamp_light(view: View, lamps: Lamps, T: Float, facing: float, work: Work, l
 def _face_lamps(
     place: Float, at: Float, ray: Float, normal: Float, T: Float, facing: float, lit: Float
 ) -> None:
-    """Write for each lamp: light over its lobe, cosine at the lamp, squared cosine of the direction halfway.
+    """Write for each lamp: light over its lobe, cosine at the lamp, squared cosine of the half-way direction.
 
     Without branches and sums, so that several lamps are computed at once.
     """
@@ -178,7 +182,7 @@ def _face_lamps(
 
 @kernel
 def _may_hide(surface: Surface, lamps_mm: float, hit: Float, T: Float, o: Float, R: Float) -> bool:
-    """Tell whether the wall between a hit and the camera stands in far enough to hide LEDs on a circle."""
+    """Return whether the wall between a hit and the camera protrudes far enough to hide LEDs on a circle."""
     along = R[0, 2] * (o[0] - T[0, 3]) + R[1, 2] * (o[1] - T[1, 3]) + R[2, 2] * (o[2] - T[2, 3])
     if along <= 1.0:
         return False
@@ -193,9 +197,9 @@ def _may_hide(surface: Surface, lamps_mm: float, hit: Float, T: Float, o: Float,
 
 @kernel
 def _shaded(surface: Surface, hit: Float, T: Float, way: Float, distance: float, R: Float) -> bool:
-    """Tell whether the wall stands between a hit and an LED; the section's frame is taken as straight.
+    """Return whether the wall lies between a hit and an LED; the section's frame is taken as straight.
 
-    ``way`` (3,) leads from the LED to the hit in C and is ``distance`` long, ``T`` takes C to W.
+    ``way`` (3,) leads from the LED to the hit in C and is ``distance`` long, ``T`` transforms C to W.
     """
     c, s, dx, dy, dz = hit[4], hit[5], 0.0, 0.0, 0.0
     for a in range(3):
@@ -217,7 +221,7 @@ def _shaded(surface: Surface, hit: Float, T: Float, way: Float, distance: float,
     return False
 
 
-# Way on each side of the camera that is tabled, in radii: a ring sends 10⁻⁴ of its light farther than 12.
+# Tabled distance on each side of the camera, in radii: a ring sends 10⁻⁴ of its light farther than 12.
 _REACH_RADII = 12.0
 _AZIMUTHS = 48
 

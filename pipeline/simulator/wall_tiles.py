@@ -1,6 +1,6 @@
-"""Light of the LEDs tile by tile: rays and starts of hits come from the tile's corners.
+"""Light of the LEDs tile by tile: rays, and start values of hits, are interpolated from the tile's corners.
 
-What a ray meets is computed as in `wall_light`; only the search for it begins nearer. Where the wall is not
+What a ray meets is computed as in `wall_light`; only the search for it starts nearer. Where the wall is not
 calm, a pixel is left to `wall_light` itself.
 """
 
@@ -58,7 +58,7 @@ class Room(NamedTuple):
 
 
 def add_wall(view: View, lamps: Lamps, colour: Float, samples: int, image: Float32) -> None:
-    """Add what lamps make of the wall to an image (H, W, 3)."""
+    """Add the light of the wall under the lamps to an image (H, W, 3)."""
     times, leds = view.pose.shape[1], lamps.place.shape[1]
     weights = _lagrange(samples)
     share = colour / (samples * samples * times)
@@ -201,7 +201,7 @@ def _add_pixel(
     view: View, lamps: Lamps, share: Float, samples: int, T: Float, start: float, s: float, v: int, u: int,
     room: Room, image: Float32,
 ) -> bool:  # fmt: skip
-    """Add the light at the work's ray; return whether its hit is sure."""
+    """Add the light at the ray in ``work``; return whether its hit is reliable."""
     ray, hit, normal, albedo = room.work.w_ray, room.work.hit, room.work.normal, room.work.albedo
     if not (ray[3] * T[0, 2] + ray[4] * T[1, 2] + ray[5] * T[2, 2] > least_ahead(lamps)):
         return True
@@ -240,7 +240,7 @@ def _light_at(
 def _dull_light(
     lamps: Lamps, lamp_w: Float, T: Float, px: float, py: float, pz: float, normal: Float
 ) -> float:
-    """Return the light of bare LEDs on a dull wall."""
+    """Return the light of bare LEDs on a matt wall."""
     ahead, even = px * T[0, 2] + py * T[1, 2] + pz * T[2, 2], lamps.even
     nx, ny, nz = normal[0], normal[1], normal[2]
     light = 0.0

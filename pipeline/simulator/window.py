@@ -15,7 +15,7 @@ class Window(Protocol):
 
     @property
     def index_beyond(self) -> float:
-        """Refractive index outside."""
+        """Refractive index of the medium outside."""
 
     def intersect(self, origin_c: Float, ray_c: Float) -> tuple[Float, Float]:
         """Return points (..., 3) where rays from inside leave, and outward unit normals (..., 3) there."""
@@ -72,7 +72,7 @@ def refracted(windows: tuple[Window, ...], origin_c: Float, ray_c: Float) -> tup
 
 
 def _refract(ray: Float, normal: Float, ratio: float) -> Float:
-    """Return unit rays behind a surface; ``ratio`` is the index before over that behind."""
+    """Return unit rays behind a surface; ``ratio`` is the index before it over that behind it."""
     cosine = _dot(ray, normal)
     with np.errstate(invalid="ignore"):
         onward = np.sqrt(1 - ratio**2 * (1 - cosine**2))

@@ -97,7 +97,7 @@ class Budget:
         return np.asarray(np.sqrt(variance))
 
     def uncorrelated_mm(self, pose: Pose) -> Float:
-        """Return the root of the sum of the rows' squares (A,): the total were nothing correlated."""
+        """Return the root of the sum of the rows' squares (A,): the total if nothing were correlated."""
         return np.asarray(np.sqrt(np.sum([row.sigma_mm[pose] ** 2 for row in self.rows], 0)))
 
     def row(self, name: str) -> Row:
@@ -137,7 +137,7 @@ def error_budget(scan: RingScan, given: Mapping[str, float] | None = None) -> Bu
 
 
 def parameter_names(probe: Probe) -> tuple[str, ...]:
-    """Return the names of everything systematic sources move: probe parameters, then disturbances."""
+    """Return the names of all parameters that systematic sources change: the probe's, then disturbances."""
     return (*probe.parameter_names, *DISTURBANCE_NAMES)
 
 
@@ -148,12 +148,12 @@ def _check(probe: Probe, given: Mapping[str, float]) -> None:
             raise InputError("error budget", f"no error source is called {name!r}", expected=", ".join(known))
         if not (math.isfinite(sigma) and sigma >= 0):
             raise InputError(
-                "error budget", f"{sigma} is no σ", place=name, expected="a number of at least 0"
+                "error budget", f"{sigma} is not a valid σ", place=name, expected="a number of at least 0"
             )
 
 
 def _stated_covariance(probe: Probe, given: Mapping[str, float]) -> Float:
-    """Scale the blocks of sources with a given σ; where nothing is stated a source takes its typical σ."""
+    """Scale the blocks of sources with a given σ; sources without a stated σ use their typical one."""
     covariance = probe.covariance.copy()
     for source in stated_sources(probe):
         index = [probe.parameter_names.index(p) for p in source.parameters]
@@ -178,7 +178,7 @@ def _shown(source: Source, block: Float) -> float:
 
 
 def _source_covariance(source: Source, sigma: float) -> Float:
-    """Return (k, k): focal lengths move together, everything else on its own."""
+    """Return (k, k): focal lengths are fully correlated, all other parameters are independent."""
     size = (sigma * source.factor) ** 2
     k = len(source.parameters)
     if source.name in ("focal_scale", "focal_drift"):

@@ -104,7 +104,8 @@ def baseline_study(
     sigma = np.array([[_level(scan, b, d, given) for d in _DIAMETERS_MM] for b in at])
     seen = np.where(np.isnan(sigma), np.inf, sigma)
     worst = seen.max(1)
-    # The shortest baseline within 10 % of the best: a longer probe buys less than it costs in bends (chosen).
+    # The shortest baseline within 10 % of the best: a longer probe gains less than it loses in bends
+    # (chosen).
     good = at[np.flatnonzero(worst <= 1.1 * worst.min())[0]]
     best = at[seen.argmin(0)]
     return BaselineStudy(at, np.array(_DIAMETERS_MM), sigma, best, float(at[worst.argmin()]), float(good))

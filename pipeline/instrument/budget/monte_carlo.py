@@ -1,4 +1,4 @@
-"""The budget by Monte Carlo through the exact chain: disturbed instrument, pixels, believed triangulation."""
+"""The budget by Monte Carlo through the exact chain: disturbed instrument, pixels, assumed triangulation."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def monte_carlo(budget: Budget, draws: int = 256) -> MonteCarlo:
     Notes
     -----
     Draws are scrambled Sobol points turned normal, then given mean 0 and covariance 1 exactly (moment
-    matching), so that what differs from the analytic budget is not the luck of the draw.
+    matching), so that differences from the analytic budget are not due to the choice of the draws.
     """
     random = np.random.default_rng(0)
     rows = {
@@ -58,7 +58,7 @@ def _row_draws(budget: Budget, row: Row, draws: int, random: np.random.Generator
 
 
 def _spread(scan: RingScan, parameters: Float, shift_px: Float) -> dict[Pose, Float]:
-    """Return 1 σ (A,) of the radius over draws (N, P + E) and (N, A), 0 if nothing moves."""
+    """Return 1 σ (A,) of the radius over draws (N, P + E) and (N, A); 0 if nothing is disturbed."""
     if not (parameters.any() or shift_px.any()):
         return {pose: np.zeros(scan.azimuths) for pose in Pose}
     split = len(scan.probe.parameter_names)
@@ -89,6 +89,6 @@ def _scatter(sigma_px: Float, draws: int, random: np.random.Generator, beside: F
     """Return (N, A) displacements with exactly the σ given at each azimuth, uncorrelated with ``beside``."""
     z = random.standard_normal((draws, len(sigma_px)))
     moved = np.zeros((draws, 0)) if beside is None else beside[:, beside.any(0)]
-    # orthonormal columns beside the constant one: mean 0, variance 1 and no correlation, exactly
+    # orthonormal columns, orthogonal to the constant one: mean 0, variance 1 and no correlation, exactly
     basis = np.linalg.qr(np.concatenate([np.ones((draws, 1)), moved / moved.std(0), z], -1))[0]
     return np.asarray(basis[:, -len(sigma_px) :] * math.sqrt(draws) * sigma_px)

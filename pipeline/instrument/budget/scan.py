@@ -80,7 +80,7 @@ class RingScan:
 
     @cached_property
     def wall_points(self) -> Float:
-        """(A, 3) points in C where the believed sheet meets the wall."""
+        """(A, 3) points in C where the stated sheet meets the wall."""
         return sheet_on_wall(self.probe.laser, self.radius_mm, np.array(self.offset_mm), self.azimuth_rad)
 
     @cached_property
@@ -108,9 +108,9 @@ def radius_error(
     Parameters
     ----------
     scan
-        What is believed.
+        The scan, with the instrument that is assumed.
     by_parameters : (P,)
-        True minus believed parameters of the probe.
+        True minus assumed parameters of the probe.
     disturbance
         Effects the probe's parameters do not describe.
     shift_px : (A,)
@@ -130,8 +130,9 @@ def radius_error(
 def radius_jacobian(scan: RingScan) -> Float:
     """Return d (triangulated radius) / d (true parameters) (A, P), pose known: −n · d X/d parameters.
 
-    The believed instrument triangulates with fixed parameters. Other true parameters move the pixel of a wall
-    point; with both changed alike the point would stay, hence the minus sign.
+    The assumed instrument triangulates with fixed parameters. Changes of the true parameters move the pixel
+    of a wall point. If true and assumed parameters changed equally, the point would stay, hence the minus
+    sign.
     """
     by_parameters = scan.probe.triangulate_jacobian(scan.pixels)[1]
     return -np.asarray(np.einsum("ni,nip->np", scan.normals, by_parameters[:, :2]))
@@ -150,7 +151,7 @@ def disturbance_jacobian(scan: RingScan) -> Float:
 
 
 def without_centre(scan: RingScan, error_mm: Float) -> Float:
-    """Return small radius errors (A, ...) without the part that the centre of a fitted circle takes up."""
+    """Return small radius errors (A, ...) without the part that the centre of a fitted circle absorbs."""
     design = np.concatenate([scan.normals, np.ones((scan.azimuths, 1))], -1)
     flat = error_mm.reshape(scan.azimuths, -1)
     shift = np.linalg.lstsq(design, flat, rcond=None)[0][:2]

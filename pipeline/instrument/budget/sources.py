@@ -1,7 +1,7 @@
 """The error sources: the paper's Table I, the further effects of the shared PHYSICS notes, a typical probe.
 
-A systematic source moves parameters of the probe or of `Disturbance`; it is the same in every frame. A random
-source moves every sample of the line on its own, and is averaged away over frames.
+A systematic source changes parameters of the probe or of `Disturbance`, equally in every frame. A random
+source moves every sample of the line independently, and averages out over frames.
 """
 
 from __future__ import annotations
@@ -155,7 +155,7 @@ def typical_probe(baseline_mm: float = 22.0) -> Probe:
     return Probe(camera, laser, covariance)
 
 
-# Crown glass, with which PHYSICS.md's 0.74 mm for 2 mm of glass in a 4 inch pipe holds; 1.5 gives 0.73 mm.
+# Crown glass: with it PHYSICS.md's 0.74 mm for 2 mm of glass in a 4 inch pipe is right; 1.5 gives 0.73 mm.
 _GLASS_INDEX = 1.51
 
 

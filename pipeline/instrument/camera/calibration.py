@@ -80,7 +80,7 @@ class CameraCalibration:
 
 @dataclass(frozen=True)
 class ModelScore:
-    """How well one camera model predicts the views; all models are tried on the same ones.
+    """How well one camera model predicts the views; all models are evaluated on the same ones.
 
     Attributes
     ----------
@@ -110,7 +110,7 @@ class UncertaintyMap:
     Attributes
     ----------
     sigma_px : (R, C)
-        With the best rotation of the camera taken out.
+        After the best rotation of the camera is removed.
     raw_sigma_px : (R, C)
         In the camera's own frame.
     """
@@ -129,7 +129,7 @@ class DisplacementMap:
     displacement_px : (R, C, 2)
         NaN where either camera has no such ray.
     rotation_rad : (3,)
-        Rotation between the two cameras that was taken out, as a vector.
+        Rotation between the two cameras that was removed, as a vector.
     """
 
     uv: Float

@@ -35,7 +35,7 @@ _CLOSED = 1e-9
 
 
 class PlumbBobCamera(ABC):
-    """A camera through a plane; its parameters in full are ξ, fx, fy, cx, cy, k1, k2, p1, p2, k3."""
+    """A camera with distortion on a plane; its full parameters are ξ, fx, fy, cx, cy, k1, k2, p1, p2, k3."""
 
     image_size: tuple[int, int]
     focal_px: tuple[float, float]

@@ -21,7 +21,8 @@ from pipeline.instrument.camera.fisheye import Polar, RadialCamera
 
 # Nodes of the table that an inversion starts from; Newton's steps do the rest.
 _NODES = 256
-# The polynomial is an interpolation: twice as far out as the image's farthest corner it says nothing.
+# The polynomial is an interpolation: beyond twice the radius of the image's farthest corner it is
+# meaningless.
 _REACH = 2.0
 
 
@@ -129,7 +130,7 @@ class Scaramuzza(RadialCamera):
 
 
 def scaramuzza_problem(polynomial: Sequence[float], affine: Sequence[float]) -> tuple[str, str, str] | None:
-    """Return (key, problem, expectation) when the numbers cannot be such a camera's, else None."""
+    """Return (key, problem, expectation) when the numbers are not those of such a camera, else None."""
     c, d, e = affine
     if polynomial[0] >= 0:
         return "polynomial[0]", f"is {polynomial[0]}", "a0 in OCamCalib's sign, which is negative"

@@ -1,4 +1,4 @@
-"""Every effect of the catalogue as a function from one scene's truth to another; switching several on."""
+"""Every effect of the catalogue as a function from one scene's truth to another, and their combination."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ EffectFunction = Callable[..., SceneTruth]
 _STEP_S = 1e-3
 _MODULES = (laser_and_window, camera, surroundings)
 
-# Each takes the truth, then the catalogue's quantities by name.
+# Each function takes the truth, then the catalogue's quantities by name.
 EFFECT_FUNCTIONS: Mapping[str, EffectFunction] = MappingProxyType(
     {name: next(getattr(m, name) for m in _MODULES if hasattr(m, name)) for name in ALL_EFFECTS}
 )
@@ -46,7 +46,7 @@ def switch_on(truth: SceneTruth, switches: Sequence[Switch]) -> SceneTruth:
 
 @dataclass(frozen=True)
 class Coursed:
-    """An effect on the instrument whose size follows a course; ``scene`` is the truth without it."""
+    """An effect on the instrument whose size follows a course; ``scene`` is the truth without the effect."""
 
     scene: SceneTruth
     switch: Switch

@@ -1,4 +1,4 @@
-"""Effects of the camera: projection, shutter, warming; and of pictures alone: light, glass, lens, sensor."""
+"""Effects of the camera (projection, shutter, warming), and effects on pictures only (light, lens)."""
 
 from __future__ import annotations
 
@@ -75,12 +75,12 @@ def principal_point(truth: SceneTruth, shift_px: float, direction_deg: float) ->
 
 
 def focal_scale(truth: SceneTruth, relative: float) -> SceneTruth:
-    """Lengthen the focal length."""
+    """Enlarge the focal length by a share."""
     return with_camera(truth, model=magnified(truth.instrument.camera.model, relative))
 
 
 def radial_distortion(truth: SceneTruth, k: float) -> SceneTruth:
-    """Add to the coefficient of θ³ in the image radius."""
+    """Add k to the coefficient of θ³ in the image radius."""
     return with_camera(truth, model=_with_added(truth.instrument.camera.model, "radial_distortion", k1=k))
 
 
@@ -97,18 +97,18 @@ def pixel_aspect(truth: SceneTruth, relative: float) -> SceneTruth:
 
 
 def pupil_shift(truth: SceneTruth, shift_mm: float) -> SceneTruth:
-    """Let the entrance pupil wander along the axis with the angle of view."""
+    """Move the entrance pupil along the axis, depending on the angle of view."""
     return with_camera(truth, pupil_shift_mm=truth.instrument.camera.pupil_shift_mm + shift_mm)
 
 
 def rolling_shutter(truth: SceneTruth, readout_s: float) -> SceneTruth:
-    """Read the rows one after the other; a frame's time stays that of its middle row."""
+    """Read the rows one after the other; a frame's time is that of its middle row."""
     shutter = replace(truth.instrument.shutter, kind="rolling", readout_s=readout_s)
     return replace(truth, instrument=replace(truth.instrument, shutter=shutter))
 
 
 def motion_blur(truth: SceneTruth, exposure_s: float) -> SceneTruth:
-    """Expose longer from the same start, the same light in all; the middle comes later by half of that.
+    """Lengthen the exposure from the same start with the same total light; its middle is later.
 
     Raises
     ------
@@ -145,7 +145,7 @@ def centre_drift(truth: SceneTruth, shift_px: float, direction_deg: float, time_
 
 
 def pixel_locking(truth: SceneTruth, amplitude_px: float) -> SceneTruth:
-    """Draw a line at image radius ρ at ρ + a sin 2πρ: the effect of an undersampling sensor on a line."""
+    """Show a line of image radius ρ at ρ + a sin 2πρ, as undersampling by the pixels does."""
     return with_camera(truth, locking_px=truth.instrument.camera.locking_px + amplitude_px)
 
 
@@ -183,7 +183,7 @@ def _warming(truth: SceneTruth, time_s: float) -> Warming:
 
 
 def light_flicker(truth: SceneTruth, relative: float, frequency_hz: float) -> SceneTruth:
-    """Let laser and LEDs flicker together, as on an uneven supply."""
+    """Let the power of laser and LEDs oscillate together, as with an unstable supply."""
     return replace(truth, instrument=replace(truth.instrument, flicker=Flicker(relative, frequency_hz)))
 
 
@@ -214,14 +214,14 @@ def black_level(truth: SceneTruth, grey: float) -> SceneTruth:
 
 
 def defocus(truth: SceneTruth, middle_px: float, edge_px: float) -> SceneTruth:
-    """Blur further, more towards the picture's edge."""
+    """Blur the picture, and its edge more than its middle."""
     sensor = truth.instrument.sensor
     blur = math.hypot(sensor.psf_sigma_px, middle_px)
     return with_sensor(truth, psf_sigma_px=blur, psf_edge_px=math.hypot(sensor.psf_edge_px, edge_px))
 
 
 def window_scatter(truth: SceneTruth, share: float, azimuth_deg: float, width_deg: float) -> SceneTruth:
-    """Put a spot on the front glass that scatters light instead of taking it away."""
+    """Put a spot on the front glass that scatters light instead of absorbing it."""
     centre, sigma = on_the_ring(truth, azimuth_deg, width_deg)
     spot = Dust(share, centre, (sigma, sigma))
     return with_sensor(truth, scatter=(*truth.instrument.sensor.scatter, spot))
@@ -250,10 +250,10 @@ def full_well(truth: SceneTruth, electrons: float) -> SceneTruth:
 
 
 def dark_pattern(truth: SceneTruth, relative: float) -> SceneTruth:
-    """Give every pixel a dark signal of its own."""
+    """Give every pixel its own constant dark signal."""
     return with_sensor(truth, dark_pattern=relative)
 
 
 def interreflection(truth: SceneTruth, relative: float) -> SceneTruth:
-    """Let the wall light itself, once."""
+    """Add the light that the wall reflects onto itself once."""
     return replace(truth, wall=replace(truth.wall, interreflection=relative))

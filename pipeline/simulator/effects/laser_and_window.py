@@ -26,7 +26,7 @@ from pipeline.simulator.instrument import SheetWave, TrueInstrument
 from pipeline.simulator.truth import SceneTruth, cartesian, with_camera, with_laser
 from pipeline.simulator.window import CylinderWindow, SphereWindow, Window
 
-# 1/e² radius of the beam on the cone mirror that spreads it: sets how decentring makes the ring uneven.
+# 1/e² radius of the beam on the cone mirror that spreads it: it sets how uneven decentring makes the ring.
 BEAM_RADIUS_MM = 1.0
 
 
@@ -47,19 +47,19 @@ class Rocking:
 
 
 def laser_tilt(truth: SceneTruth, tilt_deg: float, direction_deg: float) -> SceneTruth:
-    """Lean the sheet forward by an angle on the side of ``direction_deg``."""
+    """Tilt the sheet so that it leans forward on the side of ``direction_deg``."""
     sheet = tilted(truth.instrument.laser.sheet, math.radians(tilt_deg), direction_deg)
     return with_laser(truth, sheet=sheet)
 
 
 def laser_cone(truth: SceneTruth, cone_deg: float) -> SceneTruth:
-    """Lean the sheet forward all round."""
+    """Make the sheet a cone that leans forward all round."""
     sheet = truth.instrument.laser.sheet
     return with_laser(truth, sheet=replace(sheet, cone_rad=sheet.cone_rad + math.radians(cone_deg)))
 
 
 def baseline(truth: SceneTruth, baseline_mm: float) -> SceneTruth:
-    """Put the sheet farther away."""
+    """Move the sheet farther away from the camera."""
     sheet = truth.instrument.laser.sheet
     return with_laser(truth, sheet=replace(sheet, baseline_mm=sheet.baseline_mm + baseline_mm))
 
@@ -83,7 +83,7 @@ def beam_decentre(truth: SceneTruth, height_mm: float, direction_deg: float) -> 
 def sheet_waviness(
     truth: SceneTruth, amplitude_mrad: float, order: float, direction_deg: float
 ) -> SceneTruth:
-    """Give the sheet's elevation ``order`` waves around the ring, a crest towards ``direction_deg``."""
+    """Give the sheet's elevation ``order`` waves around the ring, with a crest towards ``direction_deg``."""
     waves = round(order)
     cos_rad, sin_rad = cartesian(1e-3 * amplitude_mrad, waves * direction_deg)
     return with_laser(truth, waves=(*truth.instrument.laser.waves, SheetWave(waves, cos_rad, sin_rad)))
@@ -115,14 +115,14 @@ def housing_glass(truth: SceneTruth, thickness_mm: float) -> SceneTruth:
 
 
 def tube_wedge(truth: SceneTruth, wedge_mm: float, direction_deg: float) -> SceneTruth:
-    """Decentre a tube's outer surface: glass thicker by up to ``wedge_mm`` towards a direction."""
+    """Decentre a tube's outer surface: the glass is thicker by up to ``wedge_mm`` towards a direction."""
     x, y = cartesian(wedge_mm, direction_deg)
     inner = CylinderWindow(TUBE_OUTER_RADIUS_MM, GLASS_INDEX)
     return _with_windows(truth, (inner, CylinderWindow(TUBE_OUTER_RADIUS_MM, _AIR, point_c=(x, y, 0.0))))
 
 
 def tube_tilt(truth: SceneTruth, tilt_deg: float, direction_deg: float) -> SceneTruth:
-    """Tilt the tube that the probe was calibrated in: its outer normal leans forward at ``direction_deg``."""
+    """Tilt the tube of the calibration: its outer normal leans forward at ``direction_deg``."""
     x, y = cartesian(math.sin(math.radians(tilt_deg)), direction_deg)
     axis = (-x, -y, math.cos(math.radians(tilt_deg)))
     inside = TUBE_OUTER_RADIUS_MM - TUBE_THICKNESS_MM
@@ -135,7 +135,7 @@ def tube_tilt(truth: SceneTruth, tilt_deg: float, direction_deg: float) -> Scene
 
 
 def dome_axial(truth: SceneTruth, offset_mm: float) -> SceneTruth:
-    """Set the dome back by ``offset_mm``: the viewpoint lies so far ahead of its centre."""
+    """Set the dome back by ``offset_mm``: the viewpoint is so far ahead of the dome's centre."""
     return _with_dome_moved(truth, 0.0, 0.0, -offset_mm)
 
 
@@ -145,12 +145,12 @@ def dome_lateral(truth: SceneTruth, offset_mm: float, direction_deg: float) -> S
 
 
 def outside_index(truth: SceneTruth, index_excess: float) -> SceneTruth:
-    """Fill the pipe with a medium; the sealed probe itself stays full of air."""
+    """Fill the pipe with a medium; the sealed probe itself remains full of air."""
     return _with_windows(truth, (CylinderWindow(TUBE_OUTER_RADIUS_MM, 1 + index_excess),))
 
 
 def _with_windows(truth: SceneTruth, windows: tuple[Window, ...]) -> SceneTruth:
-    """Return the truth with windows outside the others, in front of both camera and laser."""
+    """Return the truth with further windows outside the others, in front of both camera and laser."""
     instrument = truth.instrument
     laser = replace(instrument.laser, windows=(*instrument.laser.windows, *windows))
     camera = replace(instrument.camera, windows=(*instrument.camera.windows, *windows))
@@ -158,7 +158,7 @@ def _with_windows(truth: SceneTruth, windows: tuple[Window, ...]) -> SceneTruth:
 
 
 def _with_dome_moved(truth: SceneTruth, x: float, y: float, z: float) -> SceneTruth:
-    """Move the camera's dome, which sits about the viewpoint and shows nothing while it is not moved."""
+    """Move the camera's dome. Centred on the viewpoint, as it is without this effect, it refracts no ray."""
     windows = truth.instrument.camera.windows
     domes = [w for w in windows if isinstance(w, SphereWindow)] or list(_centred_dome())
     moved = [replace(w, centre_c=(w.centre_c[0] + x, w.centre_c[1] + y, w.centre_c[2] + z)) for w in domes]

@@ -1,4 +1,4 @@
-"""Effects of the pipe's shape, the probe's motion and the odometer; of the line's light."""
+"""Effects of the pipe's shape, of the probe's motion, of the odometer, and of the line's light."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from pipeline.simulator.truth import (
 from pipeline.simulator.view import REFERENCE_MM
 from pipeline.simulator.wall.grid import Wall
 
-# Sagitta by which the axis' polyline may cut its arc, mm.
+# Largest distance between the axis' polyline and its arc, mm.
 _SAGITTA_MM = 1e-4
 
 
@@ -53,7 +53,7 @@ def ovality(truth: SceneTruth, amplitude_mm: float, direction_deg: float) -> Sce
 def probe_vibration(
     truth: SceneTruth, amplitude_mm: float, frequency_hz: float, direction_deg: float
 ) -> SceneTruth:
-    """Shake the camera across the axis, along a direction of the pipe's section."""
+    """Add a sinusoidal motion of the camera across the axis, along a direction of the pipe's section."""
     start = float(truth.frames.time_s[0])
     x, y = cartesian(amplitude_mm, direction_deg)
     phase = -2 * math.pi * frequency_hz * start
@@ -72,14 +72,14 @@ def encoder_scale(truth: SceneTruth, relative: float) -> SceneTruth:
 
 
 def encoder_slip(truth: SceneTruth, slip_mm: float, time_s: float) -> SceneTruth:
-    """Add a distance to all readings from a time after the first frame on."""
+    """Add a distance to all readings after a given time since the first frame."""
     odometer = require_odometer(truth, "encoder_slip")
     slip = Slip(float(truth.frames.time_s[0]) + time_s, slip_mm)
     return with_odometer(truth, "encoder_slip", slips=(*odometer.slips, slip))
 
 
 def encoder_backlash(truth: SceneTruth, backlash_mm: float) -> SceneTruth:
-    """Give the encoder play, which is taken up at each reversal before the reading follows."""
+    """Give the encoder play: at each reversal the reading stays until the play is taken up."""
     before = require_odometer(truth, "encoder_backlash").backlash_mm
     return with_odometer(truth, "encoder_backlash", backlash_mm=before + backlash_mm)
 
@@ -131,7 +131,7 @@ def subsurface(truth: SceneTruth, transport_mm: float) -> SceneTruth:
 
 
 def ghost_ring(truth: SceneTruth, relative: float) -> SceneTruth:
-    """Let the wall mirror a share of the line across the bore."""
+    """Let the wall reflect a share of the line onto the opposite side of the bore, like a mirror."""
     return with_laser(truth, ghost_relative=relative)
 
 
@@ -142,7 +142,7 @@ def tube_ghost(truth: SceneTruth, relative: float, separation_mm: float) -> Scen
 
 
 def line_skew(truth: SceneTruth, skewness: float) -> SceneTruth:
-    """Make the sheet's own profile asymmetric."""
+    """Make the profile of the sheet asymmetric."""
     return with_laser(truth, profile=replace(truth.instrument.laser.profile, skewness=skewness))
 
 
@@ -152,23 +152,23 @@ def speckle(truth: SceneTruth, contrast: float) -> SceneTruth:
 
 
 def saturation(truth: SceneTruth, exposure_gain: float) -> SceneTruth:
-    """Raise the laser's power until the line's mean peak, before blur, is so many full scales."""
+    """Raise the laser's power until the line's mean peak, before blur, is ``exposure_gain`` full scales."""
     gain = exposure_gain / line_peak(truth)
     return with_laser(truth, power_mm=truth.instrument.laser.power_mm * gain)
 
 
 def gamma(truth: SceneTruth, exponent: float) -> SceneTruth:
-    """Let grey be light to a power."""
+    """Make the grey level a power of the light."""
     return with_sensor(truth, gamma=exponent)
 
 
 def vignetting(truth: SceneTruth, falloff: float) -> SceneTruth:
-    """Let the light fall towards the image's edge by a higher power."""
+    """Use a higher power of the cosine for the fall of light towards the image's edge."""
     return with_sensor(truth, vignetting=truth.instrument.sensor.vignetting + falloff)
 
 
 def ambient_light(truth: SceneTruth, relative: float) -> SceneTruth:
-    """Light the wall besides the line, a share of the line's mean peak."""
+    """Add uniform light on the wall, as a share of the line's mean peak."""
     stray = relative * line_peak(truth) / mean_albedo(truth)
     return with_sensor(truth, ambient=truth.instrument.sensor.ambient + stray)
 
@@ -186,7 +186,7 @@ def dust(truth: SceneTruth, attenuation: float, azimuth_deg: float, width_deg: f
 
 
 def on_the_ring(truth: SceneTruth, azimuth_deg: float, width_deg: float) -> tuple[tuple[float, float], float]:
-    """Return where a centred pipe shows the line at an azimuth, and a width around the ring, px."""
+    """Return where a centred pipe shows the line at an azimuth, and the spot's width there, px."""
     model, azimuth, radius = truth.instrument.camera.model, math.radians(azimuth_deg), mean_radius_mm(truth)
     place = np.array([radius * math.cos(azimuth), radius * math.sin(azimuth), truth.stated.laser.baseline_mm])
     uv = model.project(place).uv
@@ -195,7 +195,7 @@ def on_the_ring(truth: SceneTruth, azimuth_deg: float, width_deg: float) -> tupl
 
 
 def line_peak(truth: SceneTruth) -> float:
-    """Return the line's peak on the mean wall before blur, full scales."""
+    """Return the line's peak on the mean wall before blur, in full scales."""
     laser = truth.instrument.laser
     low, high = laser.profile.reach_mm()
     density = float(laser.profile.density(np.linspace(low, high, 2001)).max())
@@ -209,5 +209,5 @@ def mean_albedo(truth: SceneTruth) -> float:
 
 
 def mean_radius_mm(truth: SceneTruth) -> float:
-    """Return the radius the pipe is said to have."""
+    """Return the pipe's nominal radius."""
     return truth.facts.nominal_diameter_mm / 2

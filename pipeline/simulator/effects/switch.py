@@ -96,7 +96,7 @@ class Switch:
 
 
 def typical_switch(name: str) -> Switch:
-    """Return an effect at its typical size."""
+    """Return an effect with its typical size."""
     return Switch(name, tuple(q.typical for q in effect(name).quantities))
 
 
@@ -135,9 +135,9 @@ def _kind(text: str) -> CourseKind:
 
 
 def the_other_way(switch: Switch) -> Switch:
-    """Return an effect of the same size the other way round, or of twice the size where it has one way only.
+    """Return an effect of the opposite size, or of twice the size where the size has no sign.
 
-    As an answer it is about as far from the right one as naming no effect.
+    As an answer it is about as far from the right one as no effect at all.
     """
     values, quantities = list(switch.values), switch.effect.quantities
     direction = next((k for k, q in enumerate(quantities) if q.name in _DIRECTIONS), None)

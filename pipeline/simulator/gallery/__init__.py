@@ -1,8 +1,8 @@
 """The influence of each catalogue effect on picture, ring and encoder, and the similarity of two effects.
 
 Likeness is |cosine| of the angle between two patterns: of the radius error around the ring or, for effects
-without one, of the line's profile or the odometer's reading. Nothing is typed in: all is computed from
-renderings.
+without one, of the line's profile or the odometer's reading. No number is entered by hand: all are computed
+from renderings.
 """
 
 from __future__ import annotations
@@ -74,7 +74,7 @@ def unrolled(
 
 
 def read_radii(line_px: Float, truth: SceneTruth, azimuth_rad: Float) -> Float:
-    """Return the radius (A,), mm, that the stated instrument makes of a line."""
+    """Return the radius (A,), mm, that the stated instrument computes for a line."""
     outward = np.stack([np.cos(azimuth_rad), np.sin(azimuth_rad)], -1)
     point = truth.stated.triangulate(truth.stated.camera.centre_px + line_px[:, None] * outward)
     return np.asarray(np.hypot(point[:, 0], point[:, 1]))
@@ -88,15 +88,15 @@ def expected_px(truth: SceneTruth) -> float:
 
 # Directions around the ring, 2° apart: the catalogue's highest harmonic, 6, has 30 of them a wave.
 AZIMUTHS = 180
-# Radius errors below a third of a micrometre are the rendering's own.
+# Radius errors below a third of a micrometre are errors of the rendering itself.
 NOTHING_MM = 3e-4
 # Channel of the laser's light in BGR pictures: the stated wavelength is green (520 nm).
 _GREEN = 1
-# Unknowns of every run, with the harmonic of the radius that each of them changes in all bores.
+# Quantities that every run leaves unknown, with the harmonic of the radius that each changes in all bores.
 STATES = {"off-centre probe": 1, "pipe of another radius": 0}
-# Typical 1 σ of a frame's light, width and skewness along one azimuth, in which they are weighed together.
+# Typical 1 σ of a frame's light, width and skewness along one azimuth, used as their weights.
 _PROFILE_SIGMA = (0.05, 0.05, 0.15)
-# At most so many likenesses are listed for an effect.
+# Largest number of similar effects that are listed for an effect.
 _MOST_ALIKE = 5
 
 
@@ -149,7 +149,7 @@ class Exhibit:
     azimuth_rad : (A,)
     residual : mapping of radius, mm, to Residual
     course : Course or None
-        How it goes with time.
+        The effect over time.
     """
 
     switch: Switch
@@ -167,7 +167,7 @@ class Exhibit:
 
     @property
     def shows_on_ring(self) -> bool:
-        """Whether the radius is read wrongly at all."""
+        """Whether the effect changes the measured radius at all."""
         return max(r.rms_mm for r in self.residual.values()) > NOTHING_MM
 
     @property
@@ -201,7 +201,7 @@ def exhibit(switch: Switch) -> Exhibit:
 
 
 def recorded(truth: SceneTruth) -> Float32:
-    """Return the green light (H, W) of the scene's frame, clipped and by its gamma, noise left out."""
+    """Return the green light (H, W) of the scene's frame, clipped and with its gamma, without noise."""
     sensor = truth.instrument.sensor
     renderer = renderer_of(truth)
     if sensor.fixed_pattern > 0:
@@ -230,7 +230,7 @@ class Likeness:
 
 
 def likenesses(exhibits: Sequence[Exhibit], least: float = 0.9) -> dict[str, list[Likeness]]:
-    """Return for each effect the others that look like it in one bore, the likest over all three first.
+    """Return for each effect the others that look like it in one bore, the most similar in all three first.
 
     Radius errors over azimuth are compared. For effects that do not change the radius, the motion less the
     encoder's reading is compared or, where there is none, light, width and skewness of the line. An effect

@@ -1,4 +1,4 @@
-"""The scenes in which the gallery shows an effect, and how the effect goes with time."""
+"""The scenes in which the gallery shows an effect, and the effect's course over time."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from pipeline.simulator.wall.grid import Wall
 SIDE_PX = 880
 # The line's peak before blur, full scales.
 _PEAK = 0.8
-# A vibration of 0.2 mm at 5.3 Hz at its fastest, to the lower right.
+# Speed of a vibration of 0.2 mm at 5.3 Hz at its fastest, to the lower right.
 _RATE_MM_S = 2 * math.pi * 5.3 * 0.2
 _SHAKEN = frozenset({"rolling_shutter", "motion_blur"})
 _ROUGH = frozenset({"albedo_bias", "slope_bias"})
@@ -37,7 +37,7 @@ _COMPANIONS = {
 
 
 def surroundings(name: str) -> str:
-    """Return in words the additions to the bench that show an effect; empty for the plain bench."""
+    """Return in words what is added to the bench to show an effect; empty for the plain bench."""
     if name in _SHAKEN:
         return f"the camera moves at {_RATE_MM_S:.1f} mm/s to the lower right"
     if name in _ROUGH:
@@ -54,14 +54,17 @@ def scene_pair(switch: Switch, radius_mm: float) -> tuple[SceneTruth, SceneTruth
     if switch.name in _SHAKEN:
         base = replace(base, motion=_shaken())
     if switch.name in _COMPANIONS:
-        # a ghost lies on the line of a straight sheet; clipping and gamma do not move a symmetric line
+        # with a straight sheet a ghost lies on the line; clipping and gamma do not move a symmetric line
         base = switch_on(base, [_COMPANIONS[switch.name]])
     moment = FrameTable(np.zeros(1, int), np.array([moment_s(switch)]), np.array(["laser"]))
     return replace(base, frames=moment), replace(switch_on(base, [switch]), frames=moment)
 
 
 def moment_s(switch: Switch) -> float:
-    """Return the time at which to look: a swing's crest, a drift's time constant, else the start."""
+    """Return the time at which the effect is shown.
+
+    A swing's crest, a drift's time constant, else the start.
+    """
     sizes = switch.quantities
     if "frequency_hz" in sizes:
         return 0.25 / sizes["frequency_hz"]
@@ -116,7 +119,7 @@ def course_of(switch: Switch) -> Course | None:
 
 
 def _of_ring(switch: Switch, time_s: Float) -> Course:
-    """Return the ring's harmonic along the effect's crest, 4 inch."""
+    """Return the amplitude of the ring's harmonic along the effect's crest over time, 4 inch."""
     truth, order = switch_on(bench_truth(_RADIUS_MM), [switch]), switch.effect.harmonic or 0
     crest = np.exp(1j * order * math.radians(switch.quantities.get("direction_deg", 0.0)))
     rings = [trace_ring(truth, float(t), _AZIMUTHS) for t in time_s]
@@ -125,7 +128,10 @@ def _of_ring(switch: Switch, time_s: Float) -> Course:
 
 
 def _against_encoder(switch: Switch) -> Course:
-    """Return true minus read distance: the probe goes forward, rests, goes forward faster, and returns."""
+    """Return true minus read distance.
+
+    The probe drives forward, rests, drives forward faster, and returns.
+    """
     truth = switch_on(_driven(), [switch])
     encoder = truth.encoder()
     if encoder is None:

@@ -1,4 +1,4 @@
-"""The closed-form laws of the known effects, each held against the traced or rendered result."""
+"""The closed-form laws of the known effects, each compared with the traced or rendered result."""
 
 from __future__ import annotations
 
@@ -128,7 +128,7 @@ class Check:
 
     @property
     def agrees(self) -> bool:
-        """True if size, harmonic and exponent are the law's."""
+        """Whether size, harmonic and exponent agree with the law."""
         sized = abs(self.computed - self.predicted) <= self.tolerance
         shaped = self.harmonic is None or self.harmonic[0] == self.harmonic[1]
         grown = self.exponent is None or abs(self.exponent[0] - self.exponent[1]) <= EXPONENT_TOLERANCE
@@ -136,7 +136,7 @@ class Check:
 
     @property
     def mended_agrees(self) -> bool:
-        """True if the law put in its place holds."""
+        """Whether the law that replaces a wrong one holds."""
         return self.mended_value is not None and abs(self.computed - self.mended_value) <= self.tolerance
 
 
@@ -163,8 +163,8 @@ def exponent(radii_mm: Float, sizes: Float) -> float:
     return float(np.log(abs(sizes[-1] / sizes[0])) / np.log(radii_mm[-1] / radii_mm[0]))
 
 
-# Traced directions; 500 px halved 50 times is below rounding; steps to a wall that depends on azimuth
-# alone.
+# Number of traced directions; 500 px halved 50 times is below rounding; steps to a wall that depends on
+# azimuth alone.
 _TRACED_AZIMUTHS, _BISECTIONS, _WALL_STEPS = 144, 50, 8
 # Image radii, px, between which the bench's ring lies in bores of 2 to 4 inch: atan(r/22 mm) × 360 px/rad.
 _SEARCH_PX = (60.0, 560.0)
@@ -190,7 +190,7 @@ class TracedRing(NamedTuple):
 
 
 def trace_ring(truth: SceneTruth, time_s: float = 0.0, azimuths: int = _TRACED_AZIMUTHS) -> TracedRing:
-    """Return the ring of a moment; with a rolling shutter each row is seen at its own."""
+    """Return the ring at a moment; with a rolling shutter each row is seen at its own time."""
     instrument = truth.instrument_at(time_s)
     around = -np.pi + 2 * np.pi * np.arange(azimuths) / azimuths
     outward = np.stack([np.cos(around), np.sin(around)], -1)
@@ -210,7 +210,7 @@ def trace_ring(truth: SceneTruth, time_s: float = 0.0, azimuths: int = _TRACED_A
 
 
 def _height(truth: SceneTruth, instrument: TrueInstrument, time_s: float, uv: Float) -> tuple[Float, Float]:
-    """Return the distance ahead of the sheet of wall seen by pixels (N, 2), and its points (N, 3) in C."""
+    """Return the height above the sheet of the wall seen by pixels (N, 2), and its points (N, 3) in C."""
     origin, ray = viewing_rays(instrument.camera, uv)
     T_pc = truth.motion.pose(time_s + row_late_s(instrument, uv[:, 1]), truth.wall.axis)
     R_pc = T_pc[:, :3, :3]
@@ -224,7 +224,7 @@ def _height(truth: SceneTruth, instrument: TrueInstrument, time_s: float, uv: Fl
 
 
 def _to_wall(truth: SceneTruth, origin_p: Float, ray_p: Float) -> Float:
-    """Return the way (N,) of rays in P to the wall, whose radius depends on the azimuth alone."""
+    """Return the distance (N,) along rays in P to the wall, whose radius depends on the azimuth alone."""
     nodes, radii = truth.wall.shape.azimuth_rad, truth.wall.radius_mm[0].astype(float)
     o, d = origin_p[:, :2], ray_p[:, :2]
     a, b, c = np.sum(d * d, 1), np.sum(o * d, 1), np.sum(o * o, 1)

@@ -1,4 +1,4 @@
-"""Checks of the laws of the line's light, on profiles that the render engine made."""
+"""Checks of the laws of the line's light, on profiles made by the renderer."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def light_checks() -> Iterator[Check]:
 
 
 def _albedo() -> Iterator[Check]:
-    """Check centroid pulled by σ_z² ∂_z ln A."""
+    """Check that the centroid is pulled by σ_z² ∂_z ln A."""
     wide = Switch("albedo_bias", (0.3,))
     graded = replace(strip_truth(_R), wall=_graded_wall())
     moved = _moved_mm(profiles(graded, wide), profiles(strip_truth(_R), wide))
@@ -55,7 +55,7 @@ def _albedo() -> Iterator[Check]:
 
 
 def _slope() -> Check:
-    """Check the glint: where the wall leans by half the angle between laser and camera."""
+    """Check that a glint lies where the wall leans by half the angle between laser and camera."""
     seen = math.degrees(math.pi / 2 - theta_of(_R))
     slopes = -np.arange(0.20, 0.85, 0.05) * seen
     sheen = np.array([_sheen(math.radians(a)) for a in slopes])
@@ -72,7 +72,7 @@ def _sheen(slope_rad: float) -> float:
 
 
 def _subsurface() -> Check:
-    """Check the transport length, along the wall."""
+    """Check that light which travels in the wall moves the line along the wall by the transport length."""
     plain = profiles(strip_truth(_R))
     transport = 0.05
     moved = _moved_mm(profiles(strip_truth(_R), Switch("subsurface", (transport,))), plain)
@@ -82,7 +82,7 @@ def _subsurface() -> Check:
 
 
 def _tube_ghost() -> Check:
-    """Check the place of the copy, from its light in the picture."""
+    """Check the place of the second line, from its light in the picture."""
     plain, truth = profiles(strip_truth(_R)), strip_truth(_R)
     incidence = math.pi / 2 - theta_of(_R)
     apart = 2 * 2.0 * math.tan(math.asin(math.sin(incidence) / 1.5))
@@ -126,7 +126,7 @@ def _peak_share(skewness: float) -> float:
 
 
 def _sensor_curve() -> Iterator[Check]:
-    """Check width and shift by gamma, shift by clipping; the notes' figures are those of a skewness of 1."""
+    """Check width and shift by gamma, and shift by clipping; the notes' figures are for a skewness of 1."""
     truth, skewed = strip_truth(_R), Switch("line_skew", (1.0,))
     plain, lean = profiles(truth), profiles(truth, skewed)
     for exponent, shift in ((0.8, 0.06), (0.45, 0.34)):
@@ -145,7 +145,7 @@ def _sensor_curve() -> Iterator[Check]:
 
 
 def _vignetting() -> Check:
-    """Check that the centroid goes towards the brighter side."""
+    """Check that the centroid moves towards the brighter side."""
     truth, falloff = strip_truth(_R), 2.0
     sharp = profiles(strip_truth(_R, psf_sigma_px=0.0))
     plain = profiles(truth)
@@ -162,7 +162,7 @@ def _vignetting() -> Check:
 
 
 def _ambient() -> Check:
-    """Check a sloping background within the window ±W of a centroid."""
+    """Check the shift by a sloping background within the window ±W of a centroid."""
     truth, half = replace(strip_truth(_R), wall=_graded_wall()), 6.0
     dark, lit = profiles(truth), profiles(truth, Switch("ambient_light", (0.1,)))
     row = len(dark.rho) // 2
@@ -180,9 +180,9 @@ def _ambient() -> Check:
 
 
 def _blurred() -> Iterator[Check]:
-    """Check that a camera which moves across while it exposes widens the line."""
+    """Check that sideways motion of the camera during the exposure widens the line."""
     rate, exposure, truth = 60.0, 0.01, strip_truth(_R)
-    # Half of the longer exposure later it passes the middle.
+    # The camera passes the middle later by half of the additional exposure.
     along = rate * (np.array([-1.0, 1.0]) - exposure / 2)
     moving = replace(truth, motion=Motion(constant(0.0), Signal(np.array([-1.0, 1.0]), along)))
     widths = [
@@ -195,7 +195,7 @@ def _blurred() -> Iterator[Check]:
 
 
 def _speckle() -> Check:
-    """Check scatter of the centroid from row to row."""
+    """Check the scatter of the centroid from row to row."""
     truth, contrast = strip_truth(_R), 0.3
     grain = truth.instrument.laser.speckle_grain_mm
     scatter = float(
@@ -215,7 +215,7 @@ def _speckle() -> Check:
 
 
 def _pixels() -> Iterator[Check]:
-    """Check what unequal gains and dust do."""
+    """Check the effects of unequal gains and of dust."""
     truth, unequal = strip_truth(_R), 0.1
     plain = profiles(truth)
     scatter = [_scatter(replace(truth, seed=k), unequal) for k in range(6)]
@@ -245,7 +245,7 @@ def _locking() -> Check:
 
 
 def _scatter(truth: SceneTruth, unequal: float) -> float:
-    """Return 1 σ of the centroids that unequal gains add, rounding taken out in quadrature."""
+    """Return the 1 σ that unequal gains add to the centroids, with rounding subtracted in quadrature."""
     with_gains = exposed_profiles(truth, Switch("fixed_pattern", (unequal,)))
     rounded, exact = exposed_profiles(truth), profiles(truth)
     noise = [float(np.std(p.centroid() - exact.centroid())) for p in (with_gains, rounded)]
@@ -257,7 +257,7 @@ def _moved_mm(after: Profiles, before: Profiles) -> float:
 
 
 def _graded_wall() -> Wall:
-    """Return the bench's wall with a reflectance that grows by ``_GRADIENT`` a millimetre, relative."""
+    """Return the bench's wall with a reflectance whose relative growth is ``_GRADIENT`` per millimetre."""
     wall = bench_wall(_R)
     grid = WallGrid(0.0, 0.1, 601, 64)
     albedo = ALBEDO * np.exp(_GRADIENT * (grid.distance_mm - BASELINE_MM))

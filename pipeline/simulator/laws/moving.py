@@ -84,7 +84,7 @@ def _rolling() -> Iterator[Check]:
     rate = 2 * math.pi * 5.3 * 0.2
     rho = FOCAL_PX * theta_of(_RADIUS_MM)
     size = rate * switch.values[0] * rho / IMAGE_SIZE[1] / 2
-    # the camera going one way is the ring going the other
+    # motion of the camera in one direction is motion of the ring in the other
     sideways = trace_ring(switch_on(_moving(x_mm=_steady(-rate)), [switch]))
     yield _shutter_check("(ė_x τ/2) sin 2ψ", "m2, sine part, ring going right", size, _part(sideways, 2).imag)
     upright = trace_ring(switch_on(_moving(y_mm=_steady(-rate)), [switch]))
@@ -101,7 +101,7 @@ def _rolling() -> Iterator[Check]:
 
 
 def _vibration() -> Iterator[Check]:
-    """Check a ring off by e(t); frames see it at |f − k · frame rate|."""
+    """Check that the ring is displaced by e(t), which frames see at the frequency |f − k · frame rate|."""
     amplitude, frequency, direction = 0.2, _ALIASED_HZ, 40.0
     switch = Switch("probe_vibration", (amplitude, frequency, direction))
     truth = switch_on(bench_truth(_RADIUS_MM, frames=300), [switch])
@@ -153,7 +153,7 @@ def _moving(
 
 
 def _steady(rate: float) -> Signal:
-    """Return a value that changes steadily about 0 at time 0."""
+    """Return a value that changes linearly and is 0 at time 0."""
     return Signal(np.array([-1.0, 1.0]), np.array([-rate, rate]))
 
 
@@ -206,14 +206,17 @@ def _slip() -> Check:
 def _backlash() -> Check:
     switch = typical_switch("encoder_backlash")
     truth = _travelling([switch])
-    # forth at 3 s, back at the mirrored time after the reversal at 7 s
+    # forward at 3 s, back at the mirrored time after the reversal at 7 s
     apart = _reading(truth, 11.0) - _reading(truth, 3.0) - (_way(truth, 11.0) - _way(truth, 3.0))
     law = "reading = s − (b/2) sgn v: b apart, forth and back"
     return Check("encoder_backlash", "✓", law, "b = 0.5 mm", switch.values[0], apart, "mm", _READING_MM)
 
 
 def _late() -> Iterator[Check]:
-    """Check readings that are late by τ, and stamps of a clock behind by τ: the signs are opposite."""
+    """Check readings that are late by τ, and stamps of a clock that is behind by τ.
+
+    Their signs are opposite.
+    """
     switch = typical_switch("time_offset")
     delay, predicted = switch.values[0], _SPEED_MM_S * switch.values[0]
     late, punctual = _travelling([switch]), _travelling([])
@@ -248,7 +251,7 @@ def _bend() -> Iterator[Check]:
 
 
 def _travelling(switches: list[Switch]) -> SceneTruth:
-    """Return a bench driven forth for 7 s and back, its odometer fine, with effects."""
+    """Return a bench that is driven forward for 7 s and back, with a fine odometer and some effects."""
     time = np.arange(-2.0, 16.0, 0.5)
     way = Signal(time, _SPEED_MM_S * (7.0 - np.abs(time - 7.0)))
     truth = replace(

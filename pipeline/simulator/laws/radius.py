@@ -26,7 +26,7 @@ from pipeline.simulator.laws.closed_form import LAWS, lever_of, mended_tube_tilt
 from pipeline.simulator.sheet import sheet_rays
 from pipeline.simulator.truth import with_laser
 
-# Effects whose radius error the notes give in closed form; the first quantity sizes them.
+# Effects whose radius error the notes give in closed form; the first quantity is their size.
 _CHECKED = (
     "laser_tilt", "laser_cone", "baseline", "beam_decentre", "sheet_waviness", "principal_point",
     "focal_scale", "radial_distortion", "sensor_tilt", "pixel_aspect", "pupil_shift", "housing_glass",
@@ -35,7 +35,7 @@ _CHECKED = (
 # Tolerance as a share of the size: laws of first order leave out the square of the size, at most 1.5 % of it
 # at typical sizes.
 SHARE = 0.02
-# Laws as the physics notes give them, where these are wrong and the catalogue gives the one that holds.
+# Laws of the physics notes that are wrong, and for which the catalogue gives the right ones.
 _NOTED = {"tube_tilt": "change of d(i)/sin θ; sheet side −(r/l) t χ (1 − 1/n) cos(ψ − ψ₀)"}
 _MENDED = {
     "tube_tilt": (
@@ -79,7 +79,7 @@ def radius_check(switch: Switch) -> Check:
 
 
 def _tube_before_camera() -> Check:
-    """Check the viewing ray's part of the tilted tube, for which the notes give size and exponent."""
+    """Check the part of the tilted tube that refracts viewing rays; the notes give its size and exponent."""
     switch = typical_switch("tube_tilt")
     crest = np.exp(1j * np.radians(switch.quantities["direction_deg"]))
     sizes = []
@@ -113,7 +113,7 @@ def _along(c: complex, crest: complex) -> float:
 _R = 50.8
 # Rays of the sheet, half a degree apart; harmonics are fitted to all of them.
 _RAYS = 720
-# Direction of the effects' crest: oblique, so that a law which mixes up x and y is found out.
+# Direction of the effects' crest: oblique, so that a law that exchanges x and y fails.
 _DIRECTION_DEG = 40.0
 
 
@@ -169,16 +169,16 @@ def _pixels(tilt: float) -> Check:
 
 
 def _camera() -> Check:
-    """Check that a cause in the camera does not part line and ghost."""
+    """Check that an effect of the camera does not separate line and ghost."""
     _, apart = separation_mm(Switch("principal_point", (0.5, _DIRECTION_DEG)), _R)
     law, of = "camera-side causes: 0", "principal point off by 0.5 px, 4 inch"
     return Check("ghost_ring", "✓", law, of, 0.0, float(np.abs(apart).max()), "mm", 1e-6)
 
 
 def separation_mm(switch: Switch, radius_mm: float) -> tuple[Float, Float]:
-    """Return azimuths and the distance by which the ghost meets the wall ahead of the line there.
+    """Return azimuths, and the distance along the pipe from the line to the ghost there.
 
-    Sheet rays meet the round wall, are mirrored, and meet it again on the other side.
+    Sheet rays meet the round wall, are reflected, and meet it again on the other side.
     """
     laser = switch_on(bench_truth(radius_mm), [switch]).instrument.laser
     around = -np.pi + 2 * np.pi * np.arange(_RAYS) / _RAYS
@@ -193,7 +193,7 @@ def separation_mm(switch: Switch, radius_mm: float) -> tuple[Float, Float]:
 
 
 def _way(origin: Float, ray: Float, radius_mm: float) -> Float:
-    """Return the farther way (N,) of rays to the cylinder about the axis."""
+    """Return the distance (N,) along rays to the far intersection with the cylinder about the axis."""
     a, b = (np.sum(ray[:, :2] * v[:, :2], 1) for v in (ray, origin))
     c = np.sum(origin[:, :2] ** 2, 1) - radius_mm**2
     return np.asarray((np.sqrt(np.maximum(b * b - a * c, 0.0)) - b) / a)

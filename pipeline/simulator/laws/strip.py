@@ -1,4 +1,4 @@
-"""The line's profile on a narrow strip of the sensor at azimuth 0: quick, yet by the real renderer."""
+"""The line's profile on a narrow strip of the sensor at azimuth 0: fast, but made by the real renderer."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class Profiles(NamedTuple):
 
 
 def strip_truth(radius_mm: float, psf_sigma_px: float = 0.7) -> SceneTruth:
-    """Return the bench with a sensor that holds a strip of the ring alone."""
+    """Return the bench with a sensor that shows only a strip of the ring."""
     truth = bench_truth(radius_mm)
     model = replace(truth.stated.camera, image_size=_SIZE, centre=_CENTRE)  # type: ignore[type-var]
     stated = replace(truth.stated, camera=model)
@@ -60,7 +60,7 @@ def profiles(truth: SceneTruth, *switches: Switch) -> Profiles:
 
 
 def exposed_profiles(truth: SceneTruth, *switches: Switch) -> Profiles:
-    """Return the line's profiles in a frame as recorded, with hardly any noise but that of rounding."""
+    """Return the line's profiles in a recorded frame with hardly any noise except rounding."""
     changed = with_sensor(switch_on(truth, switches), full_well_e=1e12, read_noise_e=0.0)
     return _cut(renderer_of(changed).frame(0)[..., _GREEN].astype(float) / 255.0)
 
@@ -72,7 +72,7 @@ def _cut(grey: Float) -> Profiles:
 
 
 def _shade(sensor: TrueSensor) -> Float32 | None:
-    """Return what vignetting leaves on the whole strip; the bench's lens is equidistant."""
+    """Return the share of light that vignetting leaves on the strip; the bench's lens is equidistant."""
     height = np.arange(_SIZE[1]) - _CENTRE[1]
     radius = np.hypot((np.arange(_SIZE[0]) - _CENTRE[0])[None, :], height[:, None])
     return shade_of(sensor, np.cos(radius / FOCAL_PX).astype(np.float32))

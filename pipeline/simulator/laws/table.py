@@ -64,7 +64,7 @@ def _row(check: Check) -> str:
 
 
 def verdict(check: Check) -> str:
-    """Return whether a law holds, and the one that does where it does not."""
+    """Return in words whether a law holds, and the right law where it does not."""
     if check.agrees:
         return "holds"
     if check.mended_agrees and check.mended_value is not None:

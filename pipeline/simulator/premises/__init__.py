@@ -1,4 +1,4 @@
-"""Premises: conditions under which a scene shows its effects, before and after rendering."""
+"""Premises: conditions that a scene must meet to show its effects, checked before and after rendering."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class Premise:
     unit : str
     at_most : bool
     frames : tuple of int
-        Frames that were looked at.
+        Frames that were examined.
     hint : str
         What to change in the scene when it does not hold.
     """
@@ -49,7 +49,7 @@ class Premise:
 
     @property
     def holds(self) -> bool:
-        """Whether the scene may be rendered, or the recording be handed on."""
+        """Whether the scene may be rendered, or the recording be passed on."""
         return self.measured <= self.limit if self.at_most else self.measured >= self.limit
 
     @property
@@ -59,7 +59,7 @@ class Premise:
 
     @property
     def text(self) -> str:
-        """Measured value and limit, for people."""
+        """Measured value and limit, as text."""
         return f"{self.measured:.4g} {self.unit} ({self.bound})"
 
     @property
@@ -97,7 +97,7 @@ def require(premises: Sequence[Premise]) -> tuple[Premise, ...]:
 _FIXED_PX = 0.005
 # The same errors for relative light and relative width of the line. Chosen, not measured.
 _FIXED_SHAPE = 0.003
-# An effect must exceed the noise floor so many times (3 σ) for a scene to show it.
+# An effect must exceed the noise floor by this factor (3 σ) for a scene to show it.
 _TIMES_THE_FLOOR = 3.0
 # Of N independent azimuths, a harmonic's amplitude has 1 σ of σ √(2/N); 72 are taken as independent.
 _HARMONICS = 36
@@ -105,7 +105,7 @@ _HARMONICS = 36
 _AZIMUTHS, _REACH_PX = 720, 12
 # Light along an azimuth, full scales × px, below which a centroid is not taken. Chosen, not measured.
 _FAINT = 0.1
-# beyond the picture's edge is black, and not whatever the memory held
+# beyond the picture's edge is black, and not uninitialised memory
 _POLAR = cv2.INTER_LINEAR | cv2.WARP_FILL_OUTLIERS
 
 
@@ -160,7 +160,7 @@ def effect_premises(plain: SceneTruth, switches: Sequence[Switch]) -> list[Premi
 
 
 def _frames(truth: SceneTruth) -> tuple[int, ...]:
-    """Return two frames with a line, one of them late: what drifts has drifted by then."""
+    """Return two frames with a line, one of them late, when drifts have taken effect."""
     shown = truth.frames.of(Illumination.LASER, Illumination.BOTH)
     return tuple(sorted({int(shown[len(shown) // 3]), int(shown[-1])})) if len(shown) else ()
 
@@ -186,7 +186,7 @@ def _times_reshaped(seen: Sequence[SeenRing], without: Sequence[SeenRing]) -> fl
 
 
 def _times_counted(full: SceneTruth, others: SceneTruth) -> float:
-    """Return the largest change of the odometer's reading against the true way over its step."""
+    """Return the largest error of the odometer's reading over its step."""
     a, b = full.encoder(), others.encoder()
     if a is None or b is None or full.odometer is None or len(a.time_s) != len(b.time_s):
         return 0.0
@@ -195,13 +195,13 @@ def _times_counted(full: SceneTruth, others: SceneTruth) -> float:
 
 
 def _typical(change: Float) -> float:
-    """Return the size of a change as a robust 1 σ: where two lines lie near, a peak may jump to the other."""
+    """Return the size of a change as a robust 1 σ: between two near lines a peak may jump."""
     finite = change[np.isfinite(change)]
     return robust_spread(finite) if len(finite) else 0.0
 
 
 def _rings(truth: SceneTruth, frames: Sequence[int]) -> list[SeenRing]:
-    """Return the line that frames would show with the laser alone, as the sensor counts it, without noise."""
+    """Return the line that frames would show with the laser alone, as recorded, without noise."""
     laser = np.full(len(truth.frames.frame), Illumination.LASER.value)
     renderer = renderer_of(replace(truth, frames=replace(truth.frames, illumination=laser)))
     return [_ring(renderer, frame) for frame in frames]

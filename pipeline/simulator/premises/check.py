@@ -1,4 +1,4 @@
-"""Checks of pictures and sampling, and all checks of a scene and of a recording."""
+"""Single checks of pictures and sampling, and the complete checks of a scene and of a recording."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def line_premise(truth: SceneTruth) -> Premise:
 
 
 def line_px_per_mm(truth: SceneTruth) -> float:
-    """Return pixels of image radius a mm of height of the sheet, on the widest wall."""
+    """Return pixels of image radius per mm of height of the sheet, on the widest wall."""
     camera, height = truth.instrument.camera.model, truth.instrument.laser.sheet.baseline_mm
     radius = float(truth.wall.radius_mm.max())
     rays = np.array([[radius, 0.0, height - _LITTLE_MM], [radius, 0.0, height + _LITTLE_MM]])
@@ -54,16 +54,16 @@ _LEAST_WALL, _LEAST_TEXTURE = 8.0, 1.0
 _LEAST_MARKERS, _LEAST_FRAMES_WITH = 3, 0.3
 # Grey level from which a pixel counts as clipped: the codec may move 255 by one.
 _CLIPPED = 254
-# Directions looked along, and the size below which contrast counts as texture, px.
+# Number of directions, and the size, px, below which contrast counts as texture.
 _AZIMUTHS, _TEXTURE_PX = 360, 8
-# beyond the picture's edge is black, and not whatever the memory held
+# beyond the picture's edge is black, and not uninitialised memory
 _POLAR = cv2.INTER_LINEAR | cv2.WARP_FILL_OUTLIERS
-# Frames of each illumination that are looked at: a few seconds of rendering before the whole.
+# Frames of each illumination that are examined: a few seconds of rendering before that of the whole.
 _LED_LOOKED_AT, _LASER_LOOKED_AT = 6, 4
 
 
 def chosen_frames(truth: SceneTruth) -> tuple[int, ...]:
-    """Return the frames to look at: a few of each illumination, spread over the run."""
+    """Return the frames to examine: a few of each illumination, spread over the run."""
     numbers: set[int] = set()
     for kind in Illumination:
         frames = truth.frames.of(kind)
@@ -148,7 +148,7 @@ def _peaks(truth: SceneTruth, picture: Image) -> Float:
 
 
 def _annulus(truth: SceneTruth) -> Bool:
-    """Return the pixels (H, W) that look at the wall near the laser's ring, as stated."""
+    """Return the pixels (H, W) that see the wall near the laser's ring, by the stated probe."""
     camera = truth.stated.camera
     ring = np.arctan2(truth.facts.nominal_diameter_mm / 2, truth.stated.laser.baseline_mm)
     rays = np.array([[np.sin(a), 0.0, np.cos(a)] for a in (0.6 * ring, 1.1 * ring)])

@@ -89,7 +89,7 @@ def build_wall(pipe: Pipe, seed: int, folder: Path) -> Wall:
 
 
 def _with_defects(wall: Wall, pipe: Pipe, seeds: Seeds) -> Wall:
-    """Return a measured wall with the scene's welds, defects and branches put in."""
+    """Return a measured wall with the scene's welds, defects and branches added."""
     radius_mm = float(wall.radius_mm.mean(dtype=float))
     shape, texture = Grid(wall.shape, radius_mm), Grid(wall.texture, radius_mm)
     albedo = stain(wall.albedo_bgr[..., ::-1].copy(), texture, pipe, seeds)
@@ -102,12 +102,12 @@ def _with_defects(wall: Wall, pipe: Pipe, seeds: Seeds) -> Wall:
 
 
 def texel_mm(pipe: Pipe) -> float:
-    """Return the cell of the albedo, mm: as stated, or the finest that one frame shows of this bore."""
+    """Return the cell of the albedo, mm: as stated, or the finest that one frame resolves in this bore."""
     return pipe.texel_mm or round(FINEST_OVER_RADIUS * pipe.diameter_mm / 2, 4)
 
 
 def albedo_of(grid: Grid, pipe: Pipe, seeds: Seeds, folder: Path) -> Float32:
-    """Return the albedo (S, A, 3) in red, green, blue, fiducials and all."""
+    """Return the albedo (S, A, 3) in red, green, blue, with fiducials."""
     if pipe.photograph is None:
         albedo = paint(grid, pipe, seeds)
     else:
@@ -136,7 +136,7 @@ def bent_axis(span_mm: tuple[float, float], bends: Sequence[Bend]) -> PipeAxis:
 
 
 def _carried(curvature: Float, step_mm: float) -> tuple[Float, Float]:
-    """Return points (K + 1, 3) and frames (K + 1, 3, 3) carried on over K steps of one curvature each."""
+    """Return points (K + 1, 3) and frames (K + 1, 3, 3) integrated over K steps of one curvature each."""
     turn = np.stack([-curvature[:, 1], curvature[:, 0], np.zeros(len(curvature))], -1) * step_mm
     half = rotation_from_vector(turn / 2)
     angle = np.linalg.norm(turn, axis=1)

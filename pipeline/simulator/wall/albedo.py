@@ -92,12 +92,12 @@ FINEST_OVER_RADIUS = 0.0022
 
 
 def paint(grid: Grid, pipe: Pipe, seeds: Seeds) -> Float32:
-    """Return the albedo (S, A, 3), linear reflectance in red, green, blue, of all but fiducials."""
+    """Return the albedo (S, A, 3), linear reflectance in red, green, blue, without fiducials."""
     return stain(bare_wall(grid, pipe.surface, seeds), grid, pipe, seeds)
 
 
 def stain(albedo: Float32, grid: Grid, pipe: Pipe, seeds: Seeds) -> Float32:
-    """Return the albedo (S, A, 3) with rust, lime, streaks and what welds, defects and branches leave."""
+    """Return the albedo (S, A, 3) with rust, lime, streaks and the marks of welds, defects and branches."""
     _stain_surface(albedo, grid, pipe.surface, seeds)
     for k, weld in enumerate(pipe.welds):
         _stain_weld(albedo, grid, weld, seeds.of("weld", k))
@@ -113,7 +113,7 @@ def stain(albedo: Float32, grid: Grid, pipe: Pipe, seeds: Seeds) -> Float32:
 
 
 def bare_wall(grid: Grid, surface: Surface, seeds: Seeds) -> Float32:
-    """Return the mottled wall (S, A, 3) before any stain: the same relative texture in all colours."""
+    """Return the mottled wall (S, A, 3) without stains: the same relative texture in all colours."""
     grey = grain(grid, surface, seeds)
     if surface.mottle > 0:
         longest = surface.mottle_longest_mm
@@ -166,7 +166,7 @@ def _stain_weld(albedo: Float32, grid: Grid, weld: Weld, random: np.random.Gener
 
 
 def _cover(albedo: Float32, share: Float | Float32, colour: Tint, texture: Float32) -> None:
-    """Lay a colour, with the wall's own texture, over a share of every cell."""
+    """Cover a share of every cell with a colour that has the wall's texture."""
     share = np.asarray(share, np.float32)
     for channel, value in enumerate(colour):
         albedo[..., channel] += share * (np.float32(value) * texture - albedo[..., channel])
@@ -183,7 +183,7 @@ def _cover_window(albedo: Float32, place: tuple[Int, ...], share: Float, colour:
 
 # Reflectances of matt black and white paint.
 _BLACK, _WHITE = 0.055, 0.68
-# Samples a cell and side: painted edges lie within an eighth of a cell of where they should.
+# Samples per cell and side: painted edges are within an eighth of a cell of their place.
 _SAMPLES = 4
 
 
@@ -223,13 +223,13 @@ def require_room(pipe: Pipe, fiducials: Fiducials) -> None:
 
 
 def paint_fiducials(albedo: Float32, grid: Grid, pipe: Pipe, fiducials: Fiducials) -> None:
-    """Paint all markers onto the albedo (S, A, 3), each cell as the mean over its area."""
+    """Paint all markers onto the albedo (S, A, 3); each cell gets the mean over its area."""
     for marker in markers_of(fiducials):
         radius = float(bore_radius(np.array(marker.distance_mm), pipe))
         reach = fiducials.size_mm * (0.5 + fiducials.quiet)
         half_width = (reach + 1) * grid.radius_mm / radius
         part = window(grid, marker.distance_mm, np.radians(marker.azimuth_deg), reach + 1, half_width)
-        # the window's arc is by the nominal radius, the marker's size by the bore's own
+        # the window's arc is measured at the nominal radius, the marker's size at the bore's own
         around = part.around_mm * radius / grid.radius_mm
         steps = grid.step_mm, grid.arc_step_mm * radius / grid.radius_mm
         cover, paint = _marker_cells(fiducials, marker.id, part.along_mm, around, steps)

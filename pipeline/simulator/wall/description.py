@@ -20,7 +20,7 @@ class Bore(Parameters):
     """One section of a stepped bore."""
 
     length_mm: float = Field(gt=0, description="length of the section, mm")
-    diameter_mm: float = Field(gt=2, description="its diameter, mm")
+    diameter_mm: float = Field(gt=2, description="diameter of the section, mm")
 
 
 class Ovality(Parameters):
@@ -35,27 +35,27 @@ class Bend(Parameters):
 
     distance_mm: float = Field(description="where the arc begins, mm")
     length_mm: float = Field(gt=0, description="length of the arc along the axis, mm")
-    curvature_per_mm: float = Field(ge=0, le=0.02, description="one over its radius, 1/mm")
+    curvature_per_mm: float = Field(ge=0, le=0.02, description="curvature of the axis, 1/mm")
     direction_deg: float = Field(0.0, description="azimuth toward which the axis turns, deg")
 
 
 class Joint(Parameters):
-    """Two pipes put together: an open gap, and the second one out of line."""
+    """Two pipes joined: an open gap, and an offset of the second pipe."""
 
-    distance_mm: float = Field(description="where, mm")
+    distance_mm: float = Field(description="distance along the pipe, mm")
     gap_mm: float = Field(1.0, ge=0, le=50, description="width of the gap, mm")
     depth_mm: float = Field(3.0, ge=0, le=30, description="depth of the gap, mm")
-    offset_mm: float = Field(0.0, ge=0, le=10, description="by which the second pipe is out of line, mm")
+    offset_mm: float = Field(0.0, ge=0, le=10, description="lateral offset of the second pipe, mm")
     direction_deg: float = Field(0.0, description="azimuth of that offset, deg")
     chamfer_mm: float = Field(0.4, gt=0, le=5, description="length over which its edges fall, mm")
 
 
 class Weld(Parameters):
-    """A bead around the pipe that stands inward."""
+    """A bead around the pipe that reduces its radius."""
 
     distance_mm: float = Field(description="middle of the bead, mm")
     width_mm: float = Field(6.0, gt=0, le=50, description="along the pipe, mm")
-    height_mm: float = Field(0.8, ge=0, le=10, description="inward, mm")
+    height_mm: float = Field(0.8, ge=0, le=10, description="height of the bead, inward, mm")
     ripple_mm: float = Field(0.1, ge=0, le=2, description="height of the ripples on the bead, mm")
     heat_mm: float = Field(8.0, ge=0, le=100, description="width of the discoloured wall on each side, mm")
 
@@ -70,17 +70,17 @@ class Defect(Parameters):
     distance_mm: float = Field(description="middle along the pipe, mm")
     azimuth_deg: float = Field(description="middle around the pipe, deg")
     length_mm: float = Field(gt=0, le=500, description="along the pipe, or along a gouge or crack, mm")
-    width_mm: float = Field(gt=0, le=500, description="across, mm")
-    depth_mm: float = Field(gt=0, le=30, description="largest, mm")
+    width_mm: float = Field(gt=0, le=500, description="size across the length, mm")
+    depth_mm: float = Field(gt=0, le=30, description="largest depth, mm")
     angle_deg: float = Field(0.0, description="of a gouge or crack, from the pipe's axis, deg")
 
 
 class Branch(Parameters):
     """A hole to a side pipe."""
 
-    distance_mm: float = Field(description="middle, mm")
-    azimuth_deg: float = Field(description="middle, deg")
-    diameter_mm: float = Field(gt=1, le=500, description="of the side pipe, mm")
+    distance_mm: float = Field(description="middle along the pipe, mm")
+    azimuth_deg: float = Field(description="middle around the pipe, deg")
+    diameter_mm: float = Field(gt=1, le=500, description="diameter of the side pipe, mm")
     depth_mm: float = Field(15.0, gt=0, le=200, description="depth of the wall visible in it, mm")
 
 
@@ -96,7 +96,7 @@ class Relief(Parameters):
 
 
 class Surface(Parameters):
-    """What the wall reflects; linear reflectances from 0 to 1."""
+    """The wall's reflection; linear reflectances from 0 to 1."""
 
     albedo: float = Field(0.4, gt=0, le=1, description="mean reflectance of the bare wall")
     tint: Tint = Field((0.98, 1.0, 1.05), description="its red, green and blue over the mean")
@@ -114,27 +114,29 @@ class Surface(Parameters):
 
 
 class Photograph(Parameters):
-    """A picture laid on the wall, its rows along the distance; tiled mirror-wise."""
+    """A picture applied to the wall, its rows along the distance, tiled with alternate tiles mirrored."""
 
     file: str = Field(min_length=1, description="picture file, relative to the scene's folder")
     mm_per_px: float = Field(gt=0, le=10, description="scale along the wall, mm per pixel")
-    mean_albedo: float = Field(0.4, gt=0, le=1, description="mean reflectance given to it")
+    mean_albedo: float = Field(0.4, gt=0, le=1, description="mean reflectance to which it is scaled")
 
 
 class MarkerRing(Parameters):
     """Fiducials evenly around the bore at one distance."""
 
-    distance_mm: float = Field(description="of the centres, mm")
-    count: int = Field(ge=1, le=60, description="how many")
-    azimuth_deg: float = Field(-180.0, description="of the first, deg")
+    distance_mm: float = Field(description="distance of the markers' centres, mm")
+    count: int = Field(ge=1, le=60, description="number of markers")
+    azimuth_deg: float = Field(-180.0, description="azimuth of the first marker, deg")
 
 
 class Fiducials(Parameters):
-    """ArUco markers painted on the bore, numbered on from 0 in the order of the rings."""
+    """ArUco markers painted on the bore, numbered from 0 in the order of the rings."""
 
     dictionary: str = Field("DICT_4X4_100", description="predefined dictionary of OpenCV")
     size_mm: float = Field(9.0, gt=0.5, le=200, description="edge of the black square along the wall, mm")
-    quiet: float = Field(0.16, ge=0, le=1, description="white zone around it, over its edge")
+    quiet: float = Field(
+        0.16, ge=0, le=1, description="width of the white zone around it, over its edge length"
+    )
     rings: tuple[MarkerRing, ...] = Field(min_length=1, description="rings of markers")
 
 
@@ -143,15 +145,15 @@ class Pipe(Parameters):
 
     diameter_mm: float = Field(gt=4, le=3000, description="inner diameter (of the first bore), mm")
     nominal_diameter_mm: float | None = Field(None, gt=4, description="diameter stated by the operator, mm")
-    from_mm: float = Field(-40.0, description="distance at which the laid out wall begins, mm")
-    to_mm: float = Field(300.0, description="distance at which it ends, mm")
+    from_mm: float = Field(-40.0, description="distance at which the simulated wall begins, mm")
+    to_mm: float = Field(300.0, description="distance at which the wall ends, mm")
     cell_mm: float = Field(0.25, ge=0.02, le=5, description="cell of the relief, mm")
     texel_mm: float = Field(
         0.0, ge=0, le=5, description="cell of the albedo; 0: by the bore's finest texture"
     )
     taper: float = Field(0.0, ge=-0.2, le=0.2, description="gain of radius per distance")
     bore: tuple[Bore, ...] = Field((), description="sections of a stepped bore, the first at distance 0")
-    bore_tolerance_mm: float = Field(0.01, ge=0, description="stated for the bore, mm")
+    bore_tolerance_mm: float = Field(0.01, ge=0, description="stated tolerance of the bore, mm")
     chamfer_mm: float = Field(1.0, gt=0, le=20, description="length over which a step falls, mm")
     ovality: Ovality = Field(default_factory=lambda: Ovality.model_validate({}))
     bends: tuple[Bend, ...] = ()
@@ -177,7 +179,7 @@ _PALE: Tint = (0.50, 0.47, 0.36)
 
 @dataclass(frozen=True)
 class Imprint:
-    """What a defect does to the wall at some offsets.
+    """The effect of a defect on the wall at some offsets.
 
     Attributes
     ----------
@@ -203,7 +205,7 @@ def imprint(defect: Defect, random: np.random.Generator, along_mm: Float, around
 
 
 def reach_mm(defect: Defect) -> tuple[float, float]:
-    """Return the half length and half width of the window outside which a defect does nothing."""
+    """Return half length and half width of the window outside which a defect has no effect."""
     half = 0.65 * max(defect.length_mm, defect.width_mm) + 1.0
     if defect.angle_deg or defect.kind == "crack":
         return half, half

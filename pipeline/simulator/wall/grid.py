@@ -1,4 +1,4 @@
-"""The wall of a simulated pipe, the grid on which it is sampled, its windows, random fields on it."""
+"""The wall of a simulated pipe, the grid on which it is sampled, windows of the grid, and random fields."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from scipy.fft import irfft2, next_fast_len, rfft2
 from pipeline.arrays import Float, Float32, Int
 from pipeline.geometry.axis import PipeAxis
 
-# Waves of a random function: enough that their sum is nearly Gaussian.
+# Number of waves of a random function: enough that their sum is nearly Gaussian.
 _PLANE_WAVES = 48
 
 
@@ -139,7 +139,7 @@ class Window:
 def grid_over(distance_mm: tuple[float, float], radius_mm: float, cell_mm: float) -> Grid:
     """Return the grid between two distances with cells of about ``cell_mm``.
 
-    The number of columns has small prime factors only, so that it transforms quickly.
+    The number of columns has only small prime factors, so that its Fourier transform is fast.
     """
     rows = max(round((distance_mm[1] - distance_mm[0]) / cell_mm) + 1, 2)
     columns = next_fast_len(max(round(2 * np.pi * radius_mm / cell_mm), 16))
@@ -158,7 +158,7 @@ def window(
 
 
 def wrapped(angle_rad: Float) -> Float:
-    """Return angles (...) brought to −π … π."""
+    """Return angles (...) wrapped into −π … π."""
     return np.asarray((np.asarray(angle_rad) + np.pi) % (2 * np.pi) - np.pi)
 
 
@@ -169,7 +169,7 @@ class Seeds:
     seed: int
 
     def of(self, purpose: str, index: int = 0) -> np.random.Generator:
-        """Return a new generator of a purpose, in the same state at every call."""
+        """Return a new generator for a purpose, in the same state at every call."""
         return np.random.default_rng([self.seed, zlib.crc32(purpose.encode()), index])
 
 

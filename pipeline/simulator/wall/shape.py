@@ -24,7 +24,7 @@ def base_radius(grid: Grid, pipe: Pipe) -> Float:
 
 
 def bore_radius(distance_mm: Float, pipe: Pipe) -> Float:
-    """Return the radius (...) of the stepped bore, its steps falling evenly over the chamfer's length."""
+    """Return the radius (...) of the stepped bore; its steps fall linearly over the chamfer's length."""
     if not pipe.bore:
         return np.full(np.shape(distance_mm), pipe.diameter_mm / 2)
     edges = np.cumsum([b.length_mm for b in pipe.bore])[:-1]
@@ -69,7 +69,7 @@ _MOST_ROWS = 32_000
 
 
 def add_relief(radius_mm: Float, grid: Grid, pipe: Pipe, seeds: Seeds) -> Float:
-    """Return the radius (S, A), mm, with everything that departs from the pipe as made."""
+    """Return the radius (S, A), mm, with all deviations from the pipe as made."""
     radius = radius_mm + _surface_relief(grid, pipe, seeds)
     for k, weld in enumerate(pipe.welds):
         rows = weld_rows(grid, weld, weld.width_mm)
@@ -85,14 +85,18 @@ def add_relief(radius_mm: Float, grid: Grid, pipe: Pipe, seeds: Seeds) -> Float:
 
 
 def rust_field(grid: Grid, longest_mm: float, seeds: Seeds) -> Float32:
-    """Return the field (S, A) whose largest values are the rusty places; the same on every grid's scale."""
+    """Return the field (S, A) whose largest values are the rusty places.
+
+    It does not depend on the grid's cells.
+    """
     return coarse_field(grid, seeds.of("rust"), longest_mm)
 
 
 def coarse_field(grid: Grid, random: np.random.Generator, longest_mm: float) -> Float32:
     """Return a field that depends on place only, not on the grid's cells, down to waves of 1 mm or so.
 
-    Made on a grid of its own and interpolated, so that relief and albedo have their rust in one place.
+    It is made on a separate grid and interpolated, so that relief and albedo have their rust at the same
+    places.
     """
     span = (float(grid.distance_mm[0]), float(grid.distance_mm[-1]) + grid.step_mm)
     own = grid_over(span, grid.radius_mm, max(longest_mm / 160, grid.radius_mm / 120))
@@ -114,7 +118,10 @@ def _between(values: Float32, rows: Float, columns: Float) -> Float32:
 
 
 def weld_rows(grid: Grid, weld: Weld, reach_mm: float) -> Int:
-    """Return the rows of a grid within a reach of a weld's middle; no bead wavers by its own width."""
+    """Return the rows of a grid near a weld's middle.
+
+    No bead deviates from a circle by more than its width.
+    """
     return np.flatnonzero(np.abs(grid.distance_mm - weld.distance_mm) <= reach_mm)
 
 
@@ -129,7 +136,7 @@ def weld_relief(grid: Grid, weld: Weld, random: np.random.Generator, rows: Int) 
 
 
 def weld_across(grid: Grid, weld: Weld, random: np.random.Generator, rows: Int) -> tuple[Float, Float]:
-    """Return offsets (rows, A) from a bead's wavering middle in half widths, and its uneven height (A,)."""
+    """Return offsets (rows, A) from a bead's wavy middle in half widths, and its uneven height (A,)."""
     waver, height = (_periodic(grid, random, order) for order in (9, 14))
     middle = weld.distance_mm + 0.08 * weld.width_mm * waver[None]
     return (grid.distance_mm[rows, None] - middle) / (weld.width_mm / 2), height

@@ -48,7 +48,7 @@ class CameraDocument:
     def yaml(self) -> Section | str:
         """The YAML content, or why there is none.
 
-        OpenCV's ``%YAML:1.0`` line and ``!!opencv-matrix`` tag are not YAML and are taken out first.
+        OpenCV's ``%YAML:1.0`` line and ``!!opencv-matrix`` tag are not YAML and are removed first.
         """
         text = re.sub(r"\A%YAML[^\n]*", "", self.text).replace("!!opencv-matrix", "")
         try:

@@ -62,7 +62,7 @@ def _coefficients(section: Section) -> tuple[float, ...]:
 
 
 def _is_fisheye(section: Section, coefficients: tuple[float, ...]) -> bool:
-    """Tell the model from the file's own word; four coefficients alone could be either."""
+    """Return whether the file states the fisheye model; four coefficients alone may be of either model."""
     if section.has("fisheye_model"):
         flag = section.require("fisheye_model", "0 or 1")
         if flag not in (0, 1):
