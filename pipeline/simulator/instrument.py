@@ -121,10 +121,7 @@ class SheetWave:
 
 @dataclass(frozen=True)
 class Sector:
-    """A dimmed sector of the sheet.
-
-    The share of light lost, its middle, and its width at half of that loss.
-    """
+    """A dimmed sector of the sheet: share of light lost, middle, and width at half of that loss."""
 
     lost: float
     azimuth_rad: float

@@ -48,7 +48,7 @@ class Told:
 def asked() -> list[tuple[str, EffectModel, Shape]]:
     """Return the effects that single frames of rings can show.
 
-    Static ones that need no texture of the wall.
+    These are static ones that need no texture of the wall.
     """
     out: list[tuple[str, EffectModel, Shape]] = []
     for name, model in LIBRARY.items():

@@ -1,6 +1,6 @@
 """`boresight calibrate-camera`: from rendered pictures to a camera, its files and page.
 
-And refused inputs.
+It also tests refused inputs.
 """
 
 import json

@@ -1,6 +1,6 @@
 """The disk fills, permissions go, inputs change, the clock is set back.
 
-Reported by name, and nothing is lost.
+All are reported by name, and nothing is lost.
 """
 
 from __future__ import annotations

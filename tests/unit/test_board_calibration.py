@@ -79,7 +79,7 @@ def test_too_few_views_are_refused():
 def test_small_central_boards_leave_the_wide_angle_undetermined():
     """A board far away near the axis shows little of the focal length.
 
-    Refused, with the weakest direction.
+    It is refused, with the weakest direction.
     """
     random = np.random.default_rng(7)
     far = varied_poses(random, 6, 0.05, (2500.0, 2600.0), 0.08)

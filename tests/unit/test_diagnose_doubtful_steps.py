@@ -1,6 +1,6 @@
 """A slip that misplaced pictures may also explain, and residuals of the encoder.
 
-Reported, but never named.
+They are reported, but never named.
 """
 
 from __future__ import annotations

@@ -271,7 +271,7 @@ def test_the_meaning_of_stamps_does_not_explain_a_difference_between_two_recordi
 ) -> None:
     """10 ± 4.8 ms beside 0 ± 1 ms counted as equal.
 
-    Named, and a sound inspection's readings were moved by 18 ms.
+    The delay was named, and a sound inspection's readings were moved by 18 ms.
     """
     field = late("field", thirty_a_second, delay_s, (16.0, 1.0), sigma_s=sigma_s)
     assert field.travel is not None

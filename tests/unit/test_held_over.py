@@ -1,6 +1,6 @@
 """Light that a codec repeats in later pictures.
 
-Detected by the finest structure of rings, and part of the wall's σ.
+It is detected by the finest structure of rings, and is part of the wall's σ.
 """
 
 from __future__ import annotations

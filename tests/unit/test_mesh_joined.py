@@ -1,6 +1,6 @@
 """A Poisson surface made in pieces.
 
-Without gaps at the joints, and equal to that of one piece, also at a branch.
+It has no gaps at the joints, and equals that of one piece, also at a branch.
 """
 
 from dataclasses import replace

@@ -1,6 +1,6 @@
 """Lost pictures found by the wall's motion.
 
-None where a hand pulls the probe, and true ones at their places.
+None are found where a hand pulls the probe, and true ones at their places.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Spectral lines in the probe's motion across the pipe.
 
-Found, measured, and distinguished from a rocking sheet.
+They are found, measured, and distinguished from a rocking sheet.
 """
 
 from __future__ import annotations

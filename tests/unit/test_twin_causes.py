@@ -1,6 +1,6 @@
 """Causes over time and along the line, on synthetic sums of frames.
 
-Named where they act, and nothing else.
+They are named where they act, and nothing else is.
 """
 
 from dataclasses import replace

@@ -1,6 +1,6 @@
 """An LED that is dim during the whole run, so that the wall's photo contains it.
 
-Found from wall seen twice.
+It is found from wall seen twice.
 """
 
 from dataclasses import replace

@@ -1,6 +1,6 @@
 """A gauge run's line compared with instruments, on synthetic pixels.
 
-The effects that a diagnosis switches on.
+It also tests the effects that a diagnosis switches on.
 """
 
 import json

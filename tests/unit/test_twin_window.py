@@ -1,6 +1,6 @@
 """Dirt and drops on the window.
 
-Found at their place, named by the law that frames confirm, on synthetic pictures.
+They are found at their place and named by the law that frames confirm, on synthetic pictures.
 """
 
 import cv2

@@ -1,6 +1,6 @@
 """Decisions by mouse and by keyboard alone: accept, redraw, merge, split, undo.
 
-Results with an assumed wall.
+It also tests results with an assumed wall.
 """
 
 from __future__ import annotations
