@@ -82,4 +82,5 @@ def _percent(probability: float) -> str:
     """Return a probability in per cent, never rounded to none or to certainty."""
     if probability < _SHOWN:
         return "less than 1 %"
+    # From 0.995 on a probability rounds to 100 %.
     return f"{100 * probability:.0f} %" if probability < 0.995 else "more than 99 %"
