@@ -10,7 +10,7 @@ from stages.diagnose.causes import NONE, Cause, Causes, CourseShare
 from stages.diagnose.claims import Claim
 from stages.diagnose.effects.base import EffectModel, Shape
 from stages.diagnose.effects.nameless import Nameless
-from stages.diagnose.gauge.answer import chances
+from stages.diagnose.gauge.answer import doubted
 from stages.diagnose.gauge.examine import OF_A_PIPE, Examined
 from stages.diagnose.gauge.judge import Verdicts
 
@@ -31,26 +31,21 @@ def _claimed(claim: Claim) -> Iterator[Cause]:
 
 
 def _of_rings(examined: Examined) -> Causes:
-    """Return all laws that were asked about, with the probability that each is a cause.
+    """Return all laws that rings and fiducials were asked about, with the probability that each is a cause.
 
-    What makes a name of the likeliest hypothesis doubtful (see `chances`) is taken off its law: causes that
-    the run cannot distinguish from it are at least as likely as it, and the rest is outside the library.
-    A gauge is straight and round.
+    What makes a name of the likeliest hypothesis doubtful is taken off its law: see `doubted`. A gauge is
+    straight and round.
     """
     best, verdicts = examined.best, examined.verdicts
     if best is None or verdicts is None:
         return NONE
     chance, courses = _weighed(verdicts)
-    lost_outside = 0.0
-    for term, doubted, alike in zip(best.library_terms, chances(examined), examined.unsplit, strict=False):
-        lost, law = verdicts.chance_of(term) - doubted, term.model.law
-        chance[law] -= lost
-        for name in alike:
-            chance[name] = max(chance.get(name, 0.0), doubted)
-        lost_outside = max(lost_outside, lost - len(alike) * doubted)
+    each = doubted(examined)
+    for term, one in zip(best.library_terms, each, strict=False):
+        chance |= {term.model.law: one.chance, **one.alike}
     every = dict.fromkeys((*chance, *(f.name for f in examined.feasibility), *OF_A_PIPE))
-    laws = (Cause(law, min(max(chance.get(law, 0.0), 0.0), 1.0), courses.get(law, ())) for law in every)
-    outside = min(lost_outside + _with_patterns(verdicts), 1.0)
+    laws = (Cause(law, min(chance.get(law, 0.0), 1.0), courses.get(law, ())) for law in every)
+    outside = min(max((one.outside for one in each), default=0.0) + _with_patterns(verdicts), 1.0)
     return Causes(tuple(sorted(laws, key=lambda c: -c.probability)), outside)
 
 

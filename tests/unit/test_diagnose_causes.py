@@ -14,6 +14,7 @@ from stages.diagnose.as_json import to_json
 from stages.diagnose.causes import Cause, Causes, CourseShare
 from stages.diagnose.effects.courses import with_courses
 from stages.diagnose.effects.library import LIBRARY
+from stages.diagnose.gauge import answer
 from stages.diagnose.gauge.hypotheses import Judged
 from stages.diagnose.gauge.judge import Unfitted, Verdicts
 from stages.diagnose.gauge.run import Term
@@ -64,17 +65,16 @@ def test_a_law_gathers_its_courses_and_gives_what_is_doubtful_to_what_makes_it_s
         (beside, pattern, sensor),
         25,
     )
-    monkeypatch.setattr(by, "chances", lambda seen: (0.38,))
+    shared = answer.Doubted(0.38, {"sensor_tilt": 0.38}, 0.1)
+    monkeypatch.setattr(by, "doubted", lambda seen: (shared,))
     asked = [SimpleNamespace(name=n) for n in ("laser_tilt", "laser_cone", "baseline")]
-    seen: Any = SimpleNamespace(
-        best=judged(far), verdicts=verdicts, unsplit=(("sensor_tilt",),), feasibility=asked
-    )
+    seen: Any = SimpleNamespace(best=judged(far), verdicts=verdicts, feasibility=asked)
     found = by.weighed(seen, ())
     assert {c.name: round(c.probability, 9) for c in found.laws} == {
         "laser_tilt": 0.38, "sensor_tilt": 0.38, "laser_cone": 0.1,
         "baseline": 0.0, "ovality": 0.0, "pipe_bend": 0.0,
     }  # fmt: skip
-    assert found.outside == pytest.approx(0.95 - 2 * 0.38 + 0.05)
+    assert found.outside == pytest.approx(0.1 + 0.05)
     tilt = found.of("laser_tilt")
     assert tilt is not None
     assert [(c.kind, round(c.probability, 3)) for c in tilt.courses] == [

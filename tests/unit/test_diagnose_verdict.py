@@ -13,8 +13,8 @@ from stages.diagnose.field.run import warn_of_knock
 from stages.diagnose.gauge import answer
 from stages.diagnose.gauge.confirm import passes_again
 from stages.diagnose.gauge.examine import Examined
-from stages.diagnose.gauge.hypotheses import Judged
-from stages.diagnose.gauge.judge import Instead, Unfitted, Verdicts
+from stages.diagnose.gauge.hypotheses import Instead, Judged
+from stages.diagnose.gauge.judge import Unfitted, Verdicts
 from stages.diagnose.gauge.run import Term
 from stages.diagnose.gauge.sets import PATTERNS, Member
 from stages.diagnose.gauge.unknown_laws import Unknown
@@ -134,6 +134,23 @@ def test_each_set_counts_once_with_the_patterns_or_with_other_names(fitted, weig
     assert instead.named == pytest.approx(named)
     seen = cast(Any, SimpleNamespace(best=verdicts.judged[0], verdicts=verdicts))
     assert len(answer.unknown_rivals(seen)) == doubts
+
+
+@pytest.mark.parametrize(
+    ("instead", "chance"),
+    [({}, 0.4 / 1.44), ({"baseline": 0.3}, 0.4 / 1.14), ({"baseline": 0.5}, 0.4 / 1.04)],
+)
+def test_a_cause_that_looks_alike_counts_once_against_a_name(instead, chance, monkeypatch):
+    """A step of the focal length, one of four alike, had 6 %: each other counted twice."""
+    monkeypatch.setattr(answer, "shift_px", lambda fit, term: term.shift_px)
+    seen = examined(chance=0.4, unsplit=("baseline",), confirmed=((),))
+    seen.verdicts.instead_of = lambda term: Instead({}, 0.0, 0.6, instead)
+    (one,) = answer.doubted(seen)
+    assert one.chance == pytest.approx(chance)
+    assert one.alike["baseline"] == pytest.approx(chance * max(1.0, instead.get("baseline", 0.0) / 0.4))
+    assert one.outside == pytest.approx(0.1 * chance)
+    rest = 0.6 - instead.get("baseline", 0.0)
+    assert one.chance + one.alike["baseline"] + one.outside + rest * chance / 0.4 == pytest.approx(1.0)
 
 
 def test_the_pattern_that_is_likelier_summed_over_all_names_comes_first():

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from itertools import chain
 
 import numpy as np
@@ -51,14 +52,29 @@ def effects_found(examined: Examined) -> tuple[EffectFound, ...]:
     return tuple(_found(verdicts, duration_s, *one) for one in each)
 
 
+@dataclass(frozen=True)
+class Doubted:
+    """The probability of a name, of each cause that this run cannot tell from it, and of causes outside."""
+
+    chance: float
+    alike: dict[str, float]
+    outside: float
+
+
 def chances(examined: Examined) -> tuple[float, ...]:
-    """Return, for each effect of the likeliest hypothesis, the probability that its name is right.
+    """Return, for each effect of the likeliest hypothesis, the probability that its name is right."""
+    return tuple(d.chance for d in doubted(examined))
+
+
+def doubted(examined: Examined) -> tuple[Doubted, ...]:
+    """Return how likely each effect of the likeliest hypothesis is, and what may be in its place.
 
     The odds against it are the sum of: the hypotheses without it; each cause that this run cannot be expected
-    to distinguish from it, as likely as it; unknown laws and courses in its place, and `UNKNOWN` more where
-    no second prediction agrees; and even odds for each sign that the hypothesis is wrong: a prediction that
-    fails, a remainder that is not noise or that moves rings or fiducials by more than the effect, poorly
-    predicted held-out measurements, and other names, as many or fewer, that predict these better.
+    to distinguish from it, at least as likely as it; unknown laws and courses in its place, and `UNKNOWN`
+    more where no second prediction agrees; and even odds for each sign that the hypothesis is wrong: a
+    prediction that fails, a remainder that is not noise or that moves rings or fiducials by more than the
+    effect, poorly predicted held-out measurements, and other names, as many or fewer, that predict these
+    better.
     """
     best, verdicts = examined.best, examined.verdicts
     if best is None or verdicts is None:
@@ -70,11 +86,23 @@ def chances(examined: Examined) -> tuple[float, ...]:
     each = zip(best.library_terms, examined.unsplit, examined.confirmed, examined.unknown_laws, strict=False)
     out = []
     for term, alike, confirmed, beyond in each:
-        doubt = everywhere + len(alike) + sum(not c.agrees for c in confirmed)
-        doubt += (left > shift_px(best.fit, term)) + sum(term.model.law not in j.laws for j in others)
+        signs = everywhere + sum(not c.agrees for c in confirmed)
+        signs += (left > shift_px(best.fit, term)) + sum(term.model.law not in j.laws for j in others)
         unknown = beyond.odds + UNKNOWN * (not any(c.agrees for c in confirmed))
-        out.append(verdicts.chance_of(term) / (1 + doubt + unknown))
+        out.append(_shared(verdicts.chance_of(term), verdicts.instead_of(term).laws, alike, signs + unknown))
     return tuple(out)
+
+
+def _shared(chance: float, instead: Mapping[str, float], alike: Sequence[str], outside: float) -> Doubted:
+    """Return a name's probability shared with causes ``alike``, at least as likely as it, and those outside.
+
+    ``instead`` are the probabilities of other laws in its place, ``outside`` the odds of other causes.
+    """
+    like = {name: max(chance, instead.get(name, 0.0)) for name in alike}
+    more = sum(p - instead.get(name, 0.0) for name, p in like.items()) + chance * outside
+    return Doubted(
+        chance / (1 + more), {name: p / (1 + more) for name, p in like.items()}, chance * outside / (1 + more)
+    )
 
 
 def sure(examined: Examined) -> tuple[bool, ...]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -24,6 +24,27 @@ class Regime:
 
     part: Part
     section: int
+
+
+@dataclass(frozen=True)
+class Instead:
+    """What may be in an effect's place.
+
+    Attributes
+    ----------
+    patterns : dict of str to float
+        Patterns without a cause that stand there without any name, the likeliest first, each with the
+        probability of all sets that contain it.
+    nameless, named : float
+        Probability of all sets of patterns alone, each counted once, and of all with other names.
+    laws : dict of str to float
+        Probability of all sets with each other law.
+    """
+
+    patterns: dict[str, float]
+    nameless: float
+    named: float
+    laws: dict[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -12,7 +13,7 @@ from stages.diagnose.effects.base import EffectModel, Shape
 from stages.diagnose.effects.nameless import Nameless
 from stages.diagnose.gauge.fit import Fit, evidence, fit
 from stages.diagnose.gauge.formula import adequacy, describes_effects, empirical, may_need_pattern, swings
-from stages.diagnose.gauge.hypotheses import Judged, Regime, judged_of, regimes_of
+from stages.diagnose.gauge.hypotheses import Instead, Judged, Regime, judged_of, regimes_of
 from stages.diagnose.gauge.run import GaugeRun, Term
 from stages.diagnose.gauge.scan import Scored, refined
 from stages.diagnose.gauge.search import LEAST_SHARE, MOST_EFFECTS, Search, shift_px
@@ -57,24 +58,6 @@ class Unfitted:
         """The set in words, with its sizes."""
         each = zip(self.members, self.amplitudes, strict=True)
         return " ".join(m.model.statement(m.shape, a) for m, a in each)
-
-
-@dataclass(frozen=True)
-class Instead:
-    """What may be in an effect's place.
-
-    Attributes
-    ----------
-    patterns : dict of str to float
-        Patterns without a cause that stand there without any name, the likeliest first, each with the
-        probability of all sets that contain it.
-    nameless, named : float
-        Probability of all sets of patterns alone, each counted once, and of all with other names.
-    """
-
-    patterns: dict[str, float]
-    nameless: float
-    named: float
 
 
 @dataclass(frozen=True)
@@ -136,15 +119,16 @@ class Verdicts:
 
     def instead_of(self, term: Term) -> Instead:
         """Return the hypotheses without a term's law that explain the run otherwise."""
-        cause, found, of_patterns, of_names = cause_of(term.model, term.shape), dict[str, float](), 0.0, 0.0
+        cause, found, laws = cause_of(term.model, term.shape), Counter[str](), Counter[str]()
+        of_patterns, of_names = 0.0, 0.0
         for p, causes, _, patterns in self._each():
             if cause in causes:
                 continue
             of_names += p if causes else 0.0
             of_patterns += p if patterns and not causes else 0.0
-            for formula in () if causes else patterns:
-                found[formula] = found.get(formula, 0.0) + p
-        return Instead(dict(sorted(found.items(), key=lambda pair: -pair[1])), of_patterns, of_names)
+            found.update(dict.fromkeys(() if causes else patterns, p))
+            laws.update(dict.fromkeys((law for law, _ in causes), p))
+        return Instead(dict(found.most_common()), of_patterns, of_names, dict(laws))
 
     def _each(self) -> Iterator[tuple[float, set[Cause], set[str], set[str]]]:
         """Yield every hypothesis' probability, its causes, its effects' names, and its patterns' formulas."""
