@@ -1,4 +1,4 @@
-/** The same piece of wall in both runs, side by side or one wiped over the other, or their difference. */
+/** The same piece of wall in both runs: side by side, with a movable divider between them, or as their difference. */
 import { colourBar } from "./legend";
 import type { Session } from "./session";
 import { TileLayer, type Ground } from "./tiles";
@@ -51,7 +51,7 @@ export class CompareView {
     this.load();
   }
 
-  /** Take newer results of the same two runs. */
+  /** Show newer results of the same two runs. */
   take(found: Comparison): void { this.found = found; this.paint(); }
 
   show(change: Change): void {
@@ -63,7 +63,7 @@ export class CompareView {
   private get mode(): Way { return this.way.value as Way; }
   private get size(): [number, number] { return [this.canvas.clientWidth, this.canvas.clientHeight]; }
   private get perRad(): number { return this.session.run.radius_mm / this.view.mmPerPx; }
-  /** Where one of the two pictures lies: left and width; both are the whole canvas unless side by side. */
+  /** Left edge and width of one of the two pictures; both fill the canvas unless they are side by side. */
   private frame(side: 0 | 1): [number, number] {
     const width = this.size[0];
     return this.mode === "beside" ? [side ? width / 2 + GAP_PX / 2 : 0, width / 2 - GAP_PX / 2] : [0, width];
@@ -81,7 +81,7 @@ export class CompareView {
     this.paint();
   }
 
-  /** Fill the view with wall, in both halves, as far as there is any. */
+  /** Fill the view with wall, in both halves, as far as it was measured. */
   private keepInside(): void {
     const [from, to] = this.session.run.distance_mm, width = this.frame(1)[1];
     this.view.mmPerPx = Math.min(this.view.mmPerPx, (to - from) / width);

@@ -1,4 +1,4 @@
-/** Pipe that is too far away for detail: a round tube that wears the flat view's small tiles. */
+/** Pipe that is too far away for detail: a round tube textured with the small tiles of the flat view. */
 import * as THREE from "three";
 import type { Pipe } from "./pipe";
 import type { Session } from "./session";
@@ -10,7 +10,7 @@ const TILE = 512;
 const AROUND = 24;
 const LEAST_ROWS = 40; // pixels of a tile around the pipe
 const SEEN_RADII = 80;
-const WIDER = 1.004; // so that detail, where both are, lies in front
+const WIDER = 1.004; // so that the detailed wall lies in front where both exist
 
 interface Piece { mesh: THREE.Mesh<THREE.BufferGeometry, THREE.Material[]>; from: number; to: number; rings: number; address: string; isDressed: boolean }
 
@@ -35,7 +35,7 @@ export class CoarseWall {
     this.hide(this.hidden);
   }
 
-  /** Show what can be seen from a distance. */
+  /** Show the parts that are visible from a distance. */
   around(distance: number): void {
     this.at = distance;
     const reach = SEEN_RADII * this.session.run.radius_mm;
@@ -45,14 +45,14 @@ export class CoarseWall {
     }
   }
 
-  /** Leave out the distances where the detailed model is. */
+  /** Leave out the distances covered by the detailed model. */
   hide(between: [number, number] | null): void {
     this.hidden = between;
     const [from, to] = between ?? [Infinity, Infinity];
     for (const { mesh, from: first, to: last, rings } of this.pieces) {
       const ring = (mm: number) => (rings * (mm - first)) / (last - first);
       const inside = (n: number) => Math.max(0, Math.min(rings, n)) * AROUND * 6;
-      // A ring more on either side: the seam must not gape.
+      // One more ring on either side, so that there is no gap at the joint.
       const [a, b] = [inside(Math.ceil(ring(from)) + 1), inside(Math.floor(ring(to)) - 1)];
       if (a >= b) { mesh.geometry.clearGroups(); mesh.geometry.addGroup(0, rings * AROUND * 6, 0); continue; }
       mesh.geometry.clearGroups();

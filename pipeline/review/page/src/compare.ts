@@ -1,4 +1,4 @@
-/** Two runs of one pipe: how they lie on each other, what grew, what is new, what is gone. */
+/** Two runs of one pipe: their alignment, and which findings grew, are new or are gone. */
 import { CompareView } from "./beside";
 import { plot } from "./plot";
 import type { Session } from "./session";
@@ -59,7 +59,7 @@ function growth(value: number | null, sigma: number | null, unit: string): strin
   return value === null ? "–" : `${value > 0 ? "+" : ""}${measured(value, sigma, unit)}`;
 }
 
-/** A depth without its σ, which belongs to the growth. */
+/** A depth without its σ, which is given for the growth instead. */
 function way(mm: number | null): string { return mm === null ? "–" : `${number(Math.abs(mm))} mm ${mm < 0 ? "inward" : "deep"}`; }
 
 function chance({ p_adjusted: p }: Change): string {

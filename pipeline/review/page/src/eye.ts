@@ -1,4 +1,4 @@
-/** Where the model is seen from: in flight along the pipe, as the camera of a recorded frame, or from outside. */
+/** The camera of the model's view: in flight along the pipe, at the camera of a recorded frame, or outside. */
 import * as THREE from "three";
 import { toModel } from "./graphics";
 import { NEAR_M } from "./marks";
@@ -7,16 +7,16 @@ import type { Session } from "./session";
 import type { Stand } from "./types";
 
 const MM = 1e-3;
-// From outside, no more of a long pipe is shown than this many radii: it would be a thread.
+// From outside, at most this many radii of a long pipe are shown: all of it would be a thin thread.
 const OUTSIDE_RADII = 16;
-// The eye stands so far before the spot, in radii.
+// Distance of the camera from the chosen place, in radii.
 const BEFORE_RADII = 1.1;
-// It goes so far before the start of the wall, and no nearer to its end.
+// How far the camera may go before the start of the wall, and how near to its end, in radii.
 const END_RADII = 0.3;
 const [FOV_INSIDE, FOV_NEAR, FOV_OUTSIDE] = [80, 52, 30];
 export const FOV_STAND = 44;
 const MARGIN = 1.12;
-// From outside, the eye looks at the spot askew by so much along the pipe: depth reads, and up stays up at 12 and 6 o'clock.
+// From outside, the camera looks at the chosen place obliquely, by so much along the pipe: depth stays visible, and up stays up at 12 and 6 o'clock.
 const ASIDE = 0.5;
 const MOST_PITCH_RAD = 1.3;
 
@@ -28,7 +28,7 @@ export class Eye {
 
   constructor(private readonly session: Session, private readonly pipe: Pipe) { this.flown = session.run.distance_mm[0]; }
 
-  /** The distance next to which detail is wanted. */
+  /** The distance near which detail is needed. */
   get distance(): number { return this.isInside ? this.flown : this.session.cursor[0]; }
 
   /** Back to the start of the pipe. */
@@ -50,12 +50,12 @@ export class Eye {
     this.camera.lookAt(this.camera.position.clone().add(forward));
   }
 
-  /** Stand before a place of the wall, on the axis, and look at it, whatever its clock. */
+  /** Go to the axis near a place of the wall and look at it, at any clock position. */
   turnTo(distance: number, azimuth: number): void {
     const { radius_mm: radius } = this.session.run;
     this.flown = distance - radius * BEFORE_RADII;
     this.lens(FOV_NEAR);
-    this.fly(0); // at the start and the end of the wall the eye stays within it
+    this.fly(0); // at the start and the end of the wall the camera stays within it
     const [x, up, ahead] = [radius * Math.cos(azimuth), -radius * Math.sin(azimuth), distance - this.flown];
     this.look = { yaw: -Math.asin(x / Math.hypot(x, up, ahead)), pitch: Math.atan2(up, ahead) };
     this.fly(0);
@@ -66,7 +66,7 @@ export class Eye {
     this.fly(0);
   }
 
-  /** Stand where the camera of a recorded frame stood, turned to the spot. */
+  /** Go to the camera of a recorded frame, turned to the chosen place. */
   standAs({ eye_p, target_p, up_p }: Stand): void {
     this.isInside = true;
     this.flown = this.pipe.coordinates(eye_p).distance;
@@ -76,7 +76,7 @@ export class Eye {
     this.camera.lookAt(toModel(target_p).multiplyScalar(MM));
   }
 
-  /** Stand inside, as far along as last; or outside, on the spot's side, so that the pipe fills the picture: returns what is looked at there. */
+  /** Go inside, to the last distance; or outside, on the side of the chosen place, so that the pipe fills the picture. Returns the target there. */
   stand(): THREE.Vector3 | null {
     if (this.isInside) {
       this.lens(FOV_INSIDE);
@@ -100,7 +100,7 @@ export class Eye {
     this.camera.updateProjectionMatrix();
   }
 
-  /** How far off, in a direction, the eye must stand so that a stretch of pipe just fills the picture. */
+  /** The distance, in a direction, from which a stretch of pipe just fills the picture. */
   private farOff(direction: THREE.Vector3, centre: THREE.Vector3, middle: number, length: number): number {
     const right = new THREE.Vector3(0, 1, 0).cross(direction).normalize(), up = direction.clone().cross(right);
     const high = Math.tan((this.camera.fov * Math.PI) / 360), wide = high * this.camera.aspect;

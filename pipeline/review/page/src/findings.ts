@@ -1,4 +1,4 @@
-/** The list of findings and what can be done with the chosen one. */
+/** The list of findings, and the actions on the chosen one. */
 import { chart } from "./chart";
 import { unconfirmed, warnings } from "./notices";
 import { bySeverity, peakOf, type Session } from "./session";
@@ -47,7 +47,7 @@ export class FindingsPanel {
     if (isAtComment) this.detail.querySelector<HTMLElement>(".comment input")?.focus();
   }
 
-  /** Whether a remark or a reason is being written, which news from elsewhere must not wipe out. */
+  /** Whether a remark or a reason is being typed, which updates from the server must not erase. */
   private get isWriting(): boolean {
     const at = document.activeElement;
     return at instanceof HTMLInputElement && at.type === "text" && (at.value !== "" || at.id === "reason") && this.detail.contains(at)
@@ -60,7 +60,7 @@ export class FindingsPanel {
     this.paint();
   }
 
-  /** The finding's row; made anew only when it has changed, for a long pipe has thousands. */
+  /** The finding's row; rebuilt only when it has changed, since a long pipe has thousands. */
   private kept(finding: Finding): HTMLElement {
     const { selected, marked } = this.session;
     const key = JSON.stringify([finding.label, finding.status, finding.kind, finding.size, finding.id === selected, marked.has(finding.id)]);
@@ -120,7 +120,7 @@ export class FindingsPanel {
       this.lacking(finding), this.remarks(finding), this.curves(finding));
   }
 
-  /** Where to give what wall loss and strength still need. */
+  /** Where to enter what wall loss and strength still need. */
   private lacking(finding: Finding): HTMLElement | string {
     const { assumed } = this.session.state;
     const isLoss = ["pit", "corrosion", "gouge", "crack"].includes(finding.kind);
@@ -179,14 +179,14 @@ export class FindingsPanel {
     this.list.querySelector<HTMLElement>("[aria-current=true]")?.focus();
   }
 
-  /** Merge the ticked findings and go to what they have become. */
+  /** Merge the ticked findings and go to the result. */
   async merge(): Promise<void> {
     const { session } = this;
     if (session.marked.size < 2) { session.say("Tick two or more findings to merge them."); return; }
     if (await session.act({ do: "merge", findings: [...session.marked] })) session.select(`m${session.state.revision}`);
   }
 
-  /** Ask in place why the chosen finding is no defect. */
+  /** Ask, beside the finding, why it is not a defect. */
   private askReason(): void {
     const finding = this.session.finding;
     if (!finding || this.detail.querySelector(".reason")) return;

@@ -74,7 +74,7 @@ export class FlatView implements Plane {
     this.paint();
   }
 
-  /** Keep the spot in view, wherever it was moved from. */
+  /** Keep the chosen place in view, from wherever it was moved. */
   private follow(): void {
     const [distance, azimuth] = this.session.cursor;
     const [x, turns] = [this.x(distance), [-TURN, 0, TURN].map((t) => this.y(azimuth + t))];
@@ -140,7 +140,7 @@ export class FlatView implements Plane {
     this.paint();
   }
 
-  /** The drawn corner under a pixel, -1 where there is none. */
+  /** The index of the drawn corner under a pixel, -1 where there is none. */
   private cornerAt(x: number, y: number): number {
     return this.session.drawn.findIndex(([s, a]) => Math.hypot(this.x(s) - x, this.y(a) - y) < GRAB_PX);
   }

@@ -1,14 +1,14 @@
-/** What is drawn on the unrolled wall: clock and distances, findings with their numbers, the spot, what is being drawn. */
+/** Marks on the unrolled wall: clock and distances, findings with their numbers, the chosen place, and shapes being drawn. */
 import type { Session } from "./session";
 import type { Finding, Point } from "./types";
 import { CHOSEN_COLOUR, TURN, clock } from "./words";
 
 const TOP = -1.5 * Math.PI; // 6 o'clock
-// Outlines lie on pictures of any colour, in light and dark alike: bright on a black casing.
+// Outlines must be visible on pictures of any colour, in light and dark mode: bright with a black border.
 const [CASING, OUTLINE, CHOSEN] = ["#000000", "#ffffff", CHOSEN_COLOUR];
 const MARKS: Record<string, string> = { open: "?", accepted: "✓", rejected: "✕" };
 
-/** Where the wall lies on the screen, in pixels. */
+/** The position of the wall on the screen, in pixels. */
 export interface Plane {
   x(distance: number): number;
   y(azimuth: number): number;

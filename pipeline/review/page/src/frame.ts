@@ -1,11 +1,11 @@
-/** The recorded frames that show the spot, lit and laser beside each other, with the spot and the laser's ring marked. */
+/** The recorded frames that show the chosen place, lit and laser frame beside each other, with the place and the laser's ring marked. */
 import { FOV_STAND } from "./eye";
 import type { Session } from "./session";
 import type { Point, Sight } from "./types";
 import { drawn, element } from "./words";
 
 const DELAY_MS = 150;
-const LONG_MS = 200; // what takes longer is told to be loading
+const LONG_MS = 200; // after this time a loading message is shown
 const CLOSE = 4;
 
 export class FrameView {
@@ -19,7 +19,7 @@ export class FrameView {
   private readonly alike = element("input", { type: "checkbox", id: "alike" });
   private shots: Shot[] = [];
 
-  /** `sizeOfModel` gives the pixels of the model's picture, which a frame seen alike has too; frames are asked for after `first`. */
+  /** `sizeOfModel` gives the pixel size of the model's picture, which a frame in the same view gets too; frames are requested after `first`. */
   constructor(private readonly session: Session, private readonly sizeOfModel: () => Point, private readonly first: Promise<void>) {
     this.root.append(this.row, this.told);
     this.close.addEventListener("change", () => this.zoom());
@@ -31,7 +31,7 @@ export class FrameView {
     this.later();
   }
 
-  /** What stands beside the pane's title. */
+  /** The controls beside the pane's title. */
   bar(): HTMLElement {
     return element("div", { class: "bar" },
       !this.session.source.readOnly && element("label", { for: "alike", title: "the model from where the frame was taken, in its light; the frame through the model's lens" },
@@ -98,7 +98,7 @@ export class FrameView {
     this.tell(`${ordered.map((s) => `Frame ${s.frame} (${lightOf(s)}) at ${s.time_s.toFixed(2)} s`).join(", ")}; spot circled${has ? ", measured laser line dotted" : ""}.`);
   }
 
-  /** Move the spot to what was clicked. */
+  /** Move the chosen place to the clicked one. */
   private async pick(sight: Sight, u: number, v: number): Promise<void> {
     try {
       this.session.moveTo(await this.session.source.spot(sight.frame, u, v));
@@ -128,12 +128,12 @@ class Shot {
     });
   }
 
-  /** Bring the spot to the middle, enlarged, or show the whole frame. */
+  /** Centre the chosen place, enlarged, or show the whole frame. */
   zoom(isClose: boolean): void {
     const box = this.root, [w, h] = [this.image.naturalWidth, this.image.naturalHeight];
     if (!this.sight || !w || !isClose) { this.frame.style.transform = ""; return; }
     const fit = Math.min(box.clientWidth / w, box.clientHeight / h);
-    const close = Math.max(CLOSE, (CLOSE * box.clientHeight) / (h * fit) / 2); // half a picture beside another is no smaller for it
+    const close = Math.max(CLOSE, (CLOSE * box.clientHeight) / (h * fit) / 2); // half a picture beside another needs the same enlargement
     const [x, y] = [(this.sight.spot_px[0] - w / 2) * fit, (this.sight.spot_px[1] - h / 2) * fit];
     this.frame.style.transform = `scale(${close}) translate(${-x}px, ${-y}px)`;
   }

@@ -1,25 +1,25 @@
-/** What drawing needs to know of the machine and of glTF. */
+/** Properties of the machine and of glTF that drawing depends on. */
 import * as THREE from "three";
 import type { Vector } from "./pipe";
 
 const MM = 1e-3;
-// 60 pictures a second while moving; a longer gap is a rest, after which the picture is drawn sharply.
+// 60 pictures a second while moving; after a longer gap the view rests, and the picture is drawn sharply.
 const [WANTED_STEP_MS, LONGEST_STEP_MS, REST_MS, LEAST_SHARPNESS] = [17, 250, 300, 0.4];
 
-/** Draws less sharply while the view moves, where it would stutter otherwise, and sharply again when it rests. */
+/** Draws less sharply while the view moves, where it would stutter otherwise, and sharply again at rest. */
 export class Pace {
   private sharpness = 1;
   private drawnAt = -Infinity;
   private askedAt = 0;
   private resting = 0;
 
-  /** `sharpen` takes the share of the pixels each way and whether the view moves. */
+  /** `sharpen` takes the share of the pixels in each direction and whether the view moves. */
   constructor(private readonly sharpen: (sharpness: number, isMoving: boolean) => void, private readonly draw: () => void) {}
 
-  /** A picture is wanted. */
+  /** Request a picture. */
   ask(now: number): void { this.askedAt = now; }
 
-  /** A picture is about to be drawn. The view moves if it was wanted soon after the last one, however long that one took to draw. */
+  /** Called before a picture is drawn. The view counts as moving if the picture was requested soon after the last one, however long that took. */
   step(now: number): void {
     const took = now - this.drawnAt, isMoving = this.askedAt - this.drawnAt < LONGEST_STEP_MS;
     this.drawnAt = now;
@@ -32,11 +32,11 @@ export class Pace {
   }
 }
 
-/** The model's axes are glTF's: x right, y up, z toward the viewer; the pipe's are x right, y down, z forward. */
+/** The model's axes are those of glTF: x right, y up, z toward the viewer; the pipe's are x right, y down, z forward. */
 export function toModel([x, y, z]: Vector): THREE.Vector3 { return new THREE.Vector3(x, -y, -z); }
 export function fromModel(v: THREE.Vector3): Vector { return [v.x / MM, -v.y / MM, -v.z / MM]; }
 
-/** Whether pictures are drawn by the processor; colours are then taken as they are, and edges not smoothed. */
+/** Whether the processor draws the pictures; then colours are not converted, and edges not smoothed. */
 export function drawsPlainly(): boolean {
   const context = document.createElement("canvas").getContext("webgl2");
   const named = context?.getExtension("WEBGL_debug_renderer_info");
@@ -47,7 +47,7 @@ export function drawsPlainly(): boolean {
   return isSlow;
 }
 
-/** Fingers or pens on a view: how far the last moved, and by how much two of them spread. */
+/** Touches or pens on a view: how far the last one moved, and by how much the distance of two changed. */
 export class Pinch {
   private readonly at = new Map<number, { x: number; y: number }>();
 

@@ -4,7 +4,7 @@ import { Pinch } from "./graphics";
 const FLIGHT_MM = 6;
 const CLICK_PX = 4;
 
-/** What hands can do; angles rad, `pick` is at a point of the picture from -1 to 1, x to the right and y up. */
+/** The actions of hands; angles in rad, `pick` is at a point of the picture from -1 to 1, x to the right and y up. */
 export interface Held {
   isInside(): boolean;
   enter(): void;
@@ -13,7 +13,7 @@ export interface Held {
   pick(x: number, y: number): void;
 }
 
-/** Let hands move what a canvas shows. */
+/** Connect mouse, touch, pen and keys to what a canvas shows. */
 export function hold(canvas: HTMLCanvasElement, held: Held): void {
   const pinch = new Pinch();
   let pressed: { x: number; y: number } | null = null;

@@ -1,10 +1,10 @@
-/** The keyboard: everything can be done with it. */
+/** The keyboard, with which everything can be done. */
 import type { FindingsPanel } from "./findings";
 import type { Session } from "./session";
 import type { ToolBar } from "./tools";
 import { element } from "./words";
 
-// In the model these fly and look; everything else does there what it does everywhere.
+// In the model these keys fly and look around; all others have the same meaning everywhere.
 const FLIGHT = new Set(["w", "a", "s", "d"]);
 const KEYS: [string, string][] = [
   ["N, P", "next, previous finding"], ["A", "accept"], ["R", "reject, with a reason"], ["O", "reopen"], ["C", "comment"],

@@ -1,4 +1,4 @@
-/** The photo in the light that a recorded frame was taken in: evenly lit wall, times the lamps' brightness there. */
+/** The photo in the light of a recorded frame: uniformly lit wall times the lamps' brightness there. */
 import * as THREE from "three";
 import { toModel } from "./graphics";
 import type { Stand } from "./types";
@@ -15,12 +15,12 @@ export class Lamp {
 
   constructor(private readonly isPlain: boolean) {}
 
-  /** Take the place and the light of a frame. */
+  /** Use the position and the light of a frame. */
   take({ eye_p, R_pc, polar_rad, light }: Stand): void {
     this.uniforms.lampEye.value.copy(toModel(eye_p).multiplyScalar(MM));
     const [x, y, z] = [0, 1, 2].map((k) => toModel([R_pc[0]![k]!, R_pc[1]![k]!, R_pc[2]![k]!])) as [THREE.Vector3, THREE.Vector3, THREE.Vector3];
     this.uniforms.lampAxes.value.set(x.x, x.y, x.z, y.x, y.y, y.z, z.x, z.y, z.z);
-    // Rows lie in the middle of the picture's pixels.
+    // Rows are at the middles of the picture's pixels.
     const half = (polar_rad[1] - polar_rad[0]) / (light.length - 1) / 2;
     this.uniforms.lampPolar.value.set(polar_rad[0] - half, polar_rad[1] + half);
     this.uniforms.lampLight.value.dispose();
@@ -29,7 +29,7 @@ export class Lamp {
 
   material(map: THREE.Texture | null, name: string): THREE.MeshBasicMaterial {
     const material = new THREE.MeshBasicMaterial({ map, name });
-    // Grey levels are proportional to light; where three.js has turned them into another scale they are turned back for it.
+    // Grey levels are proportional to light; where three.js has converted them to another scale, they are converted back.
     const [to, back] = this.isPlain ? ["", ""] : ["sRGBTransferOETF", "sRGBTransferEOTF"];
     material.onBeforeCompile = (shader) => {
       Object.assign(shader.uniforms, this.uniforms);
@@ -45,7 +45,7 @@ diffuseColor = ${back}(vec4(${to}(diffuseColor).rgb * texture2D(lampLight, atLam
   }
 }
 
-/** Numbers (rows of equal length) as a picture that is read between its pixels; it closes sideways. */
+/** Numbers (rows of equal length) as a texture that is interpolated between its pixels; it is periodic sideways. */
 function table(rows: number[][]): THREE.DataTexture {
   const half = Uint16Array.from(rows.flat(), (n) => THREE.DataUtils.toHalfFloat(n));
   const made = new THREE.DataTexture(half, rows[0]!.length, rows.length, THREE.RedFormat, THREE.HalfFloatType);

@@ -1,4 +1,4 @@
-/** What the wall shows, in which colours, between which values: the same in every pane that shows it. */
+/** What the wall shows, with its colours and their range of values: the same in every pane that shows it. */
 import type { Session } from "./session";
 import type { Overlay, Point } from "./types";
 import { element, number } from "./words";
@@ -22,7 +22,7 @@ export function layerChoice(session: Session, label: string): HTMLElement {
   return select;
 }
 
-/** Colours and their values; a click on "set" fixes the values, for all runs that are compared. */
+/** The colours and their values; a click on "set" fixes the values for all compared runs. */
 export function legend(session: Session): HTMLElement {
   const root = element("div", { class: "legend" });
   const paint = () => {
@@ -49,7 +49,7 @@ export function colourBar(colours: string[]): HTMLElement {
   }));
 }
 
-/** Wall loss is told in % of the wall; it is kept in mm like every layer. */
+/** Wall loss is shown in % of the wall, but stored in mm like every layer. */
 function shown(session: Session, { name }: Overlay, mm: number): number { return name === LOSS ? (100 * mm) / (wallOf(session) ?? 1) : mm; }
 function unit({ name }: Overlay): string { return name === LOSS ? "% of the wall" : "mm"; }
 function wallOf(session: Session): number | null { return session.state.assumed.wall_thickness_mm ?? session.run.wall_thickness_mm; }

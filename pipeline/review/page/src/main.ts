@@ -52,7 +52,7 @@ function pane(title: string, id: string, bar: HTMLElement | null, ...content: HT
     element("div", { class: "head" }, element("h2", {}, title), bar), ...content);
 }
 
-/** What must be seen on every page: a refused action, a lost server, a run computed anew. */
+/** Messages that must be visible on every page: a refused action, a lost server, a run that was computed again. */
 function notice(session: Session): HTMLElement {
   const text = element("span", { role: "alert" });
   const load = element("button", { hidden: true, click: () => window.location.reload() }, "Load the new results");

@@ -1,4 +1,4 @@
-/** What is drawn on the model beside the wall: findings with their numbers, distances, clock, ends, a scale bar. */
+/** Marks on the model: findings with their numbers, distances, clock positions, ends, a scale bar. */
 import * as THREE from "three";
 import { LineMaterial } from "three/examples/jsm/lines/LineMaterial.js";
 import { LineSegments2 } from "three/examples/jsm/lines/LineSegments2.js";
@@ -10,15 +10,15 @@ import type { Finding, Point } from "./types";
 import { CHOSEN_COLOUR, TURN, element } from "./words";
 
 const MM = 1e-3;
-// Findings and distances are marked within so many radii of the eye, from inside so many behind and ahead of it: all of a long
-// pipe would be a crowd, and outlines are dear without a graphics card.
+// Findings and distances are marked within so many radii of the camera, from inside so many behind and ahead of it: those of
+// a whole long pipe would be too many, and outlines are slow without a graphics card.
 const NEAR_RADII = 14, [BEHIND_RADII, AHEAD_RADII] = [2, 8], RINGS_AHEAD_RADII = 7, CLOCK_RADII = 1.4;
 const STEP_RAD = 0.06;
 const [WITHIN, AROUND] = [0.985, 1.015]; // radii of marks, seen from inside and from outside
 const BAR_PX: Point = [50, 150];
-// From outside an outline lies this far before the wall, in radii: half its width would sink into a wall seen askew.
+// From outside an outline lies this far in front of the wall, in radii: otherwise half its width would be hidden where the wall is seen obliquely.
 const BEFORE_RADII = 0.15;
-export const NEAR_M = 1e-3; // nothing nearer to the eye is drawn
+export const NEAR_M = 1e-3; // nothing nearer to the camera is drawn
 
 interface Label { at: THREE.Vector3; root: HTMLElement; outward: THREE.Vector3 | null }
 
@@ -40,7 +40,7 @@ export class Marks {
     this.layer.append(this.bar);
   }
 
-  /** Draw the marks near a distance anew; only where the eye has gone far, unless `anew`. */
+  /** Redraw the marks near a distance; only if the camera has moved far, unless `anew`. */
   around(distance: number, isInside: boolean, anew = false): void {
     const moved = Math.abs(distance - this.at) > this.session.run.radius_mm / 2;
     if (!anew && !moved && isInside === this.isInside) return;
@@ -64,7 +64,7 @@ export class Marks {
     if (isInside) this.put(this.place(end, 0, 0), this.end, null);
   }
 
-  /** Bring the words to where their places are seen. */
+  /** Move the labels to where their places are seen. */
   follow(camera: THREE.PerspectiveCamera, width: number, height: number, spot: Point): void {
     const { forward, away, seen } = this.scratch;
     camera.getWorldDirection(forward);
@@ -79,7 +79,7 @@ export class Marks {
     this.measure(camera, height, forward, spot);
   }
 
-  /** The bar is as long as its number at the spot, or at the target seen from outside. */
+  /** The length of the bar matches its number at the chosen place, or at the target seen from outside. */
   private measure(camera: THREE.PerspectiveCamera, height: number, forward: THREE.Vector3, spot: Point): void {
     const far = this.place(spot[0], spot[1], this.isInside ? 1 : 0).sub(camera.position).dot(forward);
     const pxPerMm = (height / 2 / Math.tan((camera.fov * Math.PI) / 360) / far) * MM;
@@ -89,17 +89,17 @@ export class Marks {
     this.bar.lastChild!.textContent = `${mm} mm ${this.isInside ? "at the spot" : "at the axis"}`;
   }
 
-  /** Draw without the outlines' casing, which costs as much as they do, while the view moves and would stutter. */
+  /** While the view moves and would stutter, draw without the border of outlines, which is as slow as the outlines. */
   thin(isThin: boolean): void { for (const casing of this.casings) casing.visible = !isThin; }
 
-  /** All outlines of a colour as one line: each line is a call to the graphics. */
+  /** All outlines of one colour as one line, since each line is a separate drawing call. */
   private outlines(findings: Finding[], colour: string, width: number, casing: number): void {
     const place = findings.flatMap((f) => this.segments(f.outline, this.isInside ? WITHIN : AROUND));
     if (!place.length) return;
     const geometry = new LineSegmentsGeometry().setPositions(place);
     const [below, above] = ([["#000000", casing], [colour, width]] as [string, number][]).map(([color, linewidth], k) => {
       const material = new LineMaterial({ color, linewidth, depthTest: !this.isInside, depthWrite: false, transparent: true });
-      // Depth as it is drawn goes with 1 / distance: so much less of it is BEFORE_RADII nearer.
+      // The depth buffer varies as 1 / distance: this much less of it is BEFORE_RADII nearer.
       const nearer = 2 * NEAR_M * BEFORE_RADII * this.session.run.radius_mm * MM;
       material.vertexShader = material.vertexShader.replace("#include <logdepthbuf_vertex>", `gl_Position.z -= ${nearer.toExponential()} / gl_Position.w;\n#include <logdepthbuf_vertex>`);
       const line = new LineSegments2(geometry, material);

@@ -1,4 +1,4 @@
-/** The 3D model: every material variant, depth exaggerated, cut open, seen from outside or flown through. */
+/** The 3D model: every material variant, exaggerated relief, cut open, seen from outside or in flight. */
 import * as THREE from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
 import { CoarseWall } from "./coarse";
@@ -15,12 +15,12 @@ import { Stretches, type Light } from "./stretches";
 import { element } from "./words";
 
 const [MM, MOST_PIXELS] = [1e-3, 1280 * 720];
-// Where the raking light stands behind the eye, in radii: it meets the wall beside the spot at about 12°, so that a slope of
+// Position of the raking light behind the camera, in radii: it meets the wall beside the chosen place at about 12°, so that a slope of
 // 0.1 changes its brightness by a third. Strengths make a flat wall there as bright as recorded.
 const RAKING_RADII = 3.5;
 const [AMBIENT, RAKING, SHINING] = [0.35 * Math.PI, 9.7, 0.6 * Math.PI];
 export class ModelView {
-  private readonly isPlain = drawsPlainly(); // first: it says how colours are to be understood
+  private readonly isPlain = drawsPlainly(); // must come first: it defines how colours are interpreted
   readonly root = element("div", { class: "model" });
   readonly frameTimes: number[] = [];
   private readonly canvas = element("canvas", { tabindex: "0", role: "img", "aria-label": "Model of the pipe. Inside: W and S fly along it, A and D turn the view." });
@@ -36,7 +36,7 @@ export class ModelView {
   private readonly pipe: Pipe;
   private readonly scene = new THREE.Scene();
   private readonly ground = new THREE.Color();
-  private readonly beyond = new THREE.Color(0x46525e); // what is not wall, seen from inside: past its ends, where nothing was measured
+  private readonly beyond = new THREE.Color(0x46525e); // colour of the background seen from inside: beyond the ends, and where nothing was measured
   private readonly eye: Eye;
   private readonly rake = new THREE.PointLight(0xffffff, RAKING, 0, 0);
   private readonly marks: Marks;
@@ -50,9 +50,9 @@ export class ModelView {
   private readonly coarse: CoarseWall;
   private asked = false;
   private show!: () => void;
-  /** Kept once a part of the model is seen, or none will be: what the first view can do without waits for it. */
+  /** Resolved once a part of the model is visible, or none will be: whatever the first view does not need waits for it. */
   readonly first = new Promise<void>((resolve) => { this.show = resolve; });
-  private seen = NaN; // where the eye was when stretches were last asked for
+  private seen = NaN; // position of the camera at the last request for stretches
 
   constructor(private readonly session: Session) {
     this.pipe = new Pipe(session.run.axis);
@@ -76,14 +76,14 @@ export class ModelView {
     void this.start();
   }
 
-  /** What stands beside the pane's title. */
+  /** The controls beside the pane's title. */
   bar(): HTMLElement {
     return element("div", { class: "bar" },
       element("span", { class: "joined", role: "group", "aria-label": "where the model is seen from" }, this.within, this.without),
       element("label", {}, "shows ", layerChoice(this.session, "what the model shows")));
   }
 
-  /** How the model is shown; it stands in the picture, where there is room. */
+  /** How the model is shown; the controls are in the picture, where there is room. */
   private manner(): HTMLElement {
     this.gain.addEventListener("input", () => { this.gained.textContent = `${this.gain.value}×`; this.exaggerate(); });
     this.cut.addEventListener("change", () => this.draw());
@@ -113,10 +113,10 @@ export class ModelView {
     this.stand();
   }
 
-  /** Pixels of the picture, as the page counts them. */
+  /** The size of the picture in CSS pixels. */
   get size(): [number, number] { return [this.canvas.clientWidth, this.canvas.clientHeight]; }
 
-  /** Stand as the camera of the frame that the session names, in its light; or in even light where it names none. */
+  /** Go to the camera of the frame that the session names, with its light; with uniform light where it names none. */
   private standAs(): void {
     const { stand } = this.session;
     if (stand) {
@@ -129,7 +129,7 @@ export class ModelView {
     this.draw();
   }
 
-  /** No longer stand as a frame's camera: the view was moved by hand. */
+  /** Leave the camera of a frame, since the view was moved by hand. */
   private leave(): void { this.session.standAs(null); }
 
   private maximise(): void {
@@ -149,7 +149,7 @@ export class ModelView {
 
   private async start(): Promise<void> {
     const listed = this.fine.start();
-    listed.catch(() => undefined); // told below, where it is waited for
+    listed.catch(() => undefined); // reported below, where it is awaited
     try {
       this.renderer = new THREE.WebGLRenderer({ canvas: this.canvas, antialias: !this.isPlain });
       if (this.isPlain) this.renderer.outputColorSpace = THREE.LinearSRGBColorSpace;
@@ -184,7 +184,7 @@ export class ModelView {
   get parts() { return this.fine.parts; }
   get isReady() { return this.fine.isReady; }
 
-  /** A stretch has come or gone. */
+  /** Called when a stretch was loaded or removed. */
   private grown(): void {
     this.coarse.hide(this.fine.span);
     if (!this.fine.isAll || this.fine.isReady) this.told.remove();
@@ -230,7 +230,7 @@ export class ModelView {
     this.draw();
   }
 
-  /** Take the place of the wall under a point of the picture, both from -1 to 1. */
+  /** Choose the place of the wall under a point of the picture, both coordinates from -1 to 1. */
   private pick(x: number, y: number): void {
     const caster = new THREE.Raycaster();
     caster.setFromCamera(new THREE.Vector2(x, y), this.eye.camera);
@@ -242,7 +242,7 @@ export class ModelView {
       this.session.draw([distance, this.session.beside(azimuth)]);
       return;
     }
-    this.isStaying = true; // a click looks, it does not travel
+    this.isStaying = true; // a click turns the view without moving the camera
     this.session.moveTo([distance, azimuth]);
     this.isStaying = false;
   }
@@ -300,7 +300,7 @@ export class ModelView {
     });
   }
 
-  /** Light along the wall from behind the eye, or over the shoulder of who looks from outside. */
+  /** Light along the wall from behind the camera, or from beside the viewer outside. */
   private shine(): void {
     const { camera, isInside, flown } = this.eye;
     this.rake.intensity = isInside ? RAKING : SHINING;

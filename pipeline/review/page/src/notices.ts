@@ -1,4 +1,4 @@
-/** What must be seen beside the findings: what the run warns of, and what one ring alone shows. */
+/** Notices beside the findings: the warnings of the run, and places shown by one ring only. */
 import type { Session } from "./session";
 import { TileLayer } from "./tiles";
 import type { Point, Unconfirmed } from "./types";
@@ -15,7 +15,7 @@ export function warnings(told: string[]): HTMLElement | string {
     element("ul", {}, ...told.map((text) => element("li", {}, text))));
 }
 
-/** What was not counted among the findings, each with the photo of its place and why; a click goes there. */
+/** The places that are not counted as findings, each with its photo and the reason; a click goes there. */
 export function unconfirmed(session: Session): HTMLElement | string {
   const { unconfirmed: items } = session.run;
   if (!items.length) return "";

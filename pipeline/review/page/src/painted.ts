@@ -1,4 +1,4 @@
-/** Error colours on the model, from the flat view's own tiles, so that both wear the same colours and limits. */
+/** Error colours on the model, made of the flat view's own tiles, so that both have the same colours and limits. */
 import * as THREE from "three";
 import type { Session } from "./session";
 import type { Layer, Point } from "./types";
@@ -25,7 +25,7 @@ export class Strip {
 
   private constructor(canvas: HTMLCanvasElement, readonly azimuth: number, isPlain: boolean) {
     this.texture = new THREE.CanvasTexture(canvas);
-    this.texture.generateMipmaps = false; // where the turn closes, a smaller level would show through
+    this.texture.generateMipmaps = false; // where the texture closes around the pipe, a smaller mipmap level would show a seam
     this.texture.minFilter = THREE.LinearFilter;
     this.texture.wrapT = THREE.RepeatWrapping;
     this.texture.colorSpace = isPlain ? THREE.NoColorSpace : THREE.SRGBColorSpace;
@@ -69,7 +69,7 @@ async function picture(address: string): Promise<HTMLImageElement> {
   return image;
 }
 
-/** What `byPlace` needs of vertices: from their distances and azimuths in turn, those of the picture's edges. */
+/** The vertex attribute for `byPlace`: from distances and azimuths in turn, those of the picture's edges. */
 export function placesOf(at: Float64Array, [from, to]: Point, azimuth: number): THREE.Float32BufferAttribute {
   const out = new Float32Array((3 * at.length) / 2);
   for (let k = 0; 2 * k < at.length; k++) {

@@ -1,4 +1,4 @@
-/** The pipe's own coordinates: distance and azimuth about its axis, to and from points in space (mm). */
+/** Pipe coordinates: conversion between points in space (mm) and distance and azimuth about the axis. */
 import type { Axis } from "./types";
 
 export type Vector = [number, number, number];
@@ -43,7 +43,7 @@ export class Pipe {
     return { distance, azimuth: Math.atan2(v, u), radius, outward };
   }
 
-  /** The same of many points (x, y, z in turn, in units of `mm`): distance and azimuth in turn, and how far each lies off a radius. */
+  /** The same for many points (x, y, z in turn, in units of `mm`): distance and azimuth in turn, and the deviation of each from a radius. */
   locate(points: ArrayLike<number>, mm: number, radius: number): { at: Float64Array; away: Float32Array } {
     const count = points.length / 3, at = new Float64Array(2 * count), away = new Float32Array(3 * count), { steps } = this;
     const d = Float64Array.from(this.axis.distance_mm), last = d[steps - 1]!, [o, ex, ey] = [this.axis.origin_p, this.axis.x_p, this.axis.y_p].map((v) => Float64Array.from(v.flat())) as [Float64Array, Float64Array, Float64Array];

@@ -25,7 +25,7 @@ export function qualityPage(session: Session): HTMLElement {
     element("details", {}, element("summary", {}, "All figures, stage by stage"), element("div", { class: "columns" }, ...stages)),
     element("section", {}, element("h2", {}, "Input files"), element("table", {},
       ...Object.entries(run.inputs).map(([k, v]) => element("tr", {}, element("th", { scope: "row" }, k), element("td", {}, `SHA-256 ${v}`))))));
-  // Asked for when it is first looked at: the first view has the server to itself.
+  // Requested when it is first opened: the first view needs all of the server.
   const seen = new IntersectionObserver((all) => { if (all.some((e) => e.isIntersecting)) { seen.disconnect(); void load(); } });
   seen.observe(root);
   return root;

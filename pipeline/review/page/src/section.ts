@@ -23,7 +23,7 @@ export class SectionView {
     void this.load();
   }
 
-  /** What stands beside the pane's title. */
+  /** The controls beside the pane's title. */
   bar(): HTMLElement {
     const key = (name: string, shown: string) => {
       const line = drawn("svg", { viewBox: "0 0 26 8", class: "key", "aria-hidden": "true" });

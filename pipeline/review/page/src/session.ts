@@ -1,9 +1,9 @@
-/** What the page shows now, and who wants to know when it changes. */
+/** What the page shows at present, and the listeners that are notified of changes. */
 import { LostError, RefusedError, type Source } from "./source";
 import type { Finding, Overlay, Point, ReviewState, Run, SavedReading, Seal, Stand, Tool } from "./types";
 import { azimuthOf, wrapped } from "./words";
 
-// Least that the end colours of a layer mean: about the depth from which findings are told.
+// Least value of a layer's end colours: about the depth from which findings are reported.
 const [LEAST_RANGE_MM, LEAST_SIGMA_MM] = [0.25, 0.05];
 
 export type Topic = "limits" | "readings" | "state" | "seal" | "selection" | "cursor" | "layer" | "tool" | "message" | "shape" | "reject" | "nameless" | "named" | "recomputed" | "stand";
@@ -16,12 +16,12 @@ export class Session {
   tool: Tool = "none";
   drawn: Point[] = [];
   message = "";
-  /** The recorded frame as whose camera the model is seen; null where it is seen freely. */
+  /** The recorded frame in whose view the model is shown; null for a free view. */
   stand: Stand | null = null;
-  private isGiven = false; // whether what is drawn is the finding's own outline, untouched
-  /** Null while the server still reads what a signature binds. */
+  private isGiven = false; // whether the drawn shape is the finding's own outline, not changed yet
+  /** Null while the server still reads the files that a signature covers. */
   seal: Seal | null = null;
-  /** What was measured in this browser on this run, newest last. */
+  /** The measurements made in this browser on this run, newest last. */
   readings: SavedReading[] = [];
   private readonly fixed = new Map<string, Point>();
   private isLost = false;
@@ -68,12 +68,12 @@ export class Session {
 
   show(layer: string): void { this.layer = layer; this.tell("layer"); }
 
-  /** What a finding is called; ids of the ledger are no words for people. */
+  /** The number that people see for a finding; the ids of the ledger are internal. */
   called(id: string): string { return this.state.findings.find((f) => f.id === id)?.label ?? id; }
 
   overlay(layer = this.layer): Overlay | null { return this.run.overlays.find((o) => o.name === layer) ?? null; }
 
-  /** Between which values, mm, a layer is coloured: those that were fixed, else its full range; null for the photo. */
+  /** The range of values, mm, of a layer's colours: fixed by the user, else the full range; null for the photo. */
   limits(layer = this.layer): Point | null {
     const overlay = this.overlay(layer);
     if (!overlay) return null;
@@ -83,7 +83,7 @@ export class Session {
 
   isFixed(layer = this.layer): boolean { return this.fixed.has(layer); }
 
-  /** Fix between which values, mm, a layer is coloured; null: its full range. */
+  /** Fix the range of values, mm, of a layer's colours; null: its full range. */
   fix(limits: Point | null, layer = this.layer): void {
     if (limits) this.fixed.set(layer, limits); else this.fixed.delete(layer);
     this.tell("limits");
@@ -106,7 +106,7 @@ export class Session {
     this.tell("shape");
   }
 
-  /** Draw a point; the first one beside an outline that was given begins a new outline. */
+  /** Add a point; if the drawn shape is a finding's own outline, the point begins a new outline. */
   draw(at: Point): void {
     this.drawn = this.isGiven ? [at] : [...this.drawn, at];
     this.isGiven = false;
@@ -116,13 +116,13 @@ export class Session {
   /** Move a drawn point. */
   replace(corner: number, at: Point): void { this.drawn = this.drawn.map((p, k) => (k === corner ? at : p)); this.isGiven = false; this.tell("shape"); }
 
-  /** The azimuth, whole turns added, that lies next to the last drawn point. */
+  /** The azimuth, with whole turns added, that is nearest to the last drawn point. */
   beside(azimuth: number): number {
     const last = this.drawn[this.drawn.length - 1];
     return last ? last[1] + wrapped(azimuth - last[1]) : azimuth;
   }
 
-  /** Ask for the reason why the chosen finding is no defect. */
+  /** Ask why the chosen finding is not a defect. */
   askToReject(): void { if (this.finding) this.tell("reject"); }
 
   say(message: string): void { this.message = message; this.tell("message"); }
@@ -140,13 +140,13 @@ export class Session {
     return this.change(() => this.source.sign(name, standard, remarks, this.state.revision));
   }
 
-  /** See whether anything has changed, here or elsewhere. */
+  /** Check whether anything has changed, here or elsewhere. */
   async refresh(): Promise<void> {
     if (this.isAsking) return;
     this.isAsking = true;
     try {
       let seal = await this.source.seal();
-      while (seal.revision < this.state.revision) seal = await this.source.seal(); // asked before the last action
+      while (seal.revision < this.state.revision) seal = await this.source.seal(); // requested before the last action
       if (this.isLost) { this.isLost = false; this.say(""); }
       if (seal.run_version !== this.run.version) this.tell("recomputed");
       const isNews = seal.revision !== this.state.revision || (this.seal !== null && seal.sha256 !== this.seal.sha256);
@@ -157,7 +157,7 @@ export class Session {
     } finally { this.isAsking = false; }
   }
 
-  /** The server cannot be asked, or the run cannot be read just now: told until it can. */
+  /** The server does not answer, or the run cannot be read at present: shown until it can. */
   lose(error: Error): void { this.isLost = true; this.say(error.message); }
 
   private async change(work: () => Promise<ReviewState>): Promise<boolean> {
@@ -169,14 +169,14 @@ export class Session {
       return true;
     } catch (error) {
       if (error instanceof RefusedError && error.stale) this.put(await this.source.state());
-      // A server that is back before it is next looked for takes back what was said of it.
+      // When the server answers again before the next check, the message about it is removed.
       if (error instanceof LostError) this.lose(error);
       else this.say(error instanceof Error ? error.message : String(error));
       return false;
     }
   }
 
-  /** What a finding that is gone has become, or was made of. */
+  /** The findings that a removed finding has become, or was made of. */
   private heir(gone: Finding): string | null {
     return this.standing.find((f) => f.made_of.includes(gone.id) || gone.made_of.includes(f.id))?.id ?? null;
   }
@@ -191,14 +191,14 @@ export class Session {
   }
 }
 
-/** Where a finding is deepest, or highest; its middle where that is not known. */
+/** The place where a finding is deepest, or highest; its middle where that is not known. */
 export function peakOf({ outline, size }: Finding): Point {
   const [distance, azimuth] = middle(outline);
   const { peak_distance_mm: peak, peak_clock: hours } = size;
   return [peak ?? distance, hours === null || hours === undefined ? azimuth : azimuth + wrapped(azimuthOf(hours) - azimuth)];
 }
 
-/** All of a layer; what is signed is symmetric, and as wide that noise is not shown in alarming colours. */
+/** The full range of a layer; signed values get a symmetric range, wide enough that noise has no alarming colours. */
 export function wholeRange({ name, low_mm, high_mm, full_mm }: Overlay): Point {
   const [low, high] = full_mm ?? [low_mm, high_mm];
   if (low_mm >= 0) return [0, Math.max(high, name === "uncertainty" ? LEAST_SIGMA_MM : LEAST_RANGE_MM)];
@@ -211,7 +211,7 @@ export function middle(outline: Point[]): Point {
   return [sum[0] / outline.length, sum[1] / outline.length];
 }
 
-/** Worst first: cracks, metal loss, dents, deposits, welds, and in each the deepest. */
+/** Most severe first: cracks, metal loss, dents, deposits, welds, and within each the deepest. */
 export function bySeverity(findings: Finding[]): Finding[] {
   const rank: Record<string, number> = { crack: 0, pit: 1, corrosion: 1, gouge: 1, dent: 2, deposit: 3, weld: 4 };
   return [...findings].sort((a, b) =>

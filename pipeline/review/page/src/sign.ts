@@ -1,4 +1,4 @@
-/** Sign-off: what is assumed, who signs by which standard, history, and the downloads. */
+/** Sign-off: assumptions, signature with its standard, history, and downloads. */
 import type { Session } from "./session";
 import { element, moment } from "./words";
 
@@ -12,7 +12,7 @@ export function signPage(session: Session): HTMLElement {
   const root = element("main", { class: "page" });
   const form = session.source.readOnly ? null : signature(session);
   const assumed = session.source.readOnly ? null : element("div", {}, inspection(session), assumptions(session));
-  // Put in place again, a field loses the focus, and what is typed next would be taken for shortcuts.
+  // An input that is inserted again loses the focus, and further typing would be taken for shortcuts.
   const paint = () => {
     const writing = document.activeElement;
     root.replaceChildren(...parts(session, form, assumed));
@@ -27,7 +27,7 @@ export function signPage(session: Session): HTMLElement {
   return root;
 }
 
-// The forms are kept, so that what is being written in them outlives news from elsewhere.
+// The forms are kept, so that typed text survives updates from the server.
 function parts(session: Session, signing: HTMLElement | null, assumed: HTMLElement | null): HTMLElement[] {
   const { state, seal } = session;
   const open = session.standing.filter((f) => f.status === "open").length;
@@ -43,7 +43,7 @@ function parts(session: Session, signing: HTMLElement | null, assumed: HTMLEleme
       signing),
   ];
   signing?.dispatchEvent(new CustomEvent("undecided", { detail: open }));
-  if (assumed) made.unshift(assumed); // before the signature, which a later change would undo
+  if (assumed) made.unshift(assumed); // placed before the signature, which a later change would invalidate
   const folder = session.source.readOnly ? "" : "/api/papers/";
   made.push(element("section", {}, element("h2", {}, "Downloads"), element("ul", { class: "papers" },
     ...PAPERS.map(([file, name]) => element("li", {}, element("a", { href: folder + file, target: "_blank", rel: "noopener" }, name))))));
@@ -75,7 +75,7 @@ function signature(session: Session): HTMLElement {
   const name = element("input", { type: "text", required: true, maxlength: "200", value: session.who, id: "sign-name" });
   const standard = element("input", { type: "text", maxlength: "200", id: "sign-standard", placeholder: "such as POF 100, EN 13508-2" });
   const remarks = element("textarea", { maxlength: "4000", rows: "3", id: "sign-remarks" });
-  // Who signs with findings undecided says so, each time their number changes.
+  // Whoever signs with undecided findings has to confirm it, again whenever their number changes.
   const agreed = element("input", { type: "checkbox", id: "sign-undecided" });
   const count = element("label", { for: "sign-undecided" });
   const undecided = element("p", { class: "wide caution" }, agreed, " ", count);
@@ -94,7 +94,7 @@ function signature(session: Session): HTMLElement {
     undecided, element("button", { class: "accept" }, "Sign"));
 }
 
-/** Bring a field to what is known by now, unless something else is being written in it. */
+/** Set a field to the stored value, unless another text is being typed in it. */
 function fill(input: HTMLInputElement, value: string): void {
   if (input.value === input.defaultValue || input.value === value) input.value = input.defaultValue = value;
 }
@@ -121,7 +121,7 @@ const FACTS: [string, string][] = [
   ["procedure", "Procedure"], ["equipment", "Equipment"], ["calibration", "Calibration certificate"],
 ];
 
-/** For whom, where and how it was inspected: as recording.yaml says, completed here, printed in every report. */
+/** The facts of the inspection: read from recording.yaml, completed here, printed in every report. */
 function inspection(session: Session): HTMLElement {
   const { described } = session.state;
   const inputs = FACTS.map(([name]) => element("input", { type: name === "date" ? "date" : "text", maxlength: "200", id: `fact-${name}`, value: described[name] ?? "" }));

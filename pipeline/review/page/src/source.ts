@@ -20,10 +20,10 @@ export interface Source {
   profile(distance: number, azimuth: number, half: number): Promise<Profile>;
   sights(distance: number, azimuth: number): Promise<Sight[]>;
   layer(name: string): Promise<Layer>;
-  /** Where a tile is; between limits (mm) where they are given and the server can be asked. */
+  /** The address of a tile; between limits (mm) where they are given and the server can be asked. */
   tile(layer: string, level: number, column: number, row: number, limits?: Point | null): string;
   frame(frame: number): string;
-  /** Where a frame's camera stood, turned to a place of the wall, and the frame as it is seen from there. */
+  /** The camera of a frame, turned to a place of the wall, and the frame as seen from there. */
   stand(frame: number, at: Point): Promise<Stand>;
   seenFrom(frame: number, at: Point, fov: number, width: number, height: number): string;
   spot(frame: number, u: number, v: number): Promise<Point>;
@@ -69,7 +69,7 @@ export class Server implements Source {
     get<Profile>(`/api/profile?distance=${distance}&azimuth=${azimuth}&half=${half}`);
   sights = async (distance: number, azimuth: number) =>
     (await get<{ sights: Sight[] }>(`/api/sights?distance=${distance}&azimuth=${azimuth}`)).sights;
-  // Wall loss is deviation in other colours: it has its own place on the server only between limits.
+  // Wall loss is deviation in other colours: the server has an address for it only between limits.
   layer = (name: string) => get<Layer>(`/api/tiles/${name}${name.endsWith("wall_loss") ? "?low=0&high=1" : ""}`);
   tile = (layer: string, level: number, column: number, row: number, limits?: Point | null) =>
     `/api/tiles/${layer}/${level}/${column}/${row}.png${limits ? `?low=${limits[0]}&high=${limits[1]}` : ""}`;
@@ -89,7 +89,7 @@ export class Server implements Source {
   comparison = () => get<Comparison | null>("/api/comparison");
 }
 
-/** Data that an export puts beside the page, as a script, because a page from a file may not fetch. */
+/** Data that an export puts beside the page as a script, because a page opened from a file may not fetch. */
 export interface Exported {
   run: Run; state: ReviewState; seal: Seal; quality: Quality; comparison?: Comparison; sections: Section[]; layers: Record<string, Layer>; model: { stretches: Stretch[]; parts: string[] };
   spots: { distance_mm: number; azimuth_rad: number; sights: Sight[]; profile: Profile }[];
@@ -119,8 +119,8 @@ export class Export implements Source {
   layer = async (name: string) => this.data.layers[name]!;
   tile = (layer: string, level: number, column: number, row: number) => `tiles/${layer}/${level}/${column}/${row}.png`;
   frame = (frame: number) => `frames/${frame}.jpg`;
-  spot = async (): Promise<Point> => { throw new RefusedError("Moving by the frame needs boresight review.", false); };
-  stand = async (): Promise<Stand> => { throw new RefusedError("Seeing frame and model alike needs boresight review.", false); };
+  spot = async (): Promise<Point> => { throw new RefusedError("Choosing a place in a frame needs boresight review.", false); };
+  stand = async (): Promise<Stand> => { throw new RefusedError("Showing frame and model in the same view needs boresight review.", false); };
   seenFrom = (frame: number) => this.frame(frame);
   quality = async () => this.data.quality;
   comparison = async () => this.data.comparison ?? null;

@@ -1,4 +1,4 @@
-/** The spot and what is being drawn or measured, on the model's wall. */
+/** The chosen place, and shapes being drawn or measured, on the model's wall. */
 import * as THREE from "three";
 import { toModel } from "./graphics";
 import type { Pipe } from "./pipe";
@@ -16,11 +16,11 @@ export class Spot {
 
   constructor(private readonly session: Session, private readonly pipe: Pipe) {
     this.group.add(this.marker, this.line, this.corners);
-    for (const part of [this.marker, this.line, this.corners]) part.renderOrder = 1; // drawn after the wall, or the wall would cover them
+    for (const part of [this.marker, this.line, this.corners]) part.renderOrder = 1; // drawn after the wall, which would cover them otherwise
     for (const part of [this.line, this.corners]) part.frustumCulled = false;
   }
 
-  /** Bring the ring to the spot. */
+  /** Move the ring to the chosen place. */
   follow(): void {
     const { cursor: [distance, azimuth], run } = this.session;
     this.marker.position.copy(toModel(this.pipe.point(distance, azimuth, run.radius_mm * 0.995)).multiplyScalar(MM));
@@ -28,7 +28,7 @@ export class Spot {
     this.marker.scale.setScalar(run.radius_mm * 0.035 * MM);
   }
 
-  /** Show what is being drawn or measured. */
+  /** Show the shape that is being drawn or measured. */
   trace(): void {
     const { drawn, run } = this.session;
     const at = drawn.map(([s, a]) => toModel(this.pipe.point(s, a, run.radius_mm * 0.99)).multiplyScalar(MM));

@@ -1,4 +1,4 @@
-/** The detailed model, stretch by stretch: those next to the eye are loaded, those far from it are let go. */
+/** The detailed model in stretches: those near the camera are loaded, distant ones are removed. */
 import * as THREE from "three";
 import { GLTFLoader, type GLTF } from "three/examples/jsm/loaders/GLTFLoader.js";
 import type { Lamp } from "./lamp";
@@ -10,16 +10,16 @@ import type { Point, Stretch } from "./types";
 
 const MM = 1e-3;
 const PHOTO = "photo";
-/** As recorded, evenly lit; with raking light on its relief; in the light of a recorded frame. */
+/** As recorded, uniformly lit; with raking light on its relief; or in the light of a recorded frame. */
 export type Light = "even" | "raking" | "frame";
-// The variants of model.glb, for a copy that may not hand its pictures to the model.
+// The variants of model.glb, for an exported copy, which may not give its pictures to WebGL.
 const VARIANTS: Record<string, string> = { deviation_nominal: "deviation" };
 const ANISOTROPY = 8;
-// What a browser without a graphics card can still turn, and what keeps the tab's memory small.
+// Limits that a browser without a graphics card can still draw, and that keep the tab's memory small.
 const MOST_TRIANGLES = 215_000;
 const AT_ONCE = 2;
 // While the view moves without a graphics card, vertices are joined in cells of this many radii along and around: a twentieth
-// of the triangles is left, and between them a round wall is off by 0.2 % of its radius.
+// of the triangles remains, and between them a round wall is off by 0.2 % of its radius.
 const THINNED_RADII = 0.12;
 
 interface Part {
@@ -46,13 +46,13 @@ export class Stretches {
   get isAll(): boolean { return this.wanted().length === this.list.length; }
   get isReady(): boolean { return this.list.length > 0 && this.wanted().every((k) => this.held.has(k)); }
 
-  /** The distances between which everything is there in detail. */
+  /** The distances between which all detail is loaded. */
   get span(): [number, number] | null {
     const there = [...this.held.keys()].sort((a, b) => a - b).map((k) => this.list[k]!);
     return there.length ? [there[0]!.from_mm, there[there.length - 1]!.to_mm] : null;
   }
 
-  /** Load what lies next to a distance, nearest first. */
+  /** Load the stretches near a distance, nearest first. */
   async around(distance: number): Promise<void> {
     this.at = distance;
     const wanted = this.wanted();
@@ -67,7 +67,7 @@ export class Stretches {
     for (const part of this.parts) this.wear(part);
   }
 
-  /** Draw fewer triangles, where a browser without a graphics card moves the view, or all of them. */
+  /** Draw fewer triangles while a browser without a graphics card moves the view, or all of them. */
   thin(isThin: boolean): void {
     this.isThin = isThin && this.isPlain;
     for (const part of this.parts) this.range(part);
@@ -87,7 +87,7 @@ export class Stretches {
     else void this.paint(part, part.wanted).catch((e: Error) => session.say(e.message));
   }
 
-  /** Colour a part by the flat view's tiles; what was asked for meanwhile is not overtaken. */
+  /** Colour a part with the flat view's tiles; a newer request is not overwritten by an older one. */
   private async paint(part: Part, name: string): Promise<void> {
     const strip = await Strip.load(this.session, this.session.layer, part.span, this.isPlain);
     if (part.wanted !== name) { strip.dispose(); return; }
@@ -111,11 +111,11 @@ export class Stretches {
     for (const { mesh } of this.parts) (mesh.material as THREE.Material).clippingPlanes = planes;
   }
 
-  /** What should be there, nearest first; stretches follow each other, so that those near are found from the nearest outward. */
+  /** The stretches to be loaded, nearest first; since they are in order, the search goes from the nearest outward. */
   private wanted(): number[] {
     const ahead = this.at + this.session.run.radius_mm, { list } = this, out: number[] = [];
     const off = (k: number) => { const s = list[k]; return s ? Math.max(s.from_mm - ahead, ahead - s.to_mm, 0) : Infinity; };
-    let [low, high] = [0, list.length]; // the first that begins beyond
+    let [low, high] = [0, list.length]; // the first one that begins beyond
     while (low < high) { const middle = (low + high) >> 1; if (list[middle]!.from_mm > ahead) high = middle; else low = middle + 1; }
     for (let [before, after, sum] = [low - 1, low, 0]; out.length < list.length;) {
       const k = off(before) <= off(after) ? before-- : after++;
@@ -172,7 +172,7 @@ export class Stretches {
     variants.get(PHOTO)!.dispose();
     variants.delete(PHOTO);
     if (picture) picture.anisotropy = this.isPlain ? 1 : ANISOTROPY;
-    // The camera has seen the wall in its own light: no other is put on it unless relief is to be seen.
+    // The photo contains the light of the probe: no other light is added unless relief is to be seen.
     const lights = {
       even: new THREE.MeshBasicMaterial({ map: picture, name: title }),
       raking: new THREE.MeshLambertMaterial({ map: picture, name: `${title}, raking light` }),
@@ -180,13 +180,13 @@ export class Stretches {
     };
     for (const material of [...variants.values(), ...Object.values(lights)]) {
       const { map } = material as THREE.MeshBasicMaterial;
-      // Colours pass as they are and one level of the picture is enough: both are dear without a graphics card.
+      // Colours are not converted, and one mipmap level is enough: both are slow without a graphics card.
       if (map && this.isPlain) [map.colorSpace, map.minFilter] = [THREE.NoColorSpace, THREE.LinearMipmapNearestFilter];
       material.side = THREE.DoubleSide;
       material.clippingPlanes = [];
     }
     const base = Float32Array.from((mesh.geometry.getAttribute("position") as THREE.BufferAttribute).array);
-    // Vertices are stored in the pipe's own frame, only the node above turns them.
+    // Vertices are stored in the pipe's frame; only the node above rotates them.
     const { at, away } = this.pipe.locate(base, MM, this.session.run.radius_mm);
     const part: Part = { mesh, variants, lights, painted: null, wanted: "", at, span: spanOf(at), all: mesh.geometry.index!.count, away, base };
     if (this.isPlain) this.addThinned(part);
@@ -194,7 +194,7 @@ export class Stretches {
     return part;
   }
 
-  /** Append a part's thinned triangles to its own. */
+  /** Append the decimated triangles of a part to its own. */
   private addThinned(part: Part): void {
     const { geometry } = part.mesh, whole = geometry.index!.array, { radius_mm: radius } = this.session.run;
     const few = thinned(whole, part.at, [THINNED_RADII * radius, THINNED_RADII]);

@@ -1,4 +1,4 @@
-/** A coarser skin of the same vertices, for a browser that has no graphics card, while the view moves. */
+/** A coarser surface with the same vertices, for a browser without a graphics card, while the view moves. */
 import type { Point } from "./types";
 
 /**
@@ -17,7 +17,7 @@ export function thinned(index: ArrayLike<number>, at: Float64Array, cell: Point)
   return out.slice(0, n);
 }
 
-/** For each vertex the one that stands for it: the first of its cell, or itself at an edge. */
+/** For each vertex the one that replaces it: the first of its cell, or itself at an edge. */
 function standIns(index: ArrayLike<number>, at: Float64Array, cell: Point): Uint32Array {
   // Around an inner vertex each neighbour follows one triangle's corner and precedes another's: the differences cancel.
   const open = new Float64Array(at.length / 2);

@@ -6,12 +6,12 @@ import { TURN } from "./words";
 const TILE = 512;
 const MOST_TILES = 160;
 
-/** Where a wall lies on the screen: its own distances and azimuths in, pixels out. */
+/** The position of a wall on the screen: from its distances and azimuths to pixels. */
 export interface Ground {
   x(distance: number): number;
   y(azimuth: number, distance: number): number;
   size: [number, number]; // pixels
-  span: [number, number]; // distances of the wall that are seen
+  span: [number, number]; // visible distances of the wall
   mmPerPx: number;
 }
 
@@ -20,7 +20,7 @@ export class TileLayer {
   private readonly tiles = new Map<string, HTMLImageElement>();
   private wanted = "";
   private limits: Point | null = null;
-  private shown = ""; // the layer whose levels are known
+  private shown = ""; // the layer whose levels are loaded
 
   constructor(private readonly source: Source, private readonly repaint: () => void) {}
 
@@ -65,7 +65,7 @@ export class TileLayer {
     const known = this.tiles.get(address);
     if (known) {
       this.tiles.delete(address);
-      this.tiles.set(address, known); // the least recently seen are dropped first
+      this.tiles.set(address, known); // the least recently used are dropped first
       return known.complete && known.naturalWidth ? known : null;
     }
     const image = new Image();

@@ -36,7 +36,7 @@ export class ToolBar {
     this.place();
   }
 
-  /** What stands beside the pane's title: what both views of the wall show, and its colours. */
+  /** The controls beside the pane's title: what both views of the wall show, and its colours. */
   bar(): HTMLElement {
     return element("div", { class: "bar" }, element("label", {}, "shows ", layerChoice(this.session, "what the wall shows")), legend(this.session));
   }
@@ -57,7 +57,7 @@ export class ToolBar {
     else this.status.textContent = (HELP[session.tool] ?? "") + KEYS_HINT;
   }
 
-  /** The saved measurements: how many, as a table to take away, and how to be rid of them. */
+  /** The saved measurements: their number, a table to download, and a button to delete them. */
   private saved(): HTMLElement | string {
     const { session } = this, { readings } = session;
     if (!readings.length) return "";
@@ -112,7 +112,7 @@ export class ToolBar {
   }
 }
 
-/** Readings in words; a clock position is no number with decimals. */
+/** Readings in words; a clock position is not written as a decimal number. */
 function sentence(readings: Reading[]): string {
   return readings.map((r) => (r.unit === "h" ? `${r.name} ${clockOfHours(r.value)} ± ${(60 * r.sigma).toFixed(1)} min` : `${r.name} ${measured(r.value, r.sigma, r.unit)}`)).join("; ");
 }

@@ -1,4 +1,4 @@
-/** Recorded frames beside the same frames, re-rendered: the twin's own page, in a frame that may ask nothing of the server. */
+/** Recorded frames beside the same frames, re-rendered: the twin's own page, in a frame that may not query the server. */
 import type { Session } from "./session";
 import { element } from "./words";
 

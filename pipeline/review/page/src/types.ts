@@ -1,16 +1,16 @@
-/** What the server tells, in its own words; lengths mm, angles rad, clock positions hours. */
+/** The data of the server; lengths mm, angles rad, clock positions hours. */
 export type Point = [number, number]; // distance, azimuth
 
-/** ``low_mm`` and ``high_mm`` are those of the run's own pictures; ``full_mm`` holds every measured value. */
+/** ``low_mm`` and ``high_mm`` are the range of the run's own pictures; ``full_mm`` includes every measured value. */
 export interface Overlay { name: string; title: string; low_mm: number; high_mm: number; colours: string[]; full_mm?: [number, number] }
 export interface Quantity { name: string; value: number | string | null; unit: string }
 
 export interface Axis { distance_mm: number[]; origin_p: number[][]; x_p: number[][]; y_p: number[][] }
 
-/** What the run says of a finding beside its size. */
+/** Data of a finding besides its size. */
 export interface MeasuredDefect { id: number; statement: string; pof_class: string; pacp_suggestion: string; en13508_suggestion: string }
 
-/** What one ring alone shows: to be looked at, not counted. */
+/** A place shown by one ring only: to be examined, but not counted. */
 export interface Unconfirmed {
   kind: string; depth_mm: number | null; depth_sigma_mm: number | null; length_mm: number; width_mm: number; statement: string;
   clock_from: number; clock_to: number; distance_from_mm: number; distance_to_mm: number; outline: Point[]; peak_distance_mm?: number; peak_clock?: number;
@@ -54,7 +54,7 @@ export interface ReviewState {
   assumed: { wall_thickness_mm: number | null; yield_mpa: number | null }; described: Record<string, string>; history: Entry[];
 }
 
-/** Of what state a signature would be, and the last one; changes whenever anything does. */
+/** The state that a signature would cover, and the last signature; changes whenever anything does. */
 export interface Seal { revision: number; sha256: string; signed: boolean; signature: Signature | null; run_version: string }
 
 export interface Section {
@@ -62,14 +62,14 @@ export interface Section {
   fitted_mm: number[]; nominal_mm: number;
 }
 
-/** How the earlier run lies on this one, linear between stations of the earlier run's distance. */
+/** The alignment of the earlier run to this one, linear between stations of the earlier run's distance. */
 export interface Registration {
   at_mm: number[]; shift_mm: number[]; shift_sigma_mm: number[]; roll_rad: number[]; roll_sigma_rad: number[]; scale: number; scale_sigma: number;
   blocks: number; agreeing: number; correlation: number; chance: number; welds: { earlier_mm: number; now_mm: number }[]; overlap_mm: [number, number];
   shift_range_mm: [number, number]; roll_range_rad: [number, number];
 }
 
-/** A finding of either run; outlines where they lie in this run, this run's own first. */
+/** A finding of either run; outlines at their place in this run, this run's own first. */
 export interface Change {
   id: string | null; earlier_id: string | null; kind: string; fate: string; changed: boolean; distance_mm: number; azimuth_rad: number; half_mm: number;
   outlines: Point[][]; depth_mm: number | null; earlier_depth_mm: number | null; depth_growth_mm: number | null; depth_growth_sigma_mm: number | null;
@@ -88,7 +88,7 @@ export interface Curve { mm: number[]; depth_mm: (number | null)[]; sigma_mm: (n
 export interface Profile { along: Curve; around: Curve }
 
 export interface Sight { frame: number; time_s: number; illumination: string; spot_px: Point; ring_px: Point[] }
-/** Where a frame's camera stood, turned to a spot, and recorded over evenly lit brightness, by polar angle and azimuth in the camera. */
+/** The camera of a frame, turned to the chosen place; and recorded over uniformly lit brightness, by polar angle and azimuth in the camera. */
 export interface Stand {
   frame: number; eye_p: [number, number, number]; target_p: [number, number, number]; up_p: [number, number, number]; R_pc: number[][];
   polar_rad: Point; light: number[][];
@@ -97,6 +97,6 @@ export interface Layer { levels: number; width: number; height: number; distance
 /** A part of the model between two distances. */
 export interface Stretch { from_mm: number; to_mm: number; triangles: number }
 export interface Reading { name: string; value: number; sigma: number; unit: string }
-/** A measurement as it was kept, where, and of what. */
+/** A stored measurement, with its place and its object. */
 export interface SavedReading { tool: Tool; at: string; points: Point[]; readings: Reading[] }
 export type Tool = "none" | "point" | "distance" | "area" | "depth" | "diameter" | "redraw" | "add" | "split";

@@ -1,11 +1,11 @@
 /** Numbers and places in words, the same as in `pipeline/pages/notation.py`. */
 export const TURN = 2 * Math.PI;
-// Of the chosen finding and the spot: no colour map and no wall has it.
+// Colour of the chosen finding and place: no colour map and no wall contains it.
 export const CHOSEN_COLOUR = "#ff4fd8";
 
 export function clock(azimuth: number): string {
   const hours = ((((azimuth * 180) / Math.PI / 30 + 3) % 12) + 12) % 12;
-  // Outlines run along half minutes: rounded up, as pipeline/pages/notation.py does, however few decimals there are.
+  // Clock positions at half minutes are rounded up, as in pipeline/pages/notation.py.
   const minutes = Math.floor(Math.round(hours * 600) / 10 + 0.5) % 720;
   return `${Math.floor(minutes / 60) || 12}:${String(minutes % 60).padStart(2, "0")}`;
 }
@@ -19,7 +19,7 @@ export function clockExtent(from: number, to: number): string {
   return to - from >= 12 ? "all round" : `${clockOfHours(from)}–${clockOfHours(to)}`;
 }
 
-/** A distance along the pipe: the peak, and the extent in brackets; without a peak the extent. */
+/** A distance along the pipe: that of the peak, with the extent in brackets; without a peak the extent only. */
 export function distanceExtent(peak: number | null | undefined, from: number, to: number): string {
   const extent = `${number(from, 1)}–${number(to, 1)} mm`;
   return peak === null || peak === undefined ? extent : `${number(peak, 1)} mm (${extent})`;
@@ -29,7 +29,7 @@ export function number(value: number | null | undefined, digits = 2): string {
   return value === null || value === undefined || !Number.isFinite(value) ? "–" : fixed(value, digits);
 }
 
-/** A number with so many digits; halves go to the even digit, as in Python, so that page and papers say the same. */
+/** A number with so many digits; halves are rounded to the even digit, as in Python, so that page and papers agree. */
 function fixed(value: number, digits: number): string {
   const halves = value * 2 ** (digits + 1); // exact; a half of the last digit is an odd number of these
   if (!Number.isInteger(halves) || halves % 2 === 0) return value.toFixed(digits);
@@ -39,7 +39,7 @@ function fixed(value: number, digits: number): string {
 
 const MOST_DIGITS = 3;
 
-/** A value and its 1 σ, with as many digits as the σ bears, and no more than anyone can use. */
+/** A value and its 1 σ, with as many digits as the σ justifies, but not more than are useful. */
 export function measured(value: number | null, sigma: number | null, unit = "mm"): string {
   if (value === null || !Number.isFinite(value)) return "not seen";
   if (sigma === null || !(sigma > 0)) return `${String(Number(value.toPrecision(4)))} ${unit}`.trim();
@@ -49,7 +49,7 @@ export function measured(value: number | null, sigma: number | null, unit = "mm"
   return `${fixed(value, digits)} ± ${spread} ${unit}`.trim();
 }
 
-/** A depth in words: metal that is missing is deep, what stands into the bore is inward. */
+/** A depth in words: missing metal is "deep", what protrudes into the bore is "inward". */
 export function depth(value: number | null, sigma: number | null): string {
   if (value === null || !Number.isFinite(value)) return "depth not seen";
   return `${measured(Math.abs(value), sigma)} ${value < 0 ? "inward" : "deep"}`;
@@ -63,7 +63,7 @@ export function wrapped(azimuth: number): number {
 
 type Child = Node | string | null | undefined | false;
 
-/** Make an element; text is always text, never markup. */
+/** Make an element; text is inserted as text, never as markup. */
 export function element<K extends keyof HTMLElementTagNameMap>(
   tag: K, attributes: Record<string, string | boolean | ((event: Event) => void)> = {}, ...children: Child[]
 ): HTMLElementTagNameMap[K] {
