@@ -36,17 +36,26 @@ class Contradiction:
     ----------
     sigmas : float
         Largest contradiction, in σ, along any direction of the stated uncertainty.
-    wanted : (P,)
-        Change of the parameters that the pictures alone ask for along the directions that they contradict by
-        more than a correct probe would be, and the adjustment's change along the others.
+    farthest : float
+        Largest change by the adjustment along any of them, in stated σ.
+    moved, wanted : (P,)
+        Change of the parameters by the adjustment, and that which the pictures alone ask for along the
+        directions in which they contradict a correct probe.
     """
 
     sigmas: float
+    farthest: float
+    moved: Float
     wanted: Float
 
     @property
-    def certain(self) -> bool:
+    def of_probe(self) -> bool:
         """Whether the stated probe cannot be right."""
+        return self.farthest > _TOO_FAR
+
+    @property
+    def certain(self) -> bool:
+        """Whether pictures and stated probe contradict each other; texture may be wrong instead."""
         return self.sigmas > _TOO_FAR
 
 
@@ -61,7 +70,7 @@ def contradiction(trajectory: Trajectory, probe: Probe) -> Contradiction:
     """
     unsure = probe.principal_uncertainties()
     if trajectory.instrument is None or not unsure.size:
-        return Contradiction(0.0, np.zeros(len(probe.parameters)))
+        return Contradiction(0.0, 0.0, *np.zeros((2, len(probe.parameters))))
     inverse = np.linalg.pinv(unsure)
     moved = inverse @ (trajectory.instrument - probe.parameters)
     left = 0.0 if (own := trajectory.instrument_covariance) is None else inverse @ own @ inverse.T
@@ -69,7 +78,8 @@ def contradiction(trajectory: Trajectory, probe: Probe) -> Contradiction:
     along, gain = direction.T @ moved, np.where(gain > _NO_EVIDENCE, gain, 1.0)
     sigmas = np.abs(along) / np.sqrt(gain)
     wanted = np.where(sigmas > _TOO_FAR, along / gain, along)
-    return Contradiction(float(sigmas.max()), unsure @ direction @ wanted)
+    farthest = float(np.abs(moved).max())
+    return Contradiction(float(sigmas.max()), farthest, unsure @ moved, unsure @ direction @ wanted)
 
 
 def with_doubtful_instrument(
@@ -86,9 +96,9 @@ def with_doubtful_instrument(
     if trajectory.instrument is None or trajectory.instrument_covariance is None:
         return trajectory
     found = contradiction(trajectory, probe)
-    if not (shakes or lasting > MOST_LASTING or found.certain):
+    if not (shakes or lasting > MOST_LASTING or found.of_probe):
         return trajectory
-    wider = _wider_by(found.wanted, probe, trajectory.radius_mm)
+    wider = _wider_by(found.moved, probe, trajectory.radius_mm)
     way = np.zeros((len(trajectory.T_pc), 6))
     way[:, :3] = wider * (trajectory.T_pc[:, :3, 3] - trajectory.T_pc[0, :3, 3])
     length_mm = float(np.ptp(distance_along(trajectory.axis, trajectory.T_pc)))
@@ -96,7 +106,7 @@ def with_doubtful_instrument(
         trajectory,
         covariance=trajectory.covariance + way[:, :, None] * way[:, None, :],
         distance_sigma_mm=float(np.hypot(trajectory.distance_sigma_mm, wider * length_mm)),
-        instrument_covariance=trajectory.instrument_covariance + np.outer(found.wanted, found.wanted),
+        instrument_covariance=trajectory.instrument_covariance + np.outer(found.moved, found.moved),
     )
 
 
@@ -113,21 +123,33 @@ def _wider_by(moved: Float, probe: Probe, radius_mm: float) -> float:
 
 
 def report_instrument(probe: Probe, trajectory: Trajectory, context: Context) -> None:
-    """Report how far the pictures contradict the stated probe, and warn if it cannot have been right."""
+    """Report how far pictures and stated probe contradict each other; warn if not both can be right."""
     if trajectory.instrument is None:
         return
     found = contradiction(trajectory, probe)
     context.report("contradiction of pictures and stated probe, at most", found.sigmas, "σ")
-    if found.certain:
-        sigma = np.sqrt(np.diagonal(probe.covariance))
-        size = np.divide(np.abs(found.wanted), sigma, out=np.zeros_like(found.wanted), where=sigma > 0)
-        most = int(np.argmax(size))
+    if found.of_probe:
         context.warn(
-            f"the stated probe does not fit this recording: the pictures contradict it by {found.sigmas:.0f} "
-            f"σ; by them alone {probe.parameter_names[most]}, most of all, would change by "
-            f"{found.wanted[most]:+.3g}. Radii and distances may be wrong by more than their σ. "
-            f"{_remedy(probe, trajectory)}"
+            f"the stated probe does not fit this recording: it had to be moved by {found.farthest:.0f} times "
+            f"its stated σ, most of all {_most(found.moved, probe)}; radii and distances may be wrong by "
+            f"more than their σ. {_remedy(probe, trajectory)}"
         )
+    elif found.certain:
+        context.warn(
+            f"pictures and stated probe contradict each other by {found.sigmas:.0f} σ: by the pictures alone "
+            f"the probe would change, most of all {_most(found.wanted, probe)}. Either the pictures were "
+            "shifted, cropped or scaled after the calibration, or dust, reflections or water that move with "
+            "the probe were taken for the wall. Nothing is corrected: radii, distances and roll may be wrong "
+            "by more than their σ. What to do: compare the pictures with those of the calibration, clean and "
+            "dry the window, run boresight diagnose on a gauge run"
+        )
+
+
+def _most(change: Float, probe: Probe) -> str:
+    """Return the parameter whose change is largest in stated σ, with its change."""
+    sigma = np.sqrt(np.diagonal(probe.covariance))
+    most = int(np.argmax(np.divide(np.abs(change), sigma, out=np.zeros_like(change), where=sigma > 0)))
+    return f"{probe.parameter_names[most]} by {change[most]:+.3g}"
 
 
 def _remedy(probe: Probe, trajectory: Trajectory) -> str:
@@ -137,7 +159,4 @@ def _remedy(probe: Probe, trajectory: Trajectory) -> str:
             f"It fits pictures that are {way}; clock positions are then {way} as well. What to do: switch "
             "this off in camera and recorder, or undo it in the pictures, and run again"
         )
-    return (
-        "What to do: check that the pictures are not cropped, shifted or scaled, run boresight diagnose, "
-        "or calibrate the probe again"
-    )
+    return "What to do: run boresight diagnose, or calibrate the probe again"

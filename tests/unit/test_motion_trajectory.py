@@ -71,8 +71,8 @@ def test_a_probe_changed_by_36_sigma_gives_a_warning_with_the_number() -> None:
     assert numbers["contradiction of pictures and stated probe, at most"] == pytest.approx(36)
     text = str(numbers["warning"])
     assert "the stated probe does not fit this recording" in text
-    assert "contradict it by 36 σ" in text
-    assert "baseline_mm, most of all, would change by -0.288" in text
+    assert "36 times" in text
+    assert "baseline_mm by -0.288" in text
     assert "boresight diagnose" in text
 
 
@@ -106,7 +106,10 @@ def test_a_direction_that_pictures_hardly_show_counts_against_what_they_show(
     )
     assert ("warning" in numbers) is warned
     if warned:
-        assert f"cx, most of all, would change by {0.03 * moved / gain:+.3g}" in str(numbers["warning"])
+        text = str(numbers["warning"])
+        assert "by the pictures alone the probe would change" in text
+        assert f"cx by {0.03 * moved / gain:+.3g}" in text
+        assert "dust, reflections or water" in text, "the pictures may be wrong as well"
 
 
 @pytest.mark.parametrize("seed", range(3))
