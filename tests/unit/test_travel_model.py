@@ -145,7 +145,7 @@ def test_the_residual_with_wrong_effects_is_not_noise_though_their_size_is_sure(
     assert fit.fits_p < 1e-3
 
 
-def test_an_error_that_depends_on_direction_is_not_fitted_by_constant_play():
+def test_another_course_fits_better_if_the_column_of_the_play_is_wrong():
     fit = with_events(seen(np.random.default_rng(3)), read(play_mm=0.5))
     columns = fit.columns.copy()
     columns[:, PLAY] = np.random.default_rng(9).standard_normal(len(columns))
