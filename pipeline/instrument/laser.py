@@ -62,7 +62,7 @@ class LaserSheet:
         return np.array([*lead, *self.waviness], float)
 
     def with_parameters(self, parameters: Float) -> LaserSheet:
-        """Return the sheet with other geometric parameters."""
+        """Return the sheet with other geometric parameters (12,), in the order of ``PARAMETER_NAMES``."""
         lead = dict(zip(self.PARAMETER_NAMES[:6], map(float, parameters[:6]), strict=True))
         return replace(self, **lead, waviness=tuple(float(p) for p in parameters[6:]))
 

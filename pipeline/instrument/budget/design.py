@@ -99,7 +99,16 @@ def tolerances(budget: Budget, accuracy_mm: float) -> tuple[Tolerance, ...]:
 def baseline_study(
     scan: RingScan, given: Mapping[str, float] | None = None, baselines_mm: Iterable[float] = _BASELINES_MM
 ) -> BaselineStudy:
-    """Return the total σ of the radius over baselines, in 2 to 4 inch, the instrument as stated."""
+    """Return the total σ of the radius over baselines, in pipes of 2 to 4 inch, for the stated instrument.
+
+    Parameters
+    ----------
+    scan
+        The scan; its diameter and baseline are varied.
+    given
+        σ by source name: see `error_budget`.
+    baselines_mm : (B,)
+    """
     at = np.array(list(baselines_mm), float)
     sigma = np.array([[_level(scan, b, d, given) for d in _DIAMETERS_MM] for b in at])
     seen = np.where(np.isnan(sigma), np.inf, sigma)

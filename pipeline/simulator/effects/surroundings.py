@@ -203,11 +203,11 @@ def line_peak(truth: SceneTruth) -> float:
 
 
 def mean_albedo(truth: SceneTruth) -> float:
-    """Return the wall's mean reflectance in the laser's strongest channel."""
+    """Return the wall's mean reflectance, 0 to 1, in the laser's strongest channel."""
     strongest = int(np.argmax(truth.instrument.laser.colour_bgr))
     return float(truth.wall.albedo_bgr[..., strongest].mean())
 
 
 def mean_radius_mm(truth: SceneTruth) -> float:
-    """Return the pipe's nominal radius."""
+    """Return the pipe's nominal radius, mm."""
     return truth.facts.nominal_diameter_mm / 2

@@ -48,7 +48,7 @@ class SeenLine(NamedTuple):
 
 
 def seen_line(picture: Float32, truth: SceneTruth, azimuth_rad: Float) -> SeenLine:
-    """Return the line of a picture (H, W) along azimuths (A,)."""
+    """Return the line of a picture (H, W), in full scales, along azimuths (A,), rad in the image."""
     rho, grey = unrolled(picture, truth, azimuth_rad, _REACH_PX, _STEP_PX)
     middle = rho[np.argmax(grey, axis=1)]
     weight = grey
@@ -74,14 +74,14 @@ def unrolled(
 
 
 def read_radii(line_px: Float, truth: SceneTruth, azimuth_rad: Float) -> Float:
-    """Return the radius (A,), mm, that the stated instrument computes for a line."""
+    """Return the radius (A,), mm, that the stated instrument computes for image radii (A,), px."""
     outward = np.stack([np.cos(azimuth_rad), np.sin(azimuth_rad)], -1)
     point = truth.stated.triangulate(truth.stated.camera.centre_px + line_px[:, None] * outward)
     return np.asarray(np.hypot(point[:, 0], point[:, 1]))
 
 
 def expected_px(truth: SceneTruth) -> float:
-    """Return where the stated instrument would see the ring of a centred round pipe."""
+    """Return the image radius, px, at which the stated instrument sees the ring of a centred pipe."""
     place = np.array([truth.facts.nominal_diameter_mm / 2, 0.0, truth.stated.laser.baseline_mm])
     return float(np.linalg.norm(truth.stated.camera.project(place).uv - truth.stated.camera.centre_px))
 

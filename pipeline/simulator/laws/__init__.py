@@ -145,7 +145,10 @@ EXPONENT_TOLERANCE = 0.03
 
 
 def harmonic(azimuth_rad: Float, value: Float, order: int) -> complex:
-    """Return c of Re(c e^{-imψ}), fitted with orders 0 to 6 and up to m: amplitude |c|, crest arg(c)/m."""
+    """Return c of Re(c e^{-imψ}) in values (A,), fitted with orders 0 to 6 and up to m.
+
+    Its amplitude is |c|, its crest is at arg(c)/m. Values that are not finite are left out.
+    """
     orders = range(max(order, 6) + 1)
     columns = [f(m * azimuth_rad) for m in orders for f in (np.cos, np.sin) if m or f is np.cos]
     known = np.isfinite(value)
@@ -154,12 +157,12 @@ def harmonic(azimuth_rad: Float, value: Float, order: int) -> complex:
 
 
 def strongest(azimuth_rad: Float, value: Float) -> int:
-    """Return the harmonic, 0 to 6, of the largest amplitude."""
+    """Return the harmonic, 0 to 6, of the largest amplitude in values (A,)."""
     return int(np.argmax([abs(harmonic(azimuth_rad, value, m)) for m in range(7)]))
 
 
 def exponent(radii_mm: Float, sizes: Float) -> float:
-    """Return d ln |size| / d ln radius between the first and the last radius."""
+    """Return d ln |size| / d ln radius between the first and the last of radii (K,)."""
     return float(np.log(abs(sizes[-1] / sizes[0])) / np.log(radii_mm[-1] / radii_mm[0]))
 
 

@@ -1,7 +1,9 @@
 """The closed-form laws of the physics notes: radius error, apparent less true, over azimuth.
 
-Each takes radius and azimuth, then the catalogue's quantities by name; constants are those of the bench.
-Where the traced result shows the notes wrong, ``radius`` has the law that holds.
+Each takes the pipe's radius ``r``, mm, and azimuths ``psi`` (A,), rad, then the catalogue's quantities by
+name, and returns the error (A,), mm. Constants are those of the bench. In the formulas c_m = cos m(ψ − ψ₀), l
+is the baseline, f the focal length, T = r/l and S the function `lever_of`. Where the traced result shows that
+the notes are wrong, `pipeline.simulator.laws.radius` uses the law that holds.
 """
 
 from __future__ import annotations
@@ -19,7 +21,7 @@ Law = Callable[..., Float]
 
 
 def theta_of(r: float) -> float:
-    """Return the polar angle under which a ring of radius ``r`` is seen."""
+    """Return the polar angle, rad, at which a ring of radius ``r``, mm, is seen."""
     return float(np.arctan2(r, BASELINE_MM))
 
 
@@ -29,7 +31,7 @@ def lever_of(r: float) -> float:
 
 
 def crest(psi: Float, direction_deg: float, order: float = 1) -> Float:
-    """Return cos m(ψ − ψ₀)."""
+    """Return c_m = cos m(ψ − ψ₀) (A,)."""
     return np.asarray(np.cos(order * (psi - np.radians(direction_deg))))
 
 
