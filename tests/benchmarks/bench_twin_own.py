@@ -133,8 +133,8 @@ def score(case: Case, told: dict[str, Any], spot: tuple[float, float]) -> Any:
     right = [m for m in told["found"] if _named(case, m)]
     placed = [m for m in told["found"] if _lies_at(case, m, spot) and (case.place or m in right)]
     right = [m for m in right if m in placed]
-    size, true = case.true_size, case.true_figure
-    sizes = [(p, size) for m in right[:1] for p in m["parameters"][:1] if size is not None]
+    true = case.true_figure
+    sizes = [(p, case.size_as(m)) for m in right[:1] for p in m["parameters"][:1] if case.size is not None]
     figure = [(f, true) for f in told["figures"] if case.figure and true and f["name"] == case.figure[0]]
     seen = [f for f, is_ in figure if abs(f["value"] - is_) < _CLOSE * is_]
     sizes += [(f, is_) for f, is_ in figure if np.isfinite(f["sd"])]

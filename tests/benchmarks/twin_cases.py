@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from pipeline.simulator.scene import SwayScene, WaveScene
 from stages.twin.reflectance import LUMA_BGR
 
 _SPREAD = 1.33
@@ -58,6 +59,19 @@ class Case:
         """True value of the mismatch's first parameter."""
         return None if self.size is None else self.size * self.numbers[0]
 
+    def size_as(self, found: dict[str, Any]) -> float | None:
+        """Return the true value of a mismatch's first parameter.
+
+        A spot on the window that is told as a dim sector of the laser has the sector's size: the share that
+        the line loses, mean over the stated width. The spot is Gaussian; its numbers end with its σ, degrees.
+        """
+        width = next((p["value"] for p in found["place"] if p["name"] == "width_deg"), None)
+        if self.true_size is None or self.place != "spot" or width is None:
+            return self.true_size
+        sigma = self.numbers[2]
+        inside = math.erf(width / 2 / (math.sqrt(2) * sigma))
+        return self.true_size * math.sqrt(2 * math.pi) * sigma * inside / width
+
     @property
     def true_figure(self) -> float | None:
         """True value of the figure that shows the effect."""
@@ -88,6 +102,8 @@ _MIRRORS = (("probe.laser.opening_angle_deg", 168.0), ("pipe.relief.roughness_mm
 That of a cone, 6° forward, lands 10.7 mm ahead. Rough wall blurs that over a dozen pixels, so the wall that
 reflects is smooth.
 """
+_SHAKEN = (("motion.yaw_deg", SwayScene(waves=(WaveScene(amplitude=1.5, period_s=0.41),))),)
+"""The photo is as blurred as frames that all move alike, which shows nothing; and 18 mm/s blur by .4 px."""
 CASES = (
     # Lit frames withheld, every eighth of 30 a second, would see a flicker of 3.7 Hz always at the same
     # phase.
@@ -116,5 +132,5 @@ CASES = (
     ),
     Case("ambient_light", (0.2,), ("ambient_light", "interreflection")),
     Case("ghost_ring", (0.1,), ("second_line",), changes=_MIRRORS),
-    Case("motion_blur", (0.02,), ("motion_blur",)),
+    Case("motion_blur", (0.02,), ("motion_blur",), changes=_SHAKEN),
 )
