@@ -136,9 +136,14 @@ def photometry_of(
     )
     state = estimate_state(scene, sampled, rings, context)
     lines = [s.frame for s in sampled if s.light == Illumination.LASER]
-    few = np.array(lines[:: max(len(lines) // _COLOURED, 1)], np.int64)
-    colour = list(recording.read(few, "bgr"))
+    colour = list(recording.read(np.array(lines[:: max(len(lines) // _COLOURED, 1)], np.int64), "bgr"))
     state = replace(state, line_clipped=clipped_line(scene, colour), photo_black=black_of_photo(colour))
+    defects = defective_pixels(
+        [s.image.astype(np.uint8) for s in sampled],
+        [s.light in state.shows_wall for s in sampled],
+        ~(state.outside | state.edge),
+    )
+    sampled = [replace(s, image=defects.mended(s.image)) for s in sampled]
     displaced: tuple[ImagePlace, ...] = ()
     for _ in range(_ROUNDS):
         ratios, textures = _blocks(scene, state, sampled)
@@ -154,12 +159,7 @@ def photometry_of(
     places = (*displaced, *beside(places, displaced))
     if gain is not None:
         state = replace(state, gain_map=full_size(gain, state.outside.shape))
-    pixels = defective_pixels(
-        [s.image.astype(np.uint8) for s in sampled],
-        [s.light in state.shows_wall for s in sampled],
-        ~(state.outside | state.edge),
-    )
-    return Photometry(state, places, beside(blurred, places), parameters.blur_px, pixels)
+    return Photometry(state, places, beside(blurred, places), parameters.blur_px, defects.told())
 
 
 def compare_with_twin(
@@ -286,7 +286,7 @@ def _report(comparison: Comparison, found: tuple[Mismatch, ...], context: Contex
 
 PHOTOMETRY = Stage(
     "photometry",
-    "20",
+    "21",
     PhotometryParameters,
     measure_photometry,
     "camera noise, lamps, laser line, blur and dirt on the window, from the frames of a run",

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import cv2
 import numpy as np
 
 from pipeline.adjustment.robust import robust_spread
-from pipeline.arrays import Bool, Byte, Float, Int
+from pipeline.arrays import Bool, Byte, Float, Float32, Int
 from pipeline.artefacts.twin import Look, Mismatch, NamedFigure
 
 _LEAST_GREY, _AROUND_PX, _MOST_PIXELS, _FEWEST_FRAMES = 12, 5, 3, 6
@@ -24,10 +25,43 @@ _BEYOND = 6.0
 which are no defect, one pixel in 10⁹ does."""
 
 
-def defective_pixels(images: Sequence[Byte], lit: Sequence[bool], seen: Bool) -> tuple[Mismatch, ...]:
+@dataclass(frozen=True)
+class DefectivePixels:
+    """Rows and columns (N, 2) of single pixels, too bright or too dark, of those ``seen`` (H, W)."""
+
+    hot: Int
+    dead: Int
+    seen: Bool
+
+    def mended(self, image: Float32) -> Float32:
+        """Return a picture (H, W) with the medians of their surroundings in place of these pixels.
+
+        A codec or colour filters spread a pixel by one to each side.
+        """
+        mask = np.zeros(self.seen.shape, np.uint8)
+        mask[tuple(np.concatenate([self.hot, self.dead]).T)] = 1
+        spread = cv2.dilate(mask, np.ones((3, 3), np.uint8)) > 0
+        return np.where(spread, cv2.medianBlur(image, _AROUND_PX), image).astype(np.float32)
+
+    def told(self) -> tuple[Mismatch, ...]:
+        """Return what is reported of them; nothing without any."""
+        both, pixels, nan = np.concatenate([self.hot, self.dead]), int(self.seen.sum()), float("nan")
+        if not len(both):
+            return ()
+        size = NamedFigure("share", len(both) / pixels, float(np.sqrt(len(both))) / pixels, "of pixels")
+        v, u = (float(a) for a in both[0])
+        said = (
+            f"{len(self.hot)} single pixels are too bright in all frames, {len(self.dead)} too dark in all "
+            "lit ones."
+        )
+        look = Look(0, u, v, 4.0 * _AROUND_PX)
+        return (Mismatch("defective_pixels", "intensity", "image", (), (size,), nan, nan, nan, said, look),)
+
+
+def defective_pixels(images: Sequence[Byte], lit: Sequence[bool], seen: Bool) -> DefectivePixels:
     """Return pixels among those ``seen`` (H, W) that are bright in all frames, or dark in all lit ones."""
     if sum(lit) < _FEWEST_FRAMES:
-        return ()
+        return DefectivePixels(np.zeros((0, 2), int), np.zeros((0, 2), int), seen)
     most = np.iinfo(np.int16).max
     more, less = (np.full(seen.shape, most, np.int16) for _ in range(2))
     total, sums = np.zeros(seen.shape, np.int32), np.zeros((2, *seen.shape), np.int32)
@@ -42,15 +76,7 @@ def defective_pixels(images: Sequence[Byte], lit: Sequence[bool], seen: Bool) ->
         _alone(_single((a >= max(_LEAST_GREY, _BEYOND * kept)) & seen), way * mean)
         for a, way, mean in ((more, 1, sums[0] / len(images)), (less, -1, sums[1] / sum(lit)))
     )
-    both = np.concatenate([hot, dead])
-    if not len(both):
-        return ()
-    nan, pixels = float("nan"), int(seen.sum())
-    size = NamedFigure("share", len(both) / pixels, float(np.sqrt(len(both))) / pixels, "of pixels")
-    v, u = (float(a) for a in both[0])
-    said = f"{len(hot)} single pixels are too bright in all frames, {len(dead)} too dark in all lit ones."
-    look = Look(0, u, v, 4.0 * _AROUND_PX)
-    return (Mismatch("defective_pixels", "intensity", "image", (), (size,), nan, nan, nan, said, look),)
+    return DefectivePixels(hot, dead, seen)
 
 
 def _single(differs: Bool) -> Int:
