@@ -250,6 +250,7 @@ def cannot_tell(state: PhotometricState, silent: bool = False) -> tuple[str, ...
         "is paler on one side only as far as the probe rolls.",
         "If all frames move alike during their exposure, their blur is also in the wall's photo: motion blur "
         "is found only in frames that are more blurred than the others.",
+        "Frames are compared in grey: light whose colour changes during the run is not examined.",
     ]
     if silent:
         said.append(
