@@ -38,6 +38,7 @@ from stages.twin.steps import (
     OWN_STEP,
     first_frame,
     of_a_light,
+    side_at_once,
     steps_named,
 )
 
@@ -97,6 +98,8 @@ def _chosen(
     for _ in range(_ROUNDS):
         tries = [try_law(cells, base, law, len(laws) * _places(law)) for law in laws]
         tries = [f for f in tries if _may_be(f, cells, base)]
+        if not tries:
+            break
         tries.sort(key=lambda f: -f.fall.sum())
         best = _by_other_sectors(_simplest(tries), cells, base)
         if size_of(best) <= _LEAST[best.law.name]:
@@ -122,9 +125,11 @@ def _chosen(
 
 
 def _may_be(found: Fitted, cells: Cells, base: Float) -> bool:
-    """Return whether a law may be what its name says: no LED can lose more than all its light."""
+    """Return whether a law may be what it says: lamps change at once, and by no more than their light."""
     if found.law.name == "step":
         return of_a_light(found, cells, base)
+    if found.law.name in _AROUND and not side_at_once(found, _first(found), cells):
+        return False
     return found.law.name != "led_dead" or size_of(found) < 1.0 + _SURE * _size_sd(found)
 
 

@@ -37,6 +37,18 @@ def at_once(step: Fitted, cells: Cells) -> float:
     return float(after.mean() - before.mean())
 
 
+def side_at_once(side: Fitted, first: int, cells: Cells) -> bool:
+    """Return whether a side of the picture darkens as much between two frames as it does in all.
+
+    Where the photo is uneven and the probe rolls, a side seems to darken slowly. Sectors are compared with
+    each other: the brightness of all together may change in between.
+    """
+    both = cells.usable[first - 1] & cells.usable[first]
+    law, seen = (np.diff(a[first - 1 : first + 1], axis=0)[0][both] for a in (side.change, cells.log_ratio))
+    law = law - law.mean()
+    return bool(law @ seen > LEAST_SHARE * (law @ law))
+
+
 def of_a_light(step: Fitted, cells: Cells, base: Float) -> bool:
     """Return whether a step may be one of a light: it comes at once, and no side contradicts it.
 

@@ -1,5 +1,6 @@
 """A side of the picture that darkens during a run, and is therefore in a part of the wall's photo as well."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -8,11 +9,12 @@ import pytest
 from pipeline.artefacts.twin import Look, Mismatch, NamedFigure
 from pipeline.instrument.probe import Lighting
 from stages.twin.causes import causes
-from stages.twin.cells import SECTORS, Cells, sector_azimuth_rad
+from stages.twin.cells import SECTORS, Cells, Fitted, Law, sector_azimuth_rad
 from stages.twin.photo_course import share_of_frames
 from stages.twin.reference import WALL_COLUMNS
 from stages.twin.scene import Ring
 from stages.twin.seen_in_photo import beside_sectors
+from stages.twin.steps import side_at_once
 
 RING, RADIUS_MM = Ring((400.0, 300.0), 200.0, 50.0, 23.0), 50.0
 FRAMES, STEP_MM = 14, 5.0
@@ -73,6 +75,18 @@ def test_a_side_that_darkens_is_told_though_the_photo_holds_it(lost, first):
 
 def test_nothing_is_told_beside_a_photo_where_nothing_darkens():
     assert all(causes(_cells(0.0, 7, seed), None, Lighting(), RING, _samples()) == () for seed in range(8))
+
+
+@pytest.mark.parametrize(("slow", "is_step"), [(0.0, True), (0.4, True), (1.0, False)])
+def test_a_side_darkens_only_if_it_does_so_at_once(slow, is_step):
+    """Beside a photo dark on one side, a probe that rolled by 6° saw a flank darken slowly by 19 %."""
+    frame, flank = np.arange(FRAMES)[:, None], np.exp(-0.5 * ((sector_azimuth_rad() + 0.5) / 0.35) ** 2)
+    step, ramp = (frame >= 4) - 0.5, np.clip(frame / 8, 0, 1) - 0.5
+    law = Law("lamp_sector", -0.2 * (step * flank)[None], np.array([[-0.5, 4, 0.5, 40]]))
+    side = Fitted(law, 0, 1.0, 0.05, 1e-4, np.zeros(FRAMES), 2.0, 1.0)
+    cells = _cells(0.0, 7)
+    seen = np.exp(-0.2 * ((1 - slow) * step + slow * ramp) * flank + 0.3 * (frame == 4))
+    assert side_at_once(side, 4, replace(cells, cross=cells.cross * seen)) == is_step
 
 
 def test_the_photo_in_a_frame_is_made_from_the_frames_about_it():
