@@ -218,8 +218,8 @@ def compared_with(
     whole, withdrawn = sums.named(samples, recording, failed)
     on_window, of_photo = separated_from_photo(sums.on_window(samples), scene.ring)
     on_window, unsure = separated_from_blur(on_window, whole)
-    bent = on_line(fixed, rings, scene.ring, on_window)
-    on_window, glints = window_and_glints((*on_window, *bent), sums.glints(whole, bent))
+    on_window = (*on_window, *on_line(fixed, rings, scene.ring, on_window))
+    on_window, glints = window_and_glints(on_window, sums.glints(whole, on_window))
     apart_mm, clear = ring_step_mm(rings, scene.trajectory), (*on_window, *glints, *of_photo)
     line_rad = float(np.arctan2(scene.ring.radius_mm, scene.ring.ahead_mm))
     of_wall = unnamed(samples and samples.clear_of(clear), scene.surface, apart_mm, line_rad)
@@ -293,7 +293,7 @@ PHOTOMETRY = Stage(
 )
 TWIN = Stage(
     "twin",
-    "49",
+    "50",
     TwinParameters,
     compare_with_twin,
     "recorded frames beside the same frames, re-rendered from what the run has measured",

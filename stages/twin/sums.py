@@ -100,14 +100,16 @@ class Sums:
         judged = [w.judged(to) for w, to in zip(self.window, fixed_to, strict=True)]
         return without_duplicates([m for m in judged if m is not None])
 
-    def glints(self, whole: Sequence[Mismatch], bent: Sequence[Mismatch] = ()) -> tuple[Mismatch, ...]:
+    def glints(self, whole: Sequence[Mismatch], on_window: Sequence[Mismatch] = ()) -> tuple[Mismatch, ...]:
         """Return spots far brighter than predicted; ``whole`` are confirmed effects on the whole picture.
 
-        Spots of lit frames at places where light is ``bent`` are left out.
+        Spots of lit frames are left out where something ``on_window`` bends light: a drop, or what displaces
+        the line.
         """
         stray = [m.parameters[0].value for m in whole if set(m.names) & set(STRAY_NAMES)]
+        bends = [m for m in on_window if "droplet" in m.names or m.channel == "line"]
         lit, laser = self.spots
-        return (*lit.found(bent=bent), *laser.found(max(stray, default=0.0)))
+        return (*lit.found(bent=bends), *laser.found(max(stray, default=0.0)))
 
     def cells(self) -> tuple[Cells | None, Cells | None]:
         """Return the sectors of lit frames and of the line, twins having steady lamps and an even laser.

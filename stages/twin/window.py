@@ -86,7 +86,8 @@ class WindowPlace:
         away = np.hypot(u - self.place.u_px, v - self.place.v_px)
         inside = away < self._reach_px
         use = inside & part & free[box]
-        if use.sum() < _WHOLE * inside.sum():
+        must = away < self.place.radius_px if self.bends else inside
+        if use[must].sum() < _WHOLE * must.sum():
             return
         filled = np.where(part, level, level[use].mean()).astype(np.float32)
         rest, weight = above[box] - level, np.where(use, 1 / twin.variance[box], np.float32(0))

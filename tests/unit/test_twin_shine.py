@@ -81,6 +81,22 @@ def test_pale_wall_in_other_light_is_not_a_glint(name, glints):
     assert len(Sums.glints(SimpleNamespace(spots=spots), (light,))) == glints
 
 
+@pytest.mark.parametrize(
+    ("name", "channel", "told"), [("droplet", "intensity", 0), ("window_dirt", "intensity", 1)]
+)
+def test_wall_that_a_drop_shows_is_not_a_glint(name, channel, told):
+    """A drop that was named had spots far brighter than predicted told beside it: wall from elsewhere."""
+    spots = [SpotsOfFrames(kind, RING) for kind in (Illumination.LED, Illumination.LASER)]
+    random = np.random.default_rng(5)
+    for number in range(FRAMES):
+        twin = _twin(number, Region.WALL)
+        spots[0].add(number, twin.level + _spot(*(100, 60) + random.normal(0, 8, 2)), twin)
+    at = zip(("u_px", "v_px", "radius_px"), (100.0, 60.0, 40.0), strict=True)
+    place = tuple(NamedFigure(n, x, 8.0, "px") for n, x in at)
+    drop = Mismatch(name, channel, "image", place, (), 0.0, 2.0, 1.0, "It bends light.")
+    assert (len(Sums.glints(SimpleNamespace(spots=spots), (), (drop,))) > 0) == told
+
+
 def test_a_spot_of_the_laser_that_stays_in_the_image_may_be_a_drop():
     (found,) = _spots(lambda n, r: _spot(100 + r.normal(0, 3), 60 + r.normal(0, 3)), Illumination.LASER)
     assert (found.name, found.fixed_to) == ("glint or droplet", "image")

@@ -3,6 +3,8 @@
 They are found at their place and named by the law that frames confirm, on synthetic pictures.
 """
 
+from dataclasses import replace
+
 import cv2
 import numpy as np
 import pytest
@@ -130,8 +132,9 @@ def test_scatter_is_found_whatever_the_texture_of_the_photo(texture):
     assert share.sd < 0.04
 
 
-@pytest.mark.parametrize("drawn_px", [3.0, 0.0])
-def test_a_weak_drop_is_found_by_the_displacement_of_texture_and_named(drawn_px):
+@pytest.mark.parametrize(("drawn_px", "seen_radii"), [(3.0, 9.0), (3.0, 1.2), (0.0, 9.0)])
+def test_a_weak_drop_is_found_by_the_displacement_of_texture_and_named(drawn_px, seen_radii):
+    """At the border of the view too little wall was lit two radii about a drop, and it had no name."""
     random, shifts = np.random.default_rng(3), []
     v, u = np.mgrid[0:200, 0:240].astype(np.float32)
     away = np.hypot(u - 70, v - 130) / 20
@@ -151,8 +154,10 @@ def test_a_weak_drop_is_found_by_the_displacement_of_texture_and_named(drawn_px)
     assert 20 < found[0].radius_px < 70
     whole = np.stack([full_size(a, level.shape, 0.0) for a in aside])
     place = WindowPlace(found[0], aside_px=found[0].most_of(whole))
+    lit = np.hypot(u - found[0].u_px, v - found[0].v_px) < seen_radii * found[0].radius_px
     for frame, (level, recorded) in enumerate(pictures):
         twin = _frame(level)
+        twin = replace(twin, region=np.where(lit, twin.region, np.uint8(Region.DARK)))
         place.add(frame, recorded, twin, np.ones(level.shape, bool), twin.drawn_aside(whole).level)
     named = place.judged("image")
     assert named.name == "droplet"
