@@ -90,7 +90,7 @@ def test_wall_that_a_drop_shows_is_not_a_glint(name, channel, told):
     random = np.random.default_rng(5)
     for number in range(FRAMES):
         twin = _twin(number, Region.WALL)
-        spots[0].add(number, twin.level + _spot(*(100, 60) + random.normal(0, 8, 2)), twin)
+        spots[0].add(number, twin.level + _spot(100 + random.normal(0, 3), 60 + random.normal(0, 3)), twin)
     at = zip(("u_px", "v_px", "radius_px"), (100.0, 60.0, 40.0), strict=True)
     place = tuple(NamedFigure(n, x, 8.0, "px") for n, x in at)
     drop = Mismatch(name, channel, "image", place, (), 0.0, 2.0, 1.0, "It bends light.")
