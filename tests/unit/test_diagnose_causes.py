@@ -113,7 +113,11 @@ def test_a_class_of_what_rings_were_not_asked_about_stands_without_probabilities
     assert len(class_shown(beside).causes) == 4
     write_page(beside, Shown(), tmp_path)
     page = (tmp_path / "diagnosis.html").read_text()
-    assert "Something more remains, and these recordings cannot tell which of these it is" in page
+    assert "Something more remains. These recordings cannot tell which of these it is" in page
+    write_page(replace(FOUND, members=("laser_tilt",)), Shown(), tmp_path)
+    page = (tmp_path / "diagnosis.html").read_text()
+    assert "Most likely it is this, but these recordings do not make it certain" in page
+    assert "cannot tell which of these it is" not in page
 
 
 def test_what_rings_were_not_asked_about_is_as_likely_as_what_looks_like_it():
