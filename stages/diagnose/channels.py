@@ -277,7 +277,7 @@ def _of_geometry(
 
 LINE_PROFILE = Stage("line_profile", "5", Parameters, examine_line, "what the line's light says of effects")
 FIDUCIALS = Stage(
-    "fiducials", "7", GaugeParameters, measure_fiducials, "a gauge run's rings and fiducials", "gauge"
+    "fiducials", "8", GaugeParameters, measure_fiducials, "a gauge run's rings and fiducials", "gauge"
 )
 FREE_MOTION = Stage(
     "free_motion", "2", MotionParameters, adjust_freely, "an inspection's motion without encoder", "motion"

@@ -13,7 +13,7 @@ from scipy.special import erf
 from pipeline.arrays import Float, Image
 from pipeline.geometry.rigid import inverse, transform
 from stages.calibrate.gauge import premises
-from stages.calibrate.gauge.edges import brightest_grey, fit_steps, measure_edges
+from stages.calibrate.gauge.edges import brightest_grey, detect, detector, fit_steps, measure_edges
 from stages.calibrate.gauge.geometry import Gauge, gauge_of
 from tests.gauge_runs import USUAL, facts, stated_probe
 from tests.quiet import quiet_context
@@ -116,3 +116,20 @@ def test_no_edge_is_found_where_there_is_none_or_where_bright_comes_before_dark(
 def test_with_unreadable_frames_white_is_the_end_of_the_range() -> None:
     unread = SimpleNamespace(read=lambda frames, planes: iter((int(n), None) for n in frames))
     assert brightest_grey(unread, np.arange(3)) == 255
+
+
+@pytest.mark.parametrize("side_px", [20.0, 27.0])
+def test_the_corners_of_a_small_fiducial_lie_on_its_border(side_px: float) -> None:
+    """They lay on a contour within it; fiducials of 27 px were refused as 5 % smaller than stated."""
+    finder, random, sides = detector("DICT_4X4_100"), np.random.default_rng(4), list[float]()
+    for number in range(24):
+        pattern = cv2.aruco.generateImageMarker(finder.getDictionary(), number, 600) / 255 * 120.0 + 20.0
+        sheet = np.pad(np.pad(pattern, 100, constant_values=140.0), 400, constant_values=60.0)
+        place = cv2.getRotationMatrix2D((799.5, 799.5), random.uniform(-180, 180), side_px / 600)
+        place[:, 2] += random.uniform(64, 65, 2) - 799.5
+        fine = cv2.warpAffine(sheet, 8 * place + [[0, 0, 3.5]] * 2, (1024, 1024), borderValue=60.0)
+        image = cv2.GaussianBlur(cv2.resize(fine, (128, 128), interpolation=cv2.INTER_AREA), (0, 0), 0.8)
+        for corner in detect(finder, image.astype(np.uint8))[1]:
+            sides += list(np.linalg.norm(corner - np.roll(corner, 1, 0), axis=1))
+    assert len(sides) > 60
+    assert np.median(sides) == pytest.approx(side_px, abs=0.5)

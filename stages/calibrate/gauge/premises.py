@@ -26,9 +26,10 @@ from stages.calibrate.gauge.poses import PosedFrames, disagreeing
 from stages.calibrate.gauge.state import GaugeParameters
 
 STAGE = "calibrate"
-# Fiducials of another size are refused beyond this share. Where the white beside them is overexposed, all
-# corners move inward: a side of 25 px was measured 1.4 px too short, and 2 px are let pass.
-_SIZE_TOLERANCE, _SIDE_ERROR_PX = 0.05, 2.0
+# Fiducials of another size are refused beyond this share, of small ones beyond the error of a side between
+# found corners (drawn ones err by up to .9 px). Where the white beside them is overexposed, all corners move
+# inward: a side of 25 px was measured 1.4 px too short, and 2 px are let pass.
+_SIZE_TOLERANCE, _SIDE_ERROR_PX, _OVEREXPOSED_PX = 0.05, 1.0, 2.0
 # The white beside a fiducial is looked at so many times as far from its middle as its corners are: 0.9 cells
 # outside a marker of 6 × 6 cells, border included.
 _BESIDE = 1.3
@@ -108,9 +109,9 @@ def require_poses(
             hint=f"check columns_along, rows_along and the distance and azimuth of each id; {_PICTURES}",
         )
     ratio, side_px = _size_ratio(posed, gauge, camera)
-    tolerance = _SIZE_TOLERANCE
+    tolerance = max(_SIZE_TOLERANCE, _SIDE_ERROR_PX / side_px)
     if ratio < 1 - tolerance and _are_overexposed(recording, posed):
-        tolerance = max(tolerance, _SIDE_ERROR_PX / side_px)
+        tolerance = max(tolerance, _OVEREXPOSED_PX / side_px)
     if abs(ratio - 1) > tolerance:
         size = gauge.fiducials.size_mm
         raise UnusableError(
