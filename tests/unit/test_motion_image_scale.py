@@ -20,6 +20,7 @@ from stages.motion.bore import ONE_BORE, Bore
 from stages.motion.bundle_adjustment.equations import Measurements
 from stages.motion.bundle_adjustment.image_scale import ScaleDrift, drift_of_scale
 from stages.motion.bundle_adjustment.solver import Estimate, estimate_state
+from stages.motion.bundle_adjustment.wall_twice import WallTwice
 from stages.motion.stated_probe import with_doubtful_instrument
 from stages.motion.tracking.landmarks import TrackedPoses
 from stages.motion.windows import steady_scale
@@ -89,11 +90,16 @@ def test_a_small_change_of_the_rings_may_be_either() -> None:
     assert np.ptp(drift.stated_sigma) * drift.ring_mm > 0.05
 
 
+def textured(poses: TrackedPoses) -> SimpleNamespace:
+    """Return texture followed with these poses in patches of 4.6 mm."""
+    return SimpleNamespace(poses=poses, grid=SimpleNamespace(step_mm=0.22))
+
+
 def steady_run(bore: Bore, lost: float, **changes: float) -> SteadyRun:
     """Return the result for the image scale of a run in a ``bore`` with so many lit pictures ``lost``."""
     made, estimate = adjusted(**changes)
     poses = TrackedPoses(np.arange(FRAMES), made.truth.T_pc, np.arange(FRAMES) < lost * FRAMES)
-    run = SimpleNamespace(bore=bore, whole=None, image_scale=None, texture=SimpleNamespace(poses=poses))
+    run = SimpleNamespace(bore=bore, whole=None, image_scale=None, texture=textured(poses))
     run.time_s = made.measured.time_s
     part_of_run, nobody = Window(0, FRAMES), cast(Any, None)
     return with_steady_scale(cast(Any, run), part_of_run, estimate, made.measured, PARAMETERS, nobody)
@@ -137,7 +143,7 @@ class WholeRun:
     @property
     def texture(self) -> SimpleNamespace:
         none_lost = np.zeros(FEW, bool)
-        return SimpleNamespace(poses=TrackedPoses(np.arange(FEW), self.made.truth.T_pc, none_lost))
+        return textured(TrackedPoses(np.arange(FEW), self.made.truth.T_pc, none_lost))
 
     def measured(self, window: Window, parameters: MotionParameters) -> Measurements:
         """Return the same measurements with the scale as recorded."""
@@ -183,6 +189,19 @@ def test_a_drift_with_contradicting_evidence_is_reported_as_such() -> None:
         assert len(told) == 1
         assert "texture and rings do not agree" in told[0]
         assert "too little texture" not in told[0]
+
+
+def test_behind_a_film_of_water_no_drift_is_removed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Flowing water "made the picture grow"; with that removed, radii were .17 mm too small."""
+    made, parameters = scene(FEW, 100, noise=0.1, picture_grows=GROWS), MotionParameters(match_bias_px=0.01)
+    estimate = estimate_state(made.truth, made.measured, parameters)
+    monkeypatch.setattr(steady_scale, "wall_twice", lambda *_: WallTwice(1.0, 1e-4, 1.0))
+    steady = with_steady_scale(
+        cast(Any, WholeRun(made)), WHOLE, estimate, made.measured, parameters, lambda *_: None
+    )
+    assert not steady.corrected
+    assert steady.drift.contradicted
+    assert steady.scale_sigma is not None
 
 
 def test_a_real_drift_is_found_again_and_removed() -> None:

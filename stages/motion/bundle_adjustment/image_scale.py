@@ -128,10 +128,10 @@ class ScaleDrift:
             context.warn(self._words(corrected))
         elif self.contradicted:
             context.warn(
-                f"it seems that {self._what}. But after correction texture and rings do not agree, as with a "
-                "noise filter that makes texture lag behind the wall. Nothing is corrected: σ of the radii "
-                "includes it. What to do: switch off noise reduction, let the probe warm up, or measure the "
-                "diameters at both ends"
+                f"it seems that {self._what}. But texture and rings do not agree, as with a noise filter "
+                "that makes texture lag behind the wall, or with water on the window. Nothing is corrected: "
+                "σ of the radii includes it. What to do: switch off noise reduction, dry the window, let the "
+                "probe warm up, or measure the diameters at both ends"
             )
         elif self.ambiguous and (widest := float(np.ptp(self.alone) * abs(self.ring_mm))) > self.stated_mm:
             context.warn(

@@ -12,6 +12,7 @@ from pipeline.machine.stage import Context
 from stages.motion.bundle_adjustment.equations import Measurements
 from stages.motion.bundle_adjustment.image_scale import ScaleDrift, drift_of_scale
 from stages.motion.bundle_adjustment.solver import Estimate, estimate_state
+from stages.motion.bundle_adjustment.wall_twice import wall_twice
 from stages.motion.parameters import MotionParameters
 from stages.motion.windows.measured_run import MeasuredRun
 from stages.motion.windows.submaps import Window
@@ -75,7 +76,8 @@ def with_steady_scale(
 
     A large drift is reported and not corrected. In a reducer nothing is reported, because rings and texture
     differ there in the same way as with a drift. If most pictures show no texture, a drift cannot be
-    distinguished from a pipe that widens. A correction that the corrected run does not confirm is undone.
+    distinguished from a pipe that widens. A correction that the corrected run does not confirm is undone, and
+    none is made where water or glass displaces the picture differently from place to place.
 
     Raises
     ------
@@ -91,6 +93,9 @@ def with_steady_scale(
         return SteadyRun(run, estimate, measured, drift, corrected=False)
     contradicted = replace(drift, contradicted=True)
     unchanged = SteadyRun(run, estimate, measured, contradicted, corrected=False)
+    patch_mm = parameters.patch_size * run.texture.grid.step_mm
+    if wall_twice(estimate, measured, patch_mm).line_mm > 0:
+        return unchanged
     first = drift
     for _ in range(_ROUNDS):
         correction = drift.at_frames
