@@ -55,6 +55,7 @@ def scene(
     widens: float = 0.0,
     picture_grows: float = 0.0,
     joint_mm: tuple[float, float] = (0.0, 0.0),
+    bins: int = 24,
 ) -> Scene:
     """Return a scene; ``noise`` is in units of the stated σ, ``shake`` in those of `SHAKE`.
 
@@ -62,6 +63,7 @@ def scene(
     times the distance, and pictures are larger at the end than at the beginning by the share
     ``picture_grows``. From a joint on (`joint_at`) the pipe is wider and lies farther along x by
     ``joint_mm``.
+    Rings are condensed to so many ``bins``.
     """
     random = np.random.default_rng(seed)
     instrument = probe()
@@ -81,7 +83,7 @@ def scene(
     wall = Wall(state, widens, joint_at(frames), joint_mm)
     truth = replace(state, xyz_p=_on_wall(wall, random, landmarks))
     tracks = _tracks(truth, instrument, noise, random)
-    rings = _rings(wall, noise, random, unsure.shape[1])
+    rings = _rings(wall, noise, random, unsure.shape[1], bins)
     larger = picture_grows * (k / (frames - 1) - 0.5)
     tracks = tracks.reduced(1 - larger, instrument.camera.centre_px)
     grown = RING_PX * larger[rings.frame, None] * rings.by_pixel
@@ -156,7 +158,7 @@ def _tracks(state: State, instrument: Probe, noise: float, random: np.random.Gen
     )  # fmt: skip
 
 
-def _rings(wall: Wall, noise: float, random: np.random.Generator, unsure: int, bins: int = 24) -> RingBins:
+def _rings(wall: Wall, noise: float, random: np.random.Generator, unsure: int, bins: int) -> RingBins:
     psi = np.linspace(-np.pi, np.pi, bins, endpoint=False)
     points, poses = [], wall.state.T_pc
     for T in poses:
