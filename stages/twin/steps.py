@@ -44,6 +44,8 @@ def side_at_once(side: Fitted, first: int, cells: Cells) -> bool:
     each other: the brightness of all together may change in between.
     """
     both = cells.usable[first - 1] & cells.usable[first]
+    if not both.any():
+        return False
     law, seen = (np.diff(a[first - 1 : first + 1], axis=0)[0][both] for a in (side.change, cells.log_ratio))
     law = law - law.mean()
     return bool(law @ seen > LEAST_SHARE * (law @ law))
