@@ -22,7 +22,6 @@ from stages.diagnose.effects.base import EffectModel
 from stages.diagnose.effects.library import without as library_without
 from stages.diagnose.field.evidence import FieldEvidence, empty_evidence, field_evidence
 from stages.diagnose.field.run import Adjusted, FieldRun, field_run
-from stages.diagnose.gauge.bores import misdrawn_bore
 from stages.diagnose.gauge.examine import Examined, examine
 from stages.diagnose.profile.evidence import ProfileEvidence, profile_evidence
 from stages.diagnose.travel.evidence import TravelEvidence, travel_evidence
@@ -95,6 +94,8 @@ class Seen:
         Why channels could not be examined.
     field : FieldEvidence or None
         Rings and texture of an inspection.
+    misdrawn : bool
+        Whether a bore of the gauge that is not as drawn explains rings and fiducials as well as an effect.
     """
 
     name: str
@@ -103,6 +104,7 @@ class Seen:
     profile: ProfileEvidence | None
     shortcomings: tuple[str, ...]
     field: FieldEvidence | None = None
+    misdrawn: bool = False
 
     def with_run(self, run: FieldRun | None) -> Seen:
         """Return the evidence together with the adjusted run it came from, which is not stored with it."""
@@ -214,12 +216,12 @@ def examine_gauge(
     """Return what a gauge run's rings, fiducials, motion and line profile show."""
     recording, run, without = frames.applied_to(recording), fiducials.run, parameters.without
     missing, problem = profile.limits, fiducials.problem
-    geometry, travel, light = None, None, profile.known_light(without)
+    geometry, travel, bore, light = None, None, None, profile.known_light(without)
     if run is not None:
         try:
             library = _of_geometry(library_without(without), light)
             examined = examine(run, library, probe, progress=context.progress)
-            bore = misdrawn_bore(examined.searched) if examined.best is not None else None
+            bore = examined.misdrawn
             geometry = examined if bore is None else None
             state = examined.searched.found.state if bore is None else bore.state
             travel = gauge_travel(recording, run, state, without)
@@ -231,7 +233,7 @@ def examine_gauge(
     if problem:
         missing += (f"Rings and fiducials of the gauge run were not examined: {problem}.",)
         context.warn(missing[-1])
-    return Seen(recording.name, geometry, travel, light, missing)
+    return Seen(recording.name, geometry, travel, light, missing, misdrawn=bore is not None)
 
 
 def examine_field(
@@ -283,7 +285,7 @@ FREE_MOTION = Stage(
     "free_motion", "2", MotionParameters, adjust_freely, "an inspection's motion without encoder", "motion"
 )
 GAUGE_EVIDENCE = Stage(
-    "evidence", "51", DiagnosisParameters, examine_gauge, "what a gauge run shows of effects", "diagnosis"
+    "evidence", "52", DiagnosisParameters, examine_gauge, "what a gauge run shows of effects", "diagnosis"
 )
 FIELD_EVIDENCE = Stage(
     "evidence", "26", DiagnosisParameters, examine_field, "what an inspection shows of effects", "diagnosis"

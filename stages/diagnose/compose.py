@@ -54,6 +54,8 @@ def composed(
     of_light = _by_light(examined, rings, [c for c in own if c.name in certain])
     rings = Verdict.CONSISTENT if of_light else rings
     said = _said(examined, rings, known, unnamed, bool(of_profile), doubtful)
+    if gauge is not None and gauge.misdrawn and said.verdict is Verdict.NAMED:
+        said = replace(said, verdict=Verdict.PARTLY)  # the bore, or an effect that fits as well, remains
     asked = said.members if said.members else [e.name for e in said.effects]
     nameless = _IN_PROFILE if of_profile else of_travel[0].location if of_travel else None
     location = _location(examined, every, asked) or nameless

@@ -57,6 +57,7 @@ def test_a_bore_of_another_diameter_is_reported_instead_of_an_effect(monkeypatch
         context=cast(Any, SimpleNamespace(progress=unheard, warn=warned.append)),
     )
     assert seen.geometry is None
+    assert seen.misdrawn
     assert seen.travel is not None
     assert re.search(r"A bore of 83\.6. mm where recording\.yaml says 84 mm", warned[0])
     assert seen.shortcomings == (warned[0], "too slow")

@@ -35,6 +35,16 @@ def test_two_agreeing_parts_of_one_recording_give_a_name(real_probe: Probe) -> N
     assert 0.95 < found.effects[0].probability < 0.99
 
 
+def test_beside_a_bore_that_is_not_as_drawn_a_name_is_not_the_whole_answer(real_probe: Probe) -> None:
+    """Rings and fiducials deviate, by the bore or by an effect that fits as well; it was "named"."""
+    sure = seen("gauge", estimates=(replace(SCALE, agreements=(AGREES,)),))
+    found = answer(real_probe, None, replace(sure, misdrawn=True))
+    assert found.verdict is Verdict.PARTLY
+    assert found.remainder is not None
+    assert found.remainder.verdict is Verdict.UNEXPLAINED
+    assert answer(real_probe, None, replace(seen("gauge"), misdrawn=True)).verdict is Verdict.NOT_IDENTIFIABLE
+
+
 def test_an_effect_with_a_residual_or_another_possible_course_is_not_named(real_probe: Probe) -> None:
     sure = replace(SCALE, agreements=(AGREES,))
     unsure = of_gauge(real_probe, estimates=(replace(sure, other_courses=0.2),))

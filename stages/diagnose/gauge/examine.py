@@ -17,6 +17,7 @@ from stages.calibrate.gauge import MeasuredRun
 from stages.diagnose.effects.base import EffectModel
 from stages.diagnose.effects.courses import SEARCHED, with_courses
 from stages.diagnose.effects.nameless import Nameless
+from stages.diagnose.gauge.bores import Misdrawn, misdrawn_bore
 from stages.diagnose.gauge.confirm import Sized, confirmations, sizes_of
 from stages.diagnose.gauge.feasible import ability, feasibility, not_told_apart
 from stages.diagnose.gauge.fit import fit
@@ -115,6 +116,8 @@ class Examined:
         For each of the same terms, odds of unknown laws and courses relative to its name.
     patterns_by_chance : float
         Expected number of fits by patterns without a cause that are as good, when nothing is hidden.
+    misdrawn : Misdrawn or None
+        A bore that is not as drawn and explains the run as well as any effect; then nothing else was judged.
     """
 
     searched: Search
@@ -127,6 +130,7 @@ class Examined:
     sizes: tuple[Sized, ...] = ()
     unknown_laws: tuple[Unknown, ...] = ()
     patterns_by_chance: float = 1.0
+    misdrawn: Misdrawn | None = None
 
     @property
     def expected(self) -> float:
@@ -194,6 +198,9 @@ def examine(
             if seen.global_p > DETECTED:
                 seen = replace(seen, quality=_quality_of_stated(searched, stated))
                 return replace(seen, location=_OF_IMAGE if seen.repeats else None)
+            bore = misdrawn_bore(searched)
+            if bore is not None:
+                return replace(seen, misdrawn=bore)
             return _judged(replace(seen, verdicts=judge(searched, coursed, stated, swung)), coursed, stated)
     except np.linalg.LinAlgError as error:
         raise UnusableError("diagnose", f"the gauge run does not determine its poses ({error})") from error
