@@ -60,6 +60,10 @@ class Causes:
         looks_like_it = (c for c in self.laws if c.name in mates and c.name in members)
         return self.of(name) or next(looks_like_it, None)
 
+    def without(self, names: Collection[str]) -> Causes:
+        """Return these causes without those of which nothing is known any more."""
+        return replace(self, laws=tuple(c for c in self.laws if c.name not in names))
+
     def joined(self, others: Iterable[Cause]) -> Causes:
         """Return these causes and others; of two with the same name the likelier."""
         each = {c.name: c for c in sorted((*self.laws, *others), key=lambda c: c.probability)}

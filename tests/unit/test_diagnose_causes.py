@@ -14,13 +14,14 @@ from stages.diagnose.as_json import to_json
 from stages.diagnose.causes import Cause, Causes, CourseShare
 from stages.diagnose.effects.courses import with_courses
 from stages.diagnose.effects.library import LIBRARY
+from stages.diagnose.field.answer import _met
 from stages.diagnose.gauge import answer
 from stages.diagnose.gauge.hypotheses import Judged
 from stages.diagnose.gauge.judge import Unfitted, Verdicts
 from stages.diagnose.gauge.run import Term
 from stages.diagnose.gauge.sets import PATTERNS, Member
 from stages.diagnose.record_next import record_next
-from stages.diagnose.result import Diagnosis, EffectFound, Remainder, Verdict
+from stages.diagnose.result import Confirmation, Diagnosis, EffectFound, Remainder, Verdict
 
 MODELS = with_courses(LIBRARY)
 FAR, LATE = (
@@ -133,6 +134,27 @@ def test_what_rings_were_not_asked_about_is_as_likely_as_what_looks_like_it():
     assert record_next(members[:4], found.causes).startswith("To tell focal_scale, baseline, ")
     unlikely = replace(found, causes=Causes((focal, replace(baseline, probability=0.001))))
     assert [c.name for c in class_shown(unlikely).causes] == ["focal scale, 80 %", "encoder slip"]
+
+
+def test_a_name_that_the_inspection_contradicts_loses_its_probability_by_the_gauge_run():
+    """The page said "laser tilt, more than 99 %", and what looks like a tilt stood nowhere on it."""
+    tilt = EffectFound("laser_tilt", 0.995, {}, "The sheet is tilted.", "")
+    left = Remainder(Verdict.CLASS, None, ("laser_cone", "focal_scale"))
+    laws = (
+        Cause("laser_tilt", 0.995, (CourseShare("constant", 1.0, "The sheet is tilted."),)),
+        Cause("laser_cone", 0.6, (CourseShare("constant", 1.0, "The sheet is a cone."),)),
+        *(Cause(name, 0.0) for name in ("principal_point", "sensor_tilt", "focal_scale")),
+    )
+    partly = Diagnosis(
+        "f", "g", Verdict.PARTLY, 1e-9, effects=(tilt,), remainder=left, causes=Causes(laws, 0.003)
+    )
+    found = _met(partly, {"laser_tilt": Confirmation("0.60", "0.30", False)})
+    assert found.verdict is Verdict.CLASS
+    assert found.effects[0].probability == pytest.approx(0.995 / 1.995)
+    shown = [c.name for c in class_shown(found).causes]
+    assert [name for name in shown if "%" in name] == ["laser cone, 60 %"]
+    assert {"laser tilt", "principal point", "sensor tilt"} < set(shown)
+    assert "principal_point" in found.record_next
 
 
 def test_the_file_keeps_every_name_of_the_class_and_has_no_key_of_the_page():

@@ -233,7 +233,8 @@ def _met(
 ) -> Diagnosis:
     """Return the answer with the inspection's confirmations, or less certain where it contradicts them.
 
-    It was not asked about the effects in ``unasked``.
+    A contradiction speaks against a name at even odds, like any prediction that fails. The inspection was not
+    asked about the effects in ``unasked``.
     """
     effects = tuple(_confirmed(e, met.get(e.name)) for e in found.effects)
     silent = [name for name, each in met.items() if each is None and name in EFFECTS]
@@ -246,7 +247,8 @@ def _met(
     note = "The inspection contradicts what the gauge run names: see the second predictions of each effect."
     found = replace(found, identifiable="; ".join(e.statement for e in withdrawn), notes=(*found.notes, note))
     kept = tuple(e for e in effects if e.name not in against)
-    return beside(replace(found, effects=kept or effects), kept, classes_of([e.name for e in withdrawn]))
+    doubtful = tuple(replace(e, probability=e.probability / (1 + e.probability)) for e in withdrawn)
+    return beside(replace(found, effects=kept or doubtful), kept, classes_of([e.name for e in withdrawn]))
 
 
 def _confirmed(effect: EffectFound, met: Confirmation | None) -> EffectFound:

@@ -10,30 +10,21 @@ from stages.diagnose.result import Diagnosis, EffectFound, Remainder, Verdict
 
 
 def beside(found: Diagnosis, certain: Sequence[EffectFound], members: Sequence[str]) -> Diagnosis:
-    """Return the answer with one more class: a remainder beside what is certain, or the answer itself."""
-    before = found.remainder
+    """Return the answer with one more class: a remainder beside what is certain, or the answer itself.
+
+    How likely the ``members`` were by the gauge run alone holds no longer.
+    """
+    before, causes = found.remainder, found.causes.without(members)
     every = union(members, before.members if before is not None else found.members)
-    found = replace(found, record_next=record_next(every, found.causes))
+    found = replace(found, causes=causes, record_next=record_next(every, causes))
     if not certain:
-        return replace(
-            found,
-            verdict=Verdict.CLASS,
-            members=every,
-            remainder=None,
-            record_next=record_next(every, found.causes),
-        )
+        return replace(found, verdict=Verdict.CLASS, members=every, remainder=None)
     # What is unexplained stays so: a class does not contain it.
     is_nameless = before is not None and before.verdict is Verdict.UNEXPLAINED
     left = Remainder(
         Verdict.UNEXPLAINED if is_nameless else Verdict.CLASS, None, every, before.formula if before else ""
     )
-    return replace(
-        found,
-        verdict=Verdict.PARTLY,
-        members=(),
-        remainder=left,
-        record_next=record_next(every, found.causes),
-    )
+    return replace(found, verdict=Verdict.PARTLY, members=(), remainder=left)
 
 
 def nameless(found: Diagnosis) -> Diagnosis:
