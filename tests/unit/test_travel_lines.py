@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from pipeline.arrays import Float
-from stages.diagnose.travel.lines import find_lines
+from stages.diagnose.travel.lines import Line, find_lines
 
 RATE = 30.0
 TIME_S = np.arange(240) / RATE
@@ -55,6 +55,24 @@ def test_a_line_in_laser_pictures_only_is_the_sheets() -> None:
     assert lines[0].explained_by == ("laser_rocking",)
     assert lines[0].laser_mm == pytest.approx(0.2, abs=0.02)
     assert lines[0].lit_mm < 0.01
+
+
+@pytest.mark.parametrize(
+    ("lit_mm", "laser_mm", "causes"),
+    [
+        # The lights' image of a sheet that rocks at 1.7 Hz was named a vibration of the camera at 6.67 Hz.
+        (0.0004, 0.0084, ("probe_vibration", "laser_rocking")),
+        (0.009, 0.008, ("probe_vibration", "laser_rocking")),
+        (0.03, 0.032, ("probe_vibration",)),
+        (0.001, 0.03, ("laser_rocking",)),
+        (0.1, 0.2, ("probe_vibration", "laser_rocking")),
+    ],
+)
+def test_a_line_too_small_to_be_seen_in_lit_pictures_may_be_the_sheets(
+    lit_mm: float, laser_mm: float, causes: tuple[str, ...]
+) -> None:
+    line = Line(6.67, laser_mm, 0.0007, 3.0, 5e-12, lit_mm, laser_mm, 0.0057, 0.016)
+    assert line.explained_by == causes
 
 
 def test_with_the_laser_always_on_the_two_cannot_be_distinguished() -> None:

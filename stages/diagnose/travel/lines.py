@@ -146,11 +146,11 @@ class Line:
             return ("probe_vibration", "laser_rocking")
         # Amplitudes that differ by less than 3 σ or a fifth (chosen) count as equal.
         equal_mm = max(3 * self.share_sigma_mm, 0.2 * self.laser_mm)
-        if abs(self.lit_mm - self.laser_mm) < equal_mm:
-            return ("probe_vibration",)
-        if self.lit_mm < equal_mm:
-            return ("laser_rocking",)
-        return ("probe_vibration", "laser_rocking")
+        equal, at_rest = abs(self.lit_mm - self.laser_mm) < equal_mm, self.lit_mm < equal_mm
+        # A small line may be equal in both kinds of pictures and absent from the lit ones, for all they show.
+        if equal == at_rest:
+            return ("probe_vibration", "laser_rocking")
+        return ("probe_vibration",) if equal else ("laser_rocking",)
 
 
 def find_lines(time_s: Float, xy_mm: Float, lit: Bool, shown: Bool | None = None) -> tuple[Line, ...]:
