@@ -291,6 +291,6 @@ def _report(pictures: Pictures, radius_mm: float, changes: Changes, context: Con
 
 
 PREMISES = Stage(
-    "premises", "33", PremisesParameters, check_premises,
+    "premises", "34", PremisesParameters, check_premises,
     "stated lights, times, encoder and diameter compared with the pictures and corrected",
 )  # fmt: skip

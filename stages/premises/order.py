@@ -88,14 +88,14 @@ def _exchanged_blocks(step: Float) -> list[tuple[int, int]]:
 
     ``step`` (K,) is in usual steps. The wall leaps ahead over one block, goes back by both, and leaps ahead
     again to where it would have been. All steps between these three are usual ones, unlike those of a probe
-    pulled by hand.
+    pulled by hand. Each leap ahead is as long as the block behind the other one.
     """
     out, odd = [], np.flatnonzero(np.abs(step - 1) > _ASTRAY)
     for first, back, last in zip(odd, odd[1:], odd[2:], strict=False):
         ahead = step[[first, back, last]] - 1
-        again = abs(ahead.sum()) < max(_ASTRAY, _LEAPS_ERR * -ahead[1])
-        blocks = first > 0 and last - first > _PAIR
-        if blocks and again and ahead[0] > _ASTRAY and ahead[1] < _BACK - 1 and ahead[2] > _ASTRAY:
+        lengths = np.array([last - back, first - last, back - first])
+        fits = np.abs(ahead - lengths) < np.maximum(_ASTRAY, _LEAPS_ERR * np.abs(lengths))
+        if first > 0 and last - first > _PAIR and fits.all():
             out.append((int(first), int(last)))
     return out
 

@@ -115,3 +115,17 @@ def test_a_probe_that_stands_for_most_of_a_run_causes_no_exchange(seed):
 @pytest.mark.parametrize("seed", range(40))
 def test_a_probe_pulled_by_hand_exchanges_no_blocks(seed):
     assert _exchanged_blocks(_in_usual_steps(pulled(seed).steps.size)) == []
+
+
+@pytest.mark.parametrize(("first", "back", "last"), [(40, 190, 360), (40, 43, 47), (40, 41, 360)])
+def test_three_jerks_of_the_probe_exchange_no_blocks(first, back, last):
+    """Jerks of less than a step, 150 and 170 pictures apart, left out 321 of 400 pictures."""
+    step = np.ones(400)
+    step[[first, back, last]] = 1.8, -0.8, 1.9
+    assert _exchanged_blocks(step) == []
+
+
+@pytest.mark.parametrize(("one", "other"), [(2, 1), (5, 5), (3, 12)])
+def test_exchanged_blocks_of_any_lengths_are_found(one, other):
+    order = np.r_[:100, 100 + one : 100 + one + other, 100 : 100 + one, 100 + one + other : 400]
+    assert _exchanged_blocks(_in_usual_steps(np.diff(order))) == [(99, 99 + one + other)]
