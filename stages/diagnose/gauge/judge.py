@@ -48,16 +48,20 @@ class Unfitted:
     probability: float
 
     @property
+    def terms(self) -> tuple[Term, ...]:
+        """Its effects and patterns with their amplitudes."""
+        each = zip(self.members, self.amplitudes, strict=True)
+        return tuple(Term(m.model, m.shape, a) for m, a in each)
+
+    @property
     def possible(self) -> bool:
         """Whether all sizes are possible: for example, an exposure cannot be negative."""
-        each = zip(self.members, self.amplitudes, strict=True)
-        return all(m.model.possible(m.shape, a) for m, a in each)
+        return all(t.model.possible(t.shape, t.amplitude) for t in self.terms)
 
     @property
     def statement(self) -> str:
         """The set in words, with its sizes."""
-        each = zip(self.members, self.amplitudes, strict=True)
-        return " ".join(m.model.statement(m.shape, a) for m, a in each)
+        return " ".join(t.model.statement(t.shape, t.amplitude) for t in self.terms)
 
 
 @dataclass(frozen=True)
@@ -86,6 +90,12 @@ class Verdicts:
     unfitted: tuple[Unfitted, ...] = ()
     laws: int = 1
 
+    @property
+    def sets(self) -> Iterator[tuple[float, tuple[Term, ...]]]:
+        """The probability of each set, fitted or not, and its effects and patterns."""
+        yield from ((float(p), j.fit.terms) for p, j in zip(self.probability, self.judged, strict=True))
+        yield from ((u.probability, u.terms) for u in self.unfitted)
+
     def chance_of(self, term: Term) -> float:
         """Return the probability that a term's law is among the causes, with whatever course."""
         return sum(p for p, causes, _, _ in self._each() if cause_of(term.model, term.shape) in causes)
@@ -101,20 +111,24 @@ class Verdicts:
         Causes that merely join others, without explaining the run better, are not among them: where one law
         suffices, every other may stand beside it with a probability that it also has without any run.
         """
-        chance = dict[frozenset[Cause], float]()
-        for p, causes, *_ in self._each():
-            chance[frozenset(causes)] = chance.get(frozenset(causes), 0.0) + p
+        chance, alone = dict[frozenset[Cause], float](), dict[frozenset[Cause], float]()
+        for p, of, _, patterns in self._each():
+            causes = frozenset(of)
+            chance[causes] = chance.get(causes, 0.0) + p
+            alone[causes] = alone.get(causes, 0.0) + p * (not patterns)
         each = sorted(chance, key=lambda causes: -chance[causes])
         before = np.cumsum([chance[causes] for causes in each]) - [chance[causes] for causes in each]
         likely = (causes for causes, so_far in zip(each, before, strict=True) if so_far < sure)
-        of_each = (sorted(causes) for causes in likely if not self._joins(causes, chance))
+        of_each = (sorted(causes) for causes in likely if not self._joins(causes, chance[causes], alone))
         return tuple(dict.fromkeys(law for causes in of_each for law, _ in causes))
 
-    def _joins(self, causes: frozenset[Cause], chance: Mapping[frozenset[Cause], float]) -> bool:
-        """Return whether fewer of these causes explain the run as well."""
+    def _joins(
+        self, causes: frozenset[Cause], chance: float, alone: Mapping[frozenset[Cause], float]
+    ) -> bool:
+        """Return whether fewer of these causes, without any pattern, explain the run as well."""
         return any(
-            fewer and fewer < causes and p >= chance[causes] * self.laws ** (len(causes) - len(fewer))
-            for fewer, p in chance.items()
+            fewer and fewer < causes and p >= chance * self.laws ** (len(causes) - len(fewer))
+            for fewer, p in alone.items()
         )
 
     def instead_of(self, term: Term) -> Instead:
@@ -132,13 +146,11 @@ class Verdicts:
 
     def _each(self) -> Iterator[tuple[float, set[Cause], set[str], set[str]]]:
         """Yield every hypothesis' probability, its causes, its effects' names, and its patterns' formulas."""
-        for p, j in zip(self.probability, self.judged, strict=True):
-            yield float(p), *_named_and_nameless(j.fit.terms)
-        for one in self.unfitted:
-            yield one.probability, *_named_and_nameless(one.members)
+        for p, terms in self.sets:
+            yield p, *_named_and_nameless(terms)
 
 
-def _named_and_nameless(of: Sequence[Term | Member]) -> tuple[set[Cause], set[str], set[str]]:
+def _named_and_nameless(of: Sequence[Term]) -> tuple[set[Cause], set[str], set[str]]:
     """Return the causes and names of the effects of a hypothesis, and the formulas of its patterns."""
     named = [m for m in of if not isinstance(m.model, Nameless)]
     patterns = {m.model.formula(m.shape) for m in of if isinstance(m.model, Nameless)}
