@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from pipeline.instrument.probe import Probe
 from pipeline.physics.catalogue import effect
 from pipeline.physics.effect import Channel, FixedTo
+from stages.diagnose.both_recordings import global_p
 from stages.diagnose.causes import NONE, Causes
 from stages.diagnose.channels import Seen
 from stages.diagnose.claims import Claim, claims_of, stretch
@@ -26,6 +27,7 @@ from stages.diagnose.travel.events import SLIP
 from stages.diagnose.weighed import weighed
 
 _SAME_FREQUENCY_HZ = 0.15
+_WITH_NAMES = (Verdict.CLASS, Verdict.PARTLY, Verdict.NAMED)
 _IN_PROFILE = Location(str(Channel.PROFILE), None, None)
 _UNKNOWN = "a cause that the library does not have, such as {}"
 _BY_LIGHT = (
@@ -59,7 +61,7 @@ def composed(
     asked = said.members if said.members else [e.name for e in said.effects]
     nameless = _IN_PROFILE if of_profile else of_travel[0].location if of_travel else None
     location = _location(examined, every, asked) or nameless
-    causes = weighed(examined, known) if said.members else NONE
+    causes = weighed(examined if rings in _WITH_NAMES else None, known) if said.members else NONE
     words = _identifiable(said, examined, any(c.may_have_other_course for c in known))
     identifiable = " ".join(s for s in (words, *of_profile, *(u.sentence for u in of_travel)) if s)
     partly = said.verdict is Verdict.PARTLY
@@ -68,7 +70,7 @@ def composed(
         recording=field.name if field is not None else "",
         gauge=gauge.name if gauge is not None else "",
         verdict=said.verdict,
-        global_p=_global_p(field, gauge),
+        global_p=global_p(field, gauge),
         location=location,
         effects=said.effects,
         members=() if partly else said.members,
@@ -111,7 +113,7 @@ def _said(
     every = (*of_rings, *(c.found for c in claims))
     certain = (*_sure_of_rings(examined, rings, unexplained), *(c.found for c in claims if c.sure))
     doubted = [*(n for c in claims if not c.sure for n in (*c.rivals, c.name)), *doubtful]
-    if rings in (Verdict.CLASS, Verdict.PARTLY, Verdict.NAMED):
+    if rings in _WITH_NAMES:
         unsure = [e.name for e in of_rings if e not in certain]
         doubted += [*(of_gauge.members(examined) if unsure and examined is not None else ()), *unsure]
     nameless = unexplained or unnamed or _is_nameless(examined, rings)
@@ -280,23 +282,3 @@ def _unexplained_travel(*recordings: Seen | None) -> list[_Untold]:
             where = stretch(travel, left.where, None, None)
             out.append(_Untold(f"{name}: {left.statement}", where, left.by_slip))
     return out
-
-
-def _global_p(field: Seen | None, gauge: Seen | None) -> float:
-    """Return the smallest p-value of all channels, times the number of channels that show anything.
-
-    The p-values of the line's profile leave out errors of image formation, so that only those count which
-    exceed these, too.
-    """
-    each = []
-    for seen in (field, gauge):
-        if seen is None:
-            continue
-        if seen.geometry is not None:
-            each.append(seen.geometry.global_p)
-        if seen.travel is not None:
-            each.append(seen.travel.least_p)
-        if seen.profile is not None:
-            each.append(min((f.p_value for f in seen.profile.findings if f.found), default=1.0))
-    showing = [p for p in each if p < 1]
-    return float(min(min(showing) * len(showing), 1.0)) if showing else 1.0

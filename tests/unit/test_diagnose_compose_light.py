@@ -10,12 +10,14 @@ import numpy as np
 import pytest
 
 from pipeline.instrument.probe import Probe
+from stages.diagnose import compose
+from stages.diagnose.causes import NONE
 from stages.diagnose.gauge import answer as of_rings
 from stages.diagnose.gauge.examine import Examined
 from stages.diagnose.profile.evidence import Condition, ProfileEvidence
 from stages.diagnose.profile.finding import Size, finding
 from stages.diagnose.result import EffectFound, FitQuality, Location, Verdict
-from tests.diagnosed import AGREES, answer, seen
+from tests.diagnosed import AGREES, SCALE, answer, seen
 from tests.unit.wall_points import Bore, plain_probe, ring_points
 
 
@@ -91,6 +93,20 @@ def test_residuals_smaller_than_the_uncertainty_of_a_named_light_effect_are_not_
     told = [s for s in found.shortcomings if "less than the size of subsurface is uncertain" in s]
     assert bool(told) is (verdict is Verdict.NAMED)
     assert all("such as laser_cone, baseline_drift, moves them" in s for s in told)
+
+
+@pytest.mark.parametrize(("moved_px", "asked"), [(0.07, False), (0.3, True)])
+def test_causes_of_rings_that_light_explains_are_no_part_of_another_channels_class(
+    real_probe: Probe, monkeypatch: pytest.MonkeyPatch, moved_px: float, asked: bool
+) -> None:
+    """Beside a class of the encoder's errors, causes of rings that were left out would be summed up."""
+    rings, weighed = rings_of_a_class(monkeypatch, moved_px), []
+    monkeypatch.setattr(compose, "weighed", lambda examined, claims: weighed.append(examined) or NONE)
+    glow = light("gauge", "subsurface", Size("transport_mm", "mm", 0.3, 0.03))
+    found = answer(real_probe, None, replace(seen("gauge", estimates=(SCALE,)), profile=glow, geometry=rings))
+    assert found.remainder is not None
+    assert "encoder_scale" in found.remainder.members
+    assert weighed == [rings if asked else None]
 
 
 @pytest.mark.parametrize(
