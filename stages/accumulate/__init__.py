@@ -166,7 +166,8 @@ def accumulate_wall(
     shared = shared_on_wall(on_wall, grid, parameters.largest_gap_mm, context.scratch)
     fixed = fixed_to_probe(survey, rings.frame, trajectory.radius_mm, grid, context.scratch)
     held = _held_in(rings, survey, trajectory.radius_mm)
-    wall = replace(empty_wall(grid, survey, trajectory.axis, fixed, context.scratch), held=held)
+    wall = empty_wall(grid, survey, trajectory.axis, fixed, context.scratch)
+    wall = replace(wall, held=held, displaced_mm=trajectory.displaced_mm)
     smoothing_mm, gap_mm = parameters.smoothing_mm, parameters.largest_gap_mm
     stretches = cut_stretches(grid, survey, smoothing_mm, gap_mm)
     for done, stretch in enumerate(stretches, 1):
@@ -290,7 +291,7 @@ def _report(context: Context, wall: Wall, spread: CalibrationSpread) -> None:
 
 ACCUMULATE = Stage(
     "accumulate",
-    "19",
+    "20",
     AccumulateParameters,
     accumulate_wall,
     "point cloud and radius map around the pipe's own axis, with σ",

@@ -93,6 +93,7 @@ def find_defects(
         Witnesses(texture, rings, pictures, wall.held),
         recording.pipe.wall_thickness_mm,
         parameters.min_depth_mm,
+        wall.displaced_mm,
     )
     cloud = cloud_along(wall.cloud)
     measured = MeasuredWall(relief, cloud, cloud.ring_spacing_mm())
@@ -153,6 +154,7 @@ def _described(
     """Return a region with its ``evidence``; ``measured`` with all rings, and with those that were kept."""
     whole, kept = measured
     here, surface, depth = kept.here, kept.surface, kept.allowed
+    depth = replace(depth, sigma_mm=float(np.hypot(depth.sigma_mm, scene.displaced_mm)))
     cut = abs(whole.depth.depth_mm) - abs(depth.depth_mm)
     widened = flattened(depth, here, surface, scene.seen_by.held, measurer.wall.ways_mm)
     without_them_mm = widened.sigma_mm
@@ -224,5 +226,5 @@ def _defects_of_run(
 
 
 DEFECTS = Stage(
-    "defects", "54", DefectParameters, _defects_of_run, "defects as instances with depth, clock and kind"
+    "defects", "55", DefectParameters, _defects_of_run, "defects as instances with depth, clock and kind"
 )
