@@ -10,7 +10,17 @@ from pipeline.physics.catalogue import CLASSES
 
 @dataclass(frozen=True)
 class CourseShare:
-    """A course that a cause may have: its kind, its probability for this cause, and the cause in words."""
+    """A form that a cause may have: its course or courses, such as "constant and step", and its orders.
+
+    Attributes
+    ----------
+    kind : str
+        The courses.
+    probability : float
+        For this cause.
+    statement : str
+        The cause in words.
+    """
 
     kind: str
     probability: float

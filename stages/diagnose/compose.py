@@ -13,6 +13,7 @@ from stages.diagnose.causes import NONE, Causes
 from stages.diagnose.channels import Seen
 from stages.diagnose.claims import Claim, claims_of, stretch
 from stages.diagnose.gauge import answer as of_gauge
+from stages.diagnose.gauge.doubts import sure
 from stages.diagnose.gauge.examine import Examined
 from stages.diagnose.record_next import AGAIN, record_next
 from stages.diagnose.result import (
@@ -139,7 +140,7 @@ def _sure_of_rings(examined: Examined | None, rings: Verdict, unexplained: bool)
     """
     if examined is None or rings not in (Verdict.NAMED, Verdict.PARTLY):
         return ()
-    each = zip(of_gauge.effects_found(examined), of_gauge.sure(examined), strict=True)
+    each = zip(of_gauge.effects_found(examined), sure(examined), strict=True)
     certain = [e for e, is_sure in each if is_sure]
     if not unexplained:
         return tuple(certain)

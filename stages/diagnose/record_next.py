@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
@@ -60,7 +61,10 @@ def _courses(name: str, names: Sequence[str], causes: Causes) -> list[_Possible]
         return [_Possible(name, "", likeliest if like is None else like.probability)]
     if not known.courses:
         return [_Possible(name, "", known.probability)] if known.probability > 0 else []
-    return [_Possible(name, c.kind, known.probability * c.probability) for c in known.courses]
+    weight = defaultdict[str, float](float)
+    for c in known.courses:
+        weight[c.kind] += known.probability * c.probability
+    return [_Possible(name, kind, p) for kind, p in weight.items()]
 
 
 def _purpose(possible: Sequence[_Possible]) -> str:
@@ -103,9 +107,10 @@ def _separating(first: _Possible, second: _Possible) -> tuple[str, ...]:
     by_law = [p for name in names for p in _parts(name) if _serves(p, names)] if names[0] != names[1] else []
     if "" in courses or len(courses) == 1:
         return tuple(by_law)
-    if "reversal" in courses:
+    kinds = {kind for course in courses for kind in course.split(" and ")}
+    if "reversal" in kinds:
         return (*by_law, _TO_AND_FRO)
-    return (*by_law, _OTHER_SPEED if courses & {"speed", "distance"} else _LONGER)
+    return (*by_law, _OTHER_SPEED if kinds & {"speed", "distance"} else _LONGER)
 
 
 def _serves(part: str, names: Sequence[str]) -> bool:

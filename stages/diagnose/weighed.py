@@ -2,19 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections import defaultdict
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from itertools import chain
+from math import prod
 
-from pipeline.arrays import Float
 from stages.diagnose.causes import NONE, Cause, Causes, CourseShare
 from stages.diagnose.claims import Claim
-from stages.diagnose.effects.base import EffectModel, Shape
 from stages.diagnose.effects.nameless import Nameless
-from stages.diagnose.gauge.answer import doubted
+from stages.diagnose.gauge.doubts import Doubt, doubts
 from stages.diagnose.gauge.examine import OF_A_PIPE, Examined
 from stages.diagnose.gauge.judge import Verdicts
+from stages.diagnose.gauge.run import Term
+from stages.diagnose.gauge.sets import Cause as LawAndOrder
+from stages.diagnose.gauge.sets import cause_of
 
-_Sized = tuple[EffectModel, Shape, Float]
+_CERTAIN = Doubt({})
+# In place of a law's name: a cause that the library does not have, or measurements that do not agree.
+_OUTSIDE = ""
 
 
 def weighed(examined: Examined | None, claims: Sequence[Claim]) -> Causes:
@@ -33,53 +39,82 @@ def _claimed(claim: Claim) -> Iterator[Cause]:
 def _of_rings(examined: Examined) -> Causes:
     """Return all laws that rings and fiducials were asked about, with the probability that each is a cause.
 
-    What makes a name of the likeliest hypothesis doubtful is taken off its law: see `doubted`. A gauge is
-    straight and round.
+    A gauge is straight and round.
     """
     best, verdicts = examined.best, examined.verdicts
     if best is None or verdicts is None:
         return NONE
-    chance, courses = _weighed(verdicts)
-    each = doubted(examined)
-    for term, one in zip(best.library_terms, each, strict=False):
-        chance |= {term.model.law: one.chance, **one.alike}
-    every = dict.fromkeys((*chance, *(f.name for f in examined.feasibility), *OF_A_PIPE))
-    laws = (Cause(law, min(chance.get(law, 0.0), 1.0), courses.get(law, ())) for law in every)
-    outside = min(max((one.outside for one in each), default=0.0) + _with_patterns(verdicts), 1.0)
-    return Causes(tuple(sorted(laws, key=lambda c: -c.probability)), outside)
+    each = zip(best.library_terms, doubts(examined), strict=False)
+    table = _table(verdicts, {cause_of(t.model, t.shape): doubt for t, doubt in each})
+    chance, courses = defaultdict[str, float](float), _courses(table)
+    for one in table:
+        for name, share in one.names.items():
+            chance[name] += one.probability * share
+    every = dict.fromkeys((*chance, *(f.name for f in examined.feasibility), *sorted(OF_A_PIPE)))
+    laws = (Cause(law, chance[law], courses.get(law, ())) for law in every if law != _OUTSIDE)
+    return Causes(tuple(sorted(laws, key=lambda c: -c.probability)), chance[_OUTSIDE])
 
 
-def _weighed(verdicts: Verdicts) -> tuple[dict[str, float], dict[str, tuple[CourseShare, ...]]]:
-    """Return for each law the probability of all sets with it, and its courses, the likeliest first.
+@dataclass(frozen=True)
+class _Weighed:
+    """A set of effects with its probability, including what may be in their places.
 
-    The words for a course are those of the likeliest set with it.
+    Attributes
+    ----------
+    probability : float
+        Those of all sets add up to 1.
+    terms : tuple of Term
+    names : dict of str to float
+        Each law that may be among its causes, and `_OUTSIDE`, with the probability in this set.
     """
-    chance, of_course = dict[str, float](), dict[tuple[str, str], list[tuple[float, str]]]()
-    for p, members in _sets(verdicts):
-        for law in {model.law for model, *_ in members}:
-            chance[law] = chance.get(law, 0.0) + p
-        for model, shape, amplitude in members:
-            one = (p, model.statement(shape, amplitude))
-            of_course.setdefault((model.law, str(model.kind)), []).append(one)
-    shares = [
-        (law, CourseShare(kind, sum(p for p, _ in each) / chance[law], max(each)[1]))
-        for (law, kind), each in of_course.items()
-    ]
-    shares.sort(key=lambda pair: -pair[1].probability)
-    return chance, {law: tuple(c for name, c in shares if name == law) for law in chance}
+
+    probability: float
+    terms: tuple[Term, ...]
+    names: dict[str, float]
 
 
-def _with_patterns(verdicts: Verdicts) -> float:
-    """Return the probability of all sets that need a pattern without a cause."""
-    each = zip(verdicts.probability, verdicts.judged, strict=True)
-    fitted = sum(float(p) for p, j in each if len(j.fit.terms) > len(j.library_terms))
-    return fitted + sum(u.probability for u in verdicts.unfitted if any(m.nameless for m in u.members))
+def _table(verdicts: Verdicts, doubt: Mapping[LawAndOrder, Doubt]) -> list[_Weighed]:
+    """Return all sets, each likelier by the odds of what may be in its effects' places."""
+    sets = []
+    for p, every in verdicts.sets:
+        terms = tuple(t for t in every if not isinstance(t.model, Nameless))
+        each = {cause: doubt.get(cause, _CERTAIN) for cause in (cause_of(t.model, t.shape) for t in terms)}
+        weight = p * prod(1 + d.odds for d in each.values())
+        sets.append(_Weighed(weight, terms, _names(each, patterned=len(terms) < len(every))))
+    total = sum(s.probability for s in sets)
+    return [replace(s, probability=s.probability / total) for s in sets if s.probability > 0]
 
 
-def _sets(verdicts: Verdicts) -> Iterator[tuple[float, list[_Sized]]]:
-    """Yield the probability of each set, fitted or not, and its effects."""
-    for p, j in zip(verdicts.probability, verdicts.judged, strict=True):
-        yield float(p), [(t.model, t.shape, t.amplitude) for t in j.library_terms]
-    for u in verdicts.unfitted:
-        each = zip(u.members, u.amplitudes, strict=True)
-        yield u.probability, [(m.model, m.shape, a) for m, a in each if not isinstance(m.model, Nameless)]
+def _names(each: Mapping[LawAndOrder, Doubt], patterned: bool) -> dict[str, float]:
+    """Return the names that may be in a set's places, which are independent, with their probabilities."""
+    missing = {_OUTSIDE: 0.0 if patterned else 1.0}
+    for (law, _), doubt in each.items():
+        for name, odds in {law: 1.0, _OUTSIDE: doubt.outside, **doubt.alike}.items():
+            missing[name] = missing.get(name, 1.0) * (1 - odds / (1 + doubt.odds))
+    return {name: 1 - p for name, p in missing.items()}
+
+
+def _courses(table: Sequence[_Weighed]) -> dict[str, tuple[CourseShare, ...]]:
+    """Return each law's courses, or sets of courses and orders, the likeliest first.
+
+    The words are those of the likeliest set with them.
+    """
+    found = dict[str, dict[object, list[tuple[float, CourseShare]]]]()
+    for one in table:
+        for law in {t.model.law for t in one.terms}:
+            same = [t for t in one.terms if t.model.law == law]
+            kinds = " and ".join(sorted({str(t.model.kind) for t in same}))
+            words = " ".join(t.model.statement(t.shape, t.amplitude) for t in same)
+            of = frozenset((t.model.kind, cause_of(t.model, t.shape)) for t in same)
+            share = one.probability * one.names[law]
+            found.setdefault(law, {}).setdefault(of, []).append((share, CourseShare(kinds, 1.0, words)))
+    return {law: _shares(list(of_law.values())) for law, of_law in found.items()}
+
+
+def _shares(of_law: Sequence[Sequence[tuple[float, CourseShare]]]) -> tuple[CourseShare, ...]:
+    total = sum(p for each in of_law for p, _ in each)
+    shares = (
+        replace(max(each, key=lambda one: one[0])[1], probability=sum(p for p, _ in each) / total)
+        for each in of_law
+    )
+    return tuple(sorted(shares, key=lambda c: -c.probability))

@@ -15,11 +15,12 @@ from stages.diagnose.causes import Cause, Causes, CourseShare
 from stages.diagnose.effects.courses import with_courses
 from stages.diagnose.effects.library import LIBRARY
 from stages.diagnose.field.answer import _met
-from stages.diagnose.gauge import answer
+from stages.diagnose.gauge import doubts
 from stages.diagnose.gauge.hypotheses import Judged
 from stages.diagnose.gauge.judge import Unfitted, Verdicts
 from stages.diagnose.gauge.run import Term
 from stages.diagnose.gauge.sets import PATTERNS, Member
+from stages.diagnose.gauge.unknown_laws import Unknown
 from stages.diagnose.record_next import record_next
 from stages.diagnose.result import Confirmation, Diagnosis, EffectFound, Remainder, Verdict
 
@@ -50,41 +51,124 @@ def judged(*terms: Term) -> Judged:
     return Judged(cast(Any, SimpleNamespace(terms=terms)), cast(Any, None), (), 0.0, 0.0, 0.0)
 
 
-def test_a_law_gathers_its_courses_and_gives_what_is_doubtful_to_what_makes_it_so(monkeypatch):
+def gauge_run(sets: list[tuple[tuple[Term, ...], float]], *alike: tuple[str, ...], **given: Any) -> Any:
+    """Return a gauge run with fitted sets and their probabilities, the best first.
+
+    ``alike`` is what looks like each effect of the best. All names are confirmed, unless ``given`` says
+    otherwise.
+    """
+    fitted = tuple(judged(*terms) for terms, _ in sets)
+    count = len(fitted[0].library_terms)
+    verdicts = Verdicts((), fitted, np.array([p for _, p in sets]), 1.0, cast(Any, None), (), 25)
+    agrees = Confirmation("1", "1", True)
+    seen = {"best": fitted[0], "verdicts": verdicts, "feasibility": [], "quality": None} | {
+        "unsplit": (*alike, *[()] * (count - len(alike))), "confirmed": ((agrees,),) * count,
+        "unknown_laws": (Unknown(0.0, 0.0),) * count,
+    }  # fmt: skip
+    return SimpleNamespace(**seen | given)
+
+
+@pytest.fixture
+def same_shift(monkeypatch: pytest.MonkeyPatch) -> None:
+    """All effects and patterns move rings by 1 px."""
+    monkeypatch.setattr(doubts, "shift_px", lambda fit, term: 1.0)
+
+
+def chances(found: Causes) -> dict[str, float]:
+    return {c.name: round(c.probability, 4) for c in found.laws if c.probability > 0}
+
+
+def test_a_law_gathers_its_courses_and_gives_what_is_doubtful_to_what_makes_it_so(same_shift):
     """Courses of one law stood as causes of their own, and a name of 21 % as one of 80 %."""
     far, late = term("laser_tilt, distance", (100.0,)), term("laser_tilt, exponential", (2.0,))
     cone = Member(LIBRARY["laser_cone"], (), 0.0)
     sensor = Unfitted((Member(LIBRARY["sensor_tilt"], (), 0.0),), (np.ones(2),), 0.0, 0.01)
     beside = Unfitted((Member(far.model, far.shape, 0.0), cone), (far.amplitude, np.ones(1)), 0.0, 0.1)
     pattern = Unfitted((Member(*PATTERNS[0], 0.0),), (np.ones(2),), 0.0, 0.05)
-    verdicts = Verdicts(
-        (),
-        (judged(far), judged(late)),
-        np.array([0.6, 0.25]),
-        1.0,
-        cast(Any, None),
-        (beside, pattern, sensor),
-        25,
-    )
-    shared = answer.Doubted(0.38, {"sensor_tilt": 0.38}, 0.1)
-    monkeypatch.setattr(by, "doubted", lambda seen: (shared,))
     asked = [SimpleNamespace(name=n) for n in ("laser_tilt", "laser_cone", "baseline")]
-    seen: Any = SimpleNamespace(best=judged(far), verdicts=verdicts, feasibility=asked)
+    seen = gauge_run([((far,), 0.59), ((late,), 0.25)], ("sensor_tilt",), confirmed=((),), feasibility=asked)
+    seen.verdicts = replace(seen.verdicts, unfitted=(beside, pattern, sensor))
     found = by.weighed(seen, ())
-    assert {c.name: round(c.probability, 9) for c in found.laws} == {
-        "laser_tilt": 0.38, "sensor_tilt": 0.38, "laser_cone": 0.1,
-        "baseline": 0.0, "ovality": 0.0, "pipe_bend": 0.0,
-    }  # fmt: skip
-    assert found.outside == pytest.approx(0.1 + 0.05)
+    # To the tilt's .94 come as much for the sensor, with its own .01, and a tenth for unknown causes.
+    total = 1 + 0.94 - 0.01 + 0.094
     tilt = found.of("laser_tilt")
     assert tilt is not None
+    assert tilt.probability == pytest.approx(0.94 / total)
+    assert doubts.chances(seen) == pytest.approx([tilt.probability])
+    assert found.outside == pytest.approx((0.094 + 0.05) / total)
+    of_cone = 0.1 * (1 + 0.93 / 0.94 + 0.1) / total
+    assert chances(found) == pytest.approx(
+        {"laser_tilt": tilt.probability, "sensor_tilt": tilt.probability, "laser_cone": of_cone}, abs=1e-4
+    )
+    assert [c.name for c in found.laws[3:]] == ["baseline", "ovality", "pipe_bend"]
     assert [(c.kind, round(c.probability, 3)) for c in tilt.courses] == [
-        ("distance", 0.737),
-        ("exponential", 0.263),
+        ("distance", 0.734),
+        ("exponential", 0.266),
     ]
     assert "in proportion to the distance" in tilt.courses[0].statement
     assert found.of("focal_scale") is None
     assert by.weighed(cast(Any, SimpleNamespace(best=None, verdicts=None)), ()) == Causes()
+
+
+def test_exclusive_causes_add_up_to_one_and_doubt_changes_no_order(same_shift):
+    """A cone of 40 % beside a tilt of 60 % came first, at 40 %, once something looked like the tilt."""
+    tilt, cone = term("laser_tilt"), term("laser_cone")
+    found = by.weighed(gauge_run([((tilt,), 0.6), ((cone,), 0.4)], ("sensor_tilt",)), ())
+    assert chances(found) == {"laser_tilt": 0.375, "sensor_tilt": 0.375, "laser_cone": 0.25}
+    unsure = by.weighed(gauge_run([((tilt,), 0.6), ((cone,), 0.4)], ("sensor_tilt",), confirmed=((),)), ())
+    assert sum(c.probability for c in unsure.laws) + unsure.outside == pytest.approx(1.0)
+    assert unsure.outside == pytest.approx(0.06 / 1.66)
+
+
+def test_what_looks_like_several_effects_is_as_likely_as_the_likelier_of_them_at_least(same_shift):
+    """The second effect's alike took the place of the first's, at 2 %."""
+    both = (term("laser_tilt"), term("laser_cone"))
+    found = by.weighed(gauge_run([(both, 1.0)], ("baseline",), ("baseline", "focal_scale")), ())
+    assert chances(found) == {
+        "laser_tilt": 0.5, "laser_cone": 0.3333, "focal_scale": 0.3333, "baseline": round(2 / 3, 4),
+    }  # fmt: skip
+
+
+def test_a_law_with_two_courses_at_once_is_doubted_once(same_shift):
+    both = (term("laser_tilt"), term("laser_tilt, step", (5.0,)))
+    seen = gauge_run([((both[1],), 0.6), (both, 0.4)], ("sensor_tilt",))
+    assert chances(by.weighed(seen, ())) == {"laser_tilt": 0.5, "sensor_tilt": 0.5}
+
+
+def test_what_predicts_better_elsewhere_is_a_cause_of_its_own_and_counts_once(same_shift):
+    """Steps of cone and baseline, both also alike, were half of "a cause that the library does not have"."""
+    focal, cone = term("focal_scale"), term("laser_cone, step", (5.0,))
+    tilt, scale = term("laser_tilt"), term("baseline")
+    seen = gauge_run([((focal,), 0.8), ((cone,), 0.2), ((tilt,), 0.0), ((scale,), 0.0)], ("laser_cone",))
+    first, *others = seen.verdicts.judged
+    better = (first, *(replace(j, heldout=-1.0) for j in others))
+    seen.verdicts = replace(seen.verdicts, judged=better)
+    found = by.weighed(seen, ())
+    assert found.outside == 0.0
+    assert chances(found) == dict.fromkeys(("focal_scale", "laser_cone", "laser_tilt", scale.model.law), 0.25)
+    # Fewer names that predict better leave nothing in a name's place.
+    pair = gauge_run([((focal, cone), 1.0), ((focal,), 0.0)])
+    first, fewer = pair.verdicts.judged
+    pair.verdicts = replace(pair.verdicts, judged=(first, replace(fewer, heldout=-1.0)))
+    assert chances(by.weighed(pair, ())) == {"focal_scale": 1.0, "laser_cone": 0.5}
+    assert doubts.chances(pair) == (1.0, 0.5)
+
+
+def test_two_orders_of_one_law_are_one_form_with_both_sentences(same_shift):
+    """Of two waves, the page said "89 % of that … 18 % of that" and stated one."""
+    two, three, four = (term("sheet_waviness", (n,)) for n in (2.0, 3.0, 4.0))
+    (found, *_) = by.weighed(gauge_run([((two, three), 0.7), ((two,), 0.2), ((two, four), 0.1)]), ()).laws
+    assert [round(c.probability, 9) for c in found.courses] == [0.7, 0.2, 0.1]
+    both = [t.model.statement(t.shape, t.amplitude) for t in (two, three)]
+    assert found.courses[0].statement == " ".join(both)
+    assert found.courses[1].statement == both[0]
+    assert record_next(("sheet_waviness",), Causes((found,))) == record_next(("sheet_waviness",))
+
+
+def test_a_law_that_only_impossible_sets_have_is_no_cause(same_shift):
+    """It divided by its probability of nothing."""
+    found = by.weighed(gauge_run([((term("laser_tilt"),), 1.0), ((term("laser_cone"),), 0.0)]), ())
+    assert chances(found) == {"laser_tilt": 1.0}
 
 
 def test_the_page_groups_a_class_by_law_and_sums_up_what_is_unlikely(tmp_path):
@@ -93,7 +177,7 @@ def test_the_page_groups_a_class_by_law_and_sums_up_what_is_unlikely(tmp_path):
     assert [c.name.partition(";")[0] for c in shown.causes] == [
         "laser tilt, 80 %", "centre drift, 7 %", "principal point, 3 %",
     ]  # fmt: skip
-    assert "how its size changes over the run is not certain" in shown.causes[0].name
+    assert "which of these forms it has is not certain" in shown.causes[0].name
     assert shown.causes[0].courses == (f"80 % of that: {FAR.statement}", f"20 % of that: {LATE.statement}")
     assert shown.causes[1].courses == ("The axis drifts.",)
     assert [s.rpartition(": ")[2] for s in shown.rest] == ["10 %.", "2 %."]

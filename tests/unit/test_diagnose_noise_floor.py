@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from stages.calibrate.gauge.edges import Edges
-from stages.diagnose.gauge.answer import _fits
+from stages.diagnose.gauge.doubts import fits
 from stages.diagnose.gauge.elimination import EDGE, RING
 from stages.diagnose.gauge.heldout import _in_other_pictures, repeatability_px
 from stages.diagnose.residual import RingResidual
@@ -79,12 +79,12 @@ def test_edges_outside_the_view_form_no_pair() -> None:
     assert list(zip(first.tolist(), second.tolist(), strict=True)) == [(1, 3), (3, 1)]
 
 
-def test_with_unknown_noise_an_explanation_is_not_said_to_fit() -> None:
-    for floor, fits in ((0.09, True), (0.05, False), (np.nan, False)):
+def test_with_unknown_noise_an_explanation_fits_only_if_nothing_was_held_out() -> None:
+    for floor, fitting in ((0.09, True), (0.05, False), (np.nan, False)):
         quality = FitQuality("px", 1.0, 0.09, 1.0, 0.1, floor)
-        assert _fits(cast(Any, SimpleNamespace(quality=quality))) is fits
+        assert fits(cast(Any, SimpleNamespace(quality=quality))) is fitting
     not_tried = FitQuality("px", 1.0, 0.09, np.nan, np.nan, np.nan)
-    assert _fits(cast(Any, SimpleNamespace(quality=not_tried)))
+    assert fits(cast(Any, SimpleNamespace(quality=not_tried)))
 
 
 def of_rings(

@@ -10,7 +10,7 @@ from stages.diagnose import channels
 from stages.diagnose.compose import verdict_of_rings
 from stages.diagnose.effects.library import LIBRARY
 from stages.diagnose.field.run import warn_of_knock
-from stages.diagnose.gauge import answer
+from stages.diagnose.gauge import answer, doubts
 from stages.diagnose.gauge.confirm import passes_again
 from stages.diagnose.gauge.examine import Examined
 from stages.diagnose.gauge.hypotheses import Instead, Judged
@@ -66,7 +66,7 @@ def test_patterns_that_are_each_unlikely_make_a_name_unexplained_unless_other_na
     chance, verdict, monkeypatch
 ):
     """A focal length that drifted as no law does was a class of the cone and its companions."""
-    monkeypatch.setattr(answer, "shift_px", lambda fit, term: term.shift_px)
+    monkeypatch.setattr(doubts, "shift_px", lambda fit, term: term.shift_px)
     seen = examined(unsplit=())
     seen.verdicts.chance_of = lambda term: chance
     patterns = {"image outward: a θ^1": 0.008, "image outward: a(θ)": 0.006}
@@ -152,15 +152,16 @@ def test_each_set_counts_once_with_the_patterns_or_with_other_names(fitted, weig
 )
 def test_a_cause_that_looks_alike_counts_once_against_a_name(instead, chance, monkeypatch):
     """A step of the focal length, one of four alike, had 6 %: each other counted twice."""
-    monkeypatch.setattr(answer, "shift_px", lambda fit, term: term.shift_px)
+    monkeypatch.setattr(doubts, "shift_px", lambda fit, term: term.shift_px)
     seen = examined(chance=0.4, unsplit=("baseline",), confirmed=((),))
     seen.verdicts.instead_of = lambda term: Instead({}, 0.0, 0.6, instead)
-    (one,) = answer.doubted(seen)
-    assert one.chance == pytest.approx(chance)
-    assert one.alike["baseline"] == pytest.approx(chance * max(1.0, instead.get("baseline", 0.0) / 0.4))
-    assert one.outside == pytest.approx(0.1 * chance)
+    assert doubts.chances(seen) == pytest.approx([chance])
+    (one,) = doubts.doubts(seen)
+    of_baseline = instead.get("baseline", 0.0) + 0.4 * one.alike["baseline"]
+    assert of_baseline == pytest.approx(max(0.4, instead.get("baseline", 0.0)))
+    assert one.outside == pytest.approx(0.1)
     rest = 0.6 - instead.get("baseline", 0.0)
-    assert one.chance + one.alike["baseline"] + one.outside + rest * chance / 0.4 == pytest.approx(1.0)
+    assert 0.4 * (1 + one.outside) + of_baseline + rest == pytest.approx(0.4 / chance)
 
 
 def test_the_pattern_that_is_likelier_summed_over_all_names_comes_first():
@@ -234,7 +235,7 @@ def test_a_residual_that_repeats_elsewhere_is_not_consistent_though_no_effect_wa
     ],
 )
 def test_a_name_needs_probability_adequacy_separation_and_a_second_prediction(seen, verdict, monkeypatch):
-    monkeypatch.setattr(answer, "shift_px", lambda fit, term: term.shift_px)
+    monkeypatch.setattr(doubts, "shift_px", lambda fit, term: term.shift_px)
     assert answer.verdict_of(seen) is verdict
 
 

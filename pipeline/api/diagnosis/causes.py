@@ -65,9 +65,7 @@ def _line(cause: Cause, alike: Sequence[str]) -> CauseShown:
     likely = [c for c in cause.courses if c.probability >= _SHOWN]
     if len(likely) < 2:
         return CauseShown(name, tuple(c.statement for c in likely))
-    return CauseShown(
-        f"{name}; how its size changes over the run is not certain", tuple(map(_course, likely))
-    )
+    return CauseShown(f"{name}; which of these forms it has is not certain", tuple(map(_course, likely)))
 
 
 def _course(course: CourseShare) -> str:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import chain
 
 import numpy as np
@@ -14,21 +13,16 @@ from stages.diagnose.agreement import TELLING
 from stages.diagnose.effects.courses import Coursed, Drifting
 from stages.diagnose.effects.library import LIBRARY, ring_shift_px
 from stages.diagnose.gauge.confirm import Sized, course_of, quantities
+from stages.diagnose.gauge.doubts import better_held_out, chances, fits, sure
 from stages.diagnose.gauge.examine import Examined
 from stages.diagnose.gauge.formula import ADEQUATE
-from stages.diagnose.gauge.hypotheses import Judged
 from stages.diagnose.gauge.judge import Verdicts
 from stages.diagnose.gauge.run import Term
 from stages.diagnose.gauge.search import ring_shift_alone_px, shift_px
 from stages.diagnose.gauge.unknown_laws import Unknown
-from stages.diagnose.inference import SURE, UNKNOWN
+from stages.diagnose.inference import SURE
 from stages.diagnose.result import Candidate, Confirmation, EffectFound, Value, Verdict
 
-# Held-out measurements are predicted to within the noise if their RMS is below this many noise floors. Under
-# right names, and without hidden effects, 10 runs at ring level give 0.93–0.99 and five rendered ones
-# 1.00–1.02 (mean of all 0.974, s.d. 0.030); this limit is 5 s.d. above. A wrong explanation of four effects
-# gave 1.17 (`bench_diagnosis --mode several`, case 1, with an older floor and the ratio of both floors).
-_MOST_OF_FLOOR = 1.12
 # Explanations that were weighed but not fitted are listed above this probability: all others together change
 # no answer.
 _LISTED = 1e-3
@@ -50,85 +44,6 @@ def effects_found(examined: Examined) -> tuple[EffectFound, ...]:
     duration_s = float(np.ptp(examined.searched.run.time_s))
     each = zip(best.library_terms, examined.sizes, examined.confirmed, chances(examined), strict=False)
     return tuple(_found(verdicts, duration_s, *one) for one in each)
-
-
-@dataclass(frozen=True)
-class Doubted:
-    """The probability of a name, of each cause that this run cannot tell from it, and of causes outside."""
-
-    chance: float
-    alike: dict[str, float]
-    outside: float
-
-
-def chances(examined: Examined) -> tuple[float, ...]:
-    """Return, for each effect of the likeliest hypothesis, the probability that its name is right."""
-    return tuple(d.chance for d in doubted(examined))
-
-
-def doubted(examined: Examined) -> tuple[Doubted, ...]:
-    """Return how likely each effect of the likeliest hypothesis is, and what may be in its place.
-
-    The odds against it are the sum of: the hypotheses without it; each cause that this run cannot be expected
-    to distinguish from it, at least as likely as it; unknown laws and courses in its place, and `UNKNOWN`
-    more where no second prediction agrees; and even odds for each sign that the hypothesis is wrong: a
-    prediction that fails, a remainder that is not noise or that moves rings or fiducials by more than the
-    effect, poorly predicted held-out measurements, and other names, as many or fewer, that predict these
-    better.
-    """
-    best, verdicts = examined.best, examined.verdicts
-    if best is None or verdicts is None:
-        return ()
-    everywhere = (verdicts.adequacy < ADEQUATE) + (not _fits(examined))
-    patterns = best.fit.terms[len(best.library_terms) :]
-    left = max((shift_px(best.fit, t) for t in patterns), default=0.0)
-    others = better_held_out(verdicts)
-    each = zip(best.library_terms, examined.unsplit, examined.confirmed, examined.unknown_laws, strict=False)
-    out = []
-    for term, alike, confirmed, beyond in each:
-        signs = everywhere + sum(not c.agrees for c in confirmed)
-        signs += (left > shift_px(best.fit, term)) + sum(term.model.law not in j.laws for j in others)
-        unknown = beyond.odds + UNKNOWN * (not any(c.agrees for c in confirmed))
-        out.append(_shared(verdicts.chance_of(term), verdicts.instead_of(term).laws, alike, signs + unknown))
-    return tuple(out)
-
-
-def _shared(chance: float, instead: Mapping[str, float], alike: Sequence[str], outside: float) -> Doubted:
-    """Return a name's probability shared with causes ``alike``, at least as likely as it, and those outside.
-
-    ``instead`` are the probabilities of other laws in its place, ``outside`` the odds of other causes.
-    """
-    like = {name: max(chance, instead.get(name, 0.0)) for name in alike}
-    more = sum(p - instead.get(name, 0.0) for name, p in like.items()) + chance * outside
-    return Doubted(
-        chance / (1 + more), {name: p / (1 + more) for name, p in like.items()}, chance * outside / (1 + more)
-    )
-
-
-def sure(examined: Examined) -> tuple[bool, ...]:
-    """Return, for each effect of the likeliest hypothesis, whether its name is certain."""
-    return tuple(chance > SURE for chance in chances(examined))
-
-
-def better_held_out(verdicts: Verdicts) -> tuple[Judged, ...]:
-    """Return hypotheses of no more names than the likeliest that predict held-out measurements better.
-
-    A drift of the focal length was once named a drift of the distortion, at 99 to 1.
-    """
-    best, *others = verdicts.judged
-    as_few = (j for j in others if j.named and len(j.library_terms) <= len(best.library_terms))
-    return tuple(j for j in as_few if j.heldout < best.heldout)
-
-
-def _fits(examined: Examined) -> bool:
-    """Return whether held-out measurements are predicted to about the noise, where that was tested.
-
-    False where the noise is unknown.
-    """
-    quality = examined.quality
-    if quality is None or np.isnan(quality.heldout_after):
-        return True
-    return bool(quality.heldout_after <= _MOST_OF_FLOOR * quality.noise_floor)
 
 
 def unknown_rivals(examined: Examined) -> tuple[str, ...]:
@@ -279,7 +194,7 @@ def verdict_of(examined: Examined) -> Verdict:
         return Verdict.UNEXPLAINED if examined.repeats else Verdict.CONSISTENT
     contradicted = [any(not c.agrees for c in each) for each in examined.confirmed]
     # If held-out measurements are not predicted, something unknown was left out.
-    if not best.library_terms or verdicts.adequacy < ADEQUATE or not _fits(examined) or all(contradicted):
+    if not best.library_terms or verdicts.adequacy < ADEQUATE or not fits(examined) or all(contradicted):
         return Verdict.UNEXPLAINED
     if all(sure(examined)):
         return Verdict.NAMED if best.named else Verdict.PARTLY
