@@ -211,11 +211,11 @@ def compared_with(
     if not comparison.views:
         raise UnusableError("twin", "no frame could be decoded", hint="copy the video again")
     state, samples = photometry.state, sums.blocks.samples()
-    over_time = or_on_window(causes(*sums.cells(), scene.probe.lighting, scene.ring, samples))
+    over_time, slow = causes(*sums.cells(), scene.probe.lighting, scene.ring, samples)
+    over_time = or_on_window(over_time)
     for also in (flicker_of_measured, faded):
         over_time = (*over_time, *also(photometry.state, over_time, scene.ring))
-    failed = any("led_dead" in m.name for m in over_time)
-    whole, withdrawn = sums.named(samples, recording, failed)
+    whole, withdrawn = sums.named(samples, recording, any("led_dead" in m.name for m in over_time))
     on_window, of_photo = separated_from_photo(sums.on_window(samples), scene.ring)
     on_window, unsure = separated_from_blur(on_window, whole)
     on_window = (*on_window, *on_line(fixed, rings, scene.ring, on_window))
@@ -240,7 +240,7 @@ def compared_with(
         comparison.psnr_db(False), comparison.psnr_db(True), comparison.chi2_camera, comparison.stray_share,
         comparison.seen / max(comparison.view, 1.0), cannot_tell(state, comparison.silent),
         tuple(comparison.views), maps_of(samples), comparison.levels(), worst_places(samples),
-        (*withdrawn, *unsure, *of_photo, *beside, *of_side),
+        (*withdrawn, *slow, *unsure, *of_photo, *beside, *of_side),
     )  # fmt: skip
 
 
@@ -293,7 +293,7 @@ PHOTOMETRY = Stage(
 )
 TWIN = Stage(
     "twin",
-    "50",
+    "51",
     TwinParameters,
     compare_with_twin,
     "recorded frames beside the same frames, re-rendered from what the run has measured",

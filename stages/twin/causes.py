@@ -62,12 +62,14 @@ over √3."""
 
 def causes(
     lit: Cells | None, line: Cells | None, lighting: Lighting, ring: Ring, samples: BlockSamples | None = None
-) -> tuple[Mismatch, ...]:
+) -> tuple[tuple[Mismatch, ...], tuple[Mismatch, ...]]:
     """Return causes of changes over time and along the line, from the cells of each light's frames.
 
-    ``samples`` tell from which frames the wall's photo was made.
+    Second are withdrawn ones: a side that darkens, but not at once. ``samples`` tell from which frames the
+    wall's photo was made.
     """
     found: list[Mismatch] = []
+    slow: list[Mismatch] = []
     steps: dict[str, tuple[Fitted, Cells]] = {}
     for light, cells in (("LEDs", lit), ("laser", line)):
         if cells is None or len(cells.frame) < FEWEST_FRAMES:
@@ -83,7 +85,9 @@ def causes(
             else:
                 found.append(_mismatch(best, rivals, cells, ring))
         found += _flicker_or_else(cells, base, unsure, light, ring)
-    return (*steps_named(steps, lit, line, ring), *found)
+        if unsure is not None and unsure.probability <= FALSE_ALARM:
+            slow.append(_slow_side(unsure, cells, ring))
+    return (*steps_named(steps, lit, line, ring), *found), tuple(slow)
 
 
 def _chosen(
@@ -91,7 +95,7 @@ def _chosen(
 ) -> tuple[list[tuple[Fitted, list[str]]], Float, Fitted | None]:
     """Return the causes found one after the other, each with rivals that fit as well, and the base with them.
 
-    Last is the next cause, for which there are too few frames to be certain, or None.
+    Last is the next cause if it is not certain, or does not act at once as it should; or None.
     """
     chosen: list[tuple[Fitted, list[str]]] = []
     unsure = None
@@ -104,7 +108,8 @@ def _chosen(
         best = _by_other_sectors(_simplest(tries), cells, base)
         if size_of(best) <= _LEAST[best.law.name]:
             break
-        if best.probability > FALSE_ALARM:
+        at_once = best.law.name not in _AROUND or side_at_once(best, _first(best), cells)
+        if best.probability > FALSE_ALARM or not at_once:  # what fits less well is no cause either
             unsure = best
             break
         rivals = [
@@ -125,11 +130,9 @@ def _chosen(
 
 
 def _may_be(found: Fitted, cells: Cells, base: Float) -> bool:
-    """Return whether a law may be what it says: lamps change at once, and by no more than their light."""
+    """Return whether a law may be what it says: a light's step, or no more than an LED's light."""
     if found.law.name == "step":
         return of_a_light(found, cells, base)
-    if found.law.name in _AROUND and not side_at_once(found, _first(found), cells):
-        return False
     return found.law.name != "led_dead" or size_of(found) < 1.0 + _SURE * _size_sd(found)
 
 
@@ -231,6 +234,18 @@ def _darker_side(best: Fitted, size: NamedFigure, cells: Cells, ring: Ring) -> M
     look = ring.at(cells.frame[int(best.place[1])], float(best.place[0]))
     chi2 = best.chi2_before, best.chi2_after
     return Mismatch("", "intensity", "time", place, (size,), best.probability, *chi2, said, look)
+
+
+def _slow_side(side: Fitted, cells: Cells, ring: Ring) -> Mismatch:
+    """Return a side that darkens, without its name: the frames beside it do not step as it does."""
+    size = NamedFigure("lost", size_of(side), _size_sd(side), "share of the light")
+    at = float(np.degrees(side.place[0]))
+    said = (
+        f"During the run, lit wall about image azimuth {half_turn(at):.0f}° gets darker. But the frames do "
+        "not show that it does so at once: LEDs that fade, dirt that gathers on the window, and an uneven "
+        "photo of the wall beside which the probe rolls look the same."
+    )
+    return replace(_darker_side(side, size, cells, ring), statement=said)
 
 
 def _flicker_or_else(

@@ -38,17 +38,22 @@ def at_once(step: Fitted, cells: Cells) -> float:
 
 
 def side_at_once(side: Fitted, first: int, cells: Cells) -> bool:
-    """Return whether a side of the picture darkens as much between two frames as it does in all.
+    """Return whether a side of the picture may darken as much between two frames as it does in all.
 
     Where the photo is uneven and the probe rolls, a side seems to darken slowly. Sectors are compared with
-    each other: the brightness of all together may change in between.
+    each other, since the brightness of all together may change in between; each in the last and the first
+    frame that show it. The σ is that of other neighbouring frames.
     """
-    both = cells.usable[first - 1] & cells.usable[first]
-    if not both.any():
-        return False
-    law, seen = (np.diff(a[first - 1 : first + 1], axis=0)[0][both] for a in (side.change, cells.log_ratio))
+    usable = cells.usable
+    last, then = first - 1 - usable[first - 1 :: -1].argmax(0), first + usable[first:].argmax(0)
+    both = np.flatnonzero(usable[:first].any(0) & usable[first:].any(0))
+    if not len(both):
+        return True
+    law, seen = (a[then[both], both] - a[last[both], both] for a in (side.change, cells.log_ratio))
     law = law - law.mean()
-    return bool(law @ seen > LEAST_SHARE * (law @ law))
+    each = np.where(usable[1:] & usable[:-1], np.diff(cells.log_ratio, axis=0), 0.0)[:, both] @ law
+    sd = float(np.sqrt(np.mean(np.delete(each, first - 1) ** 2)))
+    return bool(law @ seen + sd > LEAST_SHARE * (law @ law))
 
 
 def of_a_light(step: Fitted, cells: Cells, base: Float) -> bool:

@@ -13,6 +13,7 @@ from scipy.ndimage import map_coordinates
 from pipeline.instrument.probe import Lighting
 from stages.twin.causes import causes
 from stages.twin.cells import SECTORS, Cells, CellsOfFrames, sector_azimuth_rad, sectors_of
+from stages.twin.laws import led_share
 from stages.twin.line_light import _plain_line
 from stages.twin.render import Region, TwinFrame
 from stages.twin.scene import Ring
@@ -38,7 +39,9 @@ def _cells(change, seed=0, of_photo=0.01):
 
 def _found(lit=0.0, line=0.0, seed=0):
     zero = np.zeros((FRAMES, SECTORS))
-    return causes(_cells(zero + lit, seed), _cells(zero + line, seed + 1000, of_photo=0.05), Lighting(), RING)
+    return causes(
+        _cells(zero + lit, seed), _cells(zero + line, seed + 1000, of_photo=0.05), Lighting(), RING
+    )[0]
 
 
 def _step(first):
@@ -74,7 +77,7 @@ def test_darker_wall_on_one_side_of_the_last_frames_is_not_a_step_of_the_laser(a
 def test_frames_without_any_difference_have_no_cause():
     """The size of the step, 0, was a divisor."""
     same = np.full((FRAMES, SECTORS), 500.0)
-    assert causes(Cells(NUMBER, 2 * same, same, same, same, same), None, Lighting(), RING) == ()
+    assert causes(Cells(NUMBER, 2 * same, same, same, same, same), None, Lighting(), RING) == ((), ())
 
 
 def _of_line(change, predicted=1.0, hidden=0):
@@ -82,7 +85,7 @@ def _of_line(change, predicted=1.0, hidden=0):
     cells = _cells(np.zeros((FRAMES, SECTORS)) + change, 1000, of_photo=0.05)
     pixels = np.where(np.arange(SECTORS) < hidden, 30.0, cells.pixels)
     cells = replace(cells, pixels=pixels, predicted=cells.predicted * predicted)
-    return [m.name for m in causes(_cells(np.zeros((FRAMES, SECTORS))), cells, Lighting(), RING)]
+    return [m.name for m in causes(_cells(np.zeros((FRAMES, SECTORS))), cells, Lighting(), RING)[0]]
 
 
 def test_a_step_is_found_though_half_of_the_picture_is_not_seen():
@@ -113,7 +116,7 @@ def test_the_sigma_of_a_step_is_right_beside_an_error_that_changes_slowly():
     for phase in np.linspace(0, 2 * np.pi, 12, endpoint=False):
         slow = 0.003 * np.sin(np.arange(FRAMES) / 2.5 + phase)[:, None]
         both = (_cells(np.log(1.06) * _step(8) + slow + np.zeros(SECTORS), k, 0.001) for k in (0, 1))
-        (step,) = causes(*both, Lighting(), RING)
+        (step,) = causes(*both, Lighting(), RING)[0]
         inside += abs(step.parameters[0].value - 0.06) < 2 * step.parameters[0].sd
     assert inside >= 11
 
@@ -148,6 +151,39 @@ def test_a_side_that_gets_nearly_dark_is_reported_like_one_that_darkens(lost, az
     (found,) = _found(np.log1p(-lost * side) * _step(9))
     assert (found.name, found.fixed_to) == ("", "time")
     assert found.parameters[0].value == pytest.approx(lost, abs=0.1)
+
+
+@pytest.mark.parametrize("seed", [23, 39])
+def test_an_led_that_noise_seems_to_slow_is_no_step_of_all_lamps(seed, monkeypatch):
+    """Two frames beside an LED that lost half differed by chance too little; a step was named."""
+    monkeypatch.setattr("tests.unit.test_twin_causes.FRAMES", 14)
+    monkeypatch.setattr("tests.unit.test_twin_causes.NUMBER", NUMBER[:14])
+    share = led_share(Lighting(), np.array([0.3]), RING)
+    cells = _cells(np.log1p(-0.5 * share) * _step(7), seed, of_photo=0.03)
+    (led,), slow = causes(cells, None, Lighting(), RING)
+    assert "led_dead" in led.names
+    assert slow == ()
+
+
+def test_a_side_that_darkens_slowly_is_withdrawn_with_a_reason():
+    """Nothing at all was told of it."""
+    course = np.clip((np.arange(FRAMES) - 5) / 8, 0, 1)[:, None]
+    side = np.maximum(np.cos(np.radians(AZIMUTH_DEG - 20)), 0) ** 2
+    found, (slow,) = causes(_cells(np.log1p(-0.6 * side) * course), None, Lighting(), RING)
+    assert found == ()
+    assert (slow.name, slow.fixed_to) == ("", "time")
+    assert slow.place[1].value == pytest.approx(20, abs=10)
+    assert "do not show that it does so at once" in slow.statement
+
+
+@pytest.mark.parametrize("hidden", [7, 8])
+def test_an_led_fails_though_a_frame_beside_it_shows_nothing(hidden):
+    """It was refused: sectors were compared in the two frames next to the step alone."""
+    share = led_share(Lighting(), np.array([0.3]), RING)
+    cells = _cells(np.log1p(-0.9 * share) * _step(8))
+    pixels = np.where(np.arange(FRAMES)[:, None] == hidden, 10.0, cells.pixels)
+    (led,), slow = causes(replace(cells, pixels=pixels), None, Lighting(), RING)
+    assert (led.name, slow) == ("led_dead", ())
 
 
 def test_in_few_frames_a_failing_led_may_be_that_or_flicker(monkeypatch):

@@ -66,7 +66,7 @@ def _cells(lost, first, seed=0):
 @pytest.mark.parametrize("lost", [0.5, 0.9])
 def test_a_side_that_darkens_is_told_though_the_photo_holds_it(lost, first):
     """Nothing was told: the photo's part of it rises and falls about the step, which no law contained."""
-    (side,) = causes(_cells(lost, first), None, Lighting(), RING, _samples())
+    (side,) = causes(_cells(lost, first), None, Lighting(), RING, _samples())[0]
     assert (side.name, side.fixed_to) == ("", "time")
     assert side.place[0].value == 8 * first - 4
     assert side.place[1].value == pytest.approx(np.degrees(0.1), abs=12)
@@ -74,7 +74,9 @@ def test_a_side_that_darkens_is_told_though_the_photo_holds_it(lost, first):
 
 
 def test_nothing_is_told_beside_a_photo_where_nothing_darkens():
-    assert all(causes(_cells(0.0, 7, seed), None, Lighting(), RING, _samples()) == () for seed in range(8))
+    assert all(
+        causes(_cells(0.0, 7, seed), None, Lighting(), RING, _samples()) == ((), ()) for seed in range(8)
+    )
 
 
 @pytest.mark.parametrize(("slow", "is_step"), [(0.0, True), (0.4, True), (1.0, False)])
