@@ -10,6 +10,7 @@ from itertools import combinations
 
 from pipeline.physics.catalogue import effect
 from stages.diagnose.causes import NONE, Causes
+from stages.diagnose.inference import SURE
 
 AGAIN = (
     "To see what the pattern depends on, record the gauge run again: with probe or gauge rolled by 90°, at "
@@ -18,7 +19,7 @@ AGAIN = (
 # As many recordings as a person is asked for, and as many causes as are counted up in one sentence.
 _MOST, _NAMED = 3, 4
 # Causes that are less likely than the accepted probability of a wrong name are not listed.
-_LEAST = 0.01
+_LEAST = 1 - SURE
 # What a recording says of two causes that others already tell apart counts half as much, each time.
 _AGAIN = 0.5
 _TO_AND_FRO = "the way to and fro"

@@ -218,6 +218,30 @@ def test_what_rings_were_not_asked_about_is_as_likely_as_what_looks_like_it():
     assert record_next(members[:4], found.causes).startswith("To tell focal_scale, baseline, ")
     unlikely = replace(found, causes=Causes((focal, replace(baseline, probability=0.001))))
     assert [c.name for c in class_shown(unlikely).causes] == ["focal scale, 80 %", "encoder slip"]
+    others = "Any other effect of the library, alone or beside one of these: less than 1 %."
+    assert class_shown(unlikely).rest == (others,)
+    least = Causes((replace(focal, probability=0.0), replace(baseline, probability=0.0001)))
+    assert class_shown(replace(unlikely, causes=least)).rest == (others,)
+
+
+def test_a_class_of_unlikely_names_alone_shows_all_of_them():
+    """The page showed no cause, and not one of the names in diagnosis.json."""
+    baseline = Cause("baseline", 0.004, (CourseShare("constant", 1.0, "The baseline is off."),))
+    members, causes = ("baseline", "vignetting", "laser_cone"), Causes((baseline, Cause("laser_cone", 0.0)))
+    found = Diagnosis("f", "g", Verdict.CLASS, 1e-9, members=members, causes=replace(causes, outside=0.99))
+    assert [c.name for c in class_shown(found).causes] == [
+        "baseline (or vignetting, which looks like it), less than 1 %", "laser cone, less than 1 %",
+    ]  # fmt: skip
+    assert [s.rpartition(": ")[2] for s in class_shown(found).rest] == ["99 %."]
+
+
+@pytest.mark.parametrize(("chance", "words"), [(0.2, "It may be this:"), (0.8, "Most likely it is this")])
+def test_a_single_cause_is_most_likely_only_above_one_half(chance, words, tmp_path):
+    """Of a cause of 20 %, with 80 % for causes outside the library, the page said "most likely"."""
+    causes = Causes((replace(TILT, probability=chance),), outside=1 - chance)
+    write_page(replace(FOUND, members=("laser_tilt",), causes=causes), Shown(), tmp_path)
+    page = (tmp_path / "diagnosis.html").read_text()
+    assert [w for w in ("It may be this:", "Most likely it is this") if w in page] == [words]
 
 
 def test_a_name_that_the_inspection_contradicts_loses_its_probability_by_the_gauge_run():

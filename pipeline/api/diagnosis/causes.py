@@ -6,10 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from stages.diagnose.causes import Cause, CourseShare
+from stages.diagnose.inference import SURE
 from stages.diagnose.result import Diagnosis
 
 # What is less likely than the accepted probability of a wrong name is summed up.
-_SHOWN = 0.01
+_SHOWN = 1 - SURE
 _OUTSIDE = "A cause that the library does not have, or measurements that do not agree with each other"
 _OTHERS = "Any other effect of the library, alone or beside one of these"
 
@@ -24,10 +25,14 @@ class CauseShown:
 
 @dataclass(frozen=True)
 class ClassShown:
-    """The possible causes, the likeliest first, and sentences on those that have no line of their own."""
+    """The possible causes, the likeliest first, and sentences on those that have no line of their own.
+
+    The first is ``likely`` if it is likelier than all others together.
+    """
 
     causes: tuple[CauseShown, ...]
     rest: tuple[str, ...] = ()
+    likely: bool = False
 
     @property
     def weighed(self) -> bool:
@@ -39,23 +44,28 @@ def class_shown(found: Diagnosis) -> ClassShown:
     """Return the class, or the class that remains beside what is certain, for the page.
 
     Names of which rings and fiducials of a gauge run say nothing stand with the likeliest that looks like
-    them, or else without a probability.
+    them, or else without a probability. Unlikely names are summed up, unless all are unlikely.
     """
     left = found.remainder
     members = found.members if left is None else left.members
     each = {name: found.causes.of(name) for name in members}
-    shown = [c for c in each.values() if c is not None and c.probability >= _SHOWN]
-    shown.sort(key=lambda c: -c.probability)
+    asked = sorted((c for c in each.values() if c is not None), key=lambda c: -c.probability)
     unasked = [name for name, cause in each.items() if cause is None]
     mate = {name: found.causes.like(name, members) for name in unasked}
     untold = tuple(CauseShown(_in_words(name)) for name in unasked if mate[name] is None)
+    shown = [c for c in asked if c.probability >= _SHOWN] or asked * (not untold)
     certain = {e.name for e in found.effects} if left is not None else set()
     hidden = [c for c in found.causes.laws if c not in shown and c.name not in certain]
-    others = min(sum(c.probability for c in hidden), 1.0)
-    rest = ((_OUTSIDE, found.causes.outside), (_OTHERS, others))
-    sentences = tuple(f"{words}: {_percent(p)}." for words, p in rest if shown and p >= _SHOWN / 10)
+    sentences = _rest(found.causes.outside, hidden, members) if asked else ()
     lines = (_line(c, [name for name in unasked if mate[name] == c]) for c in shown)
-    return ClassShown((*lines, *untold), sentences)
+    return ClassShown((*lines, *untold), sentences, any(c.probability > 0.5 for c in shown))
+
+
+def _rest(outside: float, hidden: Sequence[Cause], members: Sequence[str]) -> tuple[str, ...]:
+    """Return sentences on what has no line of its own: not where it is negligible and outside the class."""
+    others = min(sum(c.probability for c in hidden), 1.0)
+    told = ((_OUTSIDE, outside, False), (_OTHERS, others, any(c.name in members for c in hidden)))
+    return tuple(f"{words}: {_percent(p)}." for words, p, always in told if always or p >= _SHOWN / 10)
 
 
 def _line(cause: Cause, alike: Sequence[str]) -> CauseShown:
