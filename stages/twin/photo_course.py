@@ -8,6 +8,7 @@ minus its mean over the frames that the photo was made from.
 from __future__ import annotations
 
 import numpy as np
+from scipy.sparse import csr_array
 
 from pipeline.arrays import Float, Int
 from stages.twin.reference import BlockSamples
@@ -21,9 +22,9 @@ angle at which wall is seen: nearer to the axis no block is all wall."""
 def share_of_frames(samples: BlockSamples | None, ring: Ring, frame: Int) -> Float:
     """Return which share of the photo that each of the frames (F,) shows was made from each of them, (F, F).
 
-    Compared frames stand for the measured ones between them. The weights are those of the stage texture: the
-    square of what a parabola leaves at a distance from the laser sheet, times the brightness. 0 where nothing
-    is known.
+    Compared frames stand for the measured ones between them. Of the weights of the stage texture, brightness
+    and the square of what a parabola leaves at a distance from the laser sheet are followed; pixels per area
+    of wall, the laser's band and what that stage leaves out are not. 0 where nothing is known.
     """
     share = np.zeros((len(frame), len(frame)))
     if samples is None:
@@ -33,18 +34,17 @@ def share_of_frames(samples: BlockSamples | None, ring: Ring, frame: Int) -> Flo
     from_sheet = 1 / np.tan(theta) - ring.ahead_mm / ring.radius_mm
     bright = np.exp(samples.log_level)
     made = np.maximum(1 - (from_sheet / _REACH_RADII) ** 2, 0.0) ** 2 * bright
-    by_frame, whole = _of_cells(samples, made)
-    of_cell = np.divide(by_frame, whole, out=np.zeros_like(by_frame), where=whole > 0)
-    shown, _ = _of_cells(samples, samples.weight * bright**2 * (whole[samples.orders["wall"], 0] > 0))
-    shown /= np.maximum(shown.sum(0), 1e-12)
+    whole = np.bincount(samples.orders["wall"], made)
+    known = (whole > 0)[samples.orders["wall"]]
+    of_cell = _of_cells(samples, made / np.where(known, whole[samples.orders["wall"]], 1.0))
+    shown = _of_cells(samples, samples.weight * bright**2 * known)
+    shares = (shown.T @ of_cell).toarray() / np.maximum(shown.sum(0), 1e-12)[:, None]
     order = np.searchsorted(samples.number, frame[seen])
-    share[np.ix_(seen, seen)] = (shown.T @ of_cell)[np.ix_(order, order)]
+    share[np.ix_(seen, seen)] = shares[np.ix_(order, order)]
     return share
 
 
-def _of_cells(samples: BlockSamples, value: Float) -> tuple[Float, Float]:
-    """Return sums (C, F) of values (N,) over the blocks of cells of the wall, and over all frames (C, 1)."""
-    wall, frames = samples.orders["wall"], len(samples.number)
-    sums = np.bincount(wall * frames + samples.frame, value, (int(wall.max()) + 1) * frames)
-    by_frame = np.asarray(sums.reshape(-1, frames), float)
-    return by_frame, by_frame.sum(1, keepdims=True)
+def _of_cells(samples: BlockSamples, value: Float) -> csr_array:
+    """Return sums (C, F) of values (N,) over the blocks of cells of the wall. Most of them are 0."""
+    wall = samples.orders["wall"]
+    return csr_array((value, (wall, samples.frame)), (int(wall.max()) + 1, len(samples.number)))
