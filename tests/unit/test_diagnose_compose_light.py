@@ -81,7 +81,7 @@ def light(source: str, name: str, *size: Size) -> ProfileEvidence:
     ("moved_px", "sd_mm", "verdict"),
     [(0.07, 0.03, Verdict.NAMED), (0.3, 0.03, Verdict.PARTLY), (0.07, 0.002, Verdict.PARTLY)],
 )
-def test_residuals_smaller_than_the_uncertainty_of_a_named_light_effect_are_not_reported(
+def test_residuals_smaller_than_the_uncertainty_of_a_named_light_effect_are_no_remainder(
     real_probe: Probe, monkeypatch: pytest.MonkeyPatch, moved_px: float, sd_mm: float, verdict: Verdict
 ) -> None:
     """Beside a line with glowing wall, .07 px of drift gave the verdict "partly" and a class of 13 names."""

@@ -150,7 +150,7 @@ def test_the_gauge_refutes_effects_that_act_in_every_recording(sound_gauge):
     assert not_refuted(shown, sound_gauge, stated) == ()
 
 
-def test_the_gauge_does_not_refute_effects_of_a_pipe_or_ones_too_small_for_it(sound_gauge):
+def test_the_gauge_does_not_refute_effects_of_the_medium_small_ones_or_drifts(sound_gauge):
     shown = tuple(
         seen_in_the_field(*each)
         for each in (("outside_index", 3e-3), ("focal_scale", 1e-4), ("focal_drift", 0.03))

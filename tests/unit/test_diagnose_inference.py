@@ -222,7 +222,7 @@ def test_a_residual_is_recognised_as_noise_or_not(hidden, low, high):
     ("noise", "growing", "low", "high"),
     [(0.01, 0.0, 0.0, NAMELESS / 20), (10.0, 0.0, NAMELESS / 2, NAMELESS), (0.1, 0.5, 1.0, np.inf)],
 )
-def test_a_name_is_less_sure_if_its_growth_with_the_radius_is_unsure(noise, growing, low, high):
+def test_a_name_is_less_sure_if_its_growth_with_the_radius_is_unsure_or_another(noise, growing, low, high):
     """A cone of size 1 that grows rightly, one too faint to show its growth, and one that grows otherwise."""
     random = np.random.default_rng(10)
     off = random.uniform(-0.5, 0.5, 200)
