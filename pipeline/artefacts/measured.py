@@ -163,8 +163,10 @@ class Trajectory:
         Part of ``distance_sigma_mm`` from the unknown distance travelled at cuts of the recording; 0 without
         cuts.
     displaced_mm : float
-        1 σ of the radius from smooth displacements of the picture, over places of some millimetres; 0 if the
-        wall in texture and the wall in the rings agree.
+        1 σ by which the wall in texture and the wall in the rings differ smoothly over places of some
+        millimetres; 0 if they agree within its error, or could not be compared.
+    displaced_for_certain : bool
+        Whether chance is excluded as the cause of this difference.
     """
 
     frame: Int
@@ -187,6 +189,7 @@ class Trajectory:
     knock: LaserKnock | None = None
     cut_sigma_mm: float = 0.0
     displaced_mm: float = 0.0
+    displaced_for_certain: bool = False
 
 
 @dataclass(frozen=True)

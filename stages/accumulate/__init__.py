@@ -180,7 +180,7 @@ def accumulate_wall(
         context.progress(done, len(stretches))
     _judge_radii(wall, trajectory, context)
     _report(context, wall, spread)
-    _warn_of_displaced(trajectory.displaced_mm, wall, context)
+    _warn_of_displaced(trajectory, wall, context)
     warn_of_held(held, context)
     _warn_of_fixed(fixed, context)
     warn_of_unmeasured(wall.radius_map, trajectory.radius_mm, gap_mm, survey.middle_mm, context)
@@ -237,17 +237,17 @@ def _fixed_in_words(place: FixedPlace) -> str:
     )
 
 
-def _warn_of_displaced(displaced_mm: float, wall: Wall, context: Context) -> None:
-    """Warn of pictures displaced smoothly, if this raises the σ of radii by more than a tenth."""
+def _warn_of_displaced(trajectory: Trajectory, wall: Wall, context: Context) -> None:
+    """Warn if photo and line certainly differ, and this raises the σ of radii by more than a tenth."""
     sigma = wall.radius_map.sigma_mm[:: max(len(wall.radius_map.distance_mm) // _REPORTED_ROWS, 1)]
-    known = sigma[np.isfinite(sigma)]
-    if known.size and displaced_mm > _MATTERS * float(np.median(known)):
+    known, apart_mm = sigma[np.isfinite(sigma)], trajectory.displaced_mm
+    if known.size and trajectory.displaced_for_certain and apart_mm > _MATTERS * float(np.median(known)):
         context.warn(
-            "the pictures do not follow the stated lens: photo and laser line show the same places of the "
-            f"wall at different radii, and line and photo are displaced by some {displaced_mm:.2g} mm (1 σ), "
-            "differently from place to place. Water, grease or uneven glass in front of the lens distorts "
-            "the picture, the lens is not as stated, or strong compression displaces it. σ of the radii "
-            "includes it. What to do: dry and clean the window, run boresight diagnose on a gauge run, "
+            "photo and laser line contradict each other: they show the same places of the wall at radii that "
+            f"differ smoothly by some {apart_mm:.2g} mm (1 σ), beside a shift and a tilt. Either may be "
+            "wrong: water, grease or uneven glass in front of the lens or of the laser, a lens or a sheet of "
+            "laser light that is not as stated, or strong compression. σ of the radii includes the whole "
+            "difference. What to do: dry and clean the window, run boresight diagnose on a gauge run, "
             "record with less compression"
         )
 
@@ -291,7 +291,7 @@ def _report(context: Context, wall: Wall, spread: CalibrationSpread) -> None:
 
 ACCUMULATE = Stage(
     "accumulate",
-    "20",
+    "21",
     AccumulateParameters,
     accumulate_wall,
     "point cloud and radius map around the pipe's own axis, with σ",

@@ -98,7 +98,8 @@ def estimate_motion(
     report_instrument(probe, trajectory, context)
     return replace(
         believed, events=events, image_scale=steady.scale, image_scale_sigma=steady.scale_sigma,
-        radius_doubt=doubt, displaced_mm=estimate.wall_twice.line_mm,
+        radius_doubt=doubt, displaced_mm=estimate.wall_twice.shared_mm,
+        displaced_for_certain=estimate.wall_twice.is_certain,
         knock=steady.run.knock,
     )  # fmt: skip
 
@@ -204,7 +205,7 @@ def _motion_of_run(
 
 MOTION = Stage(
     "motion",
-    "60",
+    "61",
     MotionParameters,
     _motion_of_run,
     "camera pose in every frame and the pipe's axis, from texture, rings and encoder together",

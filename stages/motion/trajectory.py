@@ -107,7 +107,10 @@ def report_motion(
     context.report("median reprojection error", estimate.reprojection_px, "px")
     context.report("reprojection error against the σ of matching", estimate.excess, "times")
     context.report("part of it that lasts from picture to picture", estimate.lasting, "times")
-    context.report("difference of wall in photo and rings, shared", estimate.wall_twice.shared_mm, "mm")
+    twice = estimate.wall_twice
+    if twice.weight > 0:
+        context.report("difference of wall in photo and rings, shared", twice.shared_mm, "mm")
+        context.report("such a difference that noise alone may show, 1 σ", twice.noise_mm, "mm")
     _warn_of_texture(estimate.lasting, texture.poses, texture.store.spool.count, context)
     _warn_of_trembling(trajectory, texture.poses, shakes, context)
     context.report("pipe radius", trajectory.radius_mm, "mm")

@@ -287,15 +287,18 @@ def test_the_estimated_scale_is_used_for_the_radii() -> None:
     assert gain == pytest.approx(0.02 * RADIUS, rel=0.01), "a probe that encoder and diameter contradict"
 
 
-@pytest.mark.parametrize(("displaced_mm", "warned"), [(0.0, False), (0.001, False), (0.2, True)])
+@pytest.mark.parametrize(
+    ("displaced_mm", "certain", "warned"),
+    [(0.0, False, False), (0.001, True, False), (0.2, True, True), (0.2, False, False)],
+)
 def test_a_picture_displaced_smoothly_widens_sigma_and_is_told_if_that_matters(
-    displaced_mm: float, warned: bool
+    displaced_mm: float, certain: bool, warned: bool
 ) -> None:
     """Behind a film of water 56 % of the 95 % intervals held, and the cause was not named."""
     run, told = drawn_run(0.9 * np.arange(40), np.zeros(40)), list[str]()
     got = Trajectory(
         np.arange(40), np.arange(40) / 30, run.T_pc, np.zeros((40, 6, 6)), straight_axis(-50.0, 150.0),
-        RADIUS, 1, 0, 0, (), displaced_mm=displaced_mm,
+        RADIUS, 1, 0, 0, (), displaced_mm=displaced_mm, displaced_for_certain=certain,
     )  # fmt: skip
     context = replace(quiet_context(), warn=told.append)
     chosen = AccumulateParameters(azimuth_samples=180)
@@ -304,7 +307,7 @@ def test_a_picture_displaced_smoothly_widens_sigma_and_is_told_if_that_matters(
     systematic = np.nanmedian(sigma_mm**2 - random_mm**2) ** 0.5
     assert wall.displaced_mm == displaced_mm, "depths of defects include it"
     assert systematic >= 0.999 * displaced_mm
-    assert any("do not follow the stated lens" in words for words in told) is warned
+    assert any("photo and laser line contradict each other" in words for words in told) is warned
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,7 @@ Water on the window, uneven glass, a lens that is not as stated, or a codec disp
 Poses and landmarks follow, so that residuals hardly show it, and what displaces the line is taken for the
 wall's shape. But texture passes a place of the wall elsewhere in the picture, and at another time, than the
 line does. If both measure the same wall, their difference is noise, and noise of neighbouring landmarks is
-independent: what neighbours share is an error of the picture.
+independent: what neighbours share is an error of the picture, of the lens, or of the sheet of laser light.
 """
 
 from __future__ import annotations
@@ -28,11 +28,11 @@ _BESIDE = 0.5
 """Distance of rings that are compared with a landmark, in sizes of a patch: its own wall. Up to one size,
 waves of the wall 1 mm high and 40 mm long were flattened in the mean, and counted as displaced by .03 mm."""
 _SURE = 5.0
-"""Standard errors from which it is believed."""
-_OF_LINE = 0.7
-"""Error of the line over the shared difference. Line and texture are displaced alike, so that about half of
-the difference's variance is the line's. For drawn displacements of 1/25 to 1/3 of the picture in size,
-standing or flowing, the equations of open-1 gave .5 to .85."""
+"""Standard errors from which it is certain: chosen, far beyond chance."""
+_OF_POSE = 0.5
+"""Length, in radii, over which a misfit of poses is taken for linear. Where a joint of 1 mm was not known to
+the adjustment, poses followed it over a radius, and over lengths of two radii the rest counted by 17 standard
+errors; a film of water counted as much with lengths of 2 to .25 radii."""
 _ITERATIONS, _REDESCENT, _CLIPPED = 8, 3.0, 3.0
 """Reweightings, and robust spreads at which differences lose weight or are clipped: edges, false matches."""
 
@@ -66,14 +66,26 @@ class WallTwice:
         return self.product_mm2 / np.sqrt(self.square_mm4) if self.square_mm4 > 0 else 0.0
 
     @property
-    def shared_mm(self) -> float:
-        """Return the difference, 1 σ, that neighbours certainly share; 0 if they share none."""
-        return float(np.sqrt(self.product_mm2 / self.weight)) if self.in_errors > _SURE else 0.0
+    def is_certain(self) -> bool:
+        """Return whether neighbours share a difference beyond doubt."""
+        return self.in_errors > _SURE
 
     @property
-    def line_mm(self) -> float:
-        """Return the part of it, 1 σ, by which the line is displaced."""
-        return _OF_LINE * self.shared_mm
+    def noise_mm(self) -> float:
+        """Return the difference, 1 σ, whose square is the standard error of the shared variance."""
+        return float(np.sqrt(np.sqrt(self.square_mm4) / self.weight)) if self.weight > 0 else np.inf
+
+    @property
+    def shared_mm(self) -> float:
+        """Return the difference, 1 σ, that neighbours share.
+
+        Line and photo may both be displaced, or one alone, so that the line's own error may be all of it. The
+        variance v with its standard error e is shrunk to v (1 − e² / v²), and to 0 below one standard error
+        (the positive part of the estimator of James and Stein, 1961): noise alone adds little.
+        """
+        if self.in_errors <= 1:
+            return 0.0
+        return float(np.sqrt(self.product_mm2 / self.weight * (1 - self.in_errors**-2)))
 
 
 def wall_twice(estimate: Estimate, measured: Measurements, patch_mm: float) -> WallTwice:
@@ -91,7 +103,7 @@ def wall_twice(estimate: Estimate, measured: Measurements, patch_mm: float) -> W
     )
     known = np.isfinite(line_mm + sigma_mm)
     difference = _beyond_pose(
-        span[known], azimuth[known], (off_mm - line_mm)[known], sigma_mm[known], 2 * radius_mm
+        span[known], azimuth[known], (off_mm - line_mm)[known], sigma_mm[known], _OF_POSE * radius_mm
     )
     return _of_pairs(place[known], difference, sigma_mm[known], patch_mm)
 
@@ -133,11 +145,18 @@ def _on_cylinder(span_mm: Float, azimuth_rad: Float, radius_mm: float) -> Float:
 
 
 def _mean_near(place: Float, rings: Float, residual_mm: Float, within_mm: float) -> Float:
-    """Return the rings' mean residual (L,) around places (L, 3); NaN where there is no ring."""
+    """Return the rings' mean residual (L,) around places (L, 3).
+
+    It is NaN where there is no ring, and where the rings around differ more than usual: at a joint, or an
+    edge of a defect, a mean is not the wall at the place.
+    """
     if not len(rings):
         return np.full(len(place), np.nan)
     near = cKDTree(rings).query_ball_point(place, within_mm)
-    return np.array([residual_mm[k].mean() if k else np.nan for k in near])
+    mean = np.array([residual_mm[k].mean() if k else np.nan for k in near])
+    differ = np.array([residual_mm[k].std() if k else 0.0 for k in near])
+    usual = np.median(differ[differ > 0]) if (differ > 0).any() else 0.0
+    return np.where(differ > _CLIPPED * usual, np.nan, mean)
 
 
 def _beyond_pose(

@@ -94,7 +94,7 @@ def with_steady_scale(
     contradicted = replace(drift, contradicted=True)
     unchanged = SteadyRun(run, estimate, measured, contradicted, corrected=False)
     patch_mm = parameters.patch_size * run.texture.grid.step_mm
-    if wall_twice(estimate, measured, patch_mm).line_mm > 0:
+    if wall_twice(estimate, measured, patch_mm).is_certain:
         return unchanged
     first = drift
     for _ in range(_ROUNDS):
