@@ -42,7 +42,7 @@ def record_next(names: Sequence[str], causes: Causes = NONE) -> str:
     It asks for the few recordings that separate the most probability. Effects that ``causes`` say nothing
     about count as much as the likeliest that looks like them, or else as the likeliest of all.
     """
-    possible = [one for name in names for one in _courses(name, names, causes)]
+    possible = [one for name in names for one in _courses(name, names, causes) if one.weight > 0]
     possible = possible or [one for name in names for one in _courses(name, names, NONE)]
     if not possible:
         return ""
@@ -61,7 +61,7 @@ def _courses(name: str, names: Sequence[str], causes: Causes) -> list[_Possible]
         likeliest = max((c.probability for c in causes.laws), default=1.0)
         return [_Possible(name, "", likeliest if like is None else like.probability)]
     if not known.courses:
-        return [_Possible(name, "", known.probability)] if known.probability > 0 else []
+        return [_Possible(name, "", known.probability)]
     weight = defaultdict[str, float](float)
     for c in known.courses:
         weight[c.kind] += known.probability * c.probability
