@@ -14,7 +14,7 @@ from pipeline.arrays import Float, Int
 from stages.twin.reference import BlockSamples
 from stages.twin.scene import Ring
 
-_REACH_RADII, _NEAREST_RAD = 0.5, 0.2
+REACH_RADII, _NEAREST_RAD = 0.5, 0.2
 """Wall used for the photo on either side of the laser sheet: the default of the stage texture. Least polar
 angle at which wall is seen: nearer to the axis no block is all wall."""
 
@@ -33,7 +33,7 @@ def share_of_frames(samples: BlockSamples | None, ring: Ring, frame: Int) -> Flo
     theta = np.maximum(samples.away * np.arctan2(ring.radius_mm, ring.ahead_mm), _NEAREST_RAD)
     from_sheet = 1 / np.tan(theta) - ring.ahead_mm / ring.radius_mm
     bright = np.exp(samples.log_level)
-    made = np.maximum(1 - (from_sheet / _REACH_RADII) ** 2, 0.0) ** 2 * bright
+    made = np.maximum(1 - (from_sheet / REACH_RADII) ** 2, 0.0) ** 2 * bright
     whole = np.bincount(samples.orders["wall"], made)
     known = (whole > 0)[samples.orders["wall"]]
     of_cell = _of_cells(samples, made / np.where(known, whole[samples.orders["wall"]], 1.0))

@@ -14,6 +14,8 @@ from pipeline.artefacts.twin import Mismatch
 from stages.twin.cells import half_turn
 from stages.twin.discs import Disc, disc_of
 from stages.twin.laws import SECTOR_STEP_DEG
+from stages.twin.photo_course import REACH_RADII
+from stages.twin.reference import BlockSamples
 from stages.twin.scene import Ring
 
 _DIMS = ("window_dirt", "window_scatter", "droplet")
@@ -36,17 +38,17 @@ def separated_from_photo(
 
 
 def beside_sectors(
-    found: Sequence[Mismatch], sectors: Sequence[Mismatch], ring: Ring
+    found: Sequence[Mismatch], sectors: Sequence[Mismatch], ring: Ring, samples: BlockSamples | None = None
 ) -> tuple[tuple[Mismatch, ...], tuple[Mismatch, ...]]:
-    """Return the findings that remain, and unnamed ones where the photo was made in other light.
+    """Return the findings that remain, and unnamed places where the photo was made in other light.
 
     That is so at the azimuth of a sector that the window may dim, and on a side that darkens during the run:
     wall that frames show beside it, or before it, differs from its photo. A displaced line remains: no photo
-    shows it, and a drop both displaces the line and dims it.
+    shows it, and a drop both displaces the line and dims it. So does wall far from where a side darkens.
     """
-    reach = [r for r in map(dimmed, sectors) if r is not None]
-    by_photo = [m for m in found if not m.name and m.channel != "line"]
-    left = [m for m in by_photo if any(looks_at(m, *r, ring) for r in reach)]
+    reach = [(s, r) for s in sectors if (r := dimmed(s)) is not None]
+    places = [m for m in found if not m.name and m.channel != "line" and m.fixed_to in ("image", "wall")]
+    left = [m for m in places if any(looks_at(m, *r, ring) and _meets(m, s, samples, ring) for s, r in reach)]
     said = (
         "{} But the photo may have been made in other light, or through what dims the line at that azimuth."
     )
@@ -61,7 +63,8 @@ def dimmed(found: Mismatch) -> tuple[float, float] | None:
         return None
     if "window_scatter" in found.names and "width_deg" in at:
         return at["azimuth_deg"], (at["width_deg"] + SECTOR_STEP_DEG) / 2
-    side = found.fixed_to == "time" and found.channel == "intensity"
+    flickers = any(p.name == "exposure" for p in found.parameters)  # or one side darkens: it need not
+    side = found.fixed_to == "time" and found.channel == "intensity" and not flickers
     return (at["azimuth_deg"], SIDE_DEG) if side else None
 
 
@@ -71,6 +74,22 @@ def looks_at(found: Mismatch, azimuth_deg: float, half_deg: float, ring: Ring) -
         return False
     at = Disc(found.look.u_px, found.look.v_px, 0.0).around(ring.centre_px)[0]
     return abs(half_turn(at - azimuth_deg)) < half_deg
+
+
+def _meets(found: Mismatch, change: Mismatch, samples: BlockSamples | None, ring: Ring) -> bool:
+    """Return whether a place may have been seen and photographed on both sides of a change in time.
+
+    Only for wall can it be excluded: all frames that show it, or the wall for its photo, are on one side.
+    """
+    at = next((p.value for p in found.place if p.name == "distance_mm"), None)
+    first = next((p.value for p in change.place if p.name == "frame_from"), None)
+    if samples is None or at is None or first is None:
+        return True
+    after, reach = samples.number[samples.frame] >= first, REACH_RADII * ring.radius_mm
+    if after.all() or not after.any():
+        return True
+    mm = samples.first_mm + (samples.along + 0.5) * samples.cell_mm
+    return bool(mm[after].min() - reach < at < mm[~after].max() + reach)
 
 
 def _may_be_left_by(bright: Mismatch, dim: Mismatch, ring: Ring) -> bool:

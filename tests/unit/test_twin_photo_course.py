@@ -135,3 +135,22 @@ def test_no_place_is_told_where_the_photo_was_made_before_the_side_darkened(at_d
     side = Mismatch("", "intensity", "time", at, (), 0.0, 2.0, 1.0, "Darker.")
     kept, withdrawn = beside_sectors((_unnamed(at_deg),), (side,), RING)
     assert (len(kept), len(withdrawn)) == (not left, left)
+    wandering = replace(_unnamed(at_deg), fixed_to="time", statement="Spots, each time elsewhere.")
+    assert beside_sectors((wandering,), (side,), RING) == ((wandering,), ())
+    exposure = (NamedFigure("exposure", 0.05, 0.01),)
+    for name in ("flicker or led_dead", ""):
+        flickers = replace(side, name=name, parameters=exposure)
+        assert beside_sectors((_unnamed(at_deg),), (flickers,), RING) == ((_unnamed(at_deg),), ())
+
+
+@pytest.mark.parametrize(("distance_mm", "left"), [(5.0, False), (60.0, True), (160.0, False)])
+def test_wall_far_from_where_a_side_darkens_is_told(distance_mm, left):
+    """Wall that only frames long after the change show, and that they photographed, was withdrawn."""
+    at = (NamedFigure("frame_from", 60.0, 2.0), NamedFigure("azimuth_deg", 0.0, 7.0))
+    side = Mismatch("", "intensity", "time", at, (), 0.0, 2.0, 1.0, "Darker.")
+    place = (NamedFigure("distance_mm", distance_mm, 1.0),)
+    wall = replace(_unnamed(0.0), fixed_to="wall", place=place)
+    samples = _samples()
+    samples.first_mm, samples.cell_mm = 0.0, 2.5
+    samples.along = samples.orders["wall"] // WALL_COLUMNS
+    assert len(beside_sectors((wall,), (side,), RING, samples)[1]) == left
