@@ -54,8 +54,7 @@ from stages.twin.worst import maps_of, worst_places
 
 _EVERY = 10
 _COLOURED = 3
-"""Number of laser frames whose colours are checked for clipping; decoding colour takes three times as
-long."""
+"""Laser frames whose colours are checked for clipping: decoding colour takes three times as long."""
 _CLIPPED_FRAMES = 8
 """Least number of compared laser frames whose colours show what leaks from clipped pixels."""
 _ROUNDS = 3
@@ -143,7 +142,8 @@ def photometry_of(
         [s.light in state.shows_wall for s in sampled],
         ~(state.outside | state.edge),
     )
-    sampled = [replace(s, image=defects.mended(s.image)) for s in sampled]
+    for k, one in enumerate(sampled):
+        sampled[k] = replace(one, image=defects.mended(one.image))
     displaced: tuple[ImagePlace, ...] = ()
     for _ in range(_ROUNDS):
         ratios, textures = _blocks(scene, state, sampled)

@@ -36,12 +36,18 @@ class DefectivePixels:
     def mended(self, image: Float32) -> Float32:
         """Return a picture (H, W) with the medians of their surroundings in place of these pixels.
 
-        A codec or colour filters spread a pixel by one to each side.
+        A codec or colour filters spread a pixel by one to each side. Without any, the picture itself.
         """
-        mask = np.zeros(self.seen.shape, np.uint8)
-        mask[tuple(np.concatenate([self.hot, self.dead]).T)] = 1
-        spread = cv2.dilate(mask, np.ones((3, 3), np.uint8)) > 0
-        return np.where(spread, cv2.medianBlur(image, _AROUND_PX), image).astype(np.float32)
+        both, reach = np.concatenate([self.hot, self.dead]), 1 + _AROUND_PX // 2
+        made = image.copy() if len(both) else image
+        for row, column in both:
+            top, left = max(row - reach, 0), max(column - reach, 0)
+            near = cv2.medianBlur(image[top : row + reach + 1, left : column + reach + 1], _AROUND_PX)
+            first, begin = max(row - 1, 0), max(column - 1, 0)
+            made[first : row + 2, begin : column + 2] = near[
+                first - top : row + 2 - top, begin - left : column + 2 - left
+            ]
+        return made
 
     def told(self) -> tuple[Mismatch, ...]:
         """Return what is reported of them; nothing without any."""
