@@ -1,9 +1,10 @@
 """A side of the picture on which the wall's photo is darker along the whole run: by its lights, or by itself.
 
 The photo was made in the same light as the frames. Lights that are dim on one side in all frames, and wall
-that is darker on one side all along, give the same photo and the same frames, unless the probe rolls: it is
-stated that neither can be told. Where the probe rolls a little, or wall is seen at another place of the
-image, frames differ from such a photo at the flanks of that side: these are no places of the image.
+that is darker on one side all along, give the same photo and the same frames, unless the probe rolls: if it
+did not, it is stated that neither can be told. Where the probe rolls a little, or wall is seen at another
+place of the image, frames differ from such a photo at the flanks of that side: these are no places of the
+image.
 """
 
 from __future__ import annotations
@@ -17,13 +18,15 @@ from pipeline.adjustment.robust import left_out_sd
 from pipeline.arrays import Float
 from pipeline.artefacts.twin import Mismatch, NamedFigure
 from stages.twin.dead_led import seen_from
-from stages.twin.reference import BlockSamples
+from stages.twin.reference import WALL_COLUMNS, BlockSamples
 from stages.twin.scene import Scene
 from stages.twin.seen_in_photo import SIDE_DEG, dimmed, looks_at
 
 _LEAST, _SURE, _PARTS = 0.25, 5.0, 6
 """Least share by which a side is darker than the opposite one, chosen: the wall of a recording 60 mm long
 makes 14 % at 2.7 σ. σ by which it must be, and parts of the frames for that σ."""
+_HALF_TURN_DEG = 180.0
+"""Roll over which a dark side of the wall appears on opposite sides of the picture."""
 _RING = 0.05
 """Width of rings about the image's middle, in radii of the line, within which sides are compared."""
 
@@ -40,13 +43,29 @@ def dark_side(samples: BlockSamples | None, scene: Scene) -> tuple[Mismatch, ...
     at = NamedFigure("azimuth_deg", float(np.degrees(azimuth)), float(np.degrees(sd / abs(bright))), "deg")
     size = NamedFigure("darker", darker, 2 * sd * (1 - darker), "share of the light")
     said = (
-        f"Along the whole run, the wall's photo is {100 * darker:.0f} % darker about image azimuth "
-        f"{at.value:.0f}° than on the opposite side. LEDs that are dim or shaded there, dirt on the window, "
-        "and wall that is darker there look the same while the probe hardly rolls. What to do: record once "
-        "more with the probe rolled by half a turn."
+        f"Along the whole run, the wall's photo is darker about image azimuth {at.value:.0f}° than on the "
+        f"opposite side, by {100 * darker:.0f} % in what varies once around the picture. "
+        + _either(samples, scene)
     )
     look, nan = scene.ring.at(int(samples.number[0]), azimuth), float("nan")
     return (Mismatch("", "intensity", "image", (at,), (size,), nan, nan, nan, said, look),)
+
+
+def _either(samples: BlockSamples, scene: Scene) -> str:
+    """Return what may make a dark side: where the probe rolls, wall turns in the picture, lights do not."""
+    turn = 2 * np.pi * (samples.around + 0.5) / WALL_COLUMNS - seen_from(samples, scene)[1]
+    waves = (np.bincount(samples.frame, f(turn)) for f in (np.sin, np.cos))
+    roll = float(np.degrees(np.ptp(np.unwrap(np.arctan2(*waves)[np.unique(samples.frame)]))))
+    causes = "LEDs that are dim or shaded there, dirt on the window,"
+    if roll < _HALF_TURN_DEG:
+        return (
+            f"{causes} and wall that is darker there look the same while the probe rolls by no more than "
+            f"{roll:.0f}°. What to do: record once more with the probe rolled by half a turn."
+        )
+    return (
+        f"{causes} or a camera that is darker there make it so: the probe rolled by {roll:.0f}°, and wall "
+        "would have turned in the picture. What to do: check the LEDs and the window."
+    )
 
 
 def beside_dark_side(

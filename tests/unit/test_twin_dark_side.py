@@ -8,6 +8,7 @@ import pytest
 from pipeline.artefacts.twin import Look, Mismatch, NamedFigure
 from stages.twin.compare import BLOCK_PX
 from stages.twin.dark_side import beside_dark_side, dark_side
+from stages.twin.reference import WALL_COLUMNS
 from stages.twin.scene import Ring
 
 FRAMES, BLOCKS = 12, (30, 40)
@@ -18,16 +19,21 @@ POLAR = (np.hypot(U, V) / 90).astype(np.float32), np.arctan2(V, U).astype(np.flo
 SCENE = SimpleNamespace(polar=POLAR, ring=RING)
 
 
-def _samples(photo, seed=3):
-    """Blocks whose photo has a logarithm by azimuth and frame, on wall of blotches as large as a tenth."""
+def _samples(photo, seed=3, roll_deg=0.0):
+    """Blocks whose photo has a logarithm by azimuth and frame, on wall of blotches as large as a tenth.
+
+    The probe rolls by ``roll_deg`` during the run.
+    """
     theta, phi = (a[4::8, 4::8] for a in POLAR[:2])
     row, column = (np.tile(a, FRAMES) for a in np.nonzero((theta > 0.5) & (theta < 1.5)))
     frame = np.repeat(np.arange(FRAMES), len(row) // FRAMES)
     random, at = np.random.default_rng(seed), phi[row, column]
     blotches = 0.1 * random.standard_normal((FRAMES, 8))[frame, (at * 4 / np.pi).astype(int) % 8]
     light = -1.5 * np.log(theta[row, column])
+    turn = (at + np.radians(roll_deg) * frame / (FRAMES - 1)) / (2 * np.pi)
     return SimpleNamespace(
         frame=frame, number=8 * np.arange(FRAMES), row=row, column=column, away=theta[row, column],
+        around=np.floor(turn % 1 * WALL_COLUMNS).astype(int),
         log_light=light, log_level=4 + light + blotches + photo(at, frame),
     )  # fmt: skip
 
@@ -53,6 +59,15 @@ def test_a_dark_side_is_stated_and_no_places_at_its_flanks(lost):
     assert side.place[0].value == pytest.approx(np.degrees(0.1), abs=10)
     assert "look the same" in side.statement
     assert len(withdrawn) == 2
+
+
+@pytest.mark.parametrize(("roll_deg", "alike"), [(6.0, True), (400.0, False)])
+def test_wall_is_no_cause_of_a_dark_side_if_the_probe_rolled_by_more_than_half_a_turn(roll_deg, alike):
+    """Whatever the roll was, the statement was that the probe hardly rolls."""
+    (side,) = dark_side(_samples(_dark(0.6), roll_deg=roll_deg), SCENE)
+    assert ("look the same" in side.statement) == alike
+    stated = float(side.statement.split("°. What" if alike else "°, and")[0].split()[-1])
+    assert stated == pytest.approx(roll_deg, abs=2)
 
 
 @pytest.mark.parametrize(

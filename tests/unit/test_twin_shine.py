@@ -82,7 +82,12 @@ def test_pale_wall_in_other_light_is_not_a_glint(name, glints):
 
 
 @pytest.mark.parametrize(
-    ("name", "channel", "told"), [("droplet", "intensity", 0), ("window_dirt", "intensity", 1)]
+    ("name", "channel", "told"),
+    [
+        ("droplet", "intensity", 0),
+        ("window_dirt", "intensity", 1),
+        ("window_dirt or window_scatter or droplet", "intensity", 1),
+    ],
 )
 def test_wall_that_a_drop_shows_is_not_a_glint(name, channel, told):
     """A drop that was named had spots far brighter than predicted told beside it: wall from elsewhere."""
