@@ -212,7 +212,7 @@ class WindowPlace:
 
     def _said(self, names: list[str], size: float) -> str:
         at, shown = f"About ({self.place.u_px:.0f}, {self.place.v_px:.0f})", len(self.frame)
-        when = f"in the {shown} compared frames that show wall there"
+        when = f"in the {shown} compared frames that could be judged there"
         if names[0] == "window_dirt" and size < 0:
             return f"{at} the image is {100 * -size:.0f} % brighter {when}."
         if names[0] == "window_scatter" and size < 0:
