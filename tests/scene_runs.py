@@ -53,7 +53,7 @@ def run_scene(scene: Scene, folder: Path, assignments: Sequence[str] = ()) -> Sc
 def score(run: Path, truth: Path) -> SceneScore:
     """Return the comparison of a run folder with a folder of truth."""
     with np.load(run / "radius_map.npz") as file:
-        found = RadiusMap(**{f.name: file[f.name] for f in fields(RadiusMap)})
+        found = RadiusMap(**{f.name: file[f.name] for f in fields(RadiusMap) if f.name in file})
     wall = compare_wall(found, truth)
     error, rms = wall.error_mm, float(np.sqrt(np.mean(wall.error_mm**2)))
     return SceneScore(

@@ -102,8 +102,8 @@ def later(pits, seed, pipe=PIPE):
     return pipe.surface(pits, seed, SHIFT_MM, ROLL_RAD, SCALE)
 
 
-def compared(earlier_pits, later_pits, earlier_found, later_found, seed=10):
+def compared(earlier_pits, later_pits, earlier_found, later_found, seed=10, resolution=FINE):
     before, after = PIPE.surface(earlier_pits, seed), later(later_pits, seed + 1)
     registration = register(before, after, NO_WELDS, SAME)
     places = put_together(earlier_found, [moved(f) for f in later_found], registration, RADIUS)
-    return changes(places, PairedWalls(before.wall, after.wall, registration), FINE, unseen)
+    return changes(places, PairedWalls(before.wall, after.wall, registration), resolution, unseen)

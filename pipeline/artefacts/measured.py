@@ -233,7 +233,7 @@ class Wall:
     """Result of accumulation: cloud, radius map, and the axis to which both refer.
 
     ``fixed`` are departures that stay at one place of the image, None without any; ``held`` is the light that
-    a codec carried over from ring to ring; ``displaced_mm`` is that of the `Trajectory`.
+    a codec carried over from ring to ring.
     """
 
     cloud: PointCloud
@@ -241,7 +241,6 @@ class Wall:
     axis: PipeAxis
     fixed: FixedToProbe | None = None
     held: HeldOver = NOTHING_HELD
-    displaced_mm: float = 0.0
 
 
 @dataclass(frozen=True)

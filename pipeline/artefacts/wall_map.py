@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import cv2
@@ -28,6 +28,9 @@ class WallMap:
     radius_mm, sigma_mm, sigma_random_mm : (S, A)
         Radius; its total 1 σ; the random part of that. NaN where nothing is known; σ is 0 in a reference
         that states none.
+    displaced_mm : float
+        The part of the total 1 σ that a place shares with its surroundings alone, such as the error behind
+        water on the window. It has no mean around the pipe.
     """
 
     distance_mm: Float
@@ -35,6 +38,12 @@ class WallMap:
     radius_mm: Real
     sigma_mm: Real
     sigma_random_mm: Real
+    displaced_mm: float = field(default=0.0, kw_only=True)
+
+    def common_variance(self, rows: slice = slice(None)) -> Float:
+        """Return the variance of the radius (S, A), mm², from errors that all places share: calibration."""
+        total, random = (np.asarray(v[rows], float) for v in (self.sigma_mm, self.sigma_random_mm))
+        return np.asarray(np.maximum(total**2 - random**2 - self.displaced_mm**2, 0.0))
 
     @property
     def step_mm(self) -> float:

@@ -164,8 +164,7 @@ def mean_diameter(radius: WallMap) -> tuple[float, float]:
     The calibration's error is common to all cells and stays in the mean; noise averages out.
     """
     seen = np.isfinite(radius.radius_mm)
-    common = radius.sigma_mm[seen].astype(float) ** 2 - radius.sigma_random_mm[seen].astype(float) ** 2
-    sigma = 2 * float(np.sqrt(max(0.0, float(common.mean()))))
+    sigma = 2 * float(np.sqrt(radius.common_variance()[seen].mean()))
     return 2 * float(np.mean(radius.radius_mm[seen], dtype=np.float64)), sigma
 
 

@@ -189,12 +189,14 @@ def _diameter(wall: WallMap, points: Outline) -> tuple[Reading, ...]:
     """Return the diameter through the axis at the point's azimuth, and the mean of the section."""
     s, a = points[0]
     (r0, sigma0, _), (r1, sigma1, _) = wall.radius_at(s, a), wall.radius_at(s, a + np.pi)
-    row = wall.row(s)
+    row, local = wall.row(s), wall.displaced_mm
     section, sigma = wall.radius_mm[row], wall.sigma_mm[row]
-    common = float(np.nanmedian(sigma))
+    common, shared0, shared1 = np.sqrt(
+        np.maximum(np.array([np.nanmedian(sigma), sigma0, sigma1]) ** 2 - local**2, 0.0)
+    ).tolist()
     return (
         # The calibration's error, which both ends share, adds up and does not average out.
-        Reading("diameter", r0 + r1, sigma0 + sigma1, "mm"),
+        Reading("diameter", r0 + r1, float(np.hypot(shared0 + shared1, np.sqrt(2) * local)), "mm"),
         Reading("mean diameter", 2 * float(np.nanmean(section)), 2 * common, "mm"),
     )
 

@@ -167,7 +167,8 @@ def accumulate_wall(
     fixed = fixed_to_probe(survey, rings.frame, trajectory.radius_mm, grid, context.scratch)
     held = _held_in(rings, survey, trajectory.radius_mm)
     wall = empty_wall(grid, survey, trajectory.axis, fixed, context.scratch)
-    wall = replace(wall, held=held, displaced_mm=trajectory.displaced_mm)
+    radius_map = replace(wall.radius_map, displaced_mm=trajectory.displaced_mm)
+    wall = replace(wall, held=held, radius_map=radius_map)
     smoothing_mm, gap_mm = parameters.smoothing_mm, parameters.largest_gap_mm
     stretches = cut_stretches(grid, survey, smoothing_mm, gap_mm)
     for done, stretch in enumerate(stretches, 1):
@@ -175,8 +176,8 @@ def accumulate_wall(
         for departure in (None if fixed is None else fixed.departure_mm, shared):
             if departure is not None:
                 systematic = np.hypot(systematic, departure[stretch.from_row : stretch.to_row])
-        radius_map = map_of(stretch, on_wall, survey, grid, systematic, smoothing_mm, gap_mm, held)
-        fill(wall, stretch, radius_map, on_wall, survey)
+        part = map_of(stretch, on_wall, survey, grid, systematic, smoothing_mm, gap_mm, held)
+        fill(wall, stretch, part, on_wall, survey)
         context.progress(done, len(stretches))
     _judge_radii(wall, trajectory, context)
     _report(context, wall, spread)
@@ -291,7 +292,7 @@ def _report(context: Context, wall: Wall, spread: CalibrationSpread) -> None:
 
 ACCUMULATE = Stage(
     "accumulate",
-    "21",
+    "22",
     AccumulateParameters,
     accumulate_wall,
     "point cloud and radius map around the pipe's own axis, with σ",

@@ -71,13 +71,15 @@ def _resolution(walls: WallPair, pair: PairedWalls) -> Resolution:
     smoothing, spacing = max(w.smoothing_mm for w in both), max(w.ring_spacing_mm for w in both)
     # the map joins neighbouring rings by a triangular kernel of that half width, whose 1 σ is width / √6
     along = float(np.hypot(smoothing, spacing / np.sqrt(6)))
-    return Resolution(along, smoothing, pair.calibration_mm / pair.radius_mm, walls.is_one_calibration)
+    displaced = float(np.hypot(pair.now.displaced_mm, pair.earlier.displaced_mm))
+    relative = pair.calibration_mm / pair.radius_mm
+    return Resolution(along, smoothing, relative, walls.is_one_calibration, displaced)
 
 
 REGISTER = Stage(
-    "register", "3", RegisterParameters, register_walls, "Register an earlier run's wall on a later one's."
+    "register", "4", RegisterParameters, register_walls, "Register an earlier run's wall on a later one's."
 )
-COMPARE = Stage("compare", "4", CompareParameters, compare_findings, "Find the change of every finding.")
+COMPARE = Stage("compare", "5", CompareParameters, compare_findings, "Find the change of every finding.")
 COMPARISON: tuple[Stage, ...] = (REGISTER, COMPARE)
 
 

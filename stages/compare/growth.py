@@ -32,12 +32,15 @@ class Resolution:
         1 σ of the radius from calibration over the radius.
     is_common : bool
         Whether both runs share that calibration, so that it acts on the growth alone.
+    displaced_mm : float
+        1 σ of the growth from what displaces the picture smoothly in either run.
     """
 
     along_mm: float
     around_mm: float
     relative: float
     is_common: bool
+    displaced_mm: float = 0.0
 
 
 def measure_growth(
@@ -64,7 +67,7 @@ def measure_growth(
     calibration = resolution.relative * (
         abs(growth) if resolution.is_common else float(np.linalg.norm(depth))
     )
-    sigma = float(np.linalg.norm([spread[0], *lost, placed, calibration]))
+    sigma = float(np.linalg.norm([spread[0], *lost, placed, calibration, resolution.displaced_mm]))
     edge = np.array(patch.cell_mm) / np.sqrt(6)
     length, width = (Value(float(size[k]), float(np.hypot(spread[k + 1], edge[k]))) for k in (0, 1))
     cell = patch.cell_mm[0] * patch.cell_mm[1]

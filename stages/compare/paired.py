@@ -76,8 +76,7 @@ class PairedWalls:
     @property
     def calibration_mm(self) -> float:
         """Median of the later radius' 1 σ from calibration."""
-        total, random = (self._thinned(v) for v in (self.now.sigma_mm, self.now.sigma_random_mm))
-        return float(np.sqrt(np.nanmedian(np.maximum(total**2 - random**2, 0.0))))
+        return float(np.sqrt(np.nanmedian(self.now.common_variance(self._some(len(self.now.distance_mm))))))
 
     def stretches(self) -> Iterator[tuple[slice, Stretch]]:
         """Yield all rows of the later wall, some hundred at a time."""
@@ -98,7 +97,11 @@ class PairedWalls:
 
     def _thinned(self, values: NDArray[Any]) -> Float:
         """Return about two hundred rows of values, evenly: enough for a median of a long wall."""
-        return np.asarray(values[:: max(len(values) // 200, 1)], float)
+        return np.asarray(values[self._some(len(values))], float)
+
+    @staticmethod
+    def _some(rows: int) -> slice:
+        return slice(None, None, max(rows // 200, 1))
 
     def _before(self, s: Float) -> tuple[Float, Float]:
         """Return the earlier wall's radius and random σ at the later grid's rows (R,) and all azimuths."""

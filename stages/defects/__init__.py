@@ -93,7 +93,7 @@ def find_defects(
         Witnesses(texture, rings, pictures, wall.held),
         recording.pipe.wall_thickness_mm,
         parameters.min_depth_mm,
-        wall.displaced_mm,
+        wall.radius_map.displaced_mm,
     )
     cloud = cloud_along(wall.cloud)
     measured = MeasuredWall(relief, cloud, cloud.ring_spacing_mm())

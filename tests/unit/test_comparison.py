@@ -85,6 +85,16 @@ def test_grown_new_and_vanished_defects_are_found_and_others_are_unchanged():
     assert growth.sigma < 0.08
 
 
+def test_where_one_picture_was_displaced_by_water_a_change_of_that_size_is_no_growth():
+    pit = (45.0, 0.3)
+    (found,) = compared(
+        [(*pit, 0.4, 2.0)], [(*pit, 0.6, 2.0)], [finding(1, *pit)], [finding(1, *pit)],
+        resolution=replace(FINE, displaced_mm=0.2),
+    )  # fmt: skip
+    assert found.growth.depth_mm.sigma == pytest.approx(0.2, rel=0.1)
+    assert found.fate is Fate.UNCHANGED
+
+
 def test_growth_lies_in_its_95_percent_interval_in_95_percent_of_cases():
     inside = []
     for seed in range(3):

@@ -13,6 +13,7 @@ import pytest
 
 from pipeline.arrays import Float
 from pipeline.artefacts.measured import Trajectory
+from pipeline.export.run_record import mean_diameter
 from pipeline.geometry.axis import straight_axis
 from stages.accumulate import AccumulateParameters, accumulate_wall
 from stages.motion import MotionParameters, estimate_motion
@@ -305,7 +306,14 @@ def test_a_picture_displaced_smoothly_widens_sigma_and_is_told_if_that_matters(
     wall = accumulate_wall(run.probe, run.rings, run.points, got, chosen, context)
     sigma_mm, random_mm = wall.radius_map.sigma_mm, wall.radius_map.sigma_random_mm
     systematic = np.nanmedian(sigma_mm**2 - random_mm**2) ** 0.5
-    assert wall.displaced_mm == displaced_mm, "depths of defects include it"
+    assert wall.radius_map.displaced_mm == displaced_mm, "depths of defects include it"
+    calibration = accumulate_wall(
+        run.probe, run.rings, run.points, replace(got, displaced_mm=0.0), chosen, quiet_context()
+    ).radius_map
+    assert mean_diameter(wall.radius_map)[1] == pytest.approx(mean_diameter(calibration)[1], rel=1e-3)
+    assert np.nanmean(wall.radius_map.common_variance()) ** 0.5 == pytest.approx(
+        np.nanmean(calibration.common_variance()) ** 0.5, rel=1e-3
+    )
     assert systematic >= 0.999 * displaced_mm
     assert any("photo and laser line contradict each other" in words for words in told) is warned
 

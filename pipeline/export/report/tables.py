@@ -123,11 +123,14 @@ def _measured(summary: RunSummary) -> Card:
     seen = np.isfinite(radius_map.radius_mm)
     rows = seen.any(1)
     sigma, random = (float(np.median(s[seen])) for s in (radius_map.sigma_mm, radius_map.sigma_random_mm))
+    local = radius_map.displaced_mm
     lines = [
         f"{100 * seen[rows].mean():.1f} % of the wall was seen",
         f"of this uncertainty, {random:.3f} mm is random and "
-        f"{np.sqrt(max(0.0, sigma**2 - random**2)):.3f} mm comes from the calibration",
+        f"{np.sqrt(max(0.0, sigma**2 - random**2 - local**2)):.3f} mm comes from the calibration",
     ]
+    if local > 0:
+        lines.append(f"{local:.3f} mm of it is by how much photo and laser line differ from place to place")
     if summary.trajectory is not None:
         lines += _motion(summary.trajectory)
     return Card("How well it was measured", f"radius ± {sigma:.3f} mm (1 σ)", tuple(lines))
