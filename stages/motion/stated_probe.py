@@ -18,8 +18,9 @@ MOST_LASTING = 0.57
 to .51 in open-1, open-2, at half their size, shaken, and in a scene of ours; .18 in open-3, of much noise;
 .63 in open-1 as HEVC of crf 32, .69 at crf 30, .85 with glints, dust and blur as well."""
 _TOO_FAR = 5.0
-"""A correct probe is contradicted by so many σ along one of its ten or so directions once in 10⁵
-recordings."""
+"""σ of a contradiction that is warned of. By independent Gaussian errors a correct probe is contradicted as
+much along one of its ten or so directions once in 10⁵ recordings; by errors that matches share, more
+often: how often is not known."""
 _NO_EVIDENCE = 1e-6
 """Share of a direction's stated variance below which its reduction is rounding: there a move counts in stated
 σ."""
@@ -66,7 +67,8 @@ def contradiction(trajectory: Trajectory, probe: Probe) -> Contradiction:
     the probe by x = g d, where d is their difference and g = 1 / (1 + e). A correct probe has a d of variance
     1 + e, so that x has the variance g: the reduction of the stated variance. Where pictures show little, x
     is small however wrong the statement is (A. H. Jazwinski, "Stochastic Processes and Filtering Theory",
-    1970, on predicted residuals).
+    1970, on predicted residuals). The variance e is that of independent errors; errors that matches share
+    make d larger.
     """
     unsure = probe.principal_uncertainties()
     if trajectory.instrument is None or not unsure.size:

@@ -25,8 +25,9 @@ _NEAREST, _FARTHEST = 1.0, 2.5
 """Distance of neighbours, in sizes of a patch. Nearer ones share samples and therefore noise; farther ones
 are displaced differently. Up to 1.5 or 3.5 sizes the result is the same within a twentieth."""
 _BESIDE = 0.5
-"""Distance of rings that are compared with a landmark, in sizes of a patch: its own wall. Up to one size,
-waves of the wall 1 mm high and 40 mm long were flattened in the mean, and counted as displaced by .03 mm."""
+"""Distance of rings that are compared with a landmark, in sizes of a patch: its own wall, and half the least
+distance of neighbours, which so share no rings and no noise of them. Up to one size, waves of the wall 1 mm
+high and 40 mm long were flattened in the mean, and counted as displaced by .03 mm."""
 _SURE = 5.0
 """Standard errors from which it is certain: chosen, far beyond chance."""
 _OF_POSE = 0.5
