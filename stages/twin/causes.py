@@ -133,7 +133,8 @@ def _may_be(found: Fitted, cells: Cells, base: Float) -> bool:
     """Return whether a law may be what it says: a light's step, or no more than an LED's light."""
     if found.law.name == "step":
         return of_a_light(found, cells, base)
-    return found.law.name != "led_dead" or size_of(found) < 1.0 + _SURE * _size_sd(found)
+    size = size_of(found)  # σ is in proportion to it: that of all its light decides
+    return found.law.name != "led_dead" or size < 1.0 + _SURE * _size_sd(found) / max(size, 1.0)
 
 
 def _simplest(tries: Sequence[Fitted]) -> Fitted:

@@ -11,8 +11,8 @@ import pytest
 from scipy.ndimage import map_coordinates
 
 from pipeline.instrument.probe import Lighting
-from stages.twin.causes import causes
-from stages.twin.cells import SECTORS, Cells, CellsOfFrames, sector_azimuth_rad, sectors_of
+from stages.twin.causes import _may_be, causes
+from stages.twin.cells import SECTORS, Cells, CellsOfFrames, Fitted, Law, sector_azimuth_rad, sectors_of
 from stages.twin.laws import led_share
 from stages.twin.line_light import _plain_line
 from stages.twin.render import Region, TwinFrame
@@ -184,6 +184,14 @@ def test_an_led_fails_though_a_frame_beside_it_shows_nothing(hidden):
     pixels = np.where(np.arange(FRAMES)[:, None] == hidden, 10.0, cells.pixels)
     (led,), slow = causes(replace(cells, pixels=pixels), None, Lighting(), RING)
     assert (led.name, slow) == ("led_dead", ())
+
+
+@pytest.mark.parametrize(("size", "may_be"), [(1.0, True), (1.3, True), (1.7, False)])
+def test_an_led_that_loses_far_more_than_its_light_is_none(size, may_be):
+    """A side that darkened by half was told as an LED that lost 162 ± 26 % of its light."""
+    law = Law("led_dead", np.zeros((1, FRAMES, SECTORS)), np.array([[0.3, 8.0, 0.17]]))
+    led = Fitted(law, 0, size, 0.05, 1e-6, np.ones(FRAMES), 2.0, 1.0)
+    assert _may_be(led, _cells(np.zeros((FRAMES, SECTORS))), np.zeros((0, FRAMES, SECTORS))) == may_be
 
 
 def test_in_few_frames_a_failing_led_may_be_that_or_flicker(monkeypatch):
