@@ -248,7 +248,8 @@ def _warn_of_displaced(trajectory: Trajectory, wall: Wall, context: Context) -> 
             f"differ smoothly by some {apart_mm:.2g} mm (1 σ), beside a shift and a tilt. Either may be "
             "wrong: water, grease or uneven glass in front of the lens or of the laser, a lens or a sheet of "
             "laser light that is not as stated, or strong compression. σ of the radii includes the whole "
-            "difference. What to do: dry and clean the window, run boresight diagnose on a gauge run, "
+            "difference as a mean over the run, and is too small where only a part of the run is affected. "
+            "What to do: dry and clean the window, run boresight diagnose on a gauge run, "
             "record with less compression"
         )
 
@@ -292,7 +293,7 @@ def _report(context: Context, wall: Wall, spread: CalibrationSpread) -> None:
 
 ACCUMULATE = Stage(
     "accumulate",
-    "22",
+    "23",
     AccumulateParameters,
     accumulate_wall,
     "point cloud and radius map around the pipe's own axis, with σ",

@@ -315,7 +315,9 @@ def test_a_picture_displaced_smoothly_widens_sigma_and_is_told_if_that_matters(
         np.nanmean(calibration.common_variance()) ** 0.5, rel=1e-3
     )
     assert systematic >= 0.999 * displaced_mm
-    assert any("photo and laser line contradict each other" in words for words in told) is warned
+    about = [words for words in told if "photo and laser line contradict each other" in words]
+    assert len(about) == warned
+    assert all("a sheet of laser light" in words and "as a mean over the run" in words for words in about)
 
 
 @pytest.mark.parametrize(
