@@ -35,6 +35,7 @@ _BY_LIGHT = (
     "Rings of the gauge run deviate by less than the size of {} is uncertain: whether anything else, such as "
     "{}, moves them was not decided."
 )
+_BORE_FIRST = "Measure the gauge's bores and correct recording.yaml; then run the diagnosis again."
 _OF_ENCODER = "an error of the encoder that depends on distance or speed in another way"
 
 
@@ -57,7 +58,8 @@ def composed(
     of_light = _by_light(examined, rings, [c for c in own if c.name in certain])
     rings = Verdict.CONSISTENT if of_light else rings
     said = _said(examined, rings, known, unnamed, bool(of_profile), doubtful)
-    if gauge is not None and gauge.misdrawn and said.verdict is Verdict.NAMED:
+    misdrawn = gauge is not None and gauge.misdrawn
+    if misdrawn and said.verdict is Verdict.NAMED:
         said = replace(said, verdict=Verdict.PARTLY)  # the bore, or an effect that fits as well, remains
     asked = said.members if said.members else [e.name for e in said.effects]
     nameless = _IN_PROFILE if of_profile else of_travel[0].location if of_travel else None
@@ -77,7 +79,7 @@ def composed(
         members=() if partly else said.members,
         identifiable=identifiable,
         fit=examined.quality if examined is not None else None,
-        record_next=_next(said, asked, causes),
+        record_next=_BORE_FIRST if misdrawn else _next(said, asked, causes),
         causes=causes,
         feasibility=examined.feasibility if examined is not None else (),
         candidates=of_gauge.candidates(examined) if examined is not None else (),

@@ -21,6 +21,8 @@ from stages.diagnose.gauge.sets import cause_of
 _CERTAIN = Doubt({})
 # In place of a law's name: a cause that the library does not have, or measurements that do not agree.
 _OUTSIDE = ""
+# Sets of a smaller share are left out: nothing that is shown depends on them.
+_LEAST = 1e-12
 
 
 def weighed(examined: Examined | None, claims: Sequence[Claim]) -> Causes:
@@ -45,8 +47,9 @@ def _of_rings(examined: Examined) -> Causes:
     if best is None or verdicts is None:
         return NONE
     each = zip(best.library_terms, doubts(examined), strict=False)
-    table = _table(verdicts, {cause_of(t.model, t.shape): doubt for t, doubt in each})
-    chance, courses = defaultdict[str, float](float), _courses(table)
+    doubt = {cause_of(t.model, t.shape): one for t, one in each}
+    table = _table(verdicts, doubt)
+    chance, courses = defaultdict[str, float](float), _courses(table, doubt)
     for one in table:
         for name, share in one.names.items():
             chance[name] += one.probability * share
@@ -82,7 +85,7 @@ def _table(verdicts: Verdicts, doubt: Mapping[LawAndOrder, Doubt]) -> list[_Weig
         weight = p * prod(1 + d.odds for d in each.values())
         sets.append(_Weighed(weight, terms, _names(each, patterned=len(terms) < len(every))))
     total = sum(s.probability for s in sets)
-    return [replace(s, probability=s.probability / total) for s in sets if s.probability > 0]
+    return [replace(s, probability=s.probability / total) for s in sets if s.probability > _LEAST * total]
 
 
 def _names(each: Mapping[LawAndOrder, Doubt], patterned: bool) -> dict[str, float]:
@@ -94,14 +97,19 @@ def _names(each: Mapping[LawAndOrder, Doubt], patterned: bool) -> dict[str, floa
     return {name: 1 - p for name, p in missing.items()}
 
 
-def _courses(table: Sequence[_Weighed]) -> dict[str, tuple[CourseShare, ...]]:
+def _courses(
+    table: Sequence[_Weighed], doubt: Mapping[LawAndOrder, Doubt]
+) -> dict[str, tuple[CourseShare, ...]]:
     """Return each law's courses, or sets of courses and orders, the likeliest first.
 
-    The words are those of the likeliest set with them.
+    The words are those of the likeliest set with them. Those of a law that looks like another effect are of
+    sets without that effect: beside it, the law has the size of what is left over.
     """
     found = dict[str, dict[object, list[tuple[float, CourseShare]]]]()
     for one in table:
-        for law in {t.model.law for t in one.terms}:
+        causes = {cause_of(t.model, t.shape) for t in one.terms}
+        left_over = {name for cause in causes & doubt.keys() for name in doubt[cause].alike}
+        for law in {t.model.law for t in one.terms} - left_over:
             same = [t for t in one.terms if t.model.law == law]
             kinds = " and ".join(sorted({str(t.model.kind) for t in same}))
             words = " ".join(t.model.statement(t.shape, t.amplitude) for t in same)

@@ -120,6 +120,24 @@ def test_exclusive_causes_add_up_to_one_and_doubt_changes_no_order(same_shift):
     assert unsure.outside == pytest.approx(0.06 / 1.66)
 
 
+def test_what_looks_like_an_effect_is_described_as_in_its_place_and_not_as_beside_it(same_shift):
+    """A baseline .067 mm nearer that looks like a cone stood as .004 mm farther, as it is beside the cone."""
+    cone, small, large = term("laser_cone"), term("baseline", size=0.004), term("baseline", size=-0.067)
+    found = by.weighed(
+        gauge_run([((cone,), 0.9), ((cone, small), 0.09), ((large,), 0.01)], ("baseline",)), ()
+    )
+    baseline = found.of("baseline")
+    assert baseline is not None
+    assert [c.statement for c in baseline.courses] == [large.model.statement((), large.amplitude)]
+
+
+def test_a_rival_far_less_likely_than_any_other_is_left_out(same_shift):
+    """Its share of a law was 0 over 0."""
+    sets = [((term("laser_tilt"),), 1.0), ((term("laser_cone"),), 5e-324)]
+    found = by.weighed(gauge_run(sets, ("sensor_tilt",)), ())
+    assert chances(found) == {"laser_tilt": 0.5, "sensor_tilt": 0.5}
+
+
 def test_what_looks_like_several_effects_is_as_likely_as_the_likelier_of_them_at_least(same_shift):
     """The second effect's alike took the place of the first's, at 2 %."""
     both = (term("laser_tilt"), term("laser_cone"))

@@ -42,6 +42,7 @@ def test_beside_a_bore_that_is_not_as_drawn_a_name_is_not_the_whole_answer(real_
     assert found.verdict is Verdict.PARTLY
     assert found.remainder is not None
     assert found.remainder.verdict is Verdict.UNEXPLAINED
+    assert found.record_next.startswith("Measure the gauge's bores")
     assert answer(real_probe, None, replace(seen("gauge"), misdrawn=True)).verdict is Verdict.NOT_IDENTIFIABLE
 
 

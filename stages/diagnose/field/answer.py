@@ -191,7 +191,7 @@ def with_field(
         if repeats:
             return in_words(found, doubt or _BY_FIELD + alone.identifiable)
         left = replace(alone, shown=() if doubt else possible)
-        return _alone(found, alone, left, seen, gauge is not None, doubt)
+        return _alone(found, alone, left, seen, examined is not None, doubt)
     if found.verdict is Verdict.NOT_IDENTIFIABLE and gauge is None and travels(field.field.run):
         return replace(found, verdict=Verdict.CONSISTENT)
     return found
