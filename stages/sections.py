@@ -46,11 +46,15 @@ class SectionParameters(Parameters):
 
 @dataclass(frozen=True)
 class _Slab:
-    """A station's mean radius (A,), its variance by noise (A,) and by calibration, and the fraction seen."""
+    """A station's mean radius (A,) with its errors, and the fraction seen.
+
+    They are its variance by noise (A,) and by calibration, and the local 1 σ of a displaced picture.
+    """
 
     radius_mm: Float
     variance_mm2: Float
     calibration_mm2: float
+    displaced_mm: float
     coverage: float
 
 
@@ -108,15 +112,14 @@ def _slab(radius_map: RadiusMap, station: float, spacing_mm: float) -> _Slab:
     rows = slice(*np.searchsorted(radius_map.distance_mm, [station - half, station + half]))
     radius = radius_map.radius_mm[rows].astype(float)
     random = radius_map.sigma_random_mm[rows].astype(float) ** 2
-    total = radius_map.sigma_mm[rows].astype(float) ** 2
     seen = np.isfinite(radius) & np.isfinite(random)
     count = seen.sum(0)
     with np.errstate(invalid="ignore", divide="ignore"):
         mean = np.where(seen, radius, 0).sum(0) / count
         variance = np.where(seen, random, 0).sum(0) / count**2
-    excess = np.maximum(total - random, 0)[seen]
+    excess = radius_map.common_variance(rows)[seen]
     calibration = float(excess.mean()) if excess.size else np.nan
-    return _Slab(mean, variance, calibration, float(seen.mean()))
+    return _Slab(mean, variance, calibration, radius_map.displaced_mm, float(seen.mean()))
 
 
 def _determined_harmonics(seen: Bool, most: int) -> int:
@@ -165,6 +168,7 @@ def _measures(station: float, slab: _Slab, shape: _Shape, nominal_mm: float) -> 
     """Return one row of `Sections`, in the order of its fields."""
     theta, cov = shape.coefficients, shape.covariance
     calibration = 2 * np.sqrt(slab.calibration_mm2)
+    ends_mm = np.sqrt(2) * slab.displaced_mm
     calliper = _calliper_basis((len(theta) - 1) // 2)
     diameter = calliper @ theta
     high, low = calliper[np.argmax(diameter)], calliper[np.argmin(diameter)]
@@ -179,15 +183,15 @@ def _measures(station: float, slab: _Slab, shape: _Shape, nominal_mm: float) -> 
     def noise(g: Float) -> float:
         return float(np.sqrt(g @ cov @ g))
 
-    def absolute(g: Float) -> float:
-        return float(np.hypot(noise(g), calibration))
+    def absolute(g: Float, local_mm: float = 0.0) -> float:
+        return float(np.linalg.norm([noise(g), calibration, local_mm]))
 
     def relative(g: Float, value: float, base: float, base_sigma: float) -> float:
         return float(np.hypot(noise(g) / base, value / base**2 * base_sigma))
 
     return np.array([
         station, slab.coverage,
-        mean, absolute(middle), least, absolute(low), most, absolute(high),
+        mean, absolute(middle), least, absolute(low, ends_mm), most, absolute(high, ends_mm),
         span / nominal_mm, relative(high - low, span, nominal_mm, 0.0),
         span / mean, relative(high - low, span, mean, absolute(middle)),
         reach / mean, relative(far - middle, reach, mean, absolute(middle)),
@@ -208,5 +212,5 @@ def _unmeasured(station: float, coverage: float) -> Float:
 
 
 SECTIONS = Stage(
-    "sections", "2", SectionParameters, measure_sections, "diameters, ovality and centre at every station"
+    "sections", "3", SectionParameters, measure_sections, "diameters, ovality and centre at every station"
 )

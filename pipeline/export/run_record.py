@@ -27,6 +27,8 @@ from pipeline.machine.outcome import Number, RunOutcome, StageOutcome, warnings_
 from pipeline.machine.plan import Plan
 
 _RECORD = "run.json"
+# Rows of a radius map taken at once: a bound on memory alone.
+_ROWS = 2000
 # Version of its format.
 _FORMAT = 1
 
@@ -164,7 +166,9 @@ def mean_diameter(radius: WallMap) -> tuple[float, float]:
     The calibration's error is common to all cells and stays in the mean; noise averages out.
     """
     seen = np.isfinite(radius.radius_mm)
-    sigma = 2 * float(np.sqrt(radius.common_variance()[seen].mean()))
+    parts = [slice(k, k + _ROWS) for k in range(0, len(seen), _ROWS)]
+    common = sum(float(radius.common_variance(rows)[seen[rows]].sum()) for rows in parts)
+    sigma = 2 * float(np.sqrt(common / seen.sum()))
     return 2 * float(np.mean(radius.radius_mm[seen], dtype=np.float64)), sigma
 
 

@@ -89,7 +89,9 @@ class OutlineGauge:
         extreme = float(mean[peak])
         noise = float(np.median(sigma[seen & np.isfinite(sigma)])) / np.sqrt(cells[0] * cells[1])
         spread = robust_spread(away[known])
-        sigma_mm = float(np.hypot(noise, spread / np.sqrt(cells[0] * cells[1])))
+        sigma_mm = float(
+            np.linalg.norm([noise, spread / np.sqrt(cells[0] * cells[1]), self.wall.displaced_mm])
+        )
         return extreme, sigma_mm, (int(peak[0]), int(peak[1]))
 
 

@@ -175,7 +175,8 @@ def _lines(measurer: Measurer, found: Sequence[Found], scene: Scene, context: Co
         beside = any(lies_beside(region, f.region, relief) for f in found)
         line = None if beside else measurer.measured(region, every_point=True)
         if line is not None:
-            yield describe_line(line.here, line.depth, line.surface, scene)
+            depth = replace(line.depth, sigma_mm=float(np.hypot(line.depth.sigma_mm, scene.displaced_mm)))
+            yield describe_line(line.here, depth, line.surface, scene)
 
 
 def _fixed_in(region: Region, fixed: FixedToProbe | None) -> Float:
@@ -226,5 +227,5 @@ def _defects_of_run(
 
 
 DEFECTS = Stage(
-    "defects", "55", DefectParameters, _defects_of_run, "defects as instances with depth, clock and kind"
+    "defects", "56", DefectParameters, _defects_of_run, "defects as instances with depth, clock and kind"
 )

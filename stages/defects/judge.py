@@ -33,8 +33,8 @@ _IS_VAGUE = (
     "ones may have taken off so much"
 )
 _AT_LEAST = (
-    "This depth is a lower bound, with ± {:.2f} mm from noise. The rest of σ is what pictures that repeat "
-    "parts of earlier ones may have taken off the depth."
+    "This depth is a lower bound, with ± {:.2f} mm from noise and displaced pictures. The rest of σ is what "
+    "pictures that repeat parts of earlier ones may have taken off the depth."
 )
 _LONE = (
     "This depth is a lower bound: single rings show up to {:.2f} mm, but the rings beside them do not. That "
@@ -51,7 +51,7 @@ class Found:
     region : Region
     defect : Defect
     by_noise : Defect
-        The same with σ from noise alone, before codec or single deep rings widen it.
+        The same with σ from noise and displaced pictures, before codec or single deep rings widen it.
     evidence : Evidence
     bead : float
         Probability that it is not a step of the bore.

@@ -1,5 +1,7 @@
 """Sections compared with analytic ovals and with the scatter of repeated draws."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -40,6 +42,16 @@ def test_the_centre_is_subtracted_before_diameters_are_read():
     assert np.allclose(sections.centre_x_mm, 1.2, atol=1e-3)
     assert np.allclose(sections.centre_y_mm, -1.6, atol=1e-3)
     assert np.all(sections.max_diameter_mm - sections.min_diameter_mm < 0.003)
+
+
+def test_what_displaces_the_picture_from_place_to_place_averages_out_in_the_mean_diameter():
+    """It counted as common to all places: ±.26 mm where run.json said ±.03."""
+    wall = wall_of(DISTANCE, AZIMUTH, np.full((len(DISTANCE), 360), 50.0), 0.01, np.hypot(0.0166, 0.13))
+    local = replace(wall, radius_map=replace(wall.radius_map, displaced_mm=0.13))
+    sections = measure_sections(bare_recording(100.0), local, PARAMETERS, quiet_context())
+    common = 2 * np.sqrt(0.0166**2 - 0.01**2)
+    assert np.allclose(sections.mean_diameter_sigma_mm, common, rtol=0.02)
+    assert np.allclose(sections.max_diameter_sigma_mm, np.hypot(common, np.sqrt(2) * 0.13), rtol=0.02)
 
 
 def test_the_random_part_is_the_scatter_and_the_calibration_part_stays():

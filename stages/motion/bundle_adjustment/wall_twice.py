@@ -82,7 +82,7 @@ class WallTwice:
 
         Line and photo may both be displaced, or one alone, so that the line's own error may be all of it. The
         variance v with its standard error e is shrunk to v (1 − e² / v²), and to 0 below one standard error
-        (the positive part of the estimator of James and Stein, 1961): noise alone adds little.
+        (the non-negative garrote of Breiman, 1995): noise alone adds less than the standard error would.
         """
         if self.in_errors <= 1:
             return 0.0
