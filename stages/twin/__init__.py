@@ -223,7 +223,7 @@ def compared_with(
     apart_mm, clear = ring_step_mm(rings, scene.trajectory), (*on_window, *glints, *of_photo)
     line_rad = float(np.arctan2(scene.ring.radius_mm, scene.ring.ahead_mm))
     of_wall = unnamed(samples and samples.clear_of(clear), scene.surface, apart_mm, line_rad)
-    placed, beside = beside_sectors((*on_window, *of_wall, *glints), over_time, scene.ring, samples)
+    placed, beside = beside_sectors((*on_window, *of_wall, *glints), (*over_time, *slow), scene.ring, samples)
     placed, of_side = beside_dark_side(placed, over_time, samples, scene)
     found: tuple[Mismatch, ...] = (
         *over_time, *placed, *photometry.pixels, *whole,
@@ -293,7 +293,7 @@ PHOTOMETRY = Stage(
 )
 TWIN = Stage(
     "twin",
-    "56",
+    "57",
     TwinParameters,
     compare_with_twin,
     "recorded frames beside the same frames, re-rendered from what the run has measured",

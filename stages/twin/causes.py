@@ -246,7 +246,8 @@ def _slow_side(side: Fitted, cells: Cells, ring: Ring) -> Mismatch:
         "not show that it does so at once: LEDs that fade, dirt that gathers on the window, and an uneven "
         "photo of the wall beside which the probe rolls look the same."
     )
-    return replace(_darker_side(side, size, cells, ring), statement=said)
+    darker = _darker_side(side, size, cells, ring)
+    return replace(darker, place=darker.place[1:], statement=said)  # it has no frame at which it comes
 
 
 def _flicker_or_else(
@@ -263,7 +264,9 @@ def _flicker_or_else(
     if unsure.law.name in _AROUND:
         place = _of_led(unsure, cells)
         what, name = f"an LED that fails at image azimuth {place[1].value:.0f}°", "flicker or led_dead"
-    if unsure.law.name == "lamp_sector":
+    if unsure.law.name in _AROUND and (
+        unsure.law.name == "lamp_sector" or not side_at_once(unsure, _first(unsure), cells)
+    ):
         what, name = f"a side that darkens, about image azimuth {place[1].value:.0f}°,", ""
     said = (
         f"{found[0].statement} {len(cells.frame)} frames do not distinguish this from {what} from frame "

@@ -25,8 +25,8 @@ from stages.twin.seen_in_photo import SIDE_DEG, dimmed, looks_at
 _LEAST, _SURE, _PARTS = 0.25, 5.0, 6
 """Least share by which a side is darker than the opposite one, chosen: the wall of a recording 60 mm long
 makes 14 % at 2.7 σ. σ by which it must be, and parts of the frames for that σ."""
-_HALF_TURN_DEG = 180.0
-"""Roll over which a dark side of the wall appears on opposite sides of the picture."""
+_LEFT_OF_WALL = 2 / np.pi
+"""What a steady roll by half a turn leaves of the first harmonic of wall in the picture's mean."""
 _RING = 0.05
 """Width of rings about the image's middle, in radii of the line, within which sides are compared."""
 
@@ -55,12 +55,14 @@ def _either(samples: BlockSamples, scene: Scene) -> str:
     """Return what may make a dark side: where the probe rolls, wall turns in the picture, lights do not."""
     turn = 2 * np.pi * (samples.around + 0.5) / WALL_COLUMNS - seen_from(samples, scene)[1]
     waves = (np.bincount(samples.frame, f(turn)) for f in (np.sin, np.cos))
-    roll = float(np.degrees(np.ptp(np.unwrap(np.arctan2(*waves)[np.unique(samples.frame)]))))
+    turns = np.arctan2(*waves)[np.unique(samples.frame)]
+    roll = float(np.degrees(np.ptp(np.unwrap(turns))))
     causes = "LEDs that are dim or shaded there, dirt on the window,"
-    if roll < _HALF_TURN_DEG:
+    if abs(np.exp(1j * turns).mean()) > _LEFT_OF_WALL:
         return (
-            f"{causes} and wall that is darker there look the same while the probe rolls by no more than "
-            f"{roll:.0f}°. What to do: record once more with the probe rolled by half a turn."
+            f"{causes} and wall that is darker there look the same, since most frames are rolled alike; in "
+            f"all, the probe rolled by {roll:.0f}°. What to do: record once more with the probe rolled by "
+            "half a turn."
         )
     return (
         f"{causes} or a camera that is darker there make it so: the probe rolled by {roll:.0f}°, and wall "

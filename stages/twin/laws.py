@@ -58,7 +58,8 @@ def _with_photo(law: Law, in_photo: Float) -> Law:
     """Return a law whose change the photo may hold as well, as far as it was made from the frames (F, F).
 
     A step of all lamps is taken out of the photo as exposure; one of a side is not. Between frames far apart,
-    whose photos overlap little, when the change came decides what the photo holds: no law is tried there.
+    whose photos overlap little, when the change came decides what the photo holds: only the law without the
+    photo is tried.
     """
     own, first = in_photo.diagonal(), law.places[:, 1].astype(int)
     near = np.maximum(own[first - 1], own[first]) < _MOST_OWN

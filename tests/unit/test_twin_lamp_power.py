@@ -118,7 +118,7 @@ def test_neither_response_nor_uneven_lamps_are_named_where_something_else_looks_
     monkeypatch.setattr(sums, "judged", lambda some, _: (tuple(one.mismatch for one in some), ()))
     frames = SimpleNamespace(
         _scene=SimpleNamespace(ring=None), _state=SimpleNamespace(sharpness=0.0, black_in_photo=False),
-        _shown=print, _lamps=lambda *_: ((of("uneven_lamps"),), ()),
+        _shown=print, _lamps=lambda *_: ((of("uneven_lamps"),), (), ()),
         whole=SimpleNamespace(suspected=lambda sharpness: ()),
         comparison=SimpleNamespace(wall_is_clipped=clipped),
     )  # fmt: skip
