@@ -101,5 +101,5 @@ def test_the_shared_scoring_program_agrees(runs: dict[str, Run], tmp_path: Path)
 
 def _every_fourth_column(wall: Wall) -> Wall:
     full = wall.radius_map
-    part = {n: v[:, ::4] for n, v in vars(full).items() if v.ndim == 2}
+    part = {n: v[:, ::4] for n, v in vars(full).items() if np.ndim(v) == 2}
     return replace(wall, radius_map=replace(full, azimuth_rad=full.azimuth_rad[::4], **part))
