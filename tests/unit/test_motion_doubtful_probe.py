@@ -1,0 +1,69 @@
+"""σ includes the change of a stated probe where the evidence for that change is doubtful."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pipeline.artefacts.measured import Trajectory
+from pipeline.geometry.axis import straight_axis
+from stages.motion import MotionParameters, estimate_motion
+from stages.motion.stated_probe import with_doubtful_instrument
+from stages.motion.tracking.landmarks import TrackedPoses
+from tests.drawn_run import RADIUS, drawn_run, without_encoder
+from tests.quiet import quiet_context
+
+
+@pytest.mark.parametrize(
+    ("lasting", "trembles", "by", "doubted"),
+    [(0.5, False, 3.0, False), (0.7, False, 3.0, True), (0.5, True, 3.0, True), (0.5, False, 6.0, True)],
+    ids=["sound", "matches contradict", "the camera trembles", "another probe"],
+)
+def test_sigma_includes_the_change_of_a_probe_by_doubtful_evidence(
+    lasting: float, trembles: bool, by: float, doubted: bool
+) -> None:
+    run = drawn_run(0.9 * np.arange(4), np.zeros(4))
+    moved = by * run.probe.principal_uncertainties()[:, 0]
+    got = Trajectory(
+        np.arange(4), np.arange(4) / 30, run.T_pc, np.zeros((4, 6, 6)), straight_axis(-50.0, 150.0), RADIUS,
+        1, 0, 0, (), run.probe.parameters + moved, 1e-4 * np.eye(len(moved)),
+    )  # fmt: skip
+    found = with_doubtful_instrument(got, run.probe, lasting, trembles).instrument_covariance
+    assert found is not None
+    np.testing.assert_allclose(found, 1e-4 * np.eye(len(moved)) + doubted * np.outer(moved, moved))
+
+
+def test_a_probe_changed_by_frequently_lost_texture_is_doubtful(monkeypatch: pytest.MonkeyPatch) -> None:
+    run = without_encoder(drawn_run(0.9 * np.arange(12), np.zeros(12)))
+    parameters, found = MotionParameters(strip_step_mm=0.6, cell_px=20, patch_half_px=8), []
+    told: dict[str, float] = {}
+    context = replace(quiet_context(), report=lambda name, value, unit="": told.update({name: value}))
+    for lost in (False, True):
+        monkeypatch.setattr(TrackedPoses, "much_lost", lost)
+        got = estimate_motion(run.recording, run.probe, run.rings, run.points, parameters, context)
+        assert got.instrument is not None
+        assert got.instrument_covariance is not None
+        found.append(got.instrument_covariance)
+    moved = got.instrument - run.probe.parameters
+    assert np.abs(moved).max() > 1e-6, "control: with good texture it is not"
+    np.testing.assert_allclose(found[1] - found[0], np.outer(moved, moved), atol=1e-15)
+    assert told["1 σ of distance at the end"] == got.distance_sigma_mm, (
+        "the reported uncertainty includes the doubt as well"
+    )
+
+
+def test_sigma_of_distances_includes_the_wider_pipe_of_a_doubtful_probe() -> None:
+    """A view that drifted by 3 px changed the probe by 12 σ: distances were off by 2.2 to 2.8 of their σ."""
+    run = drawn_run(0.9 * np.arange(4), np.zeros(4))
+    moved = np.zeros(len(run.probe.parameters))
+    moved[run.probe.parameter_names.index("baseline_mm")] = 0.01 * run.probe.laser.baseline_mm
+    plain = Trajectory(
+        np.arange(4), np.arange(4) / 30, run.T_pc, np.zeros((4, 6, 6)), straight_axis(-50.0, 150.0), RADIUS,
+        1, 0, 0, (), run.probe.parameters + moved, 1e-4 * np.eye(len(moved)),
+    )  # fmt: skip
+    sound = replace(plain, distance_sigma_mm=0.01)
+    doubted = with_doubtful_instrument(sound, run.probe, 0.5, shakes=True)
+    assert doubted.distance_sigma_mm == pytest.approx(np.hypot(0.01, 0.01 * 2.7), rel=0.01)
+    assert np.sqrt(doubted.covariance[:, 2, 2]) == pytest.approx(0.01 * 0.9 * np.arange(4), abs=1e-4)
