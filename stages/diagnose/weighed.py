@@ -15,8 +15,7 @@ from stages.diagnose.gauge.doubts import Doubt, doubts
 from stages.diagnose.gauge.examine import OF_A_PIPE, Examined
 from stages.diagnose.gauge.judge import Verdicts
 from stages.diagnose.gauge.run import Term
-from stages.diagnose.gauge.sets import Cause as LawAndOrder
-from stages.diagnose.gauge.sets import cause_of
+from stages.diagnose.gauge.sets import LawAndOrder, cause_of
 
 _CERTAIN = Doubt({})
 # In place of a law's name: a cause that the library does not have, or measurements that do not agree.

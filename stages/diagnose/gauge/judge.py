@@ -18,7 +18,7 @@ from stages.diagnose.gauge.run import GaugeRun, Term
 from stages.diagnose.gauge.scan import Scored, refined
 from stages.diagnose.gauge.search import LEAST_SHARE, MOST_EFFECTS, Search, shift_px
 from stages.diagnose.gauge.sets import (
-    Cause,
+    LawAndOrder,
     Member,
     Sets,
     believed,
@@ -111,7 +111,7 @@ class Verdicts:
         Causes that merely join others, without explaining the run better, are not among them: where one law
         suffices, every other may stand beside it with a probability that it also has without any run.
         """
-        chance, alone = dict[frozenset[Cause], float](), dict[frozenset[Cause], float]()
+        chance, alone = dict[frozenset[LawAndOrder], float](), dict[frozenset[LawAndOrder], float]()
         for p, of, _, patterns in self._each():
             causes = frozenset(of)
             chance[causes] = chance.get(causes, 0.0) + p
@@ -123,7 +123,7 @@ class Verdicts:
         return tuple(dict.fromkeys(law for causes in of_each for law, _ in causes))
 
     def _joins(
-        self, causes: frozenset[Cause], chance: float, alone: Mapping[frozenset[Cause], float]
+        self, causes: frozenset[LawAndOrder], chance: float, alone: Mapping[frozenset[LawAndOrder], float]
     ) -> bool:
         """Return whether fewer of these causes, without any pattern, explain the run as well."""
         return any(
@@ -144,13 +144,13 @@ class Verdicts:
             laws.update(dict.fromkeys((law for law, _ in causes), p))
         return Instead(dict(found.most_common()), of_patterns, of_names, dict(laws))
 
-    def _each(self) -> Iterator[tuple[float, set[Cause], set[str], set[str]]]:
+    def _each(self) -> Iterator[tuple[float, set[LawAndOrder], set[str], set[str]]]:
         """Yield every hypothesis' probability, its causes, its effects' names, and its patterns' formulas."""
         for p, terms in self.sets:
             yield p, *_named_and_nameless(terms)
 
 
-def _named_and_nameless(of: Sequence[Term]) -> tuple[set[Cause], set[str], set[str]]:
+def _named_and_nameless(of: Sequence[Term]) -> tuple[set[LawAndOrder], set[str], set[str]]:
     """Return the causes and names of the effects of a hypothesis, and the formulas of its patterns."""
     named = [m for m in of if not isinstance(m.model, Nameless)]
     patterns = {m.model.formula(m.shape) for m in of if isinstance(m.model, Nameless)}

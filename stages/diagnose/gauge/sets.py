@@ -36,7 +36,7 @@ from stages.diagnose.inference import (
 
 Set = frozenset[int]
 # A law and its order, whatever its course: what a name stands for.
-Cause = tuple[str, Shape]
+LawAndOrder = tuple[str, Shape]
 # Likelihoods do not include the small errors of laws and of image formation: nominal odds of 1000 to 1 count
 # as 100 to 1. A simulated focal length was once named a cone at 100 to 1. Debt: data/debts.md.
 _TEMPERED = 1.5
@@ -66,7 +66,7 @@ class Member:
         return isinstance(self.model, Nameless)
 
 
-def cause_of(model: EffectModel, shape: Shape) -> Cause:
+def cause_of(model: EffectModel, shape: Shape) -> LawAndOrder:
     """Return the law and, if it may occur more than once, its order."""
     own = model.own if isinstance(model, Coursed) else shape if model.repeats else ()
     return model.law, own
