@@ -18,7 +18,7 @@ from pipeline.recording.base import FrameTable, Planes, ascending, complete, in_
 from pipeline.recording.images import shown
 from pipeline.recording.video_index import VideoIndex, list_frames
 
-# Fixed, so that the rejected frames of a damaged file do not depend on the machine.
+# Decoding of a sound file; fixed, so that the memory taken does not depend on the machine.
 _THREADS = 4
 # Restarting the decoder costs about as much as decoding this many frames.
 _RESTART_FRAMES = 8
@@ -111,23 +111,45 @@ class VideoSource:
             yield number, frame
 
     def _numbered(self, wanted: Int, damaged: set[int]) -> Iterator[tuple[int, av.VideoFrame]]:
-        """Yield decoded frames in order with their numbers; ``damaged`` grows by those that are not sound."""
-        start = int(self.index.key_of[wanted[0]])
+        """Yield decoded frames in order with their numbers; ``damaged`` grows by those that are not sound.
+
+        After the first damage, one thread decodes again from the keyframe before it: with several, it
+        depends on their timing whether a frame predicted from the damaged one is marked as damaged too.
+        """
+        resumed = int(self.index.key_of[wanted[0]])
+        for number, frame in self._in_order(wanted, resumed, _THREADS):
+            if number is None or frame is None:
+                break
+            yield number, frame
+            resumed = number + 1
+        else:
+            return
+        for number, frame in self._in_order(wanted, resumed, 1):
+            if frame is None:
+                damaged.update(() if number is None else (number,))
+            elif number is not None and number >= resumed:
+                yield number, frame
+
+    def _in_order(
+        self, wanted: Int, first: int, threads: int
+    ) -> Iterator[tuple[int | None, av.VideoFrame | None]]:
+        """Yield decoded frames with their numbers, from the keyframe before ``first`` on.
+
+        The frame is None where it is missing or damaged, its number as well where that is not known.
+        """
+        start = int(self.index.key_of[min(first, self.index.pts.size - 1)])
         needed = self.index.needed(wanted)
         only = set(self.index.pts[needed].tolist()) if self.index.timed else None
         listed, expected = set(needed.tolist()), start
         with self.opened_at(start) as (container, stream):
+            stream.codec_context.thread_count = threads
             for frame in _decoded(container, stream, only):
                 number = self._number(frame, expected)
-                if number is None or number < start:
-                    continue
-                damaged.update(listed.intersection(range(expected, number)))
-                if frame is None or frame.is_corrupt:
-                    damaged.add(number)
-                if frame is not None:
-                    yield number, frame
-                expected = number + 1
-            damaged.update(listed.intersection(range(expected, self.index.pts.size)))
+                if number is None or number >= start:
+                    yield from _missing(listed, expected, expected if number is None else number)
+                    yield number, None if frame is None or frame.is_corrupt else frame
+                    expected = expected if number is None else number + 1
+        yield from _missing(listed, expected, self.index.pts.size)
 
     @contextmanager
     def opened_at(self, keyframe: int) -> Iterator[tuple[av.container.InputContainer, av.VideoStream]]:
@@ -144,6 +166,11 @@ class VideoSource:
         if frame is None or frame.pts is None:
             return None
         return int(np.searchsorted(self.index.pts, frame.pts))
+
+
+def _missing(listed: set[int], begin: int, end: int) -> list[tuple[int, None]]:
+    """Return the listed frames from number ``begin`` up to ``end``, which did not come."""
+    return [(number, None) for number in range(begin, end) if number in listed]
 
 
 class Readable(Protocol):
@@ -192,7 +219,7 @@ def opened(
 
 
 def _prepare(container: av.container.InputContainer) -> av.VideoStream:
-    """Return the first video stream, set to decode on several threads and to report damage."""
+    """Return the first video stream, set to report damage."""
     if not container.streams.video:
         raise ValueError("no video stream in it")
     stream = container.streams.video[0]
@@ -200,7 +227,6 @@ def _prepare(container: av.container.InputContainer) -> av.VideoStream:
     if stream.codec_context is None:
         raise ValueError("a codec that FFmpeg does not know")
     stream.codec_context.thread_type = "AUTO"
-    stream.codec_context.thread_count = _THREADS
     stream.codec_context.options = {"err_detect": "crccheck+explode"}
     return stream
 

@@ -30,6 +30,8 @@ def cuts(pictures: Pictures, shown: Int, left_out: Bool, time_s: Float) -> Int:
         pictures are known to be missing, and the encoder shows how far the probe went.
     """
     place = np.flatnonzero((pictures.partner >= 0) & (shown == Light.WALL) & ~left_out)
+    if len(place) < _FEWEST:
+        return np.empty(0, np.int64)
     before = pictures.partner[place]
     most_s = (place - before + 0.5) * np.median(np.diff(time_s))
     same = (shown[before] == Light.WALL) & (time_s[place] - time_s[before] < most_s)

@@ -114,7 +114,7 @@ def test_inputs_that_cannot_be_read(
 
 UNUSABLES: dict[str, Spoil] = {
     "no ring": repainted(lambda n, p: black(n, p) if is_laser(n) else p),
-    "most of the video lost": noised(0.2, 200_000),
+    "most of the video lost": noised(0.005, 200_000),
 }
 
 
