@@ -58,7 +58,7 @@ def draw_overlays(
         When the radius map holds no measured cell.
     """
     if not np.isfinite(wall.radius_map.radius_mm).any():
-        raise UnusableError("overlays", "no cell of the wall was measured", hint="see the stages before")
+        raise UnusableError("overlays", "no cell of the wall was measured", hint="see the earlier warnings")
     overlays = overlays_of(wall.radius_map, recording.pipe.nominal_diameter_mm, parameters)
     for overlay in overlays.pictures:
         context.report(f"overlay {overlay.name}: range", overlay.high_mm, "mm")

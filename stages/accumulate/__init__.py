@@ -159,7 +159,7 @@ def accumulate_wall(
     on_wall = RingsOnWall(found, rings, points, trajectory)
     survey = survey_of(on_wall)
     if not survey.count.any():
-        hint = "the report lists the rejected samples of the stage rings by reason; see the warnings before"
+        hint = "the report lists the rejected samples of the stage rings by reason; see the earlier warnings"
         raise UnusableError("accumulate", "no valid ring sample", hint=hint)
     grid = map_grid(survey, parameters.distance_step_mm, parameters.azimuth_samples)
     spread = calibration_spread(found, rings, trajectory, survey)
@@ -245,11 +245,11 @@ def _warn_of_displaced(trajectory: Trajectory, wall: Wall, context: Context) -> 
     if known.size and trajectory.displaced_for_certain and apart_mm > _MATTERS * float(np.median(known)):
         context.warn(
             "photo and laser line contradict each other: they show the same places of the wall at radii that "
-            f"differ smoothly by some {apart_mm:.2g} mm (1 σ), beside a shift and a tilt. Either may be "
-            "wrong: water, grease or uneven glass in front of the lens or of the laser, a lens or a sheet of "
-            "laser light that is not as stated, or strong compression. σ of the radii includes the whole "
-            "difference as a mean over the run, and is too small where only a part of the run is affected. "
-            "What to do: dry and clean the window, run boresight diagnose on a gauge run, "
+            f"differ smoothly by some {apart_mm:.2g} mm (1 σ), after a shift and a tilt are removed. Either "
+            "may be wrong: water, grease or uneven glass in front of the lens or of the laser, a lens or a "
+            "sheet of laser light that is not as stated, or strong compression. σ of the radii includes the "
+            "whole difference as a mean over the run, and is too small where only a part of the run is "
+            "affected. What to do: dry and clean the window, run boresight diagnose on a gauge run, "
             "record with less compression"
         )
 

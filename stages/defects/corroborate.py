@@ -96,7 +96,7 @@ class Evidence:
         if self.fixed:
             return (
                 "It stays at one place of the image while the wall goes by, as something on the window or on "
-                "the probe does: see the warnings of accumulate"
+                "the probe does: see the warnings of the stage accumulate"
             )
         if self.contradicted:
             return (
@@ -114,11 +114,11 @@ class Evidence:
                 "wall may have drawn it aside"
             )
         if not self.corroborated:
-            return "No second ring shows it with light of its own, nor do one ring and the photo together"
+            return "No second, independent ring shows it, nor do one ring and the photo together"
         if self.bright:
             return (
                 "The line is brighter there than at nine of ten places of its ring, as of a glint or a "
-                "reflection, and more findings of this recording are so bright than chance explains"
+                "reflection, and more findings of this recording are that bright than chance explains"
             )
         return "In this recording, more findings of this strength are expected to be false than real"
 

@@ -30,7 +30,7 @@ _UNSURE = "Its depth is less than twice its σ, so that it may be zero"
 _VAGUE = 4.0
 _IS_VAGUE = (
     "The σ of its depth is more than four times the measured depth, as pictures that repeat parts of earlier "
-    "ones may have taken off so much"
+    "ones may have made it that much smaller"
 )
 _AT_LEAST = (
     "This depth is a lower bound, with ± {:.2f} mm from noise and displaced pictures. The rest of σ is what "

@@ -277,7 +277,7 @@ def _of_geometry(
     }
 
 
-LINE_PROFILE = Stage("line_profile", "5", Parameters, examine_line, "what the line's light says of effects")
+LINE_PROFILE = Stage("line_profile", "5", Parameters, examine_line, "effects that the line's profile shows")
 FIDUCIALS = Stage(
     "fiducials", "8", GaugeParameters, measure_fiducials, "a gauge run's rings and fiducials", "gauge"
 )

@@ -32,8 +32,8 @@ _WITH_NAMES = (Verdict.CLASS, Verdict.PARTLY, Verdict.NAMED)
 _IN_PROFILE = Location(str(Channel.PROFILE), None, None)
 _UNKNOWN = "a cause that the library does not have, such as {}"
 _BY_LIGHT = (
-    "Rings of the gauge run deviate by less than the size of {} is uncertain: whether anything else, such as "
-    "{}, moves them was not decided."
+    "The uncertain size of {} can explain all deviations of the rings of the gauge run: whether anything "
+    "else, such as {}, moves them was not decided."
 )
 _BORE_FIRST = "Measure the gauge's bores and correct recording.yaml; then run the diagnosis again."
 _OF_ENCODER = "an error of the encoder that depends on distance or speed in another way"

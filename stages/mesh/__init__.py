@@ -132,7 +132,7 @@ def _tile_length(wall: Wall, parameters: MeshParameters) -> float:
     some = radius[:: max(len(radius) // _SAMPLED_ROWS, 1)]
     measured = some[np.isfinite(some)]
     if len(measured) == 0:
-        raise UnusableError("mesh", "no cell of the wall was measured", hint="see the stages before")
+        raise UnusableError("mesh", "no cell of the wall was measured", hint="see the earlier warnings")
     return tile_length(
         parameters.tile_mm, float(np.median(measured)), parameters.texel_mm, parameters.atlas_px
     )

@@ -230,7 +230,7 @@ def require_along_pipe(trajectory: Trajectory) -> None:
             f"the estimated camera axis is turned by {np.degrees(turned.max()):.0f}° from the pipe's axis",
             limit=f"{limit_deg:.0f}°",
             frames=trajectory.frame[lost].tolist(),
-            hint="read the warnings before: something that moves with the probe (a reflection, text, the "
+            hint="read the earlier warnings: something that moves with the probe (a reflection, text, the "
             "line in lit pictures) may have been taken for the wall. Record with less compression, or cut "
             "the recording",
         )

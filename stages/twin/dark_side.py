@@ -44,7 +44,7 @@ def dark_side(samples: BlockSamples | None, scene: Scene) -> tuple[Mismatch, ...
     size = NamedFigure("darker", darker, 2 * sd * (1 - darker), "share of the light")
     said = (
         f"Along the whole run, the wall's photo is darker about image azimuth {at.value:.0f}° than on the "
-        f"opposite side, by {100 * darker:.0f} % in what varies once around the picture. "
+        f"opposite side, by {100 * darker:.0f} % (the part that varies once around the picture). "
         + _either(samples, scene)
     )
     look, nan = scene.ring.at(int(samples.number[0]), azimuth), float("nan")
@@ -83,7 +83,8 @@ def beside_dark_side(
     turned = [side.place[0].value for side in sides]
     left = [m for m in places if any(looks_at(m, at, SIDE_DEG, scene.ring) for at in turned)]
     said = (
-        "{} But the photo is darker on that side, and differs from frames at its flanks if lights make it so."
+        "{} But the photo is darker on that side, too. If lights cause this, frames differ from it at "
+        "both edges of the side."
     )
     withdrawn = tuple(replace(m, statement=said.format(m.statement)) for m in left)
     return tuple(m for m in found if m not in left), (*sides, *withdrawn)

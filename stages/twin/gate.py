@@ -149,7 +149,7 @@ _OF_PROFILE = 0.02
 
 
 def _withdrawn(found: Mismatch, fall: Float, sigma: float) -> Mismatch:
-    words = found.name.replace("_", " ") or "what has no name"
+    words = found.name.replace("_", " ") or "an effect without a name"
     why = (
         f"{len(fall)} frames rendered again with it fit no better than by chance ({sigma:+.1f} σ)"
         if len(fall) >= _FEWEST

@@ -111,7 +111,7 @@ def beside_response(uneven: Mismatch) -> Mismatch:
     """Return uneven lamps that are withdrawn because brightness does not follow the light as it is."""
     said = (
         "The lamps look uneven around the picture, but brightness follows their light to another power than "
-        "1, which makes lamps that come nearer to one side look uneven, too: it cannot be told."
+        "1, which makes lamps that come nearer to one side look uneven, too: the cause cannot be told."
     )
     return replace(uneven, statement=said)
 

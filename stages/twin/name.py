@@ -64,7 +64,7 @@ def beside_clipping(
     The photo is made from the same frames: where they clip, it is as flat as with another response.
     """
     unsure = tuple(m for m in named if "response" in m.names)
-    said = "{} But lit wall is clipped, and so is its photo, which looks alike: it cannot be told."
+    said = "{} But lit wall is clipped, and so is its photo, which looks the same: the cause cannot be told."
     withdrawn = tuple(replace(m, statement=said.format(m.statement)) for m in unsure)
     return tuple(m for m in named if m not in unsure), withdrawn
 

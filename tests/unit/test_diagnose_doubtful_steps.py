@@ -34,7 +34,8 @@ def test_a_step_that_misplaced_pictures_may_explain_is_reported_as_both_and_neve
     assert found.members == ("encoder_slip",)
     assert found.effects == ()
     assert (
-        "At 1.30 s the reading gains +2.00 mm: a slip of the wheel, or 3 stray pictures" in found.identifiable
+        "At 1.30 s the reading gains +2.00 mm: a slip of the wheel, or 3 misplaced pictures"
+        in found.identifiable
     )
     assert "record the passage again, slowly" in found.identifiable
     assert found.global_p <= 1e-20
@@ -138,7 +139,7 @@ def test_a_residual_that_may_be_a_slip_is_a_class_if_the_library_has_slips(real_
     found = of_gauge(real_probe, unexplained=MAY_SLIP)
     assert found.verdict is Verdict.CLASS
     assert found.members == ("encoder_slip",)
-    assert "the wheel slipped, or 3 pictures in a row are stray" in found.identifiable
+    assert "the wheel slipped, or 3 pictures in a row were misplaced" in found.identifiable
     unknown = answer(real_probe, None, seen("gauge", unexplained=LEFT), "encoder_slip")
     assert unknown.verdict is Verdict.UNEXPLAINED
 

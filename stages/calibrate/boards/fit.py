@@ -27,15 +27,15 @@ class BoardCalibrationParameters(Parameters):
     """Parameters of fitting a camera to board views, and of refusing views."""
 
     huber_px: float = Field(
-        default=1.0, gt=0, le=20, description="residual beyond which a corner counts linearly, px"
+        default=1.0, gt=0, le=20, description="residual beyond which a corner's cost is linear (Huber), px"
     )
     model: Literal["best", ModelName] = Field(
         default="best", description="camera model; best: the one that predicts held-out pictures best"
     )
     board_shape: Literal["flat", "bent", "surveyed", "best"] = Field(
         default="best",
-        description="board taken for flat, its sag estimated, every corner estimated, or whichever of the "
-        "latter two predicts held-out views best",
+        description="shape of the board: flat; with its sag estimated; with every corner estimated; or "
+        "whichever of the latter two predicts held-out views best",
     )
     survey_sigma_mm: float = Field(
         default=0.3, gt=0, le=10, description="1 σ of a corner's offset from its nominal place, mm"

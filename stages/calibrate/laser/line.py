@@ -44,7 +44,7 @@ class LaserPlaneParameters(Parameters):
         description="margin of flat board beyond the outermost corners found, squares",
     )
     huber_px: float = Field(
-        default=1.0, gt=0, le=20, description="residual beyond which a corner counts linearly, px"
+        default=1.0, gt=0, le=20, description="residual beyond which a corner's cost is linear (Huber), px"
     )
     largest_pose_rms_px: float = Field(
         default=1.0, gt=0, le=20, description="boards whose corners fit the camera worse are not used, px"

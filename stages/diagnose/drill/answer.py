@@ -161,5 +161,5 @@ def _json(file: Path) -> object:
     except OSError as error:
         raise InputError(file, error.strerror or "cannot be read", expected="a JSON file") from error
     except ValueError as error:
-        hint = "it may have been cut short; an answer that is removed is made again"
+        hint = "it may be incomplete; delete it, and the same command makes it again"
         raise InputError(file, f"is not JSON: {error}", expected="a JSON file", hint=hint) from error

@@ -33,12 +33,12 @@ from stages.diagnose.result import (
 # recording's own unknowns absorb nearly the same part of each. Debt: data/debts.md.
 _ALMOST, _APART = 0.1, 20.0
 _OTHER_ENCODER = (
-    "The inspection's own readings and pictures do not show the encoder off by so much: it counted otherwise "
-    "in the gauge run, or the inspection cannot tell."
+    "Encoder and pictures of the inspection do not differ by so much: the encoder counted differently in the "
+    "gauge run, or the inspection cannot show it."
 )
 _TOO_LITTLE = "The inspection alone shows too little of {} to confirm or to contradict it."
 _UNASKED = (
-    "The size of {} changes at times of the gauge run alone: the inspection was not asked to confirm or to "
+    "The size of {} changes at times that belong to the gauge run: the inspection can neither confirm nor "
     "contradict it."
 )
 _SHOWN = 4
@@ -244,7 +244,7 @@ def _met(
     withdrawn = [e for e in effects if e.name in against]
     if found.verdict not in (Verdict.NAMED, Verdict.PARTLY) or not withdrawn:
         return found
-    note = "The inspection contradicts what the gauge run names: see the second predictions of each effect."
+    note = "The inspection contradicts what the gauge run names: see the predictions of each effect for it."
     found = replace(found, identifiable="; ".join(e.statement for e in withdrawn), notes=(*found.notes, note))
     kept = tuple(e for e in effects if e.name not in against)
     doubtful = tuple(replace(e, probability=e.probability / (1 + e.probability)) for e in withdrawn)

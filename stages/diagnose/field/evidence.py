@@ -56,7 +56,7 @@ def shortcomings_of(run: FieldRun) -> tuple[str, ...]:
          "instrument, and a drift of the instrument like the pipe's own shape."),
         (lost_share >= _LOST_SHARE,
          f"In {100 * lost_share:.0f} % of the lit frames there is too little texture: poses rest on the "
-         "rings there and follow what a tilted or decentred sheet does to these, so that it hardly shows."),
+         "rings there and absorb how a tilted or decentred sheet moves these, so that it hardly shows."),
         (across < _LEAST_OFFSET_MM,
          f"The probe moves across the pipe by only {across:.2f} mm (1 σ): a shifted image looks nearly "
          "like a tilted or decentred sheet."),
@@ -142,7 +142,7 @@ def empty_evidence(recording: Recording, problem: str) -> FieldEvidence:
             "No frame of the inspection shows the wall's texture, so that the rings alone place the probe."
         )
     sentences.append(
-        "A pose that rests on the ring alone follows what the sheet or the lens do to the ring, and hides it."
+        "A pose that rests on the ring alone absorbs errors of the sheet and of the lens, and hides them."
     )
     none = Evidence((), np.zeros((0, 0)), np.zeros(0), np.zeros((0, 0)), 0.0, np.zeros(0))
     return FieldEvidence(None, none, tuple(sentences))

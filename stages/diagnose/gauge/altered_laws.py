@@ -98,7 +98,7 @@ def other_growth(term: Term, at: Linearised, of_line: bool) -> OtherGrowth:
     """Return a law like a term's with another growth; its reference is the middle of the rings."""
     middle = float(np.median(_radius(at.rings, of_line)))
     shape, amplitude = term.at(term.amplitude)
-    name = f"{term.model.name} {term.shape}, growing otherwise"
+    name = f"{term.model.name} {term.shape}, with another growth"
     return OtherGrowth(name, term.model, shape, amplitude, of_line, middle)
 
 
@@ -112,7 +112,7 @@ def other_course(term: Term, at: Linearised, duration_s: float) -> OtherCourse:
     each = np.split(amplitude, len(parts)) * np.sqrt([[np.mean(p**2)] for p in parts])
     _, sizes, directions = np.linalg.svd(each)
     size = each[0] if len(parts) == 1 else sizes[0] * directions[0]
-    return OtherCourse(f"{term.model.name} {term.shape}, in another course", law, own, size, duration_s)
+    return OtherCourse(f"{term.model.name} {term.shape}, with another course", law, own, size, duration_s)
 
 
 def _radius(points: ImagePoints, of_line: bool) -> Float:

@@ -30,8 +30,8 @@ _LISTED = 1e-3
 # height h at a distance d, both of width σ, by h d exp(−d² / 4σ²), which is largest, √(2/e) h σ, at d = √2 σ.
 _SECOND_LINES, _MOST_PULL = ("ghost_ring", "tube_ghost"), float(np.sqrt(2 / np.e))
 _REPEATS = (
-    "Rings and fiducials of the gauge run lie {:.2f} px from where its other parts have them, and noise is "
-    "{:.2f} px of it. The rest is the same at one place of the image on other wall, and no effect or simple "
+    "Rings and fiducials of the gauge run lie {:.2f} px from where its other parts predict them; noise makes "
+    "{:.2f} px. The rest is the same at one place of the image on other wall, and no effect or simple "
     "pattern explains it."
 )
 

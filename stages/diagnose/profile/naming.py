@@ -181,7 +181,7 @@ def _size(found: Finding, shape: Fitted, stated_mm: float) -> Size | None:
 
 
 def _in_words(shape: Fitted) -> str:
-    left = f"This shape leaves {100 * shape.left:.1f} % of the misfit."
+    left = f"{100 * shape.left:.1f} % of the misfit remain with this shape."
     if shape.shape is Shape.TAIL:
         # Forward along the axis is inward in the image.
         side = "inside" if shape.way_mm > 0 else "outside"

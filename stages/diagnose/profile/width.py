@@ -55,7 +55,7 @@ def width_findings(cells: Cells, geometry: LineGeometry, probe: Probe) -> tuple[
     exponent = Size("exponent", "", 1 / safe, sigma / safe**2)
     stated_mm = probe.laser.line_sigma_mm
     line = Size("line_sigma_mm", "mm", stated_mm * np.sqrt(safe), stated_mm * sigma / (2 * np.sqrt(safe)))
-    seen = f"The line's width² follows the image's scale with {scale:.3f} ± {sigma:.3f} of what is stated."
+    seen = f"The width² that the line has on the wall is {scale:.3f} ± {sigma:.3f} times the stated."
     return (
         finding("gamma", test.z, test.p_value, (exponent,), seen, alike=("albedo_bias",)),
         finding("albedo_bias", test.z, test.p_value, (line,), seen, alike=("gamma",)),
@@ -107,7 +107,7 @@ def blur_finding(cells: Cells, geometry: LineGeometry, probe: Probe) -> Finding:
     size = Size("exposure_s", "s", float(total - own), sigma / (2 * max(total, np.sqrt(sigma))))
     return finding(
         "motion_blur", test.z, test.p_value, (size,),
-        f"The line widens with its speed as with an exposure of {1e3 * total:.1f} ms.",
+        f"The line widens with its speed as an exposure of {1e3 * total:.1f} ms makes it.",
     )  # fmt: skip
 
 
@@ -146,7 +146,7 @@ def locking_finding(rings: RingSamples, profiles: LineProfiles, cells: Cells) ->
     return finding(
         "pixel_locking", test.z, test.p_value,
         (Size("amplitude_px", "px", float(fit.coefficient[0]), sigma),),
-        f"The line's radius follows the pixels by {size:.4f} ± {sigma:.4f} px.",
+        f"The line's measured radius varies with the fraction of a pixel by {size:.4f} ± {sigma:.4f} px.",
     )  # fmt: skip
 
 
@@ -173,7 +173,7 @@ def pattern_finding(profiles: LineProfiles, image_size: tuple[int, int]) -> Find
     return finding(
         "fixed_pattern", test.z, test.p_value,
         (Size("relative", "", size, sigma / (2 * max(size, np.sqrt(sigma)))),),
-        f"Pixels have gains of their own, {100 * size:.2f} % (1 σ).", alike=("dust",),
+        f"Pixels differ in gain by {100 * size:.2f} % (1 σ).", alike=("dust",),
     )  # fmt: skip
 
 

@@ -65,8 +65,8 @@ class LeftOver:
         if self.by_slip and not self.stray:
             return f"{off}, as after a slip of the wheel: record the passage again, slowly."
         if self.by_slip:
-            return or_else(f"{off}: the wheel slipped", f"{self.stray} pictures in a row are stray")
-        unless = f", unless {self.stray} pictures in a row are stray" if self.stray else ""
+            return or_else(f"{off}: the wheel slipped", f"{self.stray} pictures in a row were misplaced")
+        unless = f", unless {self.stray} pictures in a row were misplaced" if self.stray else ""
         return f"{off} in a way that no effect of an encoder explains{unless}."
 
 

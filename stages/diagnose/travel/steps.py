@@ -145,7 +145,7 @@ class StepFound:
     def doubt(self) -> str:
         """What else it may be, as a sentence with its time and size; empty where it is a slip."""
         words = {
-            EventKind.OUTLIER: f"{self.stray} stray picture{'s' * (self.stray != 1)}",
+            EventKind.OUTLIER: f"{self.stray} misplaced picture{'s' * (self.stray != 1)}",
             EventKind.LOST_TIME: "missing frames",
         }
         slip = f"At {self.time_s:.2f} s the reading gains {self.gain_mm:+.2f} mm: a slip of the wheel"
