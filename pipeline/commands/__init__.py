@@ -15,3 +15,18 @@ ResultFolder = Annotated[Path, typer.Option("--output", "-o", metavar="DIR", hel
 StatedProbe = Annotated[
     Path | None, typer.Option(metavar="FILE", help="stated probe, in place of the recording's own")
 ]
+PriorFile = Annotated[
+    Path, typer.Option(metavar="FILE", help="prior to draw from: a file, or the name of a shipped one")
+]
+PipeDiameter = Annotated[float, typer.Option(help="inner diameter of the pipe, mm")]
+OffsetRight = Annotated[float, typer.Option(help="offset of the probe from the pipe's axis, right, mm")]
+OffsetDown = Annotated[float, typer.Option(help="offset of the probe from the pipe's axis, down, mm")]
+BoardColumns = Annotated[
+    int, typer.Option(min=3, max=100, help="chessboard: inner corners along a row; charuco: squares")
+]
+BoardRows = Annotated[
+    int, typer.Option(min=3, max=100, help="chessboard: inner corners along a column; charuco: squares")
+]
+SquareEdge = Annotated[float, typer.Option(min=0.01, help="edge of a square, mm")]
+MarkerEdge = Annotated[float | None, typer.Option(min=0.01, help="charuco: edge of a marker, mm")]
+MarkerDictionary = Annotated[str, typer.Option(help="charuco: OpenCV's marker dictionary")]

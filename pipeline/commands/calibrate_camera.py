@@ -15,7 +15,16 @@ from rich.console import Console
 from rich.table import Table
 
 from pipeline.api.job import Job, result_of, run_shown, value_source
-from pipeline.commands import Assignments, ConfigFile, ResultFolder
+from pipeline.commands import (
+    Assignments,
+    BoardColumns,
+    BoardRows,
+    ConfigFile,
+    MarkerDictionary,
+    MarkerEdge,
+    ResultFolder,
+    SquareEdge,
+)
 from pipeline.errors import InputError
 from pipeline.files.disk import require_writable
 from pipeline.files.provenance import MadeBy
@@ -56,16 +65,12 @@ class BoardShape(StrEnum):
 
 def calibrate_camera(
     images: Annotated[list[Path], typer.Argument(help="pictures of the board, or folders of them")],
-    columns: Annotated[
-        int, typer.Option(min=3, max=100, help="chessboard: inner corners along a row; charuco: squares")
-    ],
-    rows: Annotated[
-        int, typer.Option(min=3, max=100, help="chessboard: inner corners along a column; charuco: squares")
-    ],
-    square_mm: Annotated[float, typer.Option(min=0.01, help="edge of a square, mm")],
+    columns: BoardColumns,
+    rows: BoardRows,
+    square_mm: SquareEdge,
     board: Annotated[BoardKind, typer.Option(help="kind of board")] = BoardKind.CHESSBOARD,
-    marker_mm: Annotated[float | None, typer.Option(min=0.01, help="charuco: edge of a marker, mm")] = None,
-    dictionary: Annotated[str, typer.Option(help="charuco: OpenCV's marker dictionary")] = "DICT_5X5_100",
+    marker_mm: MarkerEdge = None,
+    dictionary: MarkerDictionary = "DICT_5X5_100",
     model: Annotated[
         ModelChoice | None,
         typer.Option(help="camera model; best: the one that predicts held-out pictures best"),

@@ -14,7 +14,16 @@ from rich.table import Table
 
 from pipeline.adjustment.robust import root_mean_square
 from pipeline.api.job import Job, result_of, run_shown, value_source
-from pipeline.commands import Assignments, ConfigFile, ResultFolder
+from pipeline.commands import (
+    Assignments,
+    BoardColumns,
+    BoardRows,
+    ConfigFile,
+    MarkerDictionary,
+    MarkerEdge,
+    ResultFolder,
+    SquareEdge,
+)
 from pipeline.commands.calibrate_camera import BoardKind, describe_board
 from pipeline.files.disk import input_file, require_writable
 from pipeline.files.provenance import MadeBy
@@ -32,13 +41,9 @@ from stages.calibrate.laser import LASER_PLANE, LaserCalibration
 def calibrate_laser(
     images: Annotated[list[Path], typer.Argument(help="pictures of the lit board and line, or folders")],
     camera: Annotated[Path, typer.Option(metavar="FILE", help="camera file of any known format")],
-    columns: Annotated[
-        int, typer.Option(min=3, max=100, help="chessboard: inner corners along a row; charuco: squares")
-    ],
-    rows: Annotated[
-        int, typer.Option(min=3, max=100, help="chessboard: inner corners along a column; charuco: squares")
-    ],
-    square_mm: Annotated[float, typer.Option(min=0.01, help="edge of a square, mm")],
+    columns: BoardColumns,
+    rows: BoardRows,
+    square_mm: SquareEdge,
     wavelength_nm: Annotated[
         float | None, typer.Option(min=380, max=750, help="wavelength of the laser, nm (default: 520)")
     ] = None,
@@ -51,8 +56,8 @@ def calibrate_laser(
         ),
     ] = None,
     board: Annotated[BoardKind, typer.Option(help="kind of board")] = BoardKind.CHESSBOARD,
-    marker_mm: Annotated[float | None, typer.Option(min=0.01, help="charuco: edge of a marker, mm")] = None,
-    dictionary: Annotated[str, typer.Option(help="charuco: OpenCV's marker dictionary")] = "DICT_5X5_100",
+    marker_mm: MarkerEdge = None,
+    dictionary: MarkerDictionary = "DICT_5X5_100",
     probe: Annotated[
         Path | None,
         typer.Option(metavar="FILE", help="probe file: a copy with this camera and plane is written"),

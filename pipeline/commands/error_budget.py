@@ -19,6 +19,7 @@ from rich.table import Table
 
 from pipeline.adjustment.robust import root_mean_square
 from pipeline.arrays import Float
+from pipeline.commands import OffsetDown, OffsetRight, PipeDiameter
 from pipeline.errors import InputError
 from pipeline.files.disk import written_together
 from pipeline.instrument.budget import Budget, Row
@@ -184,13 +185,9 @@ def error_budget(
         Path | None,
         typer.Argument(help="probe.yaml, stated or calibrated (default: a typical uncalibrated probe)"),
     ] = None,
-    diameter_mm: Annotated[float, typer.Option(help="inner diameter of the pipe, mm")] = 101.6,
-    offset_x_mm: Annotated[
-        float, typer.Option(help="offset of the probe from the pipe's axis, right, mm")
-    ] = 0.0,
-    offset_y_mm: Annotated[
-        float, typer.Option(help="offset of the probe from the pipe's axis, down, mm")
-    ] = 0.0,
+    diameter_mm: PipeDiameter = 101.6,
+    offset_x_mm: OffsetRight = 0.0,
+    offset_y_mm: OffsetDown = 0.0,
     sigma: Annotated[
         list[str] | None,
         typer.Option(metavar="NAME=VALUE", help="1 σ of a source in its unit; may be repeated"),

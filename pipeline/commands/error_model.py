@@ -18,6 +18,7 @@ from matplotlib.ticker import MaxNLocator
 from mpl_toolkits.mplot3d.axes3d import Axes3D
 from rich.console import Console
 
+from pipeline.commands import OffsetDown, OffsetRight, PipeDiameter
 from pipeline.files.disk import written_together
 from pipeline.instrument.camera import Camera
 from pipeline.instrument.camera.formats import read_camera
@@ -135,7 +136,7 @@ def error_model(
     camera_file: Annotated[
         Path | None, typer.Option("--camera", help="camera file of any known format, in place of the probe's")
     ] = None,
-    diameter_mm: Annotated[float, typer.Option(help="inner diameter of the pipe, mm")] = 101.6,
+    diameter_mm: PipeDiameter = 101.6,
     tilt_deg: Annotated[float, typer.Option(help="tilt of the laser sheet, deg")] = 0.6,
     baseline_mm: Annotated[
         float | None, typer.Option(help="camera to laser sheet, mm (default: the probe's, else 22)")
@@ -147,12 +148,8 @@ def error_model(
         float, typer.Option(help="azimuth in C toward which the sheet leans forward, deg")
     ] = 0.0,
     opening_angle_deg: Annotated[float, typer.Option(help="opening angle of the sheet, deg")] = 180.0,
-    offset_x_mm: Annotated[
-        float, typer.Option(help="offset of the probe from the pipe's axis, right, mm")
-    ] = 0.0,
-    offset_y_mm: Annotated[
-        float, typer.Option(help="offset of the probe from the pipe's axis, down, mm")
-    ] = 0.0,
+    offset_x_mm: OffsetRight = 0.0,
+    offset_y_mm: OffsetDown = 0.0,
     output: Annotated[
         Path | None, typer.Option("--output", "-o", help="folder for figures and page (default: error-model)")
     ] = None,

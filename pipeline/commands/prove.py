@@ -13,7 +13,7 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from pipeline.commands import ResultFolder
+from pipeline.commands import PriorFile, ResultFolder
 from pipeline.commands.prove_cases import Drawing, NotRenderedError, Worked, draw_case, require_seal, worked
 from pipeline.errors import InputError
 from pipeline.files.disk import require_writable, written_together
@@ -96,9 +96,7 @@ def prove(
     cases: Annotated[
         int, typer.Option(min=1, help="number of probes to draw, where --sealed is not given")
     ] = 10,
-    prior: Annotated[
-        Path, typer.Option(metavar="FILE", help="prior to draw from: a file, or the name of a shipped one")
-    ] = Path("pairs"),
+    prior: PriorFile = Path("pairs"),
     seed: Annotated[int, typer.Option(min=0, help="random seed of the draw")] = 0,
     leave_out: Annotated[
         bool,

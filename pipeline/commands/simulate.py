@@ -14,6 +14,7 @@ from rich.progress import Progress as Bars
 
 from pipeline.api.simulate import Progress, Simulated, simulate_like, simulate_pairs
 from pipeline.api.simulate import simulate as simulate_scene
+from pipeline.commands import PriorFile
 from pipeline.errors import InputError
 
 
@@ -51,9 +52,7 @@ def simulate(
     first: Annotated[
         int, typer.Option(min=0, help="number of drawn pairs to skip before the first that is rendered")
     ] = 0,
-    prior: Annotated[
-        Path, typer.Option(metavar="FILE", help="prior to draw from: a file, or the name of a shipped one")
-    ] = Path("pairs"),
+    prior: PriorFile = Path("pairs"),
     like: Annotated[
         Path | None,
         typer.Option(
