@@ -196,7 +196,7 @@ class GaugeTwin:
         clip.
     rms_px_stated, rms_px_diagnosed : float
         R.m.s. of how far the line lies from where it is predicted.
-    told_px : float
+    least_px : float
         Displacement of the line that raises χ² by a tenth: less than about that cannot be told.
     sigmas : float
         By how many σ, taken from frame to frame, χ² falls when the effects are switched on.
@@ -216,7 +216,7 @@ class GaugeTwin:
     chi2_measured: float
     rms_px_stated: float
     rms_px_diagnosed: float
-    told_px: float
+    least_px: float
     sigmas: float
     kept: tuple[bool, ...]
     chi2_wrong: float = float("nan")

@@ -27,5 +27,5 @@ def open_seal(
             hint="the recording or its truth was changed after it was sealed, or they do not belong together",
         )  # fmt: skip
     effects = json.loads((truth / "truth.json").read_text("utf-8"))["effects"]
-    told = ", ".join(f"{name} {' '.join(f'{v:g}' for v in values)}" for name, values in effects)
-    typer.echo(f"Concealed: {told or 'nothing'}")
+    concealed = ", ".join(f"{name} {' '.join(f'{v:g}' for v in values)}" for name, values in effects)
+    typer.echo(f"Concealed: {concealed or 'nothing'}")

@@ -145,8 +145,8 @@ def _drawn_and_worked(
             case = draw_case(drawing, index)
         except NotRenderedError as error:
             # An effect that is too small to show in its scene is refused: the others continue.
-            return _told(Worked((), None, (str(error),), None), console)
-        return _told(worked(case, output, drawing.truth, leave_out), console)
+            return _shown(Worked((), None, (str(error),), None), console)
+        return _shown(worked(case, output, drawing.truth, leave_out), console)
 
     with ThreadPoolExecutor(workers) as pool:
         return list(pool.map(work, range(cases)))
@@ -161,7 +161,7 @@ def _sealed_and_worked(
     for case in cases:
         require_seal(case, truth)
     with ThreadPoolExecutor(workers) as pool:
-        return list(pool.map(lambda case: _told(worked(case, output, truth, leave_out), console), cases))
+        return list(pool.map(lambda case: _shown(worked(case, output, truth, leave_out), console), cases))
 
 
 def _shuffled(done: Sequence[Worked]) -> list[Worked]:
@@ -170,7 +170,7 @@ def _shuffled(done: Sequence[Worked]) -> list[Worked]:
     return [Worked(trials, seconds=None, failures=(), wall=None)]
 
 
-def _told(done: Worked, console: Console) -> Worked:
+def _shown(done: Worked, console: Console) -> Worked:
     """Report on the console a case that gave no answer."""
     words = "no answer" if done.trials else "not rendered"
     for failure in done.failures:

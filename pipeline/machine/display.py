@@ -62,7 +62,7 @@ class ProgressDisplay:
         self._progress = Progress(
             TextColumn("{task.description:<20}"),
             BarColumn(),
-            TextColumn("{task.fields[told]}"),
+            TextColumn("{task.fields[status]}"),
             TimeElapsedColumn(),
             console=console,
             transient=True,
@@ -70,7 +70,7 @@ class ProgressDisplay:
             refresh_per_second=_DRAWN_PER_SECOND,
         )
         self._console, self._warn_at_once = console, warn_at_once
-        self._whole = self._progress.add_task("whole run", total=None, told="starting")
+        self._whole = self._progress.add_task("whole run", total=None, status="starting")
         self._tasks: dict[str, TaskID] = {}
         self._stages, self._ended = 0, 0
         self.warnings: list[str] = []
@@ -91,12 +91,14 @@ class ProgressDisplay:
 
     def started(self, stage: str) -> None:
         """Open a bar."""
-        self._tasks[stage] = self._progress.add_task(f"  {stage}", total=None, told="working")
+        self._tasks[stage] = self._progress.add_task(f"  {stage}", total=None, status="working")
 
     def progressed(self, stage: str, done: int, total: int) -> None:
         """Move the bars."""
         if stage in self._tasks and total > 0:
-            self._progress.update(self._tasks[stage], completed=done, total=total, told=f"{done} of {total}")
+            self._progress.update(
+                self._tasks[stage], completed=done, total=total, status=f"{done} of {total}"
+            )
             self._move_whole()
 
     def ended(self, outcome: StageOutcome) -> None:
@@ -121,7 +123,7 @@ class ProgressDisplay:
         done = self._ended + sum(t.percentage / 100 for t in running)
         files = self._ended >= self._stages
         words = "writing files" if files else f"{self._ended} of {self._stages} stages"
-        self._progress.update(self._whole, completed=done, total=self._stages, told=words)
+        self._progress.update(self._whole, completed=done, total=self._stages, status=words)
 
 
 def print_warnings(warnings: Iterable[str], console: Console) -> None:

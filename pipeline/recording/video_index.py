@@ -127,8 +127,8 @@ def index_of(
 ) -> VideoIndex:
     """Return the index of a stream's packets."""
     # AVI stores no times of presentation: with frames out of order, its times are those of decoding.
-    told = not (container.format.name == "avi" and stream.codec_context.has_b_frames)
-    timed = told and all(p.pts is not None for p in packets)
+    times_kept = not (container.format.name == "avi" and stream.codec_context.has_b_frames)
+    timed = times_kept and all(p.pts is not None for p in packets)
     pts = np.array([p.pts for p in packets] if timed else range(len(packets)), np.int64)
     order = np.argsort(pts, kind="stable")
     key = np.array([timed and p.key for p in packets], bool)[order]

@@ -173,15 +173,15 @@ class Compared:
             raise InputError("tables", f"there is no {name[:40]!r}", expected=", ".join(_TABLES))
         if name == "growth.csv":
             return _TABLES[name], csv_text(self._rows(self.changes), GROWTH_COLUMNS).encode("utf-8-sig")
-        return _TABLES[name], json.dumps(self._told(), indent=1, ensure_ascii=False).encode()
+        return _TABLES[name], json.dumps(self._document(), indent=1, ensure_ascii=False).encode()
 
-    def _told(self) -> dict[str, Any]:
+    def _document(self) -> dict[str, Any]:
         """Return the table of changes, and the registration on which they are based."""
         document = self.document()
-        told = {k: document[k] for k in ("earlier", "years", "family_error", "registration", "diameter")}
+        head = {k: document[k] for k in ("earlier", "years", "family_error", "registration", "diameter")}
         runs = {"run": self.pair.now.files.version, "earlier": self.pair.earlier.files.version}
         made_by = MadeBy("review --compare", runs).document()
-        return told | {"made_by": made_by, "changes": self._rows(self.changes)}
+        return head | {"made_by": made_by, "changes": self._rows(self.changes)}
 
     def _rows(self, changes: tuple[Change, ...]) -> list[dict[str, Any]]:
         return growth_rows(changes, self.years, self._wall_thickness_mm)
@@ -258,8 +258,8 @@ def _shown(change: Change) -> dict[str, Any]:
 
 
 def _registration(found: Registration) -> dict[str, Any]:
-    told = vars(found)
-    return told | {
+    fields = vars(found)
+    return fields | {
         "welds": [vars(w) for w in found.welds],
         "shift_range_mm": [found.shift_mm.min(), found.shift_mm.max()],
         "roll_range_rad": [found.roll_rad.min(), found.roll_rad.max()],

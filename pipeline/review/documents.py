@@ -26,7 +26,7 @@ from pipeline.review.run_files import RunFiles
 # Number of colours of a legend's gradient.
 _LEGEND_STEPS = 64
 # Entries of a measured finding that the page needs; the rest comes with the state.
-_TOLD = ("id", "statement", "pof_class", "pacp_suggestion", "en13508_suggestion")
+_COPIED = ("id", "statement", "pof_class", "pacp_suggestion", "en13508_suggestion")
 _FLOW_ABOVE_YIELD_MPA = 69.0  # 10 ksi: flow stress of the modified method of ASME B31G
 # Beyond this share of the wall neither criterion applies.
 LARGEST_LOSS = 0.8
@@ -101,7 +101,7 @@ def run_document(files: RunFiles) -> dict[str, Any]:
         "distance_mm": [float(overlays.distance_mm[0]), float(overlays.distance_mm[-1])],
         "radius_mm": float(np.median(overlays.reference_radius_mm)),
         "overlays": [*_value_layers(files, overlays)],
-        "defects": [{k: d.get(k, "") for k in _TOLD} for d in parse_json(files.defects_text())],
+        "defects": [{k: d.get(k, "") for k in _COPIED} for d in parse_json(files.defects_text())],
         "unconfirmed": files.unconfirmed(),
         "kinds": [kind.value for kind in DefectKind],
         "axis": _axis(files.artefact(Trajectory)),
@@ -257,13 +257,13 @@ def _diagnosis(files: RunFiles) -> dict[str, Any] | None:
     if not file.is_file():
         return None
     try:
-        told = dict(read_json(file))
+        diagnosis = dict(read_json(file))
     except (OSError, ValueError, TypeError) as error:
         return {"verdict": "unreadable", "statement": f"diagnosis.json: {error}", "effects": []}
-    effects = told.get("effects", [])
+    effects = diagnosis.get("effects", [])
     words = [str(e.get("statement", e.get("name", ""))) for e in effects]
-    statement = " ".join(words) or str(told.get("identifiable") or told.get("record_next") or "")
-    return {"verdict": str(told.get("verdict", "")), "statement": statement,
+    statement = " ".join(words) or str(diagnosis.get("identifiable") or diagnosis.get("record_next") or "")
+    return {"verdict": str(diagnosis.get("verdict", "")), "statement": statement,
             "effects": [str(e.get("name", "")) for e in effects]}  # fmt: skip
 
 

@@ -229,14 +229,14 @@ def _read_again(files: RunFiles, finding: Finding) -> str:
     same = OutlineGauge(files.artefact(Wall).radius_map).measure(run.outline)
     return (
         "The depth was measured again because the outline was drawn again. "
-        f"The run found {_told_depth(run.size)}, from single ring points relative to the fitted pipe. "
+        f"The run found {_depth_text(run.size)}, from single ring points relative to the fitted pipe. "
         "The review measures the map of the wall: the extreme of its means over 1 mm, relative to the wall "
-        f"within 6 mm around the outline. In this way, the run's outline gives {_told_depth(same)}, the new "
-        f"one {_told_depth(finding.size)}."
+        f"within 6 mm around the outline. In this way, the run's outline gives {_depth_text(same)}, the new "
+        f"one {_depth_text(finding.size)}."
     )
 
 
-def _told_depth(size: Measured) -> str:
+def _depth_text(size: Measured) -> str:
     return notation.depth(size.depth_mm, size.depth_sigma_mm)
 
 

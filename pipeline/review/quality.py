@@ -120,10 +120,10 @@ class _Pictures(HTMLParser):
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
         """Store a picture's data and its text; anything else is ignored."""
-        told = dict(attrs)
-        source = (told.get("src") or "").strip()
+        attributes = dict(attrs)
+        source = (attributes.get("src") or "").strip()
         if tag == "img" and _PICTURE.fullmatch(source):
-            self.found.append({"title": told.get("alt") or "", "source": source})
+            self.found.append({"title": attributes.get("alt") or "", "source": source})
 
 
 def _diagnosis_pictures(file: Path) -> list[dict[str, str]]:

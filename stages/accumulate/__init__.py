@@ -118,7 +118,7 @@ _FEW_IMPOSSIBLE = 0.002
 # A part that is this share of the whole σ raises it by a tenth.
 _MATTERS = 0.42
 # Places fixed to the image that are warned of one by one; the largest first.
-_TOLD_PLACES = 4
+_LISTED_PLACES = 4
 
 
 class AccumulateParameters(Parameters):
@@ -213,7 +213,7 @@ def _warn_of_fixed(fixed: FixedToProbe | None, context: Context) -> None:
     """Warn of departures that stay at one place of the image while the wall moves."""
     places = () if fixed is None else fixed.places
     context.report("departures of the line that stay in the image, not on the wall", len(places), "")
-    for place in sorted(places, key=lambda p: -abs(p.departure_mm))[:_TOLD_PLACES]:
+    for place in sorted(places, key=lambda p: -abs(p.departure_mm))[:_LISTED_PLACES]:
         context.warn(_fixed_in_words(place))
 
 

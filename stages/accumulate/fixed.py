@@ -45,7 +45,7 @@ _TAKEN_FOR_SHAPE = 0.2
 # Share of the circle that a ring must show.
 _LEAST_SEEN = 0.3
 # A place is on the probe or on the wall if it scatters so many times less there.
-_TOLD = 2.0
+_CLEARLY = 2.0
 _EIGHT = np.ones((3, 3), int)
 
 
@@ -152,9 +152,9 @@ def _is_on_probe(row: Int, sector: Int, steady: Float, blocks: _Blocks) -> bool 
                       + 1j * np.bincount(index, weight * np.sin(step * sector), len(each)))  # fmt: skip
     in_image = np.hypot(_circular_spread(middle), step / 4)
     on_wall = np.hypot(_circular_spread(middle + blocks.roll_rad[each]), step / 4)
-    if on_wall > _TOLD * in_image:
+    if on_wall > _CLEARLY * in_image:
         return True
-    return False if in_image > _TOLD * on_wall else None
+    return False if in_image > _CLEARLY * on_wall else None
 
 
 def _circular_spread(angle: Float) -> float:

@@ -14,7 +14,7 @@ from pipeline.machine.stage import Context
 from pipeline.pages import notation
 
 # Number of places that are listed one by one, the largest first.
-_TOLD = 4
+_NAMED = 4
 # Rows that are examined together; a place that reaches from one part into the next counts as two.
 _ROWS = 4096
 # Rings are oblique and hidden sectors end anywhere: the inside begins where nine in ten columns have begun
@@ -92,7 +92,7 @@ def sparse_rings(ring_at_mm: Float, gap_mm: float) -> SparseRings:
 
 
 def _warn_of_places(places: list[Unmeasured], context: Context) -> None:
-    largest = sorted(places, key=lambda p: -p.area_mm2)[:_TOLD]
+    largest = sorted(places, key=lambda p: -p.area_mm2)[:_NAMED]
     where = ", ".join(
         f"at {p.distance_mm:.0f} mm, {notation.clock(float(clock_of_azimuth(p.azimuth_rad)))} "
         f"({p.length_mm:.0f} mm along, {p.width_mm:.0f} mm around)"
@@ -101,9 +101,9 @@ def _warn_of_places(places: list[Unmeasured], context: Context) -> None:
     area_mm2 = sum(p.area_mm2 for p in places)
     many = f"{len(places)} place{'s' * (len(places) > 1)} inside the wall, {area_mm2:.0f} mm² in all"
     context.warn(
-        f"{many}, could not be measured{', the largest' * (len(places) > _TOLD)}: {where}. Defects there are "
-        "not found. What to do: look at these places in the lit pictures; clean window and wall, drain the "
-        "pipe, shade reflections, and record again"
+        f"{many}, could not be measured{', the largest' * (len(places) > _NAMED)}: {where}. Defects there "
+        "are not found. What to do: look at these places in the lit pictures; clean window and wall, drain "
+        "the pipe, shade reflections, and record again"
     )
 
 

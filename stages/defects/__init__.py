@@ -160,12 +160,12 @@ def _described(
     without_them_mm = widened.sigma_mm
     if cut > 0 and whole.rings.may_be_a_pit:
         widened = replace(widened, sigma_mm=float(np.hypot(widened.sigma_mm, cut)))
-    told = describe(here, widened, surface, scene)
-    by_noise = replace(told, depth_sigma_mm=depth.sigma_mm)
+    described = describe(here, widened, surface, scene)
+    by_noise = replace(described, depth_sigma_mm=depth.sigma_mm)
     bead = measurer.chance_of_bead(region)
     if cut <= 0:
-        return Found(region, told, by_noise, evidence, bead)
-    return Found(region, told, by_noise, evidence, bead, whole.depth.depth_mm, without_them_mm)
+        return Found(region, described, by_noise, evidence, bead)
+    return Found(region, described, by_noise, evidence, bead, whole.depth.depth_mm, without_them_mm)
 
 
 def _lines(measurer: Measurer, found: Sequence[Found], scene: Scene, context: Context) -> Iterator[Defect]:

@@ -183,8 +183,8 @@ def line_is_bright(region: Region, depth_mm: float, surface: Surface, rings: Rin
     showing = frames_behind(region, depth_mm, surface)
     if len(showing) < MANY_RINGS:
         return True
-    told = [_is_bright(height, inside, points, rings, int(k)) for k in showing]
-    known = [bright for bright in told if bright is not None]
+    brightness = [_is_bright(height, inside, points, rings, int(k)) for k in showing]
+    known = [bright for bright in brightness if bright is not None]
     return not known or float(np.mean(known)) >= _MOST
 
 

@@ -92,9 +92,9 @@ class Found:
     def with_probability(self, probability: float, counts: bool) -> Defect:
         """Return it with its probability and, if it counts, a sentence where its depth is a lower bound."""
         words = self._at_least() if counts else ""
-        told = f"{self.defect.statement} {words}".rstrip()
+        statement = f"{self.defect.statement} {words}".rstrip()
         sure = self.defect.confidence * probability
-        return replace(self.defect, probability=probability, confidence=sure, statement=told)
+        return replace(self.defect, probability=probability, confidence=sure, statement=statement)
 
     def _at_least(self) -> str:
         if self.contradicted_mm is not None:

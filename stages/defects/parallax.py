@@ -62,8 +62,8 @@ class LitPictures:
         wide = Region(region.row, region.column - beside, mask, region.sign)
         rows = max(1, round(_WINDOW_MM / relief.cell_mm[0]))
         parts = [slice(k, min(k + rows, len(mask))) for k in range(0, len(mask), rows)]
-        told = [t for part in parts if (t := self._disagreement(wide, relief, part)) is not None]
-        pixels, logs = np.array(told, float).reshape(-1, 2).T
+        compared = [t for part in parts if (t := self._disagreement(wide, relief, part)) is not None]
+        pixels, logs = np.array(compared, float).reshape(-1, 2).T
         return bool(pixels.sum() > 0 and np.exp(pixels @ logs / pixels.sum()) > _DISAGREE)
 
     def _disagreement(self, region: Region, relief: Relief, rows: slice) -> tuple[int, float] | None:

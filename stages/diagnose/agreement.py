@@ -86,8 +86,8 @@ def agreement(
     unrelated = own[1] + size**2 / count * np.eye(count)
     like = stats.multivariate_normal(np.zeros(count), _spread(gap, size)).logpdf(second.value - first.value)
     unlike = stats.multivariate_normal(np.zeros(count), unrelated).logpdf(second.value)
-    told = Confirmation(f"{first.where}: {first.words}", f"{second.where}: {second.words}", agrees)
-    return Agreement(told, float(np.exp(np.clip(like - unlike, -50, 50))))
+    confirmation = Confirmation(f"{first.where}: {first.words}", f"{second.where}: {second.words}", agrees)
+    return Agreement(confirmation, float(np.exp(np.clip(like - unlike, -50, 50))))
 
 
 def same(first: Float, second: Float, gap: Float, size: float, rarest: float = AGREE) -> bool:
@@ -145,9 +145,11 @@ def _at_most(p_value: float) -> float:
 
 def sized(model: EffectModel, shape: Shape, amplitude: Float, covariance: Float) -> str:
     """Return an effect's quantities, each with its 1 σ, as text, from amplitudes (Q,)."""
-    told = drawn(partial(model.quantities, shape), amplitude, covariance)
-    words = {name: f" ± {v.sd:.2g}" if v.sd > 0 else "" for name, v in told.items()}
-    return ", ".join(f"{name} {v.value:.4g}{words[name]}" for name, v in told.items() if np.isfinite(v.value))
+    sizes = drawn(partial(model.quantities, shape), amplitude, covariance)
+    words = {name: f" ± {v.sd:.2g}" if v.sd > 0 else "" for name, v in sizes.items()}
+    return ", ".join(
+        f"{name} {v.value:.4g}{words[name]}" for name, v in sizes.items() if np.isfinite(v.value)
+    )
 
 
 def drawn(

@@ -15,10 +15,10 @@ _FORMAT = 1
 
 def to_json(found: Diagnosis) -> dict[str, object]:
     """Return the contents of diagnosis.json: all of the diagnosis except what only the page shows."""
-    told = {k: v for k, v in _fields(found).items() if k != "causes" and not k.endswith("_picture")}
+    fields = {k: v for k, v in _fields(found).items() if k != "causes" and not k.endswith("_picture")}
     return {
         "format": _FORMAT,
-        **told,
+        **fields,
         "discrepancy": None,
         "effects": [_effect(e, found) for e in found.effects],
     }

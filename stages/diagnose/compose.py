@@ -211,8 +211,8 @@ def _identifiable(said: _Said, examined: Examined | None, other_encoder_course: 
     """
     if said.verdict is Verdict.CLASS or said.unsure:
         unknown = (*_unknown(examined), *(_OF_ENCODER,) * other_encoder_course)
-        told = [*(e.statement for e in said.unsure), *(_UNKNOWN.format(f) for f in unknown)]
-        return "; or ".join(dict.fromkeys(w.rstrip(".") for w in told)) + "." * bool(told)
+        causes = [*(e.statement for e in said.unsure), *(_UNKNOWN.format(f) for f in unknown)]
+        return "; or ".join(dict.fromkeys(w.rstrip(".") for w in causes)) + "." * bool(causes)
     nameless = said.verdict in (Verdict.UNEXPLAINED, Verdict.PARTLY) and not said.members
     return of_gauge.formula(examined) if nameless and examined is not None else ""
 
@@ -260,7 +260,7 @@ def _unexplained_profile(*recordings: Seen | None) -> tuple[str, ...]:
 
 
 @dataclass(frozen=True)
-class _Untold:
+class _UnexplainedTravel:
     """An unnamed difference between motion and encoder, and whether a slip may have made it."""
 
     sentence: str
@@ -268,7 +268,7 @@ class _Untold:
     by_slip: bool
 
 
-def _unexplained_travel(*recordings: Seen | None) -> list[_Untold]:
+def _unexplained_travel(*recordings: Seen | None) -> list[_UnexplainedTravel]:
     """Return differences between motion and encoder that may be a slip or stray pictures, or are unexplained.
 
     Several doubtful steps in one recording may have one unknown cause, and so may a step beside something
@@ -280,8 +280,8 @@ def _unexplained_travel(*recordings: Seen | None) -> list[_Untold]:
         by_slip = len(travel.unsettled) == 1 and (left is None or left.by_slip)
         for step in travel.unsettled:
             where = stretch(travel, (step.place - 1, step.place), FixedTo.TIME, "event")
-            out.append(_Untold(f"{name}: {step.doubt}", where, by_slip))
+            out.append(_UnexplainedTravel(f"{name}: {step.doubt}", where, by_slip))
         if left is not None:
             where = stretch(travel, left.where, None, None)
-            out.append(_Untold(f"{name}: {left.statement}", where, left.by_slip))
+            out.append(_UnexplainedTravel(f"{name}: {left.statement}", where, left.by_slip))
     return out

@@ -222,17 +222,17 @@ def compared_with_rings(seen: Seen, sheet: Part) -> Seen:
     if seen.profile is None:
         return seen
     second = next((f for f in seen.profile.found if f.effect == _NAME and f.confirms), None)
-    told = against_rings(second, sheet) if second is not None else None
-    if second is None or told is None:
+    match = against_rings(second, sheet) if second is not None else None
+    if second is None or match is None:
         return seen
-    if told.confirmation.agrees:
-        kept = replace(second, agreements=(*second.agreements, told))
+    if match.confirmation.agrees:
+        kept = replace(second, agreements=(*second.agreements, match))
         return replace(seen, profile=seen.profile.with_finding(kept))
     withdrawn = replace(second, p_value=1.0, confirms=(), agreements=())
     words = (
         f"The line's profile of {seen.name} shows faint light beside the line. It is not light "
-        f"bounced across the bore: its place would require {told.confirmation.measured.partition(': ')[2]}, "
-        f"and the rings say {told.confirmation.prediction.partition(': ')[2]}."
+        f"bounced across the bore: its place would require {match.confirmation.measured.partition(': ')[2]}, "
+        f"and the rings say {match.confirmation.prediction.partition(': ')[2]}."
     )
     return replace(
         seen, profile=seen.profile.with_finding(withdrawn), shortcomings=(*seen.shortcomings, words)

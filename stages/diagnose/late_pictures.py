@@ -48,8 +48,8 @@ class Exposure:
     def of(cls, stated_s: float, recordings: Iterable[Seen | None]) -> Exposure:
         """Return the exposure according to the line's width in some recordings, in their order."""
         profiles = [s.profile for s in recordings if s is not None and s.profile is not None]
-        told = (f for p in profiles for f in p.findings if f.effect == _EXPOSURE and f.sizes)
-        return cls(stated_s, tuple(told))
+        widths = (f for p in profiles for f in p.findings if f.effect == _EXPOSURE and f.sizes)
+        return cls(stated_s, tuple(widths))
 
     def leaves_open(self, found: TravelEstimate) -> bool:
         """Return whether a width without confirmation may account for an uncertain part of this delay."""

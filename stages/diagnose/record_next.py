@@ -77,8 +77,8 @@ def _purpose(possible: Sequence[_Possible]) -> str:
         return f"tell how {possible[0].name} changes over the run"
     likely = [name for name in weight if weight[name] >= _LEAST * max(weight.values())]
     likeliest = sorted(likely, key=lambda name: -weight[name])
-    told = likely if len(likely) <= _NAMED else [n for n in likely if n in likeliest[: _NAMED - 1]]
-    *leading, last = (*told, "the others") if len(told) < len(likely) else told
+    listed = likely if len(likely) <= _NAMED else [n for n in likely if n in likeliest[: _NAMED - 1]]
+    *leading, last = (*listed, "the others") if len(listed) < len(likely) else listed
     if not leading:
         return f"confirm {last}"
     return f"tell {', '.join(leading)} and {last} apart"

@@ -32,9 +32,9 @@ def weighed(examined: Examined | None, claims: Sequence[Claim]) -> Causes:
 
 def _claimed(claim: Claim) -> Iterator[Cause]:
     """Yield what a claim names, and its rivals, which are as likely."""
-    told = claim.found
-    yield from (Cause(name, told.probability) for name in claim.rivals)
-    yield Cause(told.name, told.probability, (CourseShare("", 1.0, told.statement),))
+    found = claim.found
+    yield from (Cause(name, found.probability) for name in claim.rivals)
+    yield Cause(found.name, found.probability, (CourseShare("", 1.0, found.statement),))
 
 
 def _of_rings(examined: Examined) -> Causes:

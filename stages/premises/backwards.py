@@ -13,7 +13,7 @@ from stages.premises.losses import Steps
 # The pictures count as reversed if their motion fits the encoder twice as well backwards in time. In 29 sound
 # recordings (open-1 to a12) it fits at most 1.24 times as well; in all 14 gauge runs, when reversed, 2.2
 # times or more. With fewer steps there is no decision.
-_TWICE, _LEAST_TOLD = 2.0, 20
+_TWICE, _LEAST_KNOWN = 2.0, 20
 # Delays of the encoder's clock, s, that are tried before pictures count as reversed. With ±0.1 s, up to 15 of
 # 60 drawn runs that stop and go were wrongly refused where the clock was off by more; with ±1 s none was, and
 # all 120 reversed ones were. In steps of 12.5 ms, no delay is farther from a tried one than a fifth of a
@@ -47,7 +47,7 @@ def runs_forwards(encoder: Encoder | None, time_s: Float, steps: Steps) -> bool:
     mirrored_s = time_s[0] + time_s[-1] - time_s
     ends_s = np.stack([t[place] for t in (time_s, mirrored_s) for place in (steps.start, steps.end)])
     known = np.all((ends_s >= encoder.time_s[0]) & (ends_s <= encoder.time_s[-1]), axis=0)
-    if known.sum() < _LEAST_TOLD:
+    if known.sum() < _LEAST_KNOWN:
         return False
     late = (steps.by_encoder(encoder, time_s + by_s)[known] for by_s in _LATE_S)
     as_it_is = min(_misfit(steps.size[known], shown) for shown in late)

@@ -224,8 +224,8 @@ def _compare_rings(samples: RingSamples) -> None:
         )
         validity = found.validity[: own.stop][-SAYING_RINGS:]
         sigma_px = found.sigma_px[: own.stop][-SAYING_RINGS:]
-        told = contradicted(found)
-        samples.validity[rows], samples.sigma_px[rows] = told[0][own], told[1][own]
+        revised = contradicted(found)
+        samples.validity[rows], samples.sigma_px[rows] = revised[0][own], revised[1][own]
 
 
 def _some(samples: RingSamples) -> RingSamples:

@@ -159,7 +159,7 @@ def photometry_of(
     places = (*displaced, *beside(places, displaced))
     if gain is not None:
         state = replace(state, gain_map=full_size(gain, state.outside.shape))
-    return Photometry(state, places, beside(blurred, places), parameters.blur_px, defects.told())
+    return Photometry(state, places, beside(blurred, places), parameters.blur_px, defects.mismatches())
 
 
 def compare_with_twin(

@@ -43,7 +43,7 @@ from stages.twin.line_blocks import BlockLight, LineBlocks, blocks_of, light_of,
 _SOLVE, _SLOPE_PX, _FARTHEST_PX, _SETTLED_PX = 5, 0.5, 6.0, 0.02
 _SURE = 3.0
 """σ, from frame to frame, of a difference of χ² above which one instrument fits better than another."""
-_PROBED_PX, _TOLD = 0.2, 0.1
+_PROBED_PX, _NOTICED = 0.2, 0.1
 """The sensitivity is stated as the displacement that raises χ² by a tenth, extrapolated from one of 0.2
 px."""
 _PLACE_ROUNDS, _PLACE_STEPS = 2, 3
@@ -224,7 +224,7 @@ def _judged(line: GaugeLine, switches: Sequence[Switch], place: Sequence[Float])
         line.recording.frames.frame[blocks.frame], tuple(s.text for s in switches), int(pixels.sum()),
         _mean(stated, pixels), _mean(diagnosed, pixels), _mean(measured, pixels),
         _rms(place[0]), _rms(place[1]),
-        float(_PROBED_PX * np.sqrt(_TOLD * _mean(measured, pixels) / max(_mean(rise, pixels), 1e-9))),
+        float(_PROBED_PX * np.sqrt(_NOTICED * _mean(measured, pixels) / max(_mean(rise, pixels), 1e-9))),
         sigmas(stated - diagnosed), tuple(kept), _mean(wrong, pixels), sigmas(wrong - diagnosed),
     )  # fmt: skip
 

@@ -49,7 +49,7 @@ class DefectivePixels:
             ]
         return made
 
-    def told(self) -> tuple[Mismatch, ...]:
+    def mismatches(self) -> tuple[Mismatch, ...]:
         """Return what is reported of them; nothing without any."""
         both, pixels, nan = np.concatenate([self.hot, self.dead]), int(self.seen.sum()), float("nan")
         if not len(both):

@@ -273,8 +273,8 @@ def _fall_of_drop(sums: Float, aside_px: float) -> FittedLaw:
     frames, (cross, own) = np.arange(len(sums)), np.moveaxis(sums, 1, 0)
     gain, half = 2 * cross - own, np.arange(len(sums)) % 2
     by_half = np.array([int(np.argmax(gain[half != h].sum(0))) for h in (0, 1)])
-    told = frames, by_half[half]
-    fall, shown = gain[told], cross[told] / np.maximum(own[told], 1e-9)
+    kept = frames, by_half[half]
+    fall, shown = gain[kept], cross[kept] / np.maximum(own[kept], 1e-9)
     best = int(np.argmax(gain.sum(0)))
     if best == len(_DROPS):
         return FittedLaw(fall, NamedFigure("aside", aside_px, _ASIDE_PX, "px"), shown)

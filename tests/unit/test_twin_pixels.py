@@ -30,21 +30,21 @@ def _frames(hot=(), dead=(), dirt=None, pattern=0.0):
 
 
 def test_hot_and_dead_pixels_are_counted():
-    (found,) = defective_pixels(*_frames([(20, 30), (90, 100)], [(60, 70)])).told()
+    (found,) = defective_pixels(*_frames([(20, 30), (90, 100)], [(60, 70)])).mismatches()
     assert found.name == "defective_pixels"
     assert found.statement.startswith("2 single pixels are too bright in all frames, 1 too dark")
     assert found.parameters[0].value == 3 / SEEN.size
 
 
 def test_moving_wall_noise_and_dirt_are_not_defective_pixels():
-    assert defective_pixels(*_frames()).told() == ()
-    assert defective_pixels(*_frames(dirt=(slice(40, 43), slice(50, 60)))).told() == ()
+    assert defective_pixels(*_frames()).mismatches() == ()
+    assert defective_pixels(*_frames(dirt=(slice(40, 43), slice(50, 60)))).mismatches() == ()
 
 
 def test_the_tail_of_a_dark_pattern_is_not_a_defect_but_a_hot_pixel_in_it_is():
     """With offsets that spread by five grey levels, one pixel in a thousand was called defective."""
-    assert defective_pixels(*_frames(pattern=5.0)).told() == ()
-    (found,) = defective_pixels(*_frames([(20, 30)], pattern=5.0)).told()
+    assert defective_pixels(*_frames(pattern=5.0)).mismatches() == ()
+    (found,) = defective_pixels(*_frames([(20, 30)], pattern=5.0)).mismatches()
     assert found.statement.startswith("1 single pixels are too bright in all frames, 0 too dark")
 
 
@@ -57,7 +57,7 @@ def test_a_thin_scratch_on_the_window_is_not_a_row_of_dead_pixels(azimuth_deg):
     images, lit, seen = _frames(dead=[(30, 20)])
     clear = 1 - 0.5 * np.exp(-0.5 * (across / 0.8) ** 2)
     images = [np.clip(16 + (i - 16.0) * clear, 0, 255).astype(np.uint8) for i in images]
-    (found,) = defective_pixels(images, lit, seen).told()
+    (found,) = defective_pixels(images, lit, seen).mismatches()
     assert found.statement.startswith("0 single pixels are too bright in all frames, 1 too dark")
 
 

@@ -146,9 +146,9 @@ def geometry_change(before: Path, after: Path) -> GeometryChange:
 def consequence(change: GeometryChange) -> str:
     """Return the consequence of the correction for the inspection, in a sentence."""
     least_mm = _LEAST_DEPTH_CHANGE_MM
-    told = [d for d in change.defects if abs(d.after_mm - d.before_mm) > max(2 * d.sigma_mm, least_mm)]
-    if told:
-        worst = max(told, key=lambda d: abs(d.after_mm - d.before_mm))
+    changed = [d for d in change.defects if abs(d.after_mm - d.before_mm) > max(2 * d.sigma_mm, least_mm)]
+    if changed:
+        worst = max(changed, key=lambda d: abs(d.after_mm - d.before_mm))
         return _of_defect(worst)
     if not np.isfinite(change.max_mm).any():
         return ""

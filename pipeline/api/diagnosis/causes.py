@@ -52,20 +52,20 @@ def class_shown(found: Diagnosis) -> ClassShown:
     asked = sorted((c for c in each.values() if c is not None), key=lambda c: -c.probability)
     unasked = [name for name, cause in each.items() if cause is None]
     mate = {name: found.causes.like(name, members) for name in unasked}
-    untold = tuple(CauseShown(_in_words(name)) for name in unasked if mate[name] is None)
-    shown = [c for c in asked if c.probability >= _SHOWN] or asked * (not untold)
+    unweighed = tuple(CauseShown(_in_words(name)) for name in unasked if mate[name] is None)
+    shown = [c for c in asked if c.probability >= _SHOWN] or asked * (not unweighed)
     certain = {e.name for e in found.effects} if left is not None else set()
     hidden = [c for c in found.causes.laws if c not in shown and c.name not in certain]
     sentences = _rest(found.causes.outside, hidden, members) if asked else ()
     lines = (_line(c, [name for name in unasked if mate[name] == c]) for c in shown)
-    return ClassShown((*lines, *untold), sentences, any(c.probability > 0.5 for c in shown))
+    return ClassShown((*lines, *unweighed), sentences, any(c.probability > 0.5 for c in shown))
 
 
 def _rest(outside: float, hidden: Sequence[Cause], members: Sequence[str]) -> tuple[str, ...]:
     """Return sentences on what has no line of its own: not where it is negligible and outside the class."""
     others = min(sum(c.probability for c in hidden), 1.0)
-    told = ((_OUTSIDE, outside, False), (_OTHERS, others, any(c.name in members for c in hidden)))
-    return tuple(f"{words}: {_percent(p)}." for words, p, always in told if always or p >= _SHOWN / 10)
+    remaining = ((_OUTSIDE, outside, False), (_OTHERS, others, any(c.name in members for c in hidden)))
+    return tuple(f"{words}: {_percent(p)}." for words, p, always in remaining if always or p >= _SHOWN / 10)
 
 
 def _line(cause: Cause, alike: Sequence[str]) -> CauseShown:

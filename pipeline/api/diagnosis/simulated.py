@@ -184,7 +184,7 @@ def _judged(said: Switches, found: GaugeTwin, still: tuple[str, ...]) -> Diagnos
     named = [e for s, e in zip(said.found, said.effects, strict=True) if moves_line(s.name)]
     each = [_mismatch(e, kept, found, said.by_chance) for e, kept in zip(named, found.kept, strict=True)]
     power = (
-        f"A line displaced by less than about {found.told_px:.2f} px raises χ² in the gauge's pictures by "
+        f"A line displaced by less than about {found.least_px:.2f} px raises χ² in the gauge's pictures by "
         "less than a tenth: instruments that differ by less cannot be distinguished."
     )
     kept, withdrawn = (

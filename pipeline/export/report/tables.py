@@ -77,12 +77,12 @@ def verdict(summary: RunSummary) -> str:
     found = summary.defects.items
     if not found:
         return f"{length:.0f} mm of pipe were inspected and no defect was found."
-    told = f"{length:.0f} mm of pipe were inspected. Found: {_counted(found)}."
+    text = f"{length:.0f} mm of pipe were inspected. Found: {_counted(found)}."
     deepest = summary.defects.deepest
     if deepest is None:
-        return told
+        return text
     depth = notation.depth(deepest.depth_mm, deepest.depth_sigma_mm)
-    return f"{told} The largest deviation is a {deepest.kind}, {depth}, at {deepest.peak_distance_mm:.1f} mm."
+    return f"{text} The largest deviation is a {deepest.kind}, {depth}, at {deepest.peak_distance_mm:.1f} mm."
 
 
 def cards(summary: RunSummary) -> tuple[Card, ...]:
@@ -236,8 +236,8 @@ def _events(summary: RunSummary) -> Table | None:
 
 
 def _numbers(summary: RunSummary) -> Table | None:
-    told = [(s, n) for s, n in summary.numbers if n.name != WARNING and not n.name.startswith("rejected")]
-    rows = tuple((stage_title(stage), figure_name(n.name), _value(n)) for stage, n in told)
+    figures = [(s, n) for s, n in summary.numbers if n.name != WARNING and not n.name.startswith("rejected")]
+    rows = tuple((stage_title(stage), figure_name(n.name), _value(n)) for stage, n in figures)
     return Table("What the stages measured", ("stage", "quantity", "value"), rows) if rows else None
 
 

@@ -44,7 +44,7 @@ def report_content(review: Review, state: State) -> dict[str, Any]:
         "strength_assumptions": ASSUMPTIONS if any(r["b31g_mpa"] is not None for r in rows) else "",
         "has_loss": any(r["wall_loss_percent"] is not None for r in rows),
         "assumed": state.assumed.model_dump(exclude={"do"}),
-        "findings": [row | {"statement": said.get(row["id"], ""), "told": _told(row)} for row in rows],
+        "findings": [row | {"statement": said.get(row["id"], ""), "texts": _sentences(row)} for row in rows],
         "decisions": _decisions(state, {row["id"]: row["label"] for row in rows}),
         "signed": seal.signed,
         "signature": asdict(seal.signature) if seal.signature else None,
@@ -87,7 +87,7 @@ def _summary(rows: list[dict[str, Any]]) -> list[list[str]]:
     return out
 
 
-def _told(row: dict[str, Any]) -> dict[str, str]:
+def _sentences(row: dict[str, Any]) -> dict[str, str]:
     """Return the texts on a finding that every report uses."""
     size = f"{row['length_mm']} mm along × {row['width_mm']} mm around"
     pressure = ""
@@ -137,8 +137,8 @@ def _instrument(calibrated_from: str) -> str:
 def _diagnosis(diagnosis: dict[str, Any] | None) -> str:
     if diagnosis is None:
         return "Instrument diagnosis: not run."
-    told = f"Instrument diagnosis: {diagnosis['verdict']}. {diagnosis['statement']}"
-    return told.strip()
+    statement = f"Instrument diagnosis: {diagnosis['verdict']}. {diagnosis['statement']}"
+    return statement.strip()
 
 
 def _decisions(state: State, labels: dict[str, str]) -> list[list[str]]:
@@ -159,13 +159,13 @@ _WORDS_OF_ACTIONS = {
 def _in_words(entry: Entry, labels: dict[str, str]) -> str:
     """Return a sentence that describes an action."""
     said = entry.action.model_dump(mode="json")
-    told = {k: v for k, v in said.items() if isinstance(v, str)}
-    told["name"] = labels.get(str(said.get("finding")), str(said.get("finding")))
-    told["made"] = labels.get(f"a{entry.id}", "")
-    told["names"] = ", ".join(labels.get(f, f) for f in said.get("findings", ()))
+    values = {k: v for k, v in said.items() if isinstance(v, str)}
+    values["name"] = labels.get(str(said.get("finding")), str(said.get("finding")))
+    values["made"] = labels.get(f"a{entry.id}", "")
+    values["names"] = ", ".join(labels.get(f, f) for f in said.get("findings", ()))
     units = {"wall_thickness_mm": "mm wall thickness", "yield_mpa": "MPa yield strength"}
-    told["pipe"] = ", ".join(_given(said[k], unit) for k, unit in units.items() if said.get(k)) or "none"
-    return _WORDS_OF_ACTIONS[entry.action.do].format(**told)
+    values["pipe"] = ", ".join(_given(said[k], unit) for k, unit in units.items() if said.get(k)) or "none"
+    return _WORDS_OF_ACTIONS[entry.action.do].format(**values)
 
 
 def _revision(seal: Seal) -> str:

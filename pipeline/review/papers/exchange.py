@@ -72,7 +72,7 @@ def _accepted(review: Review, state: State) -> list[dict[str, Any]]:
 
 def _pof(row: dict[str, Any], wall_mm: float | None, bore_mm: float) -> dict[str, Any]:
     kind = DefectKind(row["kind"])
-    told: dict[str, Any] = dict.fromkeys(POF_COLUMNS) | {
+    entry: dict[str, Any] = dict.fromkeys(POF_COLUMNS) | {
         "Log distance [m]": _metres(row), "Feature type": _POF_TYPE.get(kind, "Anomaly"),
         "Feature identification": _POF_FEATURE[kind], "Comment / Cluster ID": f"Finding {row['label']}",
         "Internal diameter [mm]": bore_mm, "Nominal thickness [mm]": wall_mm,
@@ -80,8 +80,8 @@ def _pof(row: dict[str, Any], wall_mm: float | None, bore_mm: float) -> dict[str
         "Surface location": "" if kind is DefectKind.WELD else "Int", "Comments": _pof_comment(row),
     }  # fmt: skip
     if kind is DefectKind.DENT:
-        return told | _pof_deformation(row)
-    return told | _pof_loss(row, wall_mm) if kind.is_metal_loss else told
+        return entry | _pof_deformation(row)
+    return entry | _pof_loss(row, wall_mm) if kind.is_metal_loss else entry
 
 
 def _pof_deformation(row: dict[str, Any]) -> dict[str, Any]:
@@ -126,11 +126,11 @@ def pacp_text(review: Review, state: State) -> bytes:
 
 def _pacp(row: dict[str, Any], bore_mm: float) -> list[dict[str, Any]]:
     first, last = _whole_hours(row)
-    told: dict[str, Any] = dict.fromkeys(PACP_COLUMNS, None) | {
+    entry: dict[str, Any] = dict.fromkeys(PACP_COLUMNS, None) | {
         "PACP_Code": row["pacp"].split(" ")[0], "Value_Percent": _percent(row, bore_mm),
         "Clock_At_From": first, "Clock_To": last, "Remarks": _comment(row),
     }  # fmt: skip
-    return [told | {"Distance": at, "Continuous": mark} for at, mark in _ends(row, "S01", "F01")]
+    return [entry | {"Distance": at, "Continuous": mark} for at, mark in _ends(row, "S01", "F01")]
 
 
 def en13508_text(review: Review, state: State) -> bytes:
@@ -160,12 +160,12 @@ def _en(row: dict[str, Any], bore_mm: float) -> list[dict[str, Any]]:
     first, last = _whole_hours(row)
     one, two = _characterised(kind, row)
     is_narrowing = kind in (DefectKind.DENT, DefectKind.DEPOSIT)
-    told: dict[str, Any] = dict.fromkeys(EN_COLUMNS, None) | {
+    entry: dict[str, Any] = dict.fromkeys(EN_COLUMNS, None) | {
         "A": row["en13508"].split(" ")[0], "B": one, "C": two,
         "D": _percent(row, bore_mm) if is_narrowing else None,
         "G": first, "H": last, "F": _comment(row),
     }  # fmt: skip
-    return [told | {"I": at, "J": mark} for at, mark in _ends(row, "A1", "B1")]
+    return [entry | {"I": at, "J": mark} for at, mark in _ends(row, "A1", "B1")]
 
 
 def _characterised(kind: DefectKind, row: dict[str, Any]) -> tuple[str, str]:

@@ -86,8 +86,8 @@ class Canvas:
         bar = axes.inset_axes((0.0, -0.14, 1.0, 0.07))
         bar.imshow(self.legend.palette_bgr[None, 1:, ::-1], aspect="auto", extent=(0, 1, 0, 1))
         ends = (self.limits.low_mm, self.limits.high_mm)
-        told = [f"{abs(v):.2f} mm {notation.direction(v)}" for v in ends]
-        bar.set_xticks([0, 1], told, fontsize=6)
+        labels = [f"{abs(v):.2f} mm {notation.direction(v)}" for v in ends]
+        bar.set_xticks([0, 1], labels, fontsize=6)
         bar.set_yticks([])
 
     def _section(self, axes: Axes, distance_mm: float, azimuth_rad: float) -> None:

@@ -62,8 +62,8 @@ class Trial:
         """
         if not self.concealed:
             return False
-        told = {f.name: f.left for f in self.answer.feasibility if f.left is not None}
-        left = (told.get(c.name, 1.0) for c in self.concealed)
+        left_by_name = {f.name: f.left for f in self.answer.feasibility if f.left is not None}
+        left = (left_by_name.get(c.name, 1.0) for c in self.concealed)
         return self.snr is not None and all(self.snr * np.sqrt(share) >= _STANDS_OUT for share in left)
 
     @property

@@ -108,7 +108,7 @@ class Drifting(Worded, InCourse):
         """Return the time constant."""
         return {"time_s": shape[0]}
 
-    def told(self, shape: Shape, amplitude: Float) -> dict[str, float | str]:
+    def values_in_words(self, shape: Shape, amplitude: Float) -> dict[str, float | str]:
         """Return the quantities, the growth in its `beginning`, and how long that lasts, in words.
 
         For a drift slower than its recording the latter is well determined, while the final size is

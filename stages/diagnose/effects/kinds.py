@@ -30,15 +30,15 @@ class Worded(EffectModel):
 
     def statement(self, shape: Shape, amplitude: Float) -> str:
         """Return a sentence that states the effect with its size."""
-        told, signed = self.told(shape, amplitude), effect(self.name).quantities[0].name
+        values, signed = self.values_in_words(shape, amplitude), effect(self.name).quantities[0].name
         if "[" in self.words:
             size = self.quantities(shape, amplitude)[signed]
             word = 2 if size < 0 else 1
-            told = {**told, signed: abs(size)}
-            return _EITHER.sub(lambda either: either[word], self.words).format(**told)
-        return self.words.format(**told)
+            values = {**values, signed: abs(size)}
+            return _EITHER.sub(lambda either: either[word], self.words).format(**values)
+        return self.words.format(**values)
 
-    def told(self, shape: Shape, amplitude: Float) -> dict[str, float | str]:
+    def values_in_words(self, shape: Shape, amplitude: Float) -> dict[str, float | str]:
         """Return the quantities in the sentence, by name."""
         return {**self.quantities(shape, amplitude)}
 

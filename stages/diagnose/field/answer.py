@@ -267,9 +267,9 @@ def _alone(
     the gauge run refutes every member.
     """
     refuted = doubt or _LOOKS_LIKE.format(alone.identifiable)
-    told = _BY_FIELD + possible.identifiable if possible.shown else refuted
+    addition = _BY_FIELD + possible.identifiable if possible.shown else refuted
     notes = (_NOT_IN_GAUGE if with_gauge else _ONE_PIPE,) if possible.shown else ()
-    said = [text for text in (found.identifiable, told) if text]
+    said = [text for text in (found.identifiable, addition) if text]
     certain = found.effects if found.verdict in (Verdict.NAMED, Verdict.PARTLY) else ()
     names = () if certain else classes_of([e.name for e in found.effects])
     where = location_in_field(field, alone.shown)

@@ -35,12 +35,12 @@ def nameless(found: Diagnosis) -> Diagnosis:
     return replace(found, verdict=Verdict.UNEXPLAINED, members=(), effects=())
 
 
-def in_words(found: Diagnosis, told: str) -> Diagnosis:
-    """Return the answer with what the inspection shows ``told`` beside an unexplained gauge run.
+def in_words(found: Diagnosis, shown: str) -> Diagnosis:
+    """Return the answer with what the inspection shows ``shown`` beside an unexplained gauge run.
 
     No class contains what is unexplained, and a gauge run that shows something refutes nothing.
     """
-    said = f"{found.identifiable} {told}.".lstrip()
+    said = f"{found.identifiable} {shown}.".lstrip()
     return replace(nameless(found), identifiable=said, record_next=AGAIN)
 
 

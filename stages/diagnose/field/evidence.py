@@ -44,7 +44,7 @@ def shortcomings_of(run: FieldRun) -> tuple[str, ...]:
     lost_share = float(np.mean(lost)) if len(lost) else 1.0
     across = float(np.sqrt(np.mean(np.var(T[:, :2, 3], axis=0))))
     roll = float(np.ptp(np.unwrap(np.arctan2(T[:, 1, 0], T[:, 0, 0]))))
-    told = (
+    rules = (
         (abs(found / nominal - 1) >= _DIAMETER_SHARE,
          f"The rings show a pipe of {found:.1f} mm, not of {nominal:.1f} mm as stated: the stated diameter, "
          "the baseline or the lens is wrong; an inspection alone cannot tell which."),
@@ -67,7 +67,7 @@ def shortcomings_of(run: FieldRun) -> tuple[str, ...]:
          "In one pipe of unknown diameter, errors of cone, focal length, pupil and windows look alike, and "
          "an error of the baseline shows only against encoder and texture."),
     )  # fmt: skip
-    return tuple(sentence for holds, sentence in told if holds)
+    return tuple(sentence for holds, sentence in rules if holds)
 
 
 def travels(run: FieldRun) -> bool:

@@ -50,10 +50,10 @@ def confirmations(
             pairs = itertools.pairwise(p for p in partial if p is not None)
             compared += [_compared(a, b, term) for a, b in pairs]
         compared.append(_by_kind(edges, both, judged, term, stated))
-        told = term.model.kind is not CourseKind.STEP or passes_again(
+        reliable = term.model.kind is not CourseKind.STEP or passes_again(
             run, judged.fit.state.T_pc, term.shape[0]
         )
-        out.append(tuple(c for c in compared if told and c is not None))
+        out.append(tuple(c for c in compared if reliable and c is not None))
     return tuple(out)
 
 
@@ -116,11 +116,11 @@ def _by_half(run: GaugeRun, term: Term) -> list[tuple[str, Part]]:
 def _compared(first: Measured, second: Measured, term: Term) -> Confirmation | None:
     """Return whether two estimates agree in sign and size; None when either is too uncertain."""
     size = float(np.linalg.norm(term.amplitude))
-    found = agreement(_told(first, term), _told(second, term), size=size, rarest=_AGREE)
+    found = agreement(_in_words(first, term), _in_words(second, term), size=size, rarest=_AGREE)
     return found.confirmation if found is not None else None
 
 
-def _told(part: Measured, term: Term) -> Measured:
+def _in_words(part: Measured, term: Term) -> Measured:
     return replace(part, words=sized(term.model, term.shape, part.value, part.covariance))
 
 

@@ -211,9 +211,9 @@ def _skirt(found: Responses, line: SecondLine, width_px: float, sector: Int) -> 
     own = np.abs(off) < _OWN_WIDTHS * width_px
     parts = np.array([np.where(own, 0.0, found.score)[g].sum(0) for g in _parts(sector)])
     known = np.array([np.where(own, 0.0, found.information)[g].sum(0) for g in _parts(sector)])
-    told = known > _LEAST_SHARE * known.max()
-    uneven = np.where(told, parts / np.maximum(known, 1e-12), 0.0)
-    square = height**2 + (uneven**2).sum(0) / np.maximum(told.sum(0), 1)
+    measured = known > _LEAST_SHARE * known.max()
+    uneven = np.where(measured, parts / np.maximum(known, 1e-12), 0.0)
+    square = height**2 + (uneven**2).sum(0) / np.maximum(measured.sum(0), 1)
     level = np.interp(apart, found.distance_px, np.sqrt(square))
     weight = np.where(clear, _at(found.information, found, line.distance_px), 0.0)
     return float((weight * level).sum() / max(weight.sum(), 1e-12))

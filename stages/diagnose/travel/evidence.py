@@ -212,8 +212,8 @@ def _estimates(
         sigma, value = float(fit.sigma[k]), float(fit.values[k])
         total = float(np.hypot(sigma, allowed))
         # A size that no encoder can have is not a finding: the speed was too uniform to determine it.
-        told = np.isfinite(total) and LIBRARY[name].possible((), np.array([value]))
-        p = float(2 * norm.sf(abs(value) / total)) if told else 1.0
+        known = np.isfinite(total) and LIBRARY[name].possible((), np.array([value]))
+        p = float(2 * norm.sf(abs(value) / total)) if known else 1.0
         alike = tuple(
             (SMOOTH[j], float(correlation[k, j]))
             for j in stated
@@ -229,7 +229,7 @@ def _estimates(
         out.append(
             TravelEstimate(
                 name, quantity.name, value, sigma, allowed, p, _DETECTED * total, alike, again,
-                _where(fit.columns[:, k]), _other_courses(fit, int(k)) if told and p < _REPORTED else 0.0,
+                _where(fit.columns[:, k]), _other_courses(fit, int(k)) if known and p < _REPORTED else 0.0,
             )
         )  # fmt: skip
     return tuple(out)

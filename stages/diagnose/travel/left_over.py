@@ -19,7 +19,7 @@ from stages.diagnose.travel.steps import StepFound, or_else
 # The residual of the readings is noise unless its p-value is below this. Debt: data/debts.md.
 _NOISE = 1e-6
 # A stretch with less information than this share of the largest is not used.
-_TOLD = 1e-9
+_DETERMINED = 1e-9
 # Neighbouring pictures have a common offset if neither is off by more than this factor times the other
 # (chosen).
 _ALIKE = 2
@@ -104,28 +104,28 @@ def left_over(fit: TravelFit, steps: Sequence[StepFound], count_mm: float) -> Le
         Unit of the readings.
     """
     noise = _of_places(fit, count_mm) if fit.sight.placed else fit.noise
-    untold = _untold(fit, steps)
-    off = _beside(fit, untold, noise)
+    unreported = _unreported(fit, steps)
+    off = _beside(fit, unreported, noise)
     count = len(fit.sight.time_s)
     p_value = _p_of(fit, off, noise)
     if p_value >= _NOISE:
         return None
-    off = _simplest(fit, untold, noise, off)
+    off = _simplest(fit, unreported, noise, off)
     # Beside a delay and a play that it does not need, a stretch may come out far larger than alone.
     p_value = max(p_value, _p_of(fit, off, noise))
     if p_value >= _NOISE:
         return None
     time_s = fit.sight.time_s
-    told = chance_of_noise(off.misfit, count, count) > _NOISE
+    is_noise = chance_of_noise(off.misfit, count, count) > _NOISE
     between_s = float(time_s[off.first]), float(time_s[off.end - 1])
-    by_slip = told and SLIP not in fit.without and off.end == count
-    stray = _stray_pictures(fit, untold, off)
+    by_slip = is_noise and SLIP not in fit.without and off.end == count
+    stray = _stray_pictures(fit, unreported, off)
     return LeftOver(off.size_mm, (off.first, off.end - 1), between_s, p_value, stray, by_slip)
 
 
-def _stray_pictures(fit: TravelFit, untold: list[int], off: Stretch) -> int:
+def _stray_pictures(fit: TravelFit, unreported: list[int], off: Stretch) -> int:
     """Return how many pictures, all of a stretch or all others, were treated as stray; else 0."""
-    events = (fit.events[k - len(SMOOTH)] for k in untold)
+    events = (fit.events[k - len(SMOOTH)] for k in unreported)
     taken = {e.place for e in events if e.kind is EventKind.OUTLIER}
     within = set(range(off.first, off.end))
     rows = (within, set(range(len(fit.sight.time_s))) - within)
@@ -137,7 +137,7 @@ def _of_places(fit: TravelFit, count_mm: float) -> DriftNoise:
     return DriftNoise(float(np.sqrt(PLACED_SIGMA_MM**2 + fit.noise.white_mm**2 + count_mm**2)), 0.0)
 
 
-def _simplest(fit: TravelFit, untold: list[int], noise: DriftNoise, beside: Stretch) -> Stretch:
+def _simplest(fit: TravelFit, unreported: list[int], noise: DriftNoise, beside: Stretch) -> Stretch:
     """Return the stretch found ``beside`` delay and play, or beside neither where that is simpler.
 
     A temporary offset may have been taken for a delay or a play.
@@ -145,14 +145,14 @@ def _simplest(fit: TravelFit, untold: list[int], noise: DriftNoise, beside: Stre
     lags = [k for k in (DELAY, PLAY) if fit.values[k] != 0]
     if not lags:
         return beside
-    alone = _beside(fit, [*lags, *untold], noise)
+    alone = _beside(fit, [*lags, *unreported], noise)
     return alone if alone.left - beside.left < FAR_BETTER * len(lags) else beside
 
 
-def _beside(fit: TravelFit, untold: list[int], noise: DriftNoise) -> Stretch:
-    """Return the strongest stretch beside all that was found, except the ``untold`` columns."""
+def _beside(fit: TravelFit, unreported: list[int], noise: DriftNoise) -> Stretch:
+    """Return the strongest stretch beside all that was found, except the ``unreported`` columns."""
     held = [k for k in range(len(SMOOTH)) if k != OFFSET and fit.values[k] == 0]
-    return strongest_stretch(fit.with_columns(np.delete(fit.columns, [*held, *untold], axis=1), noise))
+    return strongest_stretch(fit.with_columns(np.delete(fit.columns, [*held, *unreported], axis=1), noise))
 
 
 def strongest_stretch(rest: Whitened) -> Stretch:
@@ -168,7 +168,7 @@ def strongest_stretch(rest: Whitened) -> Stretch:
     gain, first, end, size = 0.0, 1, 1, 0.0
     for e in ends:
         information = own[:, None] + own[e] - 2 * _shared(rest, e)
-        tried = (places[:, None] > 0) & (places[:, None] < e) & (information > _TOLD * own.max())
+        tried = (places[:, None] > 0) & (places[:, None] < e) & (information > _DETERMINED * own.max())
         found = np.where(tried, up_to[e] - up_to[:, None], 0.0) / np.where(tried, information, 1.0)
         each = found**2 * information
         at, here = np.unravel_index(np.argmax(each), each.shape)
@@ -210,7 +210,7 @@ def _tries(fit: TravelFit) -> int:
     return count * (count - 1) // 2
 
 
-def _untold(fit: TravelFit, steps: Sequence[StepFound]) -> list[int]:
+def _unreported(fit: TravelFit, steps: Sequence[StepFound]) -> list[int]:
     """Return the indices of values for consecutive stray pictures, or for steps that chance may make."""
     found, out = iter(steps), []
     stray = {e.place: fit.values[4 + k] for k, e in enumerate(fit.events) if e.kind is EventKind.OUTLIER}

@@ -34,7 +34,7 @@ from stages.diagnose.travel.solve import (
 
 _AROUND = 10
 # Share of the usual information that a picture must add to what the others determine of it.
-_TOLD = 1e-6
+_DETERMINED = 1e-6
 
 
 class EventKind(StrEnum):
@@ -113,8 +113,8 @@ class TravelFit:
         """
         parts = candidate_columns(self.sight, EventKind.OUTLIER, np.zeros(0))
         own = np.concatenate([self.whitened.information(part) for part in parts])
-        told = own > _TOLD * np.max(own)
-        return self.whitened.weighted[told] / own[told], own[told] ** -0.5
+        determined = own > _DETERMINED * np.max(own)
+        return self.whitened.weighted[determined] / own[determined], own[determined] ** -0.5
 
     def with_columns(self, columns: Float, noise: DriftNoise | None = None) -> Whitened:
         """Return the fit with other columns (N, C), and with another noise if one is given."""

@@ -40,10 +40,10 @@ def jump_of_reading(encoder: Encoder, at: int, lasting_mm: float, sigma_mm: floa
     lasting_mm, sigma_mm
         By how much the reading is ahead of the pictures after the moment, and 1 σ.
     """
-    return _told_by_reading(lasting_mm, sigma_mm, *reading_jump(encoder, at))
+    return _by_reading(lasting_mm, sigma_mm, *reading_jump(encoder, at))
 
 
-def _told_by_reading(lasting_mm: float, sigma_mm: float, jump: float, sigma: float) -> Agreement | None:
+def _by_reading(lasting_mm: float, sigma_mm: float, jump: float, sigma: float) -> Agreement | None:
     """Return whether the reading's own jump, with 1 σ, equals what it has gained on the pictures since."""
     if not np.isfinite(sigma):
         return None
@@ -97,7 +97,7 @@ def course_of_reading(fit: TravelFit, place_in_list: int, encoder: Encoder) -> A
     step = np.diff(readings_at(encoder, sight.time_s))
     first = event.place - event.during - 1 - event.during
     jump, jump_sigma = _filtered(step, weight * gain_mm / float(weight @ course), first)
-    return _told_by_reading(gain_mm, sigma, jump, jump_sigma)
+    return _by_reading(gain_mm, sigma, jump, jump_sigma)
 
 
 def _course(fit: TravelFit, place_in_list: int) -> Float:

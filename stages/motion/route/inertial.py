@@ -99,9 +99,9 @@ def contradicts(inertia: Inertia, R_pc: Float) -> bool:
     """
     step_s = inertia.step_s[:, None]
     seen = vector_from_rotation(np.swapaxes(R_pc[:-1], 1, 2) @ R_pc[1:]) / step_s
-    told = vector_from_rotation(inertia.R_step) / step_s
+    by_gyroscope = vector_from_rotation(inertia.R_step) / step_s
     noise = np.sqrt(np.median(inertia.step_variance / inertia.step_s**2) + inertia.walk_variance.sum())
-    apart, turning = (robust_spread((x - np.median(x, 0)).ravel()) for x in (seen - told, seen))
+    apart, turning = (robust_spread((x - np.median(x, 0)).ravel()) for x in (seen - by_gyroscope, seen))
     return bool(turning > _TURNING * noise and apart > _APART * turning)
 
 
@@ -157,9 +157,9 @@ def _usual_bias(imu: Imu, mount: ImuMount, time_s: Float, R_pc: Float) -> Float:
     passed = np.concatenate(
         [np.zeros((1, 3)), np.cumsum(imu.rate_rad_s[1:] * np.diff(imu.time_s)[:, None], 0)]
     )
-    told = np.diff(np.stack([np.interp(time_s, imu.time_s, passed[:, i]) for i in range(3)], -1), axis=0)
+    turned = np.diff(np.stack([np.interp(time_s, imu.time_s, passed[:, i]) for i in range(3)], -1), axis=0)
     seen = vector_from_rotation(np.swapaxes(R_pc[:-1], 1, 2) @ R_pc[1:])
-    return np.asarray(np.median((told @ mount.R_ci.T - seen) / np.diff(time_s)[:, None], axis=0))
+    return np.asarray(np.median((turned @ mount.R_ci.T - seen) / np.diff(time_s)[:, None], axis=0))
 
 
 def _rotations(imu: Imu, mount: ImuMount, at: Float, bias_c: Float) -> Float:
