@@ -118,6 +118,8 @@ def warn_of_oval(rings_mm: Float, context: Context) -> None:
 def check_diameter(radius_mm: float, pipe: PipeFacts, lamps_mm: float, context: Context) -> None:
     """Compare the stated diameter, and the radius ``lamps_mm`` of the probe's lamps, with the laser ring.
 
+    The median ring of a run through several bores may have any diameter between the smallest and the largest.
+
     Raises
     ------
     UnusableError
@@ -127,7 +129,7 @@ def check_diameter(radius_mm: float, pipe: PipeFacts, lamps_mm: float, context: 
     if not np.isfinite(radius_mm):
         return
     stated = [pipe.nominal_diameter_mm, *(b.diameter_mm for b in pipe.bore)]
-    nearest = min(stated, key=lambda d: abs(np.log(2 * radius_mm / d)))
+    nearest = float(np.clip(2 * radius_mm, min(stated), max(stated)))
     ratio = 2 * radius_mm / nearest
     if max(ratio, 1 / ratio) > _ANOTHER:
         raise UnusableError(

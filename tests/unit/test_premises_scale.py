@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from pipeline.errors import UnusableError
-from pipeline.recording.base import Encoder, FrameTable, PipeFacts
+from pipeline.recording.base import BoreSection, Encoder, FrameTable, PipeFacts
 from stages.premises.backwards import runs_forwards
 from stages.premises.losses import Steps
-from stages.premises.scale import encoder_factor, in_mm, warn_of_oval
+from stages.premises.scale import check_diameter, encoder_factor, in_mm, warn_of_oval
 from tests.drawn_run import BASELINE, RADIUS
 from tests.hand_pulled import pulled
 from tests.premises_run import COUNT, STEP_MM, checked
@@ -118,6 +118,16 @@ def test_another_diameter_and_another_clock_are_reported(good, run):
     _, told = checked(replace(good, frames=table, pipe=PipeFacts(2.3 * RADIUS)), run.probe)
     assert any("diameter of 100" in t for t in told)
     assert any("check the unit (s) of time_s" in t for t in told)
+
+
+@pytest.mark.parametrize(("diameter_mm", "warnings"), [(57.3, 0), (90.0, 1), (44.0, 1)])
+def test_the_median_ring_of_a_gauge_may_lie_between_its_bores(diameter_mm, warnings):
+    told: list[str] = []
+    bores = tuple(BoreSection(38.0, d) for d in (76.2, 64.0, 52.0))
+    check_diameter(
+        diameter_mm / 2, PipeFacts(76.2, bore=bores), 9.5, replace(quiet_context(), warn=told.append)
+    )
+    assert len(told) == warnings
 
 
 def scratches(size):
