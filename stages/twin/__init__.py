@@ -293,7 +293,7 @@ PHOTOMETRY = Stage(
 )
 TWIN = Stage(
     "twin",
-    "57",
+    "58",
     TwinParameters,
     compare_with_twin,
     "recorded frames beside the same frames, re-rendered from what the run has measured",

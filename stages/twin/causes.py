@@ -27,12 +27,13 @@ from stages.twin.cells import (
     sigmas,
     try_law,
 )
-from stages.twin.flicker import flicker
-from stages.twin.laws import LED_AZIMUTHS, SECTOR_STEP_DEG, line_laws, lit_laws
+from stages.twin.flicker import flicker, slowly
+from stages.twin.laws import SECTOR_STEP_DEG, line_laws, lit_laws
 from stages.twin.locate import FALSE_ALARM
 from stages.twin.photo_course import share_of_frames
 from stages.twin.reference import BlockSamples
 from stages.twin.scene import Ring
+from stages.twin.sides import darker_side, of_led, slow_side
 from stages.twin.steps import (
     FEWEST_FRAMES,
     OWN_STEP,
@@ -40,6 +41,7 @@ from stages.twin.steps import (
     of_a_light,
     side_at_once,
     steps_named,
+    told_apart,
 )
 
 _ROUNDS = 3
@@ -60,6 +62,10 @@ times width is measured, and widths are tried in steps of a quarter: relative 1 
 over √3."""
 
 
+Chosen = tuple[Fitted, list[str]]
+"""A cause, and names of others that fit about as well."""
+
+
 def causes(
     lit: Cells | None, line: Cells | None, lighting: Lighting, ring: Ring, samples: BlockSamples | None = None
 ) -> tuple[tuple[Mismatch, ...], tuple[Mismatch, ...]]:
@@ -70,7 +76,7 @@ def causes(
     """
     found: list[Mismatch] = []
     slow: list[Mismatch] = []
-    steps: dict[str, tuple[Fitted, Cells]] = {}
+    steps: dict[str, tuple[Fitted, Cells, list[str]]] = {}
     for light, cells in (("LEDs", lit), ("laser", line)):
         if cells is None or len(cells.frame) < FEWEST_FRAMES:
             continue
@@ -81,23 +87,23 @@ def causes(
         chosen, base, unsure = _chosen(cells, base, laws, light)
         for best, rivals in chosen:
             if best.law.name == "step":
-                steps[light] = best, cells
+                steps[light] = best, cells, rivals
             else:
                 found.append(_mismatch(best, rivals, cells, ring))
         found += _flicker_or_else(cells, base, unsure, light, ring)
-        if unsure is not None and unsure.probability <= FALSE_ALARM:
-            slow.append(_slow_side(unsure, cells, ring))
+        if unsure is not None and unsure[0].probability <= FALSE_ALARM:
+            slow.append(slow_side(unsure[0], _lost(unsure[0]), cells, ring))
     return (*steps_named(steps, lit, line, ring), *found), tuple(slow)
 
 
 def _chosen(
     cells: Cells, base: Float, laws: Sequence[Law], light: str
-) -> tuple[list[tuple[Fitted, list[str]]], Float, Fitted | None]:
+) -> tuple[list[Chosen], Float, Chosen | None]:
     """Return the causes found one after the other, each with rivals that fit as well, and the base with them.
 
     Last is the next cause if it is not certain, or does not act at once as it should; or None.
     """
-    chosen: list[tuple[Fitted, list[str]]] = []
+    chosen: list[Chosen] = []
     unsure = None
     for _ in range(_ROUNDS):
         tries = [try_law(cells, base, law, len(laws) * _places(law)) for law in laws]
@@ -108,17 +114,10 @@ def _chosen(
         best = _by_other_sectors(_simplest(tries), cells, base)
         if size_of(best) <= _LEAST[best.law.name]:
             break
-        at_once = best.law.name not in _AROUND or side_at_once(best, _first(best), cells)
-        if best.probability > FALSE_ALARM or not at_once:  # what fits less well is no cause either
-            unsure = best
+        rivals = _rivals(best, tries, light)
+        if best.probability > FALSE_ALARM or not _at_once(best, cells):  # what fits less well is none either
+            unsure = best, rivals
             break
-        rivals = [
-            OWN_STEP[light] if o.law.name == "step" else o.law.name
-            for o in tries
-            if o.law.name not in (best.law.name, "lamp_sector")
-            and o.probability < FALSE_ALARM
-            and sigmas(best.fall - o.fall) < _SURE
-        ]
         if best.law.name == "lamp_sector":  # what came at once with it, and what comes next, is its misfit
             chosen = [(c, r) for c, r in chosen if abs(_first(c) - _first(best)) > 1]
         if not any(_same_sector(best, earlier) for earlier, _ in chosen):
@@ -127,6 +126,17 @@ def _chosen(
         if best.law.name == "lamp_sector":
             break
     return chosen, base, unsure
+
+
+def _rivals(best: Fitted, tries: Sequence[Fitted], light: str) -> list[str]:
+    """Return names of other laws that fit about as well, however many places each of them tried."""
+    return [
+        OWN_STEP[light] if o.law.name == "step" else o.law.name
+        for o in tries
+        if o.law.name not in (best.law.name, "lamp_sector")
+        and size_of(o) > _LEAST[o.law.name]
+        and sigmas(best.fall - o.fall) < _SURE
+    ]
 
 
 def _may_be(found: Fitted, cells: Cells, base: Float) -> bool:
@@ -145,6 +155,11 @@ def _simplest(tries: Sequence[Fitted]) -> Fitted:
     named = next((o for o in tries if o.law.name != "lamp_sector"), tries[0])
     by_chance = named.probability > FALSE_ALARM >= tries[0].probability
     return tries[0] if by_chance or sigmas(tries[0].fall - named.fall) >= _SURE else named
+
+
+def _at_once(found: Fitted, cells: Cells) -> bool:
+    """Return whether a side of the picture, if it is one, may darken at once."""
+    return found.law.name not in _AROUND or side_at_once(found, _first(found), cells)
 
 
 def _first(found: Fitted) -> int:
@@ -198,13 +213,17 @@ def _size_sd(found: Fitted) -> float:
     return float(np.hypot(size_of(more) - size_of(found), beyond))
 
 
+def _lost(found: Fitted) -> NamedFigure:
+    return NamedFigure("lost", size_of(found), _size_sd(found), "share of the light")
+
+
 def _mismatch(best: Fitted, rivals: list[str], cells: Cells, ring: Ring) -> Mismatch:
-    size = NamedFigure("lost", size_of(best), _size_sd(best), "share of the light")
+    size = _lost(best)
     name = best.law.name
     if name == "lamp_sector":
-        return _darker_side(best, size, cells, ring)
+        return darker_side(best, size, cells, ring)
     if name == "led_dead":
-        place = _of_led(best, cells)
+        place = of_led(best, cells)
         said = f"From frame {place[0].value:.0f} on, the LED at image azimuth {place[1].value:.0f}° has lost"
         fixed_to, look = "time", ring.at(cells.frame[int(best.place[1])], float(best.place[0]))
     else:
@@ -217,66 +236,40 @@ def _mismatch(best: Fitted, rivals: list[str], cells: Cells, ring: Ring) -> Mism
         fixed_to, look = "line", ring.at(cells.frame[0], np.radians(where))
     said += f" {100 * size.value:.0f} % of its light."
     if rivals:
-        said += " The frames do not distinguish this from: " + ", ".join(rivals).replace("_", " ") + "."
+        said += f" {told_apart(rivals)}"
     return Mismatch(
         " or ".join([name, *rivals]), "line" if fixed_to == "line" else "intensity", fixed_to, place, (size,),
         best.probability, best.chi2_before, best.chi2_after, said, look,
     )  # fmt: skip
 
 
-def _darker_side(best: Fitted, size: NamedFigure, cells: Cells, ring: Ring) -> Mismatch:
-    """Return a change of one side of the picture that no LED makes."""
-    place = _of_led(best, cells)
-    said = (
-        f"From frame {place[0].value:.0f} on, lit wall about image azimuth {place[1].value:.0f}° is up to "
-        f"{100 * size.value:.0f} % darker, otherwise than one LED of the probe makes it: several lamps have "
-        "failed, or something shades them or the window."
-    )
-    look = ring.at(cells.frame[int(best.place[1])], float(best.place[0]))
-    chi2 = best.chi2_before, best.chi2_after
-    return Mismatch("", "intensity", "time", place, (size,), best.probability, *chi2, said, look)
-
-
-def _slow_side(side: Fitted, cells: Cells, ring: Ring) -> Mismatch:
-    """Return a side that darkens, without its name: the frames beside it do not step as it does."""
-    size = NamedFigure("lost", size_of(side), _size_sd(side), "share of the light")
-    at = float(np.degrees(side.place[0]))
-    said = (
-        f"During the run, lit wall about image azimuth {half_turn(at):.0f}° gets darker. But the frames do "
-        "not show that it does so at once: LEDs that fade, dirt that gathers on the window, and an uneven "
-        "photo of the wall beside which the probe rolls look the same."
-    )
-    darker = _darker_side(side, size, cells, ring)
-    return replace(darker, place=darker.place[1:], statement=said)  # it has no frame at which it comes
-
-
 def _flicker_or_else(
-    cells: Cells, base: Float, unsure: Fitted | None, light: str, ring: Ring
+    cells: Cells, base: Float, unsure: Chosen | None, light: str, ring: Ring
 ) -> list[Mismatch]:
-    """Return flicker; as "flicker or X" if it vanishes once the uncertain cause X is fitted."""
-    found = flicker(cells, base, light, ring)
-    if not found or unsure is None or unsure.law.name == "laser_sector":  # a sector changes no frame alone
+    """Return flicker, or the slow change that explains most of it.
+
+    As "flicker or X" if it vanishes once the uncertain cause X is fitted.
+    """
+    found = [slowly(one, cells, base, light, ring) for one in flicker(cells, base, light, ring)]
+    if unsure is None or unsure[0].law.name == "laser_sector" or not any(m.name for m in found):
+        return found  # a sector changes no frame alone
+    if flicker(cells, np.concatenate([base, unsure[0].change[None]]), light, ring):
         return found
-    if flicker(cells, np.concatenate([base, unsure.change[None]]), light, ring):
-        return found
-    what, name = "a step of brightness", f"{found[0].name} or {OWN_STEP[light]}"
-    place: tuple[NamedFigure, ...] = (first_frame(cells.frame, int(unsure.place[0])),)
-    if unsure.law.name in _AROUND:
-        place = _of_led(unsure, cells)
-        what, name = f"an LED that fails at image azimuth {place[1].value:.0f}°", "flicker or led_dead"
-    if unsure.law.name in _AROUND and (
-        unsure.law.name == "lamp_sector" or not side_at_once(unsure, _first(unsure), cells)
-    ):
-        what, name = f"a side that darkens, about image azimuth {place[1].value:.0f}°,", ""
+    return [_flicker_or(found[0], unsure, cells, light)]
+
+
+def _flicker_or(found: Mismatch, unsure: Chosen, cells: Cells, light: str) -> Mismatch:
+    """Return flicker that may as well be an uncertain cause, or one of its rivals."""
+    cause, rivals = unsure
+    what, names = "a step of brightness", [found.name, OWN_STEP[light], *rivals]
+    place: tuple[NamedFigure, ...] = (first_frame(cells.frame, int(cause.place[0])),)
+    if cause.law.name in _AROUND:
+        place = of_led(cause, cells)
+        what, names = f"an LED that fails at image azimuth {place[1].value:.0f}°", ["flicker", "led_dead"]
+    if cause.law.name == "lamp_sector" or not _at_once(cause, cells):
+        what, names = f"a side that darkens, about image azimuth {place[1].value:.0f}°,", [""]
     said = (
-        f"{found[0].statement} {len(cells.frame)} frames do not distinguish this from {what} from frame "
+        f"{found.statement} {len(cells.frame)} frames do not distinguish this from {what} from frame "
         f"{place[0].value:.0f} on. What to do: withhold more frames."
     )
-    return [replace(found[0], name=name, place=place, statement=said)]
-
-
-def _of_led(found: Fitted, cells: Cells) -> tuple[NamedFigure, NamedFigure]:
-    """Return when an LED fails (frame) and where (image azimuth)."""
-    where = half_turn(float(np.degrees(found.place[0])))
-    at = NamedFigure("azimuth_deg", where, 180 / LED_AZIMUTHS, "deg")
-    return first_frame(cells.frame, int(found.place[1])), at
+    return replace(found, name=" or ".join(names), place=place, statement=said)

@@ -102,6 +102,14 @@ def steps_of(frames: int) -> tuple[Float, Float]:
     return np.repeat(after[..., None], SECTORS, 2), first.astype(float)
 
 
+def ramps_of(frames: int) -> tuple[Float, Float, Float]:
+    """Return columns (C, F, S) of changes within one step or over more, and first and last frames of each."""
+    both = [(f, f + k) for k in range(1, frames // 2 + 1) for f in range(frames - k)]
+    first, last = np.array(both, float).reshape(-1, 2).T
+    course = np.clip((np.arange(frames) - first[:, None]) / (last - first)[:, None], 0, 1)
+    return np.repeat(course[..., None], SECTORS, 2), first, last
+
+
 def led_share(lighting: Lighting, azimuth_rad: Float, ring: Ring) -> Float:
     """Return the share (L, S) of each sector's light that comes from an LED at azimuths (L,)."""
     around = sector_azimuth_rad()

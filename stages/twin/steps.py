@@ -111,11 +111,14 @@ def first_frame(frame: Int, first: int) -> NamedFigure:
 
 
 def steps_named(
-    steps: dict[str, tuple[Fitted, Cells]], lit: Cells | None, line: Cells | None, ring: Ring
+    steps: dict[str, tuple[Fitted, Cells, list[str]]], lit: Cells | None, line: Cells | None, ring: Ring
 ) -> list[Mismatch]:
-    """Return steps of brightness: of the exposure where both lights step alike, else of one light."""
+    """Return steps of brightness: of the exposure where both lights step alike, else of one light.
+
+    Beside each are names of other causes that fit about as well: a step of both lights is none of them.
+    """
     found = []
-    for light, (best, cells) in steps.items():
+    for light, (best, cells, rivals) in steps.items():
         other = {"LEDs": line, "laser": lit}[light]
         first = int(best.place[0])
         at = first_frame(cells.frame, first)
@@ -137,12 +140,19 @@ def steps_named(
         said = f"From frame {at.value:.0f} on, {what} {100 * abs(size.value):.0f} % {way}."
         if _may_be_wall(best, cells, light):
             name, said = f"{name} or other_wall", f"{said} {_OR_WALL}"
+        if rivals and not same:
+            name, said = " or ".join([name, *rivals]), f"{said} {told_apart(rivals)}"
         found.append(Mismatch(
             name, "line" if light == "laser" and not same else "intensity", "time", (at,), (size,),
             best.probability, best.chi2_before, best.chi2_after,
             said, ring.whole(cells.frame[first]),
         ))  # fmt: skip
     return found
+
+
+def told_apart(rivals: list[str]) -> str:
+    """Return the sentence that names causes which fit about as well."""
+    return "The frames do not distinguish this from: " + ", ".join(rivals).replace("_", " ") + "."
 
 
 def _same_step(best: Fitted, between: Int, other: Cells | None) -> bool | None:
