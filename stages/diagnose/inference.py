@@ -101,11 +101,11 @@ class Evidence:
         right[here], degrees[here] = self.right[own], self.degrees[own]
         return Evidence(tuple(columns), information, right, covariance, self.misfit, degrees)
 
-    def deflated(self, alike: float) -> Evidence:
-        """Return the evidence when ``alike`` measurements with correlated errors count as one."""
+    def deflated(self, inflation: float) -> Evidence:
+        """Return the evidence when ``inflation`` measurements with correlated errors count as one."""
         return Evidence(
-            self.columns, self.information / alike, self.right / alike, self.score_covariance / alike**2,
-            self.misfit / alike, self.degrees,
+            self.columns, self.information / inflation, self.right / inflation,
+            self.score_covariance / inflation**2, self.misfit / inflation, self.degrees,
         )  # fmt: skip
 
 

@@ -59,7 +59,9 @@ def test_patterns_are_weighed_once_beside_each_likeliest_set_even_where_a_likeli
     for name, stand_in in stand_ins.items():
         monkeypatch.setattr(judging, name, stand_in)
     nothing, tilt = (SimpleNamespace(terms=(), name=n) for n in ("nothing", "tilt"))
-    searched: Any = SimpleNamespace(run=None, nothing=nothing, found=tilt, rivals=(), alike=1.0, scores=())
+    searched: Any = SimpleNamespace(
+        run=None, nothing=nothing, found=tilt, rivals=(), inflation=1.0, scores=()
+    )
     stated: Any = None
     verdicts = judging.judge(searched, {}, stated, ())
     assert [j.fit.name for j in verdicts.judged] == ranked_as

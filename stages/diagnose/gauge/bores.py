@@ -58,8 +58,8 @@ def misdrawn_bore(searched: Search) -> Misdrawn | None:
     found, nothing = searched.found, searched.nothing
     best = min((_freed(nothing, int(k)) for k in np.unique(searched.run.rings.section)), key=lambda b: b.cost)
     numbers = sum(free_numbers(term, *span(searched.run)) for term in found.terms)
-    each = np.log(len(np.unique(found.linearised.equations.cell))) * searched.alike
-    explains = nothing.cost - best.cost > LEAST_GAIN * searched.alike
+    each = np.log(len(np.unique(found.linearised.equations.cell))) * searched.inflation
+    explains = nothing.cost - best.cost > LEAST_GAIN * searched.inflation
     return best if explains and best.cost < found.cost + each * (numbers - 1) else None
 
 

@@ -158,14 +158,14 @@ class Sized:
     time_s: Value | None = None
 
 
-def sizes_of(run: GaugeRun, judged: Judged, stated: Stated, alike: float) -> tuple[Sized, ...]:
+def sizes_of(run: GaugeRun, judged: Judged, stated: Stated, inflation: float) -> tuple[Sized, ...]:
     """Return the terms of a hypothesis with covariances from data, shapes, and the accuracy of laws."""
     free = freed(run, judged.fit)
     whole = judged.evidence if free is judged.fit else evidence(run, free, ())[0]
     about = replace(judged, fit=free, evidence=whole)
     sized = [_sized(run, about, term, stated) for term in free.terms]
     return tuple(
-        replace(s, time_s=change_time(run, free, k, alike)) if s.term.model.kind is CourseKind.STEP else s
+        replace(s, time_s=change_time(run, free, k, inflation)) if s.term.model.kind is CourseKind.STEP else s
         for k, s in enumerate(sized)
     )
 

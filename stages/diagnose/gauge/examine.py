@@ -209,7 +209,7 @@ def examine(
 def _quality_of_stated(searched: Search, stated: Stated) -> FitQuality:
     """Return how well the stated instrument, within its uncertainty, predicts the run."""
     run, regimes = searched.run, regimes_of(searched.run)
-    nothing = judged_of(run, searched.nothing, regimes, stated, searched.alike)
+    nothing = judged_of(run, searched.nothing, regimes, stated, searched.inflation)
     return fit_quality(run, nothing, nothing, regimes, stated)
 
 
@@ -220,7 +220,7 @@ def _judged(seen: Examined, library: Mapping[str, EffectModel], stated: Stated) 
     assert best is not None
     run, regimes = searched.run, verdicts.regimes
     nothing = next(j for j in verdicts.judged if not j.fit.terms)
-    terms, alike = best.library_terms, searched.alike
+    terms, alike = best.library_terms, searched.inflation
     ratio = believed(best.evidence, alike)
     unsplit = not_told_apart(run, searched.nothing, terms, library, stated, alike) if terms else ()
     shown = best if terms and verdicts.adequacy >= ADEQUATE else verdicts.formula

@@ -118,14 +118,19 @@ def regimes_of(run: GaugeRun) -> tuple[Regime, ...]:
 
 
 def judged_of(
-    run: GaugeRun, found: Fit, regimes: Sequence[Regime], stated: Stated, alike: float, before: float = 0.0
+    run: GaugeRun,
+    found: Fit,
+    regimes: Sequence[Regime],
+    stated: Stated,
+    inflation: float,
+    before: float = 0.0,
 ) -> Judged:
     """Return the hypothesis with its evidence and its deviance on all and on held-out regimes."""
     whole, *parts = evidence(run, found, (), [r.part for r in regimes], with_spread=False)
     sigma = prior_sigma(whole, found.terms)
 
     def deviance(of: Evidence) -> float:
-        return estimate(of.deflated(alike), stated, sigma).deviance
+        return estimate(of.deflated(inflation), stated, sigma).deviance
 
     if len(parts) < 2:
         return Judged(found, whole, tuple(parts), deviance(whole), deviance(whole), before)

@@ -166,7 +166,7 @@ def judge(
     """
     run, regimes = searched.run, regimes_of(searched.run)
     laws = len({model.law for model in library.values()})
-    ratio = believed(evidence(run, searched.found, ())[0], searched.alike)
+    ratio = believed(evidence(run, searched.found, ())[0], searched.inflation)
     formula = empirical(run, searched.nothing, stated, swung)
 
     def weighed(found: Fit) -> Judged:

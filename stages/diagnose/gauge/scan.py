@@ -173,16 +173,16 @@ def retimed(run: GaugeRun, found: Fit) -> Fit:
     return found
 
 
-def change_time(run: GaugeRun, found: Fit, place: int, alike: float) -> Value:
+def change_time(run: GaugeRun, found: Fit, place: int, inflation: float) -> Value:
     """Return the time of the step of term ``place``, s, with 1 σ, for a uniform prior.
 
     Parameters
     ----------
-    alike : float
+    inflation : float
         Number of measurements with correlated errors that count as one.
     """
     time_s, gain = _gains(run, found, place)
-    chance = np.exp(0.5 * (gain - gain.max()) / alike)
+    chance = np.exp(0.5 * (gain - gain.max()) / inflation)
     chance /= chance.sum()
     middle = float(chance @ time_s)
     # Within the gap between two frames, every moment is equally likely.

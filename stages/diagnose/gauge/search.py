@@ -135,7 +135,7 @@ class Search:
         All scores about what was found.
     by_chance : float
         Expected number of scores about the stated instrument as large as the largest, when nothing is hidden.
-    alike : float
+    inflation : float
         Number of measurements with correlated errors that count as one, given the effects found.
     """
 
@@ -145,7 +145,7 @@ class Search:
     rivals: tuple[Fit, ...]
     scores: tuple[Scored, ...]
     by_chance: float
-    alike: float
+    inflation: float
 
 
 def search(run: GaugeRun, start: Fit, library: Mapping[str, EffectModel], stated: Stated) -> Search:
@@ -158,7 +158,7 @@ def search(run: GaugeRun, start: Fit, library: Mapping[str, EffectModel], stated
             break
         tried += [*better, found]
         run, found = _weighed_anew(run, refined(run, better[0]))
-    ratio = alike(scanned[-1])
+    ratio = chi2_inflation(scanned[-1])
     nothing, rivals = fit(run, start.state, ()), _rivals(run, found, tried, ratio)
     return Search(run, nothing, found, rivals, tuple(scanned[-1]), by_chance(scanned[0]), ratio)
 
@@ -196,7 +196,7 @@ def refits(run: GaugeRun, found: Fit, scores: Sequence[Scored]) -> list[Fit]:
     worth = [s for s in promising if s.score.gain > _WORTH_REFITTING * promising[0].score.gain]
     found = found if run.measures_as(found.run) else replace(found, run=run)
     fits: list[Fit] = []
-    near, allowed = np.inf, _FAR * alike(scores)
+    near, allowed = np.inf, _FAR * chi2_inflation(scores)
     for s in sorted(worth, key=lambda s: -s.score.gain):
         # The linear prediction of a large effect is inaccurate, so that its fit starts from size zero.
         fits.append(fit_beside(found, s.model, s.shape, _RIVAL_ITERATIONS, near))
@@ -214,7 +214,7 @@ def _promising(scores: Sequence[Scored]) -> list[Scored]:
     return [*best, *others[:_OTHER_COURSES]]
 
 
-def alike(scores: Sequence[Scored]) -> float:
+def chi2_inflation(scores: Sequence[Scored]) -> float:
     """Return by how much a gain of χ² is overestimated because errors of neighbours are correlated."""
     ratio = [s.score.gain / s.score.statistic for s in scores if s.score.statistic > 1]
     return float(max(np.median(ratio), 1.0)) if ratio else 1.0
@@ -245,7 +245,7 @@ def _is_needed(better: Fit, found: Fit, scores: Sequence[Scored]) -> bool:
     *others, last = [shift_px(better, t) for t in better.terms]
     large = not others or last > LEAST_SHARE * max(others)
     gain = found.cost - better.cost
-    return len(better.terms) <= MOST_EFFECTS and large and gain > LEAST_GAIN * alike(scores)
+    return len(better.terms) <= MOST_EFFECTS and large and gain > LEAST_GAIN * chi2_inflation(scores)
 
 
 def _in_own_units(state: Unknowns) -> Unknowns:

@@ -79,7 +79,7 @@ def key(terms: Iterable[Term | Member]) -> frozenset[tuple[str, Shape]]:
     )
 
 
-def believed(of: Evidence, alike: float) -> float:
+def believed(of: Evidence, inflation: float) -> float:
     """Return the factor by which a difference of χ² is divided.
 
     It is at least the factor by which the true variance of the scores of the found effects exceeds that of
@@ -87,7 +87,7 @@ def believed(of: Evidence, alike: float) -> float:
     """
     effects = np.array([c.effect != INSTRUMENT for c in of.columns], bool)
     own, true = np.diag(of.information)[effects], np.diag(of.score_covariance)[effects]
-    return float(max(_TEMPERED * alike, np.max(true / np.maximum(own, 1e-300), initial=1.0)))
+    return float(max(_TEMPERED * inflation, np.max(true / np.maximum(own, 1e-300), initial=1.0)))
 
 
 def prior_deviance(run: GaugeRun, terms: Sequence[tuple[EffectModel, Shape]], laws: int) -> float:
