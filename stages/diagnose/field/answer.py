@@ -13,8 +13,8 @@ from stages.diagnose.agreement import same
 from stages.diagnose.channels import Seen
 from stages.diagnose.effects.base import EffectModel
 from stages.diagnose.field.against_gauge import is_asked, met_in_field, not_refuted
-from stages.diagnose.field.beside import beside, in_words, nameless, union
 from stages.diagnose.field.evidence import FieldEvidence, travels
+from stages.diagnose.field.extended_answer import each_once, with_class, with_statement, with_unexplained
 from stages.diagnose.field.unexplained import why_unexplained
 from stages.diagnose.gauge.scan import Scored
 from stages.diagnose.inference import DETECTED, INSTRUMENT, Evidence, Stated, places_of, score, stated_belief
@@ -189,7 +189,7 @@ def with_field(
         possible = alone.shown if asked is None else not_refuted(alone.shown, asked, stated)
         doubt = why_unexplained(seen, possible[0]) if possible else ""
         if repeats:
-            return in_words(found, doubt or _BY_FIELD + alone.identifiable)
+            return with_statement(found, doubt or _BY_FIELD + alone.identifiable)
         left = replace(alone, shown=() if doubt else possible)
         return _alone(found, alone, left, seen, examined is not None, doubt)
     if found.verdict is Verdict.NOT_IDENTIFIABLE and gauge is None and travels(field.field.run):
@@ -248,7 +248,7 @@ def _met(
     found = replace(found, identifiable="; ".join(e.statement for e in withdrawn), notes=(*found.notes, note))
     kept = tuple(e for e in effects if e.name not in against)
     doubtful = tuple(replace(e, probability=e.probability / (1 + e.probability)) for e in withdrawn)
-    return beside(replace(found, effects=kept or doubtful), kept, classes_of([e.name for e in withdrawn]))
+    return with_class(replace(found, effects=kept or doubtful), kept, classes_of([e.name for e in withdrawn]))
 
 
 def _confirmed(effect: EffectFound, met: Confirmation | None) -> EffectFound:
@@ -276,7 +276,11 @@ def _alone(
     if where is not None and not possible.shown:
         # What the refuted causes would be fixed to was not measured.
         where = replace(where, fixed_to=None, time=None)
-    found = beside(found, certain, union(possible.members, names)) if possible.shown else nameless(found)
+    found = (
+        with_class(found, certain, each_once(possible.members, names))
+        if possible.shown
+        else with_unexplained(found)
+    )
     following = possible.next if possible.shown or not with_gauge else AGAIN
     found = replace(found, identifiable="; ".join(said), record_next=following, notes=(*found.notes, *notes))
     if found.remainder is None:

@@ -1,4 +1,4 @@
-"""Put what an inspection shows beside an answer: a class, something unexplained, or words only."""
+"""Add what an inspection shows to an answer: a class, something unexplained, or a statement only."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from stages.diagnose.record_next import AGAIN, record_next
 from stages.diagnose.result import Diagnosis, EffectFound, Remainder, Verdict
 
 
-def beside(found: Diagnosis, certain: Sequence[EffectFound], members: Sequence[str]) -> Diagnosis:
+def with_class(found: Diagnosis, certain: Sequence[EffectFound], members: Sequence[str]) -> Diagnosis:
     """Return the answer with one more class: a remainder beside what is certain, or the answer itself.
 
-    How likely the ``members`` were by the gauge run alone holds no longer.
+    The probabilities that the gauge run alone gave the ``members`` are dropped.
     """
     before, causes = found.remainder, found.causes.without(members)
-    every = union(members, before.members if before is not None else found.members)
+    every = each_once(members, before.members if before is not None else found.members)
     found = replace(found, causes=causes, record_next=record_next(every, causes))
     if not certain:
         return replace(found, verdict=Verdict.CLASS, members=every, remainder=None)
@@ -27,23 +27,23 @@ def beside(found: Diagnosis, certain: Sequence[EffectFound], members: Sequence[s
     return replace(found, verdict=Verdict.PARTLY, members=(), remainder=left)
 
 
-def nameless(found: Diagnosis) -> Diagnosis:
-    """Return the answer with something unexplained, alone or beside what is certain: no class contains it."""
+def with_unexplained(found: Diagnosis) -> Diagnosis:
+    """Return the answer with something unexplained in place of its class; effects that are certain stay."""
     if found.verdict in (Verdict.NAMED, Verdict.PARTLY):
         before = found.remainder or Remainder(Verdict.UNEXPLAINED)
         return replace(found, verdict=Verdict.PARTLY, remainder=replace(before, verdict=Verdict.UNEXPLAINED))
     return replace(found, verdict=Verdict.UNEXPLAINED, members=(), effects=())
 
 
-def in_words(found: Diagnosis, shown: str) -> Diagnosis:
-    """Return the answer with what the inspection shows ``shown`` beside an unexplained gauge run.
+def with_statement(found: Diagnosis, statement: str) -> Diagnosis:
+    """Return the answer of an unexplained gauge run, with the statement of what the inspection shows.
 
     No class contains what is unexplained, and a gauge run that shows something refutes nothing.
     """
-    said = f"{found.identifiable} {shown}.".lstrip()
-    return replace(nameless(found), identifiable=said, record_next=AGAIN)
+    said = f"{found.identifiable} {statement}.".lstrip()
+    return replace(with_unexplained(found), identifiable=said, record_next=AGAIN)
 
 
-def union(first: Sequence[str], second: Sequence[str]) -> tuple[str, ...]:
+def each_once(first: Sequence[str], second: Sequence[str]) -> tuple[str, ...]:
     """Return the names of both, each once."""
     return tuple(dict.fromkeys((*first, *second)))
