@@ -57,7 +57,20 @@ def warn_of_frames(
     changes: Changes, pictures: Pictures, light: Int, table: FrameTable, context: Context
 ) -> None:
     """Warn of lost pictures, wrong labels, a video that ends early and pictures that show nothing."""
-    frame, lost = changes.frames.frame, changes.lost()
+    frame = changes.frames.frame
+    _warn_of_lost(changes, context)
+    _warn_of_lights(changes, context)
+    _warn_of_repeats(changes, table, context)
+    warn_of(frame[~pictures.seen], "that cannot be decoded", "copy the video again", context)
+    dark = (light == Light.UNKNOWN) & pictures.seen & np.any(light != Light.UNKNOWN)
+    warn_of(
+        frame[dark], "that show neither a laser line in the dark nor a lit wall; their stated light is used",
+        "look at them: the lens was covered, a lamp failed, or daylight came in", context,
+    )  # fmt: skip
+
+
+def _warn_of_lost(changes: Changes, context: Context) -> None:
+    lost = changes.lost()
     if lost:
         context.warn(
             f"{_pictures(sum(n for _, n in lost))} lost that the times in frames.csv do not show: before "
@@ -66,15 +79,21 @@ def warn_of_frames(
             "rows that belong to them. What to do: nothing, if the recorder is known to drop frames; else "
             "correct frames.csv"
         )
-    wrong = frame[changes.relabelled & (changes.rows_later == 0)]
+
+
+def _warn_of_lights(changes: Changes, context: Context) -> None:
+    wrong = changes.frames.frame[changes.relabelled & (changes.rows_later == 0)]
     if wrong.size:
         context.warn(
             f"{_pictures(len(wrong))} in another light than frames.csv states: frame {_listed(wrong)}. The "
             "light that the pictures show is used. What to do: correct the column illumination"
         )
+
+
+def _warn_of_repeats(changes: Changes, table: FrameTable, context: Context) -> None:
+    """Warn of a video that ends before its table, and of pictures that repeat the one before."""
     repeats = np.diff(changes.row, prepend=-1) < 1
-    again = frame[repeats]
-    left = len(table.frame) - 1 - int(changes.row[-1]) - len(again)
+    left = len(table.frame) - 1 - int(changes.row[-1]) - int(repeats.sum())
     if left > 0:
         context.warn(
             f"the video ends early: it lacks the last {left} of the {len(table.frame)} frames in frames.csv. "
@@ -86,13 +105,9 @@ def warn_of_frames(
         "earlier rows. If it inserts none, correct frames.csv"
     )
     what = "left out, since they repeat the picture before"
-    warn_of(again, what, hint if earlier else "nothing, or repair the recorder", context)
-    warn_of(frame[~pictures.seen], "that cannot be decoded", "copy the video again", context)
-    dark = (light == Light.UNKNOWN) & pictures.seen & np.any(light != Light.UNKNOWN)
     warn_of(
-        frame[dark], "that show neither a laser line in the dark nor a lit wall; their stated light is used",
-        "look at them: the lens was covered, a lamp failed, or daylight came in", context,
-    )  # fmt: skip
+        changes.frames.frame[repeats], what, hint if earlier else "nothing, or repair the recorder", context
+    )
 
 
 def interlaced(pictures: Pictures) -> bool:

@@ -77,6 +77,26 @@ def extract_rings(
         raise UnusableError(
             "rings", "the laser is on in no frame", hint="check frames.csv, column illumination"
         )
+    samples = _measured(recording, probe, frames, parameters, context)
+    if parameters.left_out:
+        samples = set_right(samples, parameters.left_out, context)
+    _compare_rings(samples)
+    lattices = lattices_of(samples)
+    samples = take_out(lattices, samples)
+    warn_of_lattices(lattices, context)
+    wander = wander_of(_some(samples))
+    typical = _typical(samples, wander)
+    _report(context, samples, typical)
+    warn_of_rings(samples, typical, recording.kind == "gauge", context)
+    warn_of_seam(seam_of(_some(samples)), context)
+    np.hypot(samples.sigma_px, wander.at(samples.amplitude), out=samples.sigma_px, casting="same_kind")
+    return samples
+
+
+def _measured(
+    recording: Recording, probe: Probe, frames: Int, parameters: RingParameters, context: Context
+) -> RingSamples:
+    """Return the rings of frames (F,) as each image alone shows them."""
     # Decoding continues in the background from here.
     lasers = recording.read(recording.frames.of(Illumination.LASER), "grey")
     both = recording.read(recording.frames.of(Illumination.BOTH), "bgr")
@@ -93,18 +113,6 @@ def extract_rings(
             "rings", "no laser ring was found in any frame", frames=frames.tolist(),
             hint="is the laser on, the probe inside the pipe, and the exposure long enough?",
         )  # fmt: skip
-    if parameters.left_out:
-        samples = set_right(samples, parameters.left_out, context)
-    _compare_rings(samples)
-    lattices = lattices_of(samples)
-    samples = take_out(lattices, samples)
-    warn_of_lattices(lattices, context)
-    wander = wander_of(_some(samples))
-    typical = _typical(samples, wander)
-    _report(context, samples, typical)
-    warn_of_rings(samples, typical, recording.kind == "gauge", context)
-    warn_of_seam(seam_of(_some(samples)), context)
-    np.hypot(samples.sigma_px, wander.at(samples.amplitude), out=samples.sigma_px, casting="same_kind")
     return samples
 
 
