@@ -92,6 +92,27 @@ def test_every_listed_debt_is_of_an_existing_constant() -> None:
     assert sorted(set(re.findall(r"`(_?[A-Z][A-Z0-9_]*)`", debts)) - there) == [], "remove its row"
 
 
+def absent_debts(debts: str, files: list[Path]) -> Iterator[str]:
+    """Yield listed constants that none of the files or folders in their row contains."""
+    for row in (line.split("|") for line in debts.splitlines()):
+        places = re.findall(r"`([\w/]+(?:\.py|/|/\*\.py))`", row[2]) if len(row) > 4 else []
+        ends = tuple(f"/{place.removesuffix('*.py')}" for place in places)
+        own = [f for f in files if any(f"/{f.parent}/".endswith(e) or f"/{f}".endswith(e) for e in ends)]
+        there = set(NAME.findall("\n".join((PROJECT_ROOT / f).read_text("utf-8") for f in own)))
+        if places:
+            yield from sorted(set(re.findall(r"`(_?[A-Z][A-Z0-9_]*)`", row[1])) - there)
+
+
+def test_every_listed_debt_stands_in_the_files_of_its_row() -> None:
+    debts = (PROJECT_ROOT / "data" / "debts.md").read_text("utf-8")
+    files = [
+        f.relative_to(PROJECT_ROOT) for p in ("pipeline", "stages") for f in (PROJECT_ROOT / p).rglob("*.py")
+    ]
+    assert list(absent_debts(debts, files)) == [], "remove the row, or name the file of the constant"
+    planted = "| `_BELL` 3 | `rings/kernels.py` | nothing | M |"
+    assert list(absent_debts(planted, files)) == ["_BELL"]
+
+
 def test_a_planted_constant_without_a_reason_is_found() -> None:
     assert list(unexplained("import math\n_LIMIT = 0.3\n", set())) == ["2: _LIMIT"]
     assert list(unexplained("_A, _B = 1, math.radians(1.2)\n", set())) == ["1: _A, _B"]
