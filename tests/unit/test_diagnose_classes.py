@@ -1,5 +1,7 @@
 """Classes of effects that one kind of recording cannot distinguish, and what to record next."""
 
+import re
+
 import pytest
 
 from pipeline.physics.catalogue import CLASSES, EFFECTS
@@ -34,6 +36,12 @@ def test_what_to_record_next_names_each_recording_once():
         record_next(["outside_index"])
         == "To confirm outside_index, record: a log of pressure and temperature."
     )
+
+
+@pytest.mark.parametrize("name", [name for name in EFFECTS if name != "speckle"])  # the noise is no finding
+def test_what_to_record_next_can_be_recorded(name):
+    wanted = record_next([name]).partition("record: ")[2].split("; ")
+    assert all(re.match("(a|an|the|bores|frames|rings|runs) ", part) for part in wanted), wanted
 
 
 def test_an_unknown_effect_is_in_no_class():
