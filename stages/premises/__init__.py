@@ -42,6 +42,7 @@ from stages.premises.scale import (
     warn_of_oval,
 )
 from stages.premises.stays import find_static_places
+from stages.premises.zoom import Zoom, warn_of_zooms, without_zooms
 
 _LASER, _LED, _BOTH = Illumination.LASER.value, Illumination.LED.value, Illumination.BOTH.value
 Labels = NDArray[np.str_]
@@ -128,6 +129,7 @@ class _Matched:
     changes: Changes
     left_out: LeftOut
     cut: Int
+    zoomed: list[Zoom]
     jumps: list[ClockJump]
     steps: Steps
     rings_mm: Float
@@ -136,7 +138,8 @@ class _Matched:
 
 
 def _seen(recording: Recording, probe: Probe, pictures: Pictures, context: Context) -> _Seen:
-    light, outside = _light(recording.frames, pictures), off_the_pipe(pictures)
+    light = _light(recording.frames, pictures)
+    outside = off_the_pipe(pictures, light)
     astray = out_of_order(pictures, np.where(outside, Light.UNKNOWN, light))
     in_order = np.where(astray | outside, Light.UNKNOWN, light)
     shown = in_order if np.any(in_order == Light.WALL) else _lights_of(recording.frames.illumination)
@@ -152,7 +155,8 @@ def _matched(recording: Recording, probe: Probe, seen: _Seen) -> _Matched:
     alignment = _aligned(recording.frames, table, pictures, light)
     copy = _copies(recording, table, pictures, light, alignment.row)
     label = np.where(copy, _stated(table, alignment.row), _labels(table, alignment, light, pictures))
-    steps, sway = steps_of_wall(pictures, seen.shown, copy), sway_of_line(pictures, light)
+    steps, zoomed = without_zooms(steps_of_wall(pictures, seen.shown, copy), pictures, light)
+    sway = sway_of_line(pictures, light)
     again = copy | (np.diff(alignment.row, prepend=-1) < 1)
     first = rows_that_follow_encoder(alignment.row, again, table, steps, encoder)
     rings_mm = rings_seen_mm(pictures, probe)
@@ -165,16 +169,17 @@ def _matched(recording: Recording, probe: Probe, seen: _Seen) -> _Matched:
     changes = Changes(recording.frames, label, row, without_jumps(stated_s, jumps))
     left_out = LeftOut(seen.outside, seen.astray, again & (np.diff(row, prepend=-1) > 0))
     cut = cuts(pictures, seen.shown, left_out.any, changes.time_s)
-    return _Matched(changes, left_out, cut, jumps, steps, rings_mm, radius_mm, forwards)
+    return _Matched(changes, left_out, cut, zoomed, jumps, steps, rings_mm, radius_mm, forwards)
 
 
 def _compared(recording: Recording, probe: Probe, seen: _Seen, found: _Matched, context: Context) -> float:
     """Warn of every wrong statement; return the factor by which the encoder's readings are multiplied."""
     frame, pictures, changes = recording.frames.frame, seen.pictures, found.changes
-    shown = np.where(seen.outside, Light.WALL, seen.light)
+    shown = np.where(seen.outside & np.any(seen.light != Light.UNKNOWN), Light.WALL, seen.light)
     warn_of_frames(changes, pictures, shown, _table(recording), context)
     found.left_out.warn(frame, context)
     warn_of_cuts(found.cut, pictures, frame, context)
+    warn_of_zooms(found.zoomed, frame, context)
     check_diameter(found.radius_mm, recording.pipe, probe.lighting.radius_mm, context)
     warn_of_oval(found.rings_mm, context)
     factor = encoder_factor(recording, changes.time_s, found.steps, found.radius_mm, found.forwards, context)
@@ -219,16 +224,13 @@ def _stated(table: FrameTable, row: Int) -> Labels:
 def _light(frames: FrameTable, pictures: Pictures) -> Int:
     """Return the `Light` (F,) of every picture.
 
-    If all pictures look the same although the table states two lights, the light of most rows is returned.
+    If all look the same although the table states two lights, the light of most rows is returned.
     """
     light, stated = light_seen(pictures), _lights_of(frames.illumination)
     _refuse_one_light(frames, stated, light)
     line, wall = stated == Light.LINE, stated == Light.WALL
-    if (
-        np.any(light != Light.UNKNOWN)
-        or not (line.any() and wall.any())
-        or not look_the_same(pictures, line, wall)
-    ):
+    two = line.any() and wall.any()
+    if np.any(light != Light.UNKNOWN) or not (two and look_the_same(pictures, line, wall)):
         return light
     if max(line.mean(), wall.mean()) < _MOST_ROWS:
         raise UnusableError(
@@ -291,6 +293,6 @@ def _report(pictures: Pictures, radius_mm: float, changes: Changes, context: Con
 
 
 PREMISES = Stage(
-    "premises", "34", PremisesParameters, check_premises,
+    "premises", "35", PremisesParameters, check_premises,
     "stated lights, times, encoder and diameter compared with the pictures and corrected",
 )  # fmt: skip

@@ -51,10 +51,9 @@ def light_seen(pictures: Pictures) -> Int:
     """
     out = np.full(len(pictures.brightness), Light.UNKNOWN, np.int64)
     seen = np.flatnonzero(pictures.seen)
-    split = _two_lights(pictures.brightness[seen]) if seen.size else None
-    if split is None:
+    height = _height(pictures.brightness[seen]) if seen.size else None
+    if height is None:
         return out
-    height = _height(pictures.brightness[seen], *split)
     dark, closed = height < (1 - _MIDDLE) / 2, pictures.closed[seen] > CLOSED
     if closed[dark].mean() > _MOST_DARK:
         out[seen[height > (1 + _MIDDLE) / 2]] = Light.WALL
@@ -121,14 +120,22 @@ def _otsu(value: Float) -> float:
     return float(ordered[best : best + 2].mean())
 
 
-def _height(brightness: Float, low: float, high: float) -> Float:
-    """Return where each picture (F,) lies between dark (0) and bright (1).
+def _height(brightness: Float) -> Float | None:
+    """Return where each picture (F,) lies between dark (0) and bright (1); None if there is only one light.
 
     It is measured against its neighbours if both lights are among them: daylight or a warming lamp brightens
-    both, so that medians of the whole run would misjudge them.
+    both, so that medians of the whole run would misjudge them. If the whole run does not show two lights,
+    the neighbours of every picture may: towards the end of a pipe the lit pictures become ever darker.
     """
     darkest = minimum_filter1d(brightness, 2 * _AROUND + 1, mode="nearest")
     brightest = maximum_filter1d(brightness, 2 * _AROUND + 1, mode="nearest")
+    split = _two_lights(brightness)
+    if split is None:
+        span = brightest - darkest
+        height = (brightness - darkest) / np.maximum(span, 1e-9)
+        everywhere = np.all(span > _LEAST_APART * brightest)
+        return np.asarray(height) if everywhere and _two_lights(height) is not None else None
+    low, high = split
     both: Bool = brightest - darkest > _BOTH_THERE * (high - low)
     below, above = np.where(both, darkest, low), np.where(both, brightest, high)
     return np.asarray((brightness - below) / (above - below))

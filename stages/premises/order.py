@@ -138,13 +138,16 @@ def _mends(light: Int, breaks: Bool, first: int) -> bool:
     return int(pattern_breaks(other)[behind].sum()) <= int(breaks[behind].sum()) - 2
 
 
-def off_the_pipe(pictures: Pictures) -> Bool:
+def off_the_pipe(pictures: Pictures, light: Int) -> Bool:
     """Return (F,) true for pictures before the first closed laser line and after the last, if many.
 
-    Pictures that cannot be decoded do not count: they may well have shown a line.
+    Pictures that cannot be decoded do not count: they may well have shown a line. Where the `Light` (F,)
+    of the pictures is known, lit ones do not count as lines: the rim of a pipe's end is a closed line, too.
     """
     out = np.zeros(len(pictures.closed), bool)
     closed = pictures.closed > CLOSED
+    if np.any(light == Light.LINE):
+        closed &= light != Light.WALL
     beside = np.abs(pictures.line_px - np.roll(pictures.line_px, 1, axis=1))
     smooth = np.mean(beside < _SMOOTH * pictures.line_px, axis=1)
     if closed.sum() < _LEAST_LINES:

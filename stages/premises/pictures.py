@@ -25,6 +25,9 @@ _NEAREST, _FARTHEST = 0.15, 0.98
 # A laser line is thinner than this part of the picture's height, or it could not be measured to a tenth of
 # a millimetre; twice as much is left around it for blur and ghosts.
 _THICKEST_LINE = 0.03
+# A line goes on if both neighbouring rays show it, less than so many times fainter: along the lines of open-1
+# to open-3 its brightness varies up to threefold from ray to ray.
+_GOES_ON = 4
 # Polar angles between which the wall is unrolled to see the motion; as in motion, with less at either end.
 _NEAR_DEG, _FAR_DEG = 76.0, 35.0
 _ROWS, _COLUMNS = 128, 256
@@ -147,10 +150,18 @@ class _PolarView:
 
     def closed_line(self, line: Image) -> tuple[float, Float32]:
         """Return the share of neighbouring rays with the strongest line at one radius, and the radii (R,)."""
+        line = _that_goes_on(line, self.line_width_px)
         strongest = line.argmax(1)
         beside = np.abs(strongest - np.roll(strongest, 1)) <= self.line_width_px // 2
         there = line.max(1) > 0
         return float((beside & there).mean()), self._radius[strongest]
+
+
+def _that_goes_on(line: Image, width_px: int) -> Image:
+    """Return thin structures (R, N) without those that end within a ray: hot pixels, hits of radiation."""
+    near = cv2.dilate(line, np.ones((1, width_px), np.uint8))
+    beside = np.minimum(np.roll(near, 1, axis=0), np.roll(near, -1, axis=0))
+    return np.where(line <= _GOES_ON * beside.astype(np.uint16), line, np.uint8(0))
 
 
 @dataclass(frozen=True)

@@ -38,6 +38,37 @@ def test_two_lights_differ_in_brightness(brighter: float, told: bool) -> None:
     np.testing.assert_array_equal(light_seen(seen), expected)
 
 
+@pytest.mark.parametrize("lit_share", [1.0, 0.35])
+def test_two_lights_are_seen_where_the_lit_pictures_become_ever_darker(lit_share: float) -> None:
+    """Towards the end of a pipe they did, and all pictures "showed neither a line nor a lit wall"."""
+    brightness = np.where(LIT, np.linspace(8.5, 8.5 * lit_share + 4 * (1 - lit_share), COUNT), 4.0)
+    line, nothing = np.ones((COUNT, 1), np.float32), np.full(COUNT, np.nan)
+    closed, partner = np.where(LIT, 0.6, 0.9), np.arange(COUNT) - 2
+    seen = Pictures(brightness, closed, line, np.zeros(1), nothing, partner, nothing, nothing)
+    np.testing.assert_array_equal(light_seen(seen), np.where(LIT, Light.WALL, Light.LINE))
+
+
+def test_one_light_that_changes_at_random_is_not_two() -> None:
+    brightness = 8 * np.random.default_rng(1).uniform(0.5, 1, COUNT)
+    line, nothing = np.ones((COUNT, 1), np.float32), np.full(COUNT, np.nan)
+    seen = Pictures(
+        brightness, np.ones(COUNT), line, np.zeros(1), nothing, np.arange(COUNT) - 1, nothing, nothing
+    )
+    assert np.all(light_seen(seen) == Light.UNKNOWN)
+
+
+@pytest.mark.parametrize("hits", [300, 2000])
+def test_hits_of_radiation_do_not_hide_the_line(hits: int, run: DrawnRun, good: Recording) -> None:
+    """Half of a run was left out where more and more pixels were hit."""
+    draw, images = np.random.default_rng(1), dict(good.source.images)
+    for k, image in images.items():
+        images[k] = image.copy()
+        images[k].flat[draw.integers(0, image.size, hits)] = 255
+    spoiled = replace(good, source=MemorySource(images, run.probe.camera.image_size))
+    seen = examine_pictures(spoiled, run.probe, quiet_context())
+    assert np.all(seen.closed[good.frames.illumination == "laser"] > 0.85)
+
+
 def cut_off(run: DrawnRun, good: Recording, columns: int) -> tuple[Recording, DrawnRun]:
     """Return a recording whose pictures end after so many columns, and its run."""
     height = run.probe.camera.image_size[1]
