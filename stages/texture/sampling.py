@@ -76,11 +76,11 @@ class LightSampler:
         self._reference = float(self._at_sheet(radius))
 
     def of(self, seen: tuple[int, Image | None]) -> LightSamples:
-        """Return the samples of ``seen``, a view and its luma (H, W); none where the luma is None."""
+        """Return the samples of ``seen``, a view and its luma (H, W); none without luma, or beyond the wall."""
         view, image = seen
-        if image is None:
-            return LightSamples.none()
         rows = self._rows_near(view)
+        if image is None or rows.start == rows.stop:
+            return LightSamples.none()
         T_cp = self._views.T_cp[view]
         xyz_c = transform(T_cp, self._patch.xyz_p[rows])
         normal_c = self._patch.normal_p[rows] @ T_cp[:3, :3].T

@@ -14,7 +14,7 @@ from stages.texture.grid import NODE_PX, FlatGrid, flat_grid, footprint_mm
 from stages.texture.light import irradiance
 from stages.texture.photometry import solve_light
 from stages.texture.project import TileProjection, _enlarge
-from stages.texture.sampling import LightSamples
+from stages.texture.sampling import LightSampler, LightSamples
 from stages.texture.surface import smoothed, wall_surface
 from stages.texture.views import LitViews, lit_views, seen_by, sheet_distance_mm, thinned
 from tests.synthetic_wall import wall_of
@@ -218,6 +218,15 @@ def plan_of(distance, reach_mm=10.0, most=40):
     surface = wall_surface(straight_wall(), 0.0, 0.5)
     grid = FlatGrid(0.0, 0.5, 120, 640, 24)
     return grid, thinned(seen_by(grid, surface, views_at(distance), small_probe().laser, reach_mm), most)
+
+
+def test_a_picture_that_shows_no_measured_wall_gives_no_samples_of_light():
+    """At the end of a pipe, pictures beyond the measured wall ended the run as an error of the program."""
+    surface, probe = wall_surface(straight_wall(), 0.0, 0.5), small_probe()
+    sampler = LightSampler(surface, probe, views_at([500.0, -10.0]), 10.0, 1.0)
+    image = np.full(probe.camera.image_size[::-1], 90, np.uint8)
+    assert not len(sampler.of((0, image)).cell)
+    assert len(sampler.of((1, image)).cell), "control"
 
 
 def test_views_near_the_sheet_are_preferred():
