@@ -76,7 +76,7 @@ class LightSampler:
         self._reference = float(self._at_sheet(radius))
 
     def of(self, seen: tuple[int, Image | None]) -> LightSamples:
-        """Return the samples of ``seen``, a view and its luma (H, W); none without luma, or beyond the wall."""
+        """Return the samples of ``seen``, a view and its luma (H, W); none without luma or wall."""
         view, image = seen
         rows = self._rows_near(view)
         if image is None or rows.start == rows.stop:
