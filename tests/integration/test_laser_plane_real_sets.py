@@ -15,7 +15,7 @@ from stages.calibrate.boards.detect import Chessboard, detect
 from stages.calibrate.boards.fit import BoardCalibrationParameters
 from stages.calibrate.laser import LaserPicture, calibrate_laser_plane, line_on_board
 from stages.calibrate.laser.line import LaserPlaneParameters
-from stages.calibrate.laser.plane import fit_plane
+from stages.calibrate.laser.plane import weighted_plane
 from tests.quiet import quiet_context
 from tests.shared_data import shared
 
@@ -31,7 +31,7 @@ def test_published_points_give_their_published_plane(file, count, rms_mm):
     a, b, c, d = (float(n) for n in text.splitlines()[1].split(","))
     points = [[float(n) for n in line.split(",")] for line in re.findall(r"lp: (.*)", text)]
     assert len(points) == count
-    plane = fit_plane(1000 * np.array(points), np.zeros(count, np.int64))
+    plane = weighted_plane(1000 * np.array(points), np.zeros(count, np.int64), np.ones(count))
     scale = c / plane.normal_c[2]
     assert plane.normal_c[:2] * scale == pytest.approx([a, b], abs=5e-6)
     assert -plane.distance_mm * scale / 1000 == pytest.approx(d, abs=6e-5)

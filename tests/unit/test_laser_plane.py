@@ -19,7 +19,7 @@ from stages.calibrate.laser import (
     line_on_board,
 )
 from stages.calibrate.laser.line import LaserPlaneParameters, fit_peaks
-from stages.calibrate.laser.plane import BoardErrors, fit_plane, fit_plane_robustly
+from stages.calibrate.laser.plane import BoardErrors, fit_plane_robustly, weighted_plane
 from tests.board_scene import chessboard_picture, facing_pose, render, views_of
 from tests.quiet import quiet_context
 
@@ -46,6 +46,11 @@ def _plane_points(random, pictures=8, per_picture=60, noise_mm=0.03, picture_mm=
         z = 50 + 0.2 * xy[:, 0] - 0.1 * xy[:, 1] + random.normal(0, picture_mm)
         lines.append(np.c_[xy, z + random.normal(0, noise_mm, per_picture)])
     return np.concatenate(lines), np.repeat(np.arange(pictures), per_picture)
+
+
+def fit_plane(points, group, boards=None):
+    """Return the plane of least squared distances, all points alike."""
+    return weighted_plane(points, group, np.ones(len(points)), boards)
 
 
 TRUE_NORMAL = np.array([-0.2, 0.1, 1.0]) / np.linalg.norm([-0.2, 0.1, 1.0])

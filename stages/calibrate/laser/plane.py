@@ -37,8 +37,21 @@ class BoardErrors:
     pose_covariance: Float
 
 
-def fit_plane(xyz_c: Float, group: Int, boards: BoardErrors | None = None) -> LaserPlane:
-    """Return the plane of least squared distances of points (N, 3), mm.
+def fit_plane_robustly(xyz_c: Float, group: Int, boards: BoardErrors | None = None) -> LaserPlane:
+    """Return the plane through points (N, 3), mm, of which a minority lies off it: see `weighted_plane`."""
+    weight = np.ones(len(xyz_c))
+    for _ in range(_MOST_STEPS):
+        distance = np.abs(weighted_plane(xyz_c, group, weight).distances(xyz_c))
+        following = _tukey(distance / max(robust_spread(distance), 1e-12))
+        moved = float(np.abs(following - weight).max())
+        weight = following
+        if moved < _SETTLED:
+            break
+    return weighted_plane(xyz_c, group, weight, boards)
+
+
+def weighted_plane(xyz_c: Float, group: Int, weight: Float, boards: BoardErrors | None = None) -> LaserPlane:
+    """Return the plane of least squared distances of points (N, 3), mm, with weights (N,).
 
     Parameters
     ----------
@@ -47,23 +60,6 @@ def fit_plane(xyz_c: Float, group: Int, boards: BoardErrors | None = None) -> La
     boards : BoardErrors, optional
         The errors of the boards' poses.
     """
-    return _weighted(xyz_c, group, np.ones(len(xyz_c)), boards)
-
-
-def fit_plane_robustly(xyz_c: Float, group: Int, boards: BoardErrors | None = None) -> LaserPlane:
-    """Return the plane through points (N, 3), mm, of which a minority lies off it: see `fit_plane`."""
-    weight = np.ones(len(xyz_c))
-    for _ in range(_MOST_STEPS):
-        distance = np.abs(_weighted(xyz_c, group, weight, None).distances(xyz_c))
-        following = _tukey(distance / max(robust_spread(distance), 1e-12))
-        moved = float(np.abs(following - weight).max())
-        weight = following
-        if moved < _SETTLED:
-            break
-    return _weighted(xyz_c, group, weight, boards)
-
-
-def _weighted(xyz_c: Float, group: Int, weight: Float, boards: BoardErrors | None) -> LaserPlane:
     centroid = weight @ xyz_c / weight.sum()
     centred = xyz_c - centroid
     axes = np.linalg.eigh((centred * weight[:, None]).T @ centred)[1]
