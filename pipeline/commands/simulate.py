@@ -84,37 +84,43 @@ def simulate(
     An effect takes its catalogue's quantities: a size, @ a direction in deg, x an order, / others with their
     unit, as in baseline_drift=0.05/40s. A scene that cannot show what it is meant to show is refused.
     """
+    _refuse_what_does_not_go_together(scene, effects, draw, like, seal)
     with _progress() as progress:
+        made: Iterator[Simulated]
         if draw:
-            if scene or effects:
-                hint = "leave out SCENE and --with"
-                raise InputError("--draw", "draws scene and effects itself", hint=hint)
             pairs = simulate_pairs(
                 prior, output, draw, first=first, truth=truth, seed=seed or 0, frames=frames, seal=seal,
                 progress=progress,
             )  # fmt: skip
-            made: Iterator[Simulated] = (recording for pair in pairs for recording in pair)
+            made = (recording for pair in pairs for recording in pair)
         elif like is not None:
-            if scene or seal:
-                raise InputError("--like", "takes no SCENE and no --seal", hint="leave them out")
             made = iter([
                 simulate_like(
                     like, output, truth=truth, effects=effects or (), speed=speed, probe=probe,
                     defects=defects or (), seed=seed or 0, frames=frames, progress=progress,
                 )
             ])  # fmt: skip
-        elif scene is None:
-            raise InputError(
-                "simulate", "is given no scene", hint="name a scene file, --like RUN or --draw N"
-            )
-        else:
+        elif scene is not None:
             one = simulate_scene(
                 scene, output, truth=truth, effects=effects or (), seed=seed, frames=frames, seal=seal,
                 progress=progress,
             )  # fmt: skip
             made = iter([one])
+        else:
+            raise InputError(
+                "simulate", "is given no scene", hint="name a scene file, --like RUN or --draw N"
+            )
         for recording in made:
             _show(recording)
+
+
+def _refuse_what_does_not_go_together(
+    scene: Path | None, effects: list[str] | None, draw: int, like: Path | None, seal: bool
+) -> None:
+    if draw and (scene or effects):
+        raise InputError("--draw", "draws scene and effects itself", hint="leave out SCENE and --with")
+    if not draw and like is not None and (scene or seal):
+        raise InputError("--like", "takes no SCENE and no --seal", hint="leave them out")
 
 
 @contextmanager
