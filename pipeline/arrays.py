@@ -1,4 +1,4 @@
-"""Names of the array types used in annotations: the name tells the element type, the docstring the shape."""
+"""Names of the array types used in annotations: the name states the element type, the docstring the shape."""
 
 from typing import Any
 

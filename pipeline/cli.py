@@ -217,7 +217,7 @@ def kernels_of_a_run() -> dict[str, dict[str, str]]:
 
 
 def main() -> None:
-    """Run the command line; a refusal is told as text, with its own exit code."""
+    """Run the command line; a refusal is printed as text, with its own exit code."""
     try:
         app(prog_name="boresight")
     except BoresightError as error:

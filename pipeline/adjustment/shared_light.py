@@ -14,12 +14,12 @@ from pipeline.arrays import Float
 # Smaller correlation counts as none: σ from the scatter of such rings is too small by 1 − √(1 − 0.1) = 5 %.
 _NOTHING = 0.1
 # Likeness of neighbouring rings in open-1, open-2 and open-3: 0.05, 0.05 and 0.16; in 7 copies at crf 30, by
-# HEVC and with all spoilings 0.36 to 0.79, of which two told a false finding with probabilities of 0.89 and
+# HEVC and with all spoilings 0.36 to 0.79, of which two had a false finding with probabilities of 0.89 and
 # 0.98; behind filters against noise that flattened a pit by a fifth 0.23 to 0.79.
 _USUAL = 0.2
 # Error of the likeness of rings far apart, by 120 rings of some 400 independent samples.
 _LIKENESS_ERRS = 0.01
-# Shares handed on that are tried. With a larger one, the fall over 16 rings can hardly be told from none.
+# Shares handed on that are tried. A larger one looks like none: over 16 rings it hardly falls.
 _SHARES = np.arange(0.02, 0.985, 0.01)
 # Two lags leave open whether something is the same in all rings: it is taken to be handed on.
 _LAGS_OF_A_PLATEAU = 3

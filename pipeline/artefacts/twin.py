@@ -79,7 +79,7 @@ class Mismatch:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Each effect that may be the cause: more than one where they are not told apart."""
+        """Each effect that may be the cause: more than one where they are not distinguished."""
         return tuple(self.name.split(" or "))
 
 
@@ -197,7 +197,7 @@ class GaugeTwin:
     rms_px_stated, rms_px_diagnosed : float
         R.m.s. of how far the line lies from where it is predicted.
     least_px : float
-        Displacement of the line that raises χ² by a tenth: less than about that cannot be told.
+        Displacement of the line that raises χ² by a tenth: a smaller one cannot be distinguished.
     sigmas : float
         By how many σ, taken from frame to frame, χ² falls when the effects are switched on.
     kept : tuple of bool

@@ -88,7 +88,7 @@ def _twin_page(twin: Path | None) -> Path | None:
 def _compared(
     opened: Review, earlier: Path | None, years: float | None, config: Path | None, assignments: Sequence[str]
 ) -> Compared | None:
-    """Return the review's run beside an earlier one, told in a line; None without one."""
+    """Return the review's run beside an earlier one, and print a line on it; None without one."""
     if earlier is None:
         for name, given in (("--years", years), ("--config", config), ("--set", assignments or None)):
             if given is not None:

@@ -132,7 +132,7 @@ class ReviewApp:
         ]
 
     def _answering(self, work: Callable[[Request, bytes], Response]) -> Handler:
-        """Return a handler that runs ``work`` in a thread and tells errors as JSON with their own code."""
+        """Return a handler that runs ``work`` in a thread and returns errors as JSON with their own code."""
 
         async def handle(request: Request) -> Response:
             body = await request.body()

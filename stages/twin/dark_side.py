@@ -2,9 +2,9 @@
 
 The photo was made in the same light as the frames. Lights that are dim on one side in all frames, and wall
 that is darker on one side all along, give the same photo and the same frames, unless the probe rolls: if it
-did not, it is stated that neither can be told. Where the probe rolls a little, or wall is seen at another
-place of the image, frames differ from such a photo at the flanks of that side: these are no places of the
-image.
+did not, it is stated that the two cannot be distinguished. Where the probe rolls a little, or wall is seen at
+another place of the image, frames differ from such a photo at both edges of that side. These edges are not
+reported as places of the image.
 """
 
 from __future__ import annotations

@@ -44,7 +44,7 @@ _EDGE = 1 / 14
 # Time constants that are searched, in recordings: from the shortest, a step at the start, to the longest, of
 # the catalogue's own drifts nearly a straight line.
 _SHARES, _DRIFT_SHARES = (0.1, 0.2, 0.4, 0.8, 1.6), (0.1, 0.2, 0.4, 0.8, 1.6, 3.2, 6.4)
-# A drift is told by its growth in the first second, or, where its time constant is longer than this, in a
+# A drift is stated by its growth in the first second, or, where its time constant is longer than this, in a
 # tenth of that: of .02 mm in 600 s, the first second has .00003. The recording lasts longer than a tenth: at
 # least about a sixth of the time constant, see `_DRIFT_SHARES`.
 _SLOW_S = 60.0
@@ -206,7 +206,7 @@ class Coursed(InCourse):
 
 
 def beginning(time_s: float) -> tuple[float, str]:
-    """Return for how long the growth of a drift with such a time constant is told, s, and that in words."""
+    """Return for how long the growth of a drift with such a time constant is stated, s, and that in words."""
     if time_s <= _SLOW_S:
         return 1.0, "second"
     beginning_s = round(time_s / 10)

@@ -138,7 +138,7 @@ def find_jump(circles: RingCircles, at_mm: Float, points: RingPoints, probe: Pro
 
 
 def texture_breaks(jump: RingJump, ring_frame: Int, poses: TrackedPoses) -> bool:
-    """Return whether texture is lost at the jump of rings (F,): a knock then cannot be told from a cut."""
+    """Return whether texture is lost at the jump of rings (F,): a knock then looks like a cut."""
     place = int(np.searchsorted(ring_frame, jump.frame))
     first, last = ring_frame[max(place - 1, 0)], ring_frame[min(place + 1, len(ring_frame) - 1)]
     lost = poses.frames[poses.lost]
