@@ -51,7 +51,13 @@ from stages.defects.noise_tail import noise_tail
 from stages.defects.parallax import LitPictures
 from stages.defects.parameters import DefectParameters
 from stages.defects.relief import smooth_shape_removed
-from stages.defects.report import report_found, report_unconfirmed, warn_of_missed, warn_of_short_ones
+from stages.defects.report import (
+    report_found,
+    report_unconfirmed,
+    warn_of_drops,
+    warn_of_missed,
+    warn_of_short_ones,
+)
 from stages.defects.segment import Region, regions_of
 from stages.defects.smear import flattened
 from stages.defects.surface import MeasuredWall
@@ -109,6 +115,7 @@ def find_defects(
     expected = sum(1 - d.probability for d in items)
     report_found(len(items), expected, context)
     report_unconfirmed(len(items), len(unconfirmed), len(lines), context)
+    warn_of_drops(sum(f.evidence.contradicted for f in found), context)
     rejected = len(regions) - len(found)
     context.report("rejected: shallower than the smallest depth or between rings", rejected, "detections")
     smallest_mm = _smallest_depth(seeds, parameters)
@@ -227,5 +234,5 @@ def _defects_of_run(
 
 
 DEFECTS = Stage(
-    "defects", "56", DefectParameters, _defects_of_run, "defects as instances with depth, clock and kind"
+    "defects", "57", DefectParameters, _defects_of_run, "defects as instances with depth, clock and kind"
 )

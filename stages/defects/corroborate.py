@@ -9,7 +9,7 @@ may in every ring be an effect of that end.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.ndimage import label
@@ -153,16 +153,19 @@ def evidence_for(
     showing = np.union1d(
         frames_behind(region, depth.depth_mm, surface), frames_at_peak(depth, region, surface)
     )
-    return Evidence(
+    pictures = seen_by.pictures
+    evidence = Evidence(
         seen_by.held.independent(len(showing)),
         None if shifted else photo_stands_out(seen_by.texture, relief, region),
         score,
         _is_fixed(region, surface, fixed_mm),
         lies_at_edge(region, relief),
         seen_by.rings is not None and line_is_bright(region, depth.depth_mm, surface, seen_by.rings),
-        seen_by.pictures is not None and seen_by.pictures.contradict(region, relief),
-        seen_by.pictures is not None and seen_by.pictures.drove_through(region, depth, relief),
+        in_probe_path=pictures is not None and pictures.drove_through(region, depth, relief),
     )
+    # Pictures are read only for what would count without them: with glints there may be hundreds of others.
+    contradicted = pictures is not None and evidence.corroborated and pictures.contradict(region, relief)
+    return replace(evidence, contradicted=contradicted)
 
 
 def line_is_bright(region: Region, depth_mm: float, surface: Surface, rings: RingSamples) -> bool:

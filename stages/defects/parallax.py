@@ -1,11 +1,12 @@
-"""Check a long finding against lit pictures taken from other places.
+"""Check a finding against lit pictures taken from other places.
 
-A ring shows one place of the wall at one place of the image, in one frame only. A drop that slides down the
-window displaces the line as long as it is in front of it; the result looks like a groove or a ridge along the
-pipe. A lit picture taken before or after shows the same wall at another place of the image, beside the drop.
-Projected onto the wall as the rings measured it, such pictures agree with each other where the depth is true.
-A false depth shifts them against each other by its size times the distance between the camera positions over
-the pipe's radius.
+A ring shows one place of the wall at one place of the image, in one frame only. A drop that runs down the
+window displaces the line as long as it is in front of it; the result looks like a pit, a deposit or a groove,
+the longer the slower the drop. A lit picture taken before or after shows the same wall at another place of
+the image, beside the drop. Projected onto the wall as the rings measured it, such pictures agree with each
+other where the depth is true. A false depth shifts them against each other by its size times the distance
+between the camera positions over the pipe's radius. Where that is less than the texture shows, with and
+without the finding they agree equally well, and nothing is concluded.
 """
 
 from __future__ import annotations
@@ -26,9 +27,6 @@ from stages.defects.depth import Depth
 from stages.defects.relief import Relief
 from stages.defects.segment import Region
 
-# Only findings at least this long, and at least as long as wide, are checked: no drop crosses the line
-# faster.
-_LONG_MM = 8.0
 # The finding is cut into parts of 8 mm, each compared in pictures whose line is 2 to 15 mm away: farther off
 # the wall is seen too obliquely, and nearer by, the line and what displaces it would be in the picture.
 _WINDOW_MM, _FARTHEST_MM, _CLEAR_MM = 8.0, 15.0, 2.0
@@ -54,8 +52,7 @@ class LitPictures:
 
         The rows of ``region`` count from the first row of ``relief``.
         """
-        size = np.array(region.mask.shape) * relief.cell_mm
-        if region.all_round or size[0] < max(_LONG_MM, size[1]):
+        if region.all_round:
             return False
         beside = round(_BESIDE_MM / relief.cell_mm[1])
         mask = np.pad(region.mask, ((0, 0), (beside, beside)))

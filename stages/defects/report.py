@@ -9,6 +9,8 @@ from stages.defects.corroborate import LEAST_RINGS
 # So few unconfirmed findings need no warning, since they are quickly looked at. A warning is due where one
 # defect in four is expected to be false.
 _FEW_UNCONFIRMED, _MANY_FALSE = 3, 0.25
+# One finding that lit pictures contradict may be a single splash; from two on, drops run over the window.
+_SPLASHES = 2
 # A warning is due where the depth that is found reliably exceeds the wanted one by this factor. Chosen; in
 # good recordings the two are close.
 _DEEPER = 2.0
@@ -42,6 +44,18 @@ def report_unconfirmed(defects: int, unconfirmed: int, lines: int, context: Cont
             f"{defects} defects: glints, splashes or compression were taken for the line. What to do: look "
             "at the unconfirmed findings in the review; record again with less exposure of the laser, a "
             "clean window or less compression"
+        )
+
+
+def warn_of_drops(contradicted: int, context: Context) -> None:
+    """Report how many findings lit pictures contradict, and warn where they are several."""
+    context.report("unconfirmed: lit pictures show the wall without them", contradicted, "detections")
+    if contradicted >= _SPLASHES:
+        context.warn(
+            f"at {contradicted} places the line departs from the wall as at a defect, but lit pictures "
+            "taken before and after show the wall without it: drops or dirt moved over the window. These "
+            "places are unconfirmed. Others may be false as well, and the depth of a defect under a drop may "
+            "be wrong. What to do: look at each finding's pictures; dry the window and record again"
         )
 
 
