@@ -35,6 +35,7 @@ from stages.twin.locate import (
 )
 from stages.twin.name import cannot_tell, clipped, left_over, noise_figures, state_figures
 from stages.twin.on_wall import ring_step_mm, unnamed
+from stages.twin.photo_course import hidden_failures
 from stages.twin.pixels import defective_pixels
 from stages.twin.render import Region, Renderer
 from stages.twin.scene import Scene, scene_of
@@ -52,11 +53,9 @@ from stages.twin.sums import Sums
 from stages.twin.window import or_on_window, separated_from_blur
 from stages.twin.worst import maps_of, worst_places
 
-_EVERY = 10
-_COLOURED = 3
-"""Laser frames whose colours are checked for clipping: decoding colour takes three times as long."""
-_CLIPPED_FRAMES = 8
-"""Least number of compared laser frames whose colours show what leaks from clipped pixels."""
+_EVERY, _COLOURED, _CLIPPED_FRAMES = 10, 3, 8
+"""Frames from one compared frame to the next where none is withheld. Laser frames whose colours are checked
+for clipping: decoding colour takes three times as long. Least number of them that show what leaks."""
 _ROUNDS = 3
 """Rounds in which the displacement of texture is measured, each in frames drawn with the one before: the
 second finds a third of the first, the fourth hardly any."""
@@ -236,9 +235,10 @@ def compared_with(
         np.array([v.frame for v in comparison.views]), frames.withheld is not None,
         (*noise_figures(state.noise), *pattern_figures(state.pattern)),
         (*state_figures(state), *(() if comparison.wall_is_clipped else lamp_power(samples)), *unnamed_map),
-        comparison.regions(), found,
-        comparison.psnr_db(False), comparison.psnr_db(True), comparison.chi2_camera, comparison.stray_share,
-        comparison.seen / max(comparison.view, 1.0), cannot_tell(state, comparison.silent),
+        comparison.regions(), found, comparison.psnr_db(False), comparison.psnr_db(True),
+        comparison.chi2_camera, comparison.stray_share,
+        comparison.seen / max(comparison.view, 1.0),
+        (*cannot_tell(state, comparison.silent), *hidden_failures(samples, scene.ring)),
         tuple(comparison.views), maps_of(samples), comparison.levels(), worst_places(samples),
         (*withdrawn, *slow, *unsure, *of_photo, *beside, *of_side),
     )  # fmt: skip
@@ -293,7 +293,7 @@ PHOTOMETRY = Stage(
 )
 TWIN = Stage(
     "twin",
-    "58",
+    "59",
     TwinParameters,
     compare_with_twin,
     "recorded frames beside the same frames, re-rendered from what the run has measured",

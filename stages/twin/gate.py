@@ -41,8 +41,8 @@ class Suspected:
     ----------
     mismatch : Mismatch
         What is reported if the effect is confirmed.
-    law : callable
-        Returns a frame without and with the effect.
+    law : callable or None
+        Returns a frame without and with the effect; None for what has no name, which nothing confirms.
     frame : (F,) int
         Frames in which its size was measured, ascending.
     sizes : (F, K)
@@ -54,7 +54,7 @@ class Suspected:
     """
 
     mismatch: Mismatch
-    law: Law
+    law: Law | None
     frame: Int
     sizes: Float
     size_of: Callable[[Float], Float] = np.asarray
@@ -81,6 +81,8 @@ def judged(suspected: Sequence[Suspected], again: Again) -> tuple[tuple[Mismatch
 
 def _judged(one: Suspected, again: Again) -> tuple[Mismatch, bool]:
     """Return the mismatch with the figures from frames rendered again, and whether its name stays."""
+    if one.law is None:
+        return one.mismatch, True
     squares, sizes = [np.zeros((0, 4))], []
     for frame, shown in again(one.judges):
         numbers = one.from_other_half(frame)

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from pipeline.arrays import Float
+from pipeline.arrays import Bool, Float
 from pipeline.instrument.probe import Lighting
 from stages.twin.cells import SECTORS, Cells, Law, drift, half_turn, sector_azimuth_rad
 from stages.twin.leds import even_light
@@ -21,6 +21,8 @@ SECTOR_STEP_DEG = 180 / SECTORS
 _MOST_OWN = 1 / 3
 """Most that a frame's photo may contain of that frame itself. Drawn courses: at a third, sizes err by up to a
 fifth, whenever between two frames the change came; at three quarters, by a factor of up to 2.4."""
+TRIED = slice(2, -1)
+"""First frames of a step that are tried: two frames or more lie on each side."""
 _LEAST_AHEAD = 0.05
 """Least distance ahead of the LEDs, in radii, from which they are taken to light the wall."""
 
@@ -61,13 +63,21 @@ def _with_photo(law: Law, in_photo: Float) -> Law:
     whose photos overlap little, when the change came decides what the photo holds: only the law without the
     photo is tried.
     """
-    own, first = in_photo.diagonal(), law.places[:, 1].astype(int)
-    near = np.maximum(own[first - 1], own[first]) < _MOST_OWN
+    near = follows_photo(in_photo)[law.places[:, 1].astype(int)]
     if not in_photo.any() or not near.any():
         return law
     beyond = law.columns[near] - np.einsum("tf,cfs->cts", in_photo, law.columns[near], optimize=True)
     places = np.concatenate([law.places, law.places[near]])
     return Law(law.name, np.concatenate([law.columns, beyond]), places)
+
+
+def follows_photo(in_photo: Float) -> Bool:
+    """Return for each frame (F,) whether it is so near to the one before that the photo in both is known.
+
+    ``in_photo`` (F, F) is the share of the photo in each frame that was made from each.
+    """
+    own = in_photo.diagonal()
+    return np.asarray(np.maximum(own, np.concatenate([own[:1], own[:-1]])) < _MOST_OWN)
 
 
 def _lamp_sector(azimuth_rad: Float, steps: Float, first: Float) -> Law:
@@ -96,8 +106,8 @@ def line_laws(cells: Cells) -> tuple[Float, list[Law]]:
 
 
 def steps_of(frames: int) -> tuple[Float, Float]:
-    """Return columns (C, F, S) of steps, two frames or more on each side, and their first frames (C,)."""
-    first = np.arange(2, frames - 1)
+    """Return columns (C, F, S) of steps, and their first frames (C,)."""
+    first = np.arange(frames)[TRIED]
     after = (np.arange(frames)[None] >= first[:, None]).astype(float)
     return np.repeat(after[..., None], SECTORS, 2), first.astype(float)
 

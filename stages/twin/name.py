@@ -19,6 +19,7 @@ from stages.twin.noise import CameraNoise
 from stages.twin.picture import FEWEST_FRAMES, LEAST_BLUR_PX, OF_LAW, WholePictures
 from stages.twin.reference import BlockSamples
 from stages.twin.scene import Ring
+from stages.twin.second_ring import LEAST_SECOND
 from stages.twin.state import PhotometricState
 from stages.twin.switched import IN_FOCUS_PX, defocus, response, wide_line
 
@@ -198,10 +199,11 @@ def _gain_and_offset(x: Float, y: Float, weight: Float, cell: Int) -> tuple[Floa
 
 def noise_figures(noise: CameraNoise) -> tuple[NamedFigure, ...]:
     """Return the camera's noise in the terms of EMVA 1288."""
-    e, read = noise.electrons_per_level, noise.read_electrons
+    e, read, levels = noise.electrons_per_level, noise.read_electrons, noise.read_levels
     return (
         NamedFigure("black_dn", noise.black.value, noise.black.sd, "grey levels"),
         NamedFigure("white_dn", noise.white, 0.0, "grey levels"),
+        NamedFigure("read_dn", levels.value, levels.sd, "grey levels"),
         NamedFigure("read_e", read.value, read.sd, "electrons"),
         NamedFigure("gain_e_per_dn", e.value, e.sd, "electrons per grey level"),
         NamedFigure("non_uniformity", noise.uneven.value, noise.uneven.sd, "relative"),
@@ -249,7 +251,8 @@ def cannot_tell(state: PhotometricState, silent: bool = False) -> tuple[str, ...
         "Lamps that are uneven in all frames, other than by one dim LED, can be distinguished from wall that "
         "is paler on one side only as far as the probe rolls.",
         "If all frames move alike during their exposure, their blur is also in the wall's photo: motion blur "
-        "is found only in frames that are more blurred than the others.",
+        "is found only in frames that are more blurred than the others, and from a 1 σ of "
+        f"{LEAST_BLUR_PX} px on: lens and pixels blur as much.",
         "Frames are compared in grey: light whose colour changes during the run is not examined.",
     ]
     if silent:
@@ -282,7 +285,7 @@ def cannot_tell(state: PhotometricState, silent: bool = False) -> tuple[str, ...
     else:
         said += [
             "The sheet's thickness is the stated one: in one diameter it looks like the lens's blur.",
-            "A second line is searched for at one ratio of radii all round. A mirror image of the line on "
-            "wall farther ahead has another ratio in each direction if the probe is askew: it may be missed.",
+            "A second line, or a mirror image of the line on the wall, is told only if darkness lies between "
+            f"it and the line, and from {100 * LEAST_SECOND:.0f} % of the line's brightness on.",
         ]
     return tuple(said)

@@ -101,19 +101,24 @@ class CameraNoise:
         return Figure(np.inf, np.inf) if k.value <= 0 else Figure(1 / k.value, k.sd / k.value**2)
 
     @property
+    def read_levels(self) -> Figure:
+        """Read noise, 1 σ, in grey levels, without rounding, which may hide all or add as much again."""
+        read = float(np.sqrt(max(self.read_variance.value - _LEAST_VARIANCE, 0.0)))
+        sd = float(np.hypot(self.read_variance.sd, _LEAST_VARIANCE))
+        return Figure(read, _of_root(read, sd) if np.isfinite(sd) else np.inf)
+
+    @property
     def read_electrons(self) -> Figure:
         """Read noise, 1 σ, in electrons, without rounding; infinite where the conversion is.
 
         Read noise and conversion come from one fit, in which one gains what the other loses: their σ are
-        added. Of noise below one grey level, rounding may hide all or add as much again.
+        added.
         """
-        e, variance = self.electrons_per_level, max(self.read_variance.value - _LEAST_VARIANCE, 0.0)
+        e, read = self.electrons_per_level, self.read_levels
         if not np.isfinite(e.value):
             return Figure(np.inf, np.inf)
-        read, sd = float(np.sqrt(variance)), float(np.hypot(self.read_variance.sd, _LEAST_VARIANCE))
-        if not np.isfinite([sd, e.sd]).all():
-            return Figure(read * e.value, np.inf)
-        return Figure(read * e.value, _of_root(read, sd) * e.value + read * e.sd)
+        sd = read.sd * e.value + read.value * e.sd if np.isfinite([read.sd, e.sd]).all() else np.inf
+        return Figure(read.value * e.value, sd)
 
 
 @dataclass(frozen=True)
@@ -234,11 +239,18 @@ class _Cells:
 
     @property
     def gamma(self) -> float:
-        """Exponent of the response; NaN where the cells cannot determine it."""
-        x, shot = self.level, self.variance - _LEAST_VARIANCE
-        if len(x) <= 3 or x.max() <= _RANGE_FOR_GAMMA * max(x.min(), 1.0) or not (shot > 0).all():
+        """Exponent of the response; NaN where the cells cannot determine it.
+
+        Read noise and non-uniformity bend the variance as a response does: where a linear response with both
+        fits the cells as well, it is unknown.
+        """
+        x, shot = np.maximum(self.level, 1.0), self.variance - _LEAST_VARIANCE
+        if len(x) <= 3 or x.max() <= _RANGE_FOR_GAMMA * x.min() or not (shot > 0).all():
             return float("nan")
-        return 2 - float(np.polyfit(np.log(np.maximum(x, 1.0)), np.log(shot), 1)[0])
+        power, log_size = np.polyfit(np.log(x), np.log(shot), 1)
+        off = (np.exp(log_size) * x**power + _LEAST_VARIANCE) / self.variance - 1
+        linear = nnls(self.design, np.ones_like(x))[1]
+        return float("nan") if linear <= np.linalg.norm(off) else 2 - float(power)
 
 
 def _fitted(cells: _Cells | None) -> Float:

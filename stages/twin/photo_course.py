@@ -11,12 +11,28 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from pipeline.arrays import Float, Int
+from stages.twin.laws import TRIED, follows_photo
 from stages.twin.reference import BlockSamples
 from stages.twin.scene import Ring
 
 REACH_RADII, _NEAREST_RAD = 0.5, 0.2
 """Wall used for the photo on either side of the laser sheet: the default of the stage texture. Least polar
 angle at which wall is seen: nearer to the axis no block is all wall."""
+
+
+def hidden_failures(samples: BlockSamples | None, ring: Ring) -> tuple[str, ...]:
+    """Return a sentence if an LED that fails between lit frames would be in the photo of both, unnoticed."""
+    if samples is None:
+        return ()
+    far = ~follows_photo(share_of_frames(samples, ring, samples.number))[TRIED]
+    if not far.any():
+        return ()
+    return (
+        f"{far.sum()} of {len(far)} neighbouring pairs of compared lit frames lie so far apart that the "
+        "wall's photo was made near each frame itself: if one LED fails or one side darkens in between, the "
+        "photo contains it as well, and it may be missed. What to do: compare more frames, with a smaller "
+        "premises.withhold and a larger twin.compared.",
+    )
 
 
 def share_of_frames(samples: BlockSamples | None, ring: Ring, frame: Int) -> Float:

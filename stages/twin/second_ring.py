@@ -1,11 +1,17 @@
-"""A second line beside the first: a ghost of window or lens, or a second laser sheet."""
+"""A second line beside the first: a ghost of window or lens, a second laser sheet, or a mirror image.
+
+It is light that is separate from the line: darkness lies between the two. A glow about the line, as of light
+from wall to wall, only fades with distance and is none. A wall that reflects like a mirror shows the line at
+a distance from the line that differs from direction to direction where the probe is askew.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.ndimage import median_filter
+from scipy.ndimage import grey_opening, uniform_filter1d
 
 from pipeline.arrays import Bool, Float, Float32, Int
 from pipeline.artefacts.twin import Mismatch, NamedFigure
@@ -16,15 +22,37 @@ from stages.twin.render import Region, TwinFrame
 from stages.twin.scene import Ring
 from stages.twin.switched import STEP, second_line, share_of_second
 
-_SURE, _FEWEST_FRAMES = 3.0, 6
-_RATIOS, _REACH, _FAR_WIDTHS, _LEAST_LINE, _AROUND, _BESIDE_PEAK = 400, 0.8, 14.0, 0.01, 25, 3
+_SURE, _FEWEST_FRAMES, _QUADRANTS = 3.0, 6, 4
+_RATIOS, _REACH, _FAR_WIDTHS, LEAST_SECOND, _BESIDE_PEAK = 400, 0.8, 14.0, 0.01, 3
 """Number of bins and largest ln(radius over the line's radius); width about the line, px, that belongs to it;
-least share of a second line; bins on each side that give the level it stands out from; bins beside a peak
-that still belong to it."""
+least share of a second line that is told; bins beside a peak that still belong to it. Sound recordings of two
+renderers leave up to .002 of the line."""
+_WIDEST, _SMOOTH, _ALIKE, _OF_HEIGHT = 65, 3, 2, 0.2
+"""Bins of the widest band that is searched for (a quarter of the line's radius), bins over which profiles are
+smoothed, bins by which the quadrants of one ring may differ, and share of a band's height from which a bin
+counts. Chosen."""
 
 
 def ring_profile(ring: Ring, above: Float32, twin: TwinFrame, use: Bool) -> Float | None:
     """Return grey levels (4, R) over ln(radius / line radius) by quadrants; None without a line."""
+    at = _beside_line(ring, twin)
+    if at is None:
+        return None
+    few = use[::STEP, ::STEP]
+    grey, (quadrant, ratio) = above[::STEP, ::STEP][few], (a[few] for a in at)
+    cell = np.floor((ratio / _REACH + 1) / 2 * _RATIOS).astype(int)
+    inside = (cell >= 0) & (cell < _RATIOS)
+    cell = quadrant[inside].astype(int) % _QUADRANTS * _RATIOS + cell[inside]
+    total, pixels = (np.bincount(cell, w, _QUADRANTS * _RATIOS) for w in (grey[inside], None))
+    mean = np.where(pixels > 3, total / np.maximum(pixels, 1), np.nan)
+    return np.asarray(mean.reshape(_QUADRANTS, _RATIOS))
+
+
+def _beside_line(ring: Ring, twin: TwinFrame) -> tuple[Float32, Float32] | None:
+    """Return azimuth in quadrants from −π on, and ln(radius / line radius); None without a line.
+
+    Both are those of every `STEP`-th row and column.
+    """
     rows, columns = np.nonzero(twin.region == Region.LINE_CORE)
     u, v = ring.centre_px
     degree = np.floor(np.degrees(np.arctan2(rows - v, columns - u)) + 180).astype(int) % 360
@@ -33,53 +61,112 @@ def ring_profile(ring: Ring, above: Float32, twin: TwinFrame, use: Bool) -> Floa
         return None
     radius = np.bincount(degree, np.hypot(rows - v, columns - u), 360) / np.maximum(count, 1)
     radius = np.interp(np.arange(360), np.flatnonzero(count), radius[count > 0], period=360)
-    row, column = np.nonzero(use[::STEP, ::STEP])
-    grey, away = above[::STEP, ::STEP][row, column], (STEP * column - u, STEP * row - v)
-    turn = (np.degrees(np.arctan2(away[1], away[0])) + 180) % 360
-    ratio = np.log(np.maximum(np.hypot(*away), 1) / radius[turn.astype(int) % 360])
-    cell = np.floor((ratio / _REACH + 1) / 2 * _RATIOS).astype(int)
-    inside = (cell >= 0) & (cell < _RATIOS)
-    cell = (turn[inside] // 90).astype(int) % 4 * _RATIOS + cell[inside]
-    total, pixels = (np.bincount(cell, w, 4 * _RATIOS) for w in (grey[inside], None))
-    mean = np.where(pixels > 3, total / np.maximum(pixels, 1), np.nan)
-    return np.asarray(mean.reshape(4, _RATIOS))
+    row, column = np.mgrid[: twin.level.shape[0] : STEP, : twin.level.shape[1] : STEP].astype(np.float32)
+    turn = (np.degrees(np.arctan2(row - v, column - u)) + 180) % 360
+    ratio = np.log(np.maximum(np.hypot(row - v, column - u), 1) / radius[turn.astype(int) % 360])
+    return np.asarray(turn / 90, np.float32), np.asarray(ratio, np.float32)
 
 
 def second_ring(ring: Ring, profiles: Sequence[Float], frame: Int) -> Suspected | None:
-    """Return a ring beside the line on which the profiles of frames (F,) agree."""
+    """Return light beside the line on which the profiles of frames (F,) agree in three quadrants."""
     if len(profiles) < _FEWEST_FRAMES:
         return None
-    stack = np.stack(profiles)
-    at = (np.arange(_RATIOS) + 0.5) / _RATIOS * 2 * _REACH - _REACH
-    # The line itself is within 2 % of its radius.
-    line = float(np.where(np.abs(at) < 0.02, np.nan_to_num(stack), 0).max((1, 2)).mean())
-    ground = median_filter(np.apply_along_axis(_without_gaps, -1, stack), (1, 1, _AROUND), mode="nearest")
-    far = np.abs(at) * ring.radius_px > _FAR_WIDTHS
-    known = np.isfinite(stack) & far
-    excess, count = np.where(known, np.nan_to_num(stack) - ground, 0.0), np.maximum(known.sum(0), 1)
-    mean = excess.sum(0) / count
-    sd = np.sqrt((np.where(known, excess - mean, 0) ** 2).sum(0)) / count
-    beyond = (mean > _SURE * sd) & (mean > _LEAST_LINE * line) & (count >= _FEWEST_FRAMES)
-    seen = beyond.sum(0) >= 3  # at least three quadrants: a glint is in one, at most two
-    if not seen.any():
+    stack = np.apply_along_axis(_without_gaps, -1, np.stack(profiles))
+    ratio = (np.arange(_RATIOS) + 0.5) / _RATIOS * 2 * _REACH - _REACH
+    line = float(np.where(np.abs(ratio) < 0.02, stack, 0).max((1, 2)).mean())  # the line is within 2 %
+    away = np.abs(ratio) * ring.radius_px > _FAR_WIDTHS
+    mean = uniform_filter1d(stack.mean(0), _SMOOTH, axis=-1)
+    found = (_band(stack, mean, away & side, line) for side in (ratio < 0, ratio > 0))
+    best = max((f for f in found if f is not None), key=lambda f: float(f.each.mean()), default=None)
+    if best is None:
         return None
-    k = int(np.argmax(np.where(seen, mean.mean(0), -1)))
-    each = excess[:, :, k].mean(1) / line
-    share, chance = float(each.mean()), min(1.0, _RATIOS * chance_of(each))
-    if chance > FALSE_ALARM or share < _LEAST_LINE:
+    chance = min(1.0, _RATIOS * chance_of(best.each))
+    if chance > FALSE_ALARM or best.each.mean() < LEAST_SECOND:
         return None
-    figure = NamedFigure("share", share, float(each.std()) / np.sqrt(len(each)), "of the line")
-    near = np.abs(np.arange(_RATIOS) - k) <= _BESIDE_PEAK
-    heights = np.where(near, np.maximum(mean.mean(0), 0), 0)
-    ratio = float(np.exp((at * heights).sum() / max(heights.sum(), 1e-9)))
-    radius = NamedFigure("radius", ratio, _REACH / _RATIOS, "of the line's")
-    found = Mismatch(
-        "second_line", "line", "line", (radius,), (figure,), chance, np.nan, np.nan,
-        f"A second ring lies at {radius.value:.2f} radii of the line, {100 * share:.0f} % as bright: "
-        "a ghost of window or lens, or a second sheet.", ring.whole(int(frame[0])),
-    )  # fmt: skip
-    sizes = np.stack([each, np.full(len(each), ratio)], 1)
+    if np.ptp(best.peak[best.seen]) <= _ALIKE:
+        return _ring(ring, best, ratio, chance, frame)
+    ghost = _told(ring, best, np.exp(ratio[best.peak[best.seen]]), chance, frame)
+    return Suspected(replace(ghost, name=""), None, frame, best.each[:, None])
+
+
+def _ring(ring: Ring, band: _Band, ratio: Float, chance: float, frame: Int) -> Suspected:
+    """Return a second line at one ratio of radii all round."""
+    near = np.abs(np.arange(_RATIOS) - int(np.median(band.peak[band.seen]))) <= _BESIDE_PEAK
+    heights = np.where(near, band.more.mean(0), 0)
+    at = float(np.exp((ratio * heights).sum() / max(heights.sum(), 1e-9)))
+    sizes = np.stack([band.each, np.full(len(band.each), at)], 1)
+    found = _told(ring, band, np.array([at]), chance, frame)
     return Suspected(found, second_line, frame, sizes, measured=share_of_second)
+
+
+def _told(ring: Ring, band: _Band, at: Float, chance: float, frame: Int) -> Mismatch:
+    """Return what is reported of a second line ``at`` one ratio of radii, or one for each quadrant."""
+    share = float(band.each.mean())
+    figure = NamedFigure("share", share, float(band.each.std()) / np.sqrt(len(band.each)), "of the line")
+    radius = NamedFigure(
+        "radius", float(at.mean()), max(_REACH / _RATIOS, float(np.ptp(at)) / 2), "of the line's"
+    )
+    said = (
+        f"A second ring lies at {at[0]:.2f} radii of the line, {100 * share:.0f} % as bright: "
+        "a ghost of window or lens, or a second sheet."
+    )
+    if len(at) > 1:
+        said = (
+            f"Light {100 * share:.0f} % as bright as the line lies apart from it, at {at.min():.2f} to "
+            f"{at.max():.2f} of its radius around the picture: a mirror image of the line on the wall, or a "
+            "ghost of window or lens."
+        )
+    return Mismatch(
+        "second_line", "line", "line", (radius,), (figure,), chance, np.nan, np.nan, said,
+        ring.whole(int(frame[0])),
+    )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class _Band:
+    """Light that stands out on one side of the line.
+
+    Attributes
+    ----------
+    more : (4, R)
+        Grey levels by which it stands out, by quadrants and bins of the ratio of radii.
+    peak, seen : (4,)
+        Bin of the brightest light, and whether it is certain.
+    each : (F,)
+        Its height in every frame, by the light in all of its bins, over that of the line.
+    """
+
+    more: Float
+    peak: Int
+    seen: Bool
+    each: Float
+
+
+def _band(stack: Float, mean: Float, use: Bool, line: float) -> _Band | None:
+    """Return what stands out beside the line in bins ``use`` (R,) of profiles (F, 4, R); None without any."""
+    more = np.zeros_like(mean)
+    more[:, use] = _standing_out(mean[:, use], bool(np.flatnonzero(use)[0] == 0))
+    peak, height = more.argmax(1), more.max(1)
+    # The place of a mirror image differs between frames: all of the band's light counts in each.
+    inside = np.where(more > _OF_HEIGHT * height[:, None], more, 0.0)
+    inside *= (height / np.maximum((inside * more).sum(1), 1e-12))[:, None]
+    each = ((stack - (mean - more)) * inside).sum(-1)
+    sd = each.std(0) / np.sqrt(len(stack))
+    seen = (height > _SURE * sd) & (height > LEAST_SECOND * line)
+    if seen.sum() < 3:  # a glint is in one quadrant, at most two
+        return None
+    return _Band(more, peak, seen, each[:, seen].mean(1) / line)
+
+
+def _standing_out(mean: Float, line_after: bool) -> Float:
+    """Return by how much profiles (4, N) exceed what is left without bumps: their opening (J. Serra, 1982).
+
+    The line lies after their last bin or before the first one: light that only fades from there is no bump.
+    """
+    high, low = (np.full((len(mean), _WIDEST), v) for v in (np.inf, 0.0))
+    whole = np.concatenate([low, mean, high] if line_after else [high, mean, low], 1)
+    opened = grey_opening(np.minimum(whole, mean.max() + 1), (1, _WIDEST))
+    return np.asarray(mean - opened[:, _WIDEST:-_WIDEST])
 
 
 def _without_gaps(values: Float) -> Float:

@@ -122,7 +122,10 @@ CASES = (
     Case("defocus", (1.8, 0.0), ("defocus",), figure=("lens_blur_px", lambda d: math.hypot(0.7, d))),
     Case("defective_pixels", (2e-4, 0.5), ("defective_pixels",), 2.0, changes=_EXACT),
     Case(
-        "read_noise", (60.0,), figure=("read_e", lambda e: math.hypot(15.0, e) / _OF_COLOUR), changes=_EXACT
+        "read_noise",
+        (60.0,),
+        figure=("read_dn", lambda e: math.hypot(15.0, e) * _OF_COLOUR * 255 / 10000),
+        changes=_EXACT,
     ),
     Case("full_well", (3000.0,), figure=("gain_e_per_dn", lambda e: e / 255 / _OF_COLOUR**2), changes=_EXACT),
     Case("fixed_pattern", (0.03,), figure=("gain_pattern", lambda g: g), changes=_EXACT),

@@ -56,6 +56,31 @@ def test_read_noise_in_electrons_is_no_surer_than_their_number():
     assert np.isinf(unknown.value), "without shot noise nothing is known in electrons"
 
 
+def test_read_noise_in_grey_levels_does_not_need_the_number_of_electrons():
+    """Only electrons were stated, 57 ± 14 for 81, though it was their number that was uncertain."""
+    made = [
+        photon_transfer(list(_dim_frames(np.random.default_rng(k), 1.5, 40.0)), BLACK, 255.0)
+        for k in range(12)
+    ]
+    levels, true = [n.read_levels for n in made], np.sqrt(1.5**2 - 1 / 12)
+    assert np.mean([abs(f.value - true) < 2 * f.sd for f in levels]) >= 0.8
+    assert np.median([f.sd for f in levels]) < 0.15 * true
+    assert np.median([n.read_electrons.sd for n in made]) > 0.15 * true * 40
+
+
+@pytest.mark.parametrize(("power", "known"), [(1.0, False), (0.4, True)])
+def test_a_response_is_known_only_if_read_noise_does_not_look_alike(power, known):
+    """Read noise of 1.3 grey levels under a linear response was told as an exponent of 1.45 ± .02."""
+    random = np.random.default_rng(3)
+    each = [random.uniform(8, 60, 600) for _ in range(6)]
+    made = [NoiseWindows(x, (1.6 + 0.017 * x) * random.chisquare(140, 600) / 140) for x in each]
+    if power != 1:
+        made = [NoiseWindows(x, 0.1 * x**power * random.chisquare(140, 600) / 140 + 1 / 12) for x in each]
+    gamma = photon_transfer(made, BLACK, 255.0).gamma
+    assert np.isfinite(gamma.sd) == known
+    assert not known or gamma.value == pytest.approx(2 - power, abs=0.1)
+
+
 @pytest.mark.parametrize("rows", [12, 60])
 def test_few_windows_show_little_of_the_noise_and_say_so(rows):
     """With some hundred windows each part alone had too few; all gave the same empty result with a σ of 0."""

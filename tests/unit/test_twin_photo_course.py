@@ -12,7 +12,7 @@ from pipeline.instrument.probe import Lighting
 from stages.twin.causes import causes
 from stages.twin.cells import SECTORS, Cells, Fitted, Law, sector_azimuth_rad
 from stages.twin.laws import lit_laws
-from stages.twin.photo_course import share_of_frames
+from stages.twin.photo_course import hidden_failures, share_of_frames
 from stages.twin.reference import WALL_COLUMNS
 from stages.twin.scene import Ring
 from stages.twin.seen_in_photo import beside_sectors
@@ -109,6 +109,16 @@ def test_no_law_of_the_photo_is_tried_between_frames_far_apart(step_mm, tried, m
     share = share_of_frames(_samples(), RING, cells.frame)
     with_it, without = (lit_laws(cells, Lighting(), RING, a)[1] for a in (share, np.zeros_like(share)))
     assert [len(a.places) / len(b.places) for a, b in zip(with_it, without, strict=True)] == [1, tried, tried]
+
+
+@pytest.mark.parametrize(("step_mm", "sentences"), [(5.0, 0), (20.0, 1), (60.0, 1)])
+def test_where_a_failing_led_may_be_missed_it_is_said(step_mm, sentences, monkeypatch):
+    """Between frames far apart nothing was told of it."""
+    monkeypatch.setattr("tests.unit.test_twin_photo_course.STEP_MM", step_mm)
+    said = hidden_failures(_samples(), RING)
+    assert len(said) == sentences
+    assert all("11 of 11 neighbouring pairs" in s and "may be missed" in s for s in said)
+    assert hidden_failures(None, RING) == ()
 
 
 def test_the_photo_of_a_long_pipe_takes_little_memory():

@@ -293,6 +293,15 @@ def test_a_second_ring_is_found_and_a_glint_is_not_taken_for_one():
     assert "second_line" not in _named(laser=lambda p, r: p + glint)
 
 
+def test_a_mirror_image_of_the_line_is_found_and_a_glow_about_the_line_is_not_taken_for_one():
+    """It lies at another ratio of radii in each direction if the probe is askew; it was missed."""
+    away = AWAY - 70 * (0.7 + 0.04 * np.cos(PHI) + 0.02 * np.sin(2 * PHI))
+    assert _named(laser=lambda p, r: p + 8 * np.exp(-0.5 * (away / 1.5) ** 2)) == [""]
+    for reach in (8, 25):
+        glow = 40 * np.exp(-abs(AWAY - 70) / reach)
+        assert not {"second_line", ""} & set(_named(laser=lambda p, r, more=glow: p + more))
+
+
 def test_an_effect_that_frames_show_unequally_is_confirmed_where_it_acts():
     random = np.random.default_rng(8)
     foretold = np.array([4.0, 9, 900, 30, 60, 14, 25])
