@@ -68,7 +68,7 @@ def other_truth(file: Path) -> Path:
 @pytest.mark.parametrize(
     ("place", "spoil", "told"),
     [
-        ("out/answers/a/diagnosis.json", half_of, "removed is made again"),
+        ("out/answers/a/diagnosis.json", half_of, "delete it, and the same command makes it again"),
         ("truth/a-gauge/truth.json", other_truth, "is not what was sealed"),
         ("truth/a-gauge/nonce.txt", lambda f: f.unlink(), "without it no hash can be checked"),
         ("truth/a-gauge", shutil.rmtree, "nonce.txt"),

@@ -90,7 +90,7 @@ def test_residuals_smaller_than_the_uncertainty_of_a_named_light_effect_are_no_r
     found = answer(real_probe, None, replace(seen("gauge"), profile=glow, geometry=rings))
     assert found.verdict is verdict
     assert [e.name for e in found.effects] == ["subsurface"]
-    told = [s for s in found.shortcomings if "less than the size of subsurface is uncertain" in s]
+    told = [s for s in found.shortcomings if "uncertain size of subsurface can explain all deviations" in s]
     assert bool(told) is (verdict is Verdict.NAMED)
     assert all("such as laser_cone, baseline_drift, moves them" in s for s in told)
 

@@ -101,7 +101,7 @@ def test_misplaced_pictures_at_an_end_are_not_a_sure_slip(placed: bool, strays: 
     wrong = replace(sight, distance_mm=distance_mm, placed=placed)
     (found,) = steps_found(with_events(wrong, read()), read())
     assert EventKind.OUTLIER in found.rivals
-    assert f"{count} stray pictures" in found.doubt
+    assert f"{count} misplaced pictures" in found.doubt
     assert f"{found.gain_mm:+.2f} mm" in found.doubt
     assert f"At {found.time_s:.2f} s" in found.doubt
     assert "they look the same here: record the passage again, slowly" in found.doubt

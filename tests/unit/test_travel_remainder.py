@@ -132,7 +132,7 @@ def test_single_misplaced_pictures_leave_no_remainder(placed):
 
 @pytest.mark.parametrize("placed", [True, False])
 def test_a_misplaced_picture_beside_a_slightly_misplaced_one_leaves_no_remainder(placed):
-    """Two of the same sign were taken for a row: "unless 1 pictures in a row are stray"."""
+    """Two of the same sign were taken for a row: "unless 1 pictures in a row were misplaced"."""
     sight = strayed({20: 2.0, 21: 0.2}, placed=placed)
     fit = with_events(sight, read())
     assert left_over(fit, steps_found(fit, read()), 0.05) is None
