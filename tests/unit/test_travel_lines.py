@@ -109,3 +109,9 @@ def test_the_size_of_a_swing_in_the_rhythm_of_the_lights_is_about_right(frequenc
     (line,) = find_lines(TIME_S, wander(6) + swing(frequency, 0.2), np.arange(len(TIME_S)) % 3 == 0)
     assert line.frequency_hz == pytest.approx(frequency, abs=0.05)
     assert line.amplitude_mm == pytest.approx(0.2, abs=0.02)
+
+
+def test_too_few_pictures_that_show_the_position_make_no_line_and_no_error():
+    """Two waves of the sheet left few pictures that did: the diagnosis ended with "SVD did not converge"."""
+    shown = np.arange(len(TIME_S)) % 10 == 0
+    assert find_lines(TIME_S, wander(1) + swing(5.3, 0.1), LIT, shown) == ()

@@ -210,7 +210,8 @@ def _measured(time_s: Float, xy_mm: Float, lit: Bool, frequency: float, p_value:
     laser_only = ~lit
     frequency = _refined(time_s, xy_mm, lit, frequency)
     both, sigma = amplitudes(time_s, xy_mm, lit, frequency)
-    direction = np.linalg.svd(both)[0][:, 0] if np.any(both) else np.array([1.0, 0.0])
+    told = np.isfinite(sigma) and np.any(both)
+    direction = np.linalg.svd(both)[0][:, 0] if told else np.array([1.0, 0.0])
     shares = []
     for kind in (lit, laser_only):
         clear = kind.sum() >= LEAST_SAMPLES / 2 and shows_apart(time_s[kind], frequency)
