@@ -32,12 +32,17 @@ from stages.diagnose.gauge.scan import span
 from stages.diagnose.gauge.sets import NAMELESS, prior_deviance, prior_sigma
 from stages.diagnose.inference import INSTRUMENT, Evidence, Stated, estimate, places_of
 
-# Size of the difference between an unknown law and the named one, relative to the latter: in equal steps of
-# the logarithm over the differences between the library's own laws. Over the rings of a gauge with bores of
+# 1 σ, in equal parts, of the difference between an unknown law and the named one, relative to the latter, in
+# each power of the radius; as large as the library's own laws differ. Over the rings of a gauge with bores of
 # 25 and 38 mm, 122 pairs that differ only in their growth differ by .31, 1.4 and 3.8 in the first power (10
-# %, 50 % and 90 % quantile) and by .29, 2.1 and 9.8 in the second. Courses of the library (constant, with
-# distance, its sign, all searched in time) differ from each other's best size by .32, .70 and 2.6 of it.
-_APART = (0.3, 1.0, 3.0)
+# %, 50 % and 90 % quantile) and by .29, 2.1 and 9.8 in the second: below these are 14, 54 and 87 %, and 13,
+# 69 and 99 %, of what these make. Over stepped gauges of 102 to 35 mm they differ by .56 to .68, 1.7 to 2.4
+# and 4.1 to 5.5 in the first power.
+GROWTH = (1.0, 2.0, 4.0)
+# The same of courses: those of the library (constant, with distance, its sign, all searched
+# in time) differ from each other's best size by .32, .70 and 2.6 of it (the same quantiles); below these are
+# 11, 43 and 86 % of what these make.
+_COURSE = (0.5, 1.0, 3.0)
 # Periods of a swing that a run must hold before its return is seen more than once. A sheet that hung to one
 # side of the pipe while the probe rolled by 300° passed for one that rocks once during the run, at .994.
 _LEAST_PERIODS = 2.0
@@ -95,9 +100,9 @@ def odds_of_unknown_laws(
 
     patterns = [pattern_of(t) for t in terms]
     laid_out = [(time, harmonic) for _, time, harmonic in patterns]
-    growth = odds_in(about, terms, [o.name for o in grown], laid_out, before, stated)
+    growth = odds_in(about, terms, [o.name for o in grown], laid_out, before, stated, GROWTH)
     around = [t.model.name if p[2] is None else p[2] for t, p in zip(terms, patterns, strict=True)]
-    course = odds_in(about, terms, [o.name for o in moved], around, before, stated, as_one=False)
+    course = odds_in(about, terms, [o.name for o in moved], around, before, stated, _COURSE, False)
     duration = span(run)[0]
     each = zip(growth, course, best.library_terms, strict=True)
     return tuple(
@@ -140,13 +145,14 @@ def _kind(model: EffectModel) -> tuple[int | None, bool, str]:
 
 def odds_in(
     about: Evidence, terms: Sequence[Term], others: Sequence[str], pattern: Sequence[object],
-    before: Callable[[Sequence[Term]], float], stated: Stated, as_one: bool = True,
+    before: Callable[[Sequence[Term]], float], stated: Stated, sizes: Sequence[float] = GROWTH,
+    as_one: bool = True,
 ) -> tuple[float, ...]:  # fmt: skip
     """Return the odds of unknown laws in the place of each of the terms that ``others`` resemble.
 
     ``about`` is the evidence over all terms and all others, ``pattern`` what terms must share to be one law,
-    and ``before`` −2 ln of the prior probability of terms; ``as_one`` says whether terms along one direction
-    may be one law as they are.
+    and ``before`` −2 ln of the prior probability of terms; ``sizes`` are the 1 σ of differences, equally
+    likely, and ``as_one`` says whether terms along one direction may be one law as they are.
     """
     alone, odds = _surprise(about, terms, "", 0.0, stated), np.zeros(len(others))
     for group in _groups(pattern):
@@ -154,7 +160,7 @@ def odds_in(
         each = []
         for k in grown:
             kept = [t for n, t in enumerate(terms) if n == k or n not in group]
-            left = [_surprise(about, kept, others[k], apart, stated) for apart in _APART]
+            left = [_surprise(about, kept, others[k], apart, stated) for apart in sizes]
             headed = all(len(terms[n].amplitude) == len("xy") for n in group)
             if as_one and (len(group) > _AS_ANY or (len(group) > 1 and headed)):
                 left.append(_surprise(_aligned(about, terms, group, k), terms, "", 0.0, stated))
