@@ -60,14 +60,29 @@ FREE_PROFILES: tuple[tuple[FreeProfile, Shape], ...] = tuple(
 def patterns_in_course(like: EffectModel, harmonic: int | None) -> tuple[PatternInCourse, ...]:
     """Return the patterns of a harmonic that have an effect's course and displace what the effect does not.
 
-    For an effect on the laser's line they displace the picture, and the other way round: a law of the
-    effect's own kind with another growth is tested separately (`stages.diagnose.gauge.unknown_laws`). There
-    are none for constant effects.
+    For an effect on the laser's line they displace the picture, and the other way round: see
+    `patterns_of_kind`. There are none for constant effects.
     """
     if like.kind is CourseKind.CONSTANT:
         return ()
-    law = effect(like.static.law if isinstance(like, Drifting) else like.law)
-    moves = Moves.OUTWARD if law.fixed_to is FixedTo.LASER else Moves.LINE
-    powers = [t for t in GENERIC if t.moves is moves and t.harmonic == harmonic]
-    free = [profile for profile, _ in FREE_PROFILES if profile.powers[0] in powers]
-    return tuple(PatternInCourse(p, like.kind, like) for p in (*powers, *free))
+    moves = Moves.OUTWARD if _of_laser(like) else Moves.LINE
+    return tuple(PatternInCourse(p, like.kind, like) for p in _patterns(moves, harmonic))
+
+
+def patterns_of_kind(like: EffectModel, harmonic: int | None) -> tuple[Nameless, ...]:
+    """Return the steady patterns of a harmonic that displace what a constant effect displaces.
+
+    They are its law with another growth, which is weighed by `stages.diagnose.gauge.unknown_laws`.
+    """
+    moves = Moves.LINE if _of_laser(like) else Moves.OUTWARD
+    return _patterns(moves, harmonic) if like.kind is CourseKind.CONSTANT else ()
+
+
+def _of_laser(model: EffectModel) -> bool:
+    law = effect(model.static.law if isinstance(model, Drifting) else model.law)
+    return law.fixed_to is FixedTo.LASER
+
+
+def _patterns(moves: Moves, harmonic: int | None) -> tuple[Nameless, ...]:
+    powers = tuple(t for t in GENERIC if t.moves is moves and t.harmonic == harmonic)
+    return (*powers, *(profile for profile, _ in FREE_PROFILES if profile.powers[0] in powers))

@@ -20,8 +20,8 @@ from pipeline.arrays import Float, Int
 from pipeline.physics.effect import CourseKind
 from stages.diagnose.effects.base import EffectModel, Shape
 from stages.diagnose.effects.courses import SEARCHED, Coursed
-from stages.diagnose.effects.free_profile import FREE_PROFILES, patterns_in_course
-from stages.diagnose.effects.nameless import VOCABULARY, Nameless, PatternInCourse
+from stages.diagnose.effects.free_profile import FREE_PROFILES, patterns_in_course, patterns_of_kind
+from stages.diagnose.effects.nameless import STEADY, VOCABULARY, Nameless, PatternInCourse
 from stages.diagnose.gauge.fit import Fit
 from stages.diagnose.gauge.run import GaugeRun, Term, pattern_of
 from stages.diagnose.gauge.scan import Scored, span
@@ -64,6 +64,14 @@ class Member:
     def nameless(self) -> bool:
         """Whether it is a pattern without a cause."""
         return isinstance(self.model, Nameless)
+
+    @property
+    def of_kind(self) -> tuple[tuple[Nameless, Shape], ...]:
+        """Steady patterns that are a constant law like its own with another growth."""
+        if self.nameless:
+            return ()
+        harmonic = pattern_of(Term(self.model, self.shape, np.ones(len(self.model.amplitudes))))[2]
+        return tuple((p, STEADY) for p in patterns_of_kind(self.model, harmonic))
 
 
 def cause_of(model: EffectModel, shape: Shape) -> LawAndOrder:
@@ -218,10 +226,16 @@ class Sets:
         return frozenset(k for k, m in enumerate(self.members) if (m.model.name, m.shape) in own)
 
     def without_describing_patterns(self, chosen: Set) -> Sets:
-        """Return the sets without patterns that merely describe one of some effects: they are no rivals."""
+        """Return the sets without patterns that merely describe one of some effects: they are no rivals.
+
+        Nor are patterns of an effect's kind: as unknown laws like it they count already
+        (`stages.diagnose.gauge.unknown_laws`).
+        """
+        own = {p for c in chosen for p in self.members[c].of_kind}
         echoes = {
             k for k, member in enumerate(self.members)
-            if member.nameless and k not in chosen and any(self._apart(k, c) < SAME**2 for c in chosen)
+            if member.nameless and k not in chosen
+            and ((member.model, member.shape) in own or any(self._apart(k, c) < SAME**2 for c in chosen))
         }  # fmt: skip
         kept = [k for k in range(len(self.members)) if k not in echoes]
         return replace(
