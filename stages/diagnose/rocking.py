@@ -16,15 +16,13 @@ def rocking_excluded(line: Line, seen: Seen) -> bool:
     If the sheet is assumed to be at rest, a tilt φ of it moves the ring like a camera that is r² φ / l off
     the axis. But only a sheet moves rings relative to fiducials, the more the wider the bore.
     """
-    if seen.geometry is None or any("laser_rocking" in names for names in seen.geometry.unsplit):
+    if seen.geometry is None:
         return False
     rings, verdicts = seen.geometry.searched.nothing.linearised.rings, seen.geometry.verdicts
     about = [f for f in seen.geometry.feasibility if f.name == "laser_rocking"]
-    suspected = verdicts is not None and any(
-        p > _ROCKING_P and "laser_rocking" in j.names
-        for p, j in zip(verdicts.probability, verdicts.judged, strict=True)
-    )
-    if not about or suspected:
+    sets = verdicts.sets if verdicts is not None else ()
+    suspected = sum(p for p, terms in sets if any(t.model.law == "laser_rocking" for t in terms))
+    if not about or suspected > _ROCKING_P:
         return False
     widest_mm = float(np.max(rings.radius_mm))
     needed_mrad = 1e3 * line.amplitude_mm * rings.probe.laser.baseline_mm / widest_mm**2

@@ -54,16 +54,16 @@ def judged(*terms: Term) -> Judged:
 def gauge_run(sets: list[tuple[tuple[Term, ...], float]], *alike: tuple[str, ...], **given: Any) -> Any:
     """Return a gauge run with fitted sets and their probabilities, the best first.
 
-    ``alike`` is what looks like each effect of the best. All names are confirmed, unless ``given`` says
-    otherwise.
+    ``alike`` are laws that predict held-out measurements better in the place of effects of the best, each set
+    with probability 0. All names are confirmed, unless ``given`` says otherwise.
     """
-    fitted = tuple(judged(*terms) for terms, _ in sets)
-    count = len(fitted[0].library_terms)
-    verdicts = Verdicts((), fitted, np.array([p for _, p in sets]), 1.0, cast(Any, None), (), 25)
+    better = [replace(judged(*map(term, laws)), heldout=-1.0) for laws in alike]
+    fitted = (*(judged(*terms) for terms, _ in sets), *better)
+    count, chance = len(fitted[0].library_terms), [*(p for _, p in sets), *(0.0 for _ in better)]
+    verdicts = Verdicts((), fitted, np.array(chance), 1.0, cast(Any, None), (), 25)
     agrees = Confirmation("1", "1", True)
     seen = {"best": fitted[0], "verdicts": verdicts, "feasibility": [], "quality": None} | {
-        "unsplit": (*alike, *[()] * (count - len(alike))), "confirmed": ((agrees,),) * count,
-        "unknown_laws": (Unknown(0.0, 0.0),) * count,
+        "confirmed": ((agrees,),) * count, "unknown_laws": (Unknown(0.0, 0.0),) * count,
     }  # fmt: skip
     return SimpleNamespace(**seen | given)
 
@@ -141,7 +141,7 @@ def test_a_rival_far_less_likely_than_any_other_is_left_out(same_shift):
 def test_what_looks_like_several_effects_is_as_likely_as_the_likelier_of_them_at_least(same_shift):
     """The second effect's alike took the place of the first's, at 2 %."""
     both = (term("laser_tilt"), term("laser_cone"))
-    found = by.weighed(gauge_run([(both, 1.0)], ("baseline",), ("baseline", "focal_scale")), ())
+    found = by.weighed(gauge_run([(both, 1.0)], ("baseline",), ("laser_tilt", "focal_scale")), ())
     assert chances(found) == {
         "laser_tilt": 0.5, "laser_cone": 0.3333, "focal_scale": 0.3333, "baseline": round(2 / 3, 4),
     }  # fmt: skip

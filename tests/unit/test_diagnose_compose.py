@@ -189,9 +189,10 @@ def geometry(detectable_mrad: float, *suspected: str) -> Any:
     laser = SimpleNamespace(baseline_mm=20.0)
     rings = SimpleNamespace(radius_mm=np.array([40.0]), probe=SimpleNamespace(laser=laser))
     searched = SimpleNamespace(nothing=SimpleNamespace(linearised=SimpleNamespace(rings=rings)))
-    verdicts = SimpleNamespace(probability=(0.6,), judged=(SimpleNamespace(names=suspected),))
+    terms = tuple(SimpleNamespace(model=SimpleNamespace(law=law)) for law in suspected)
+    verdicts = SimpleNamespace(sets=((0.6, terms),))
     table = (SimpleNamespace(name="laser_rocking", detectable=detectable_mrad),)
-    return SimpleNamespace(searched=searched, verdicts=verdicts, feasibility=table, unsplit=())
+    return SimpleNamespace(searched=searched, verdicts=verdicts, feasibility=table)
 
 
 @pytest.mark.parametrize(
@@ -228,7 +229,7 @@ def test_ring_residuals_without_a_pattern_are_attributed_to_the_effect_found_in_
     names: tuple[str, ...], claimed: bool, verdict: Verdict
 ) -> None:
     best = SimpleNamespace(named=False, names=names, library_terms=())
-    rings = SimpleNamespace(best=best, verdicts=SimpleNamespace(adequacy=0.5), confirmed=(), unsplit=())
+    rings = SimpleNamespace(best=best, verdicts=SimpleNamespace(adequacy=0.5), confirmed=())
     own = [cast(Any, SimpleNamespace(location=Location("motion", None, None)))] * claimed
     assert verdict_of_rings(cast(Any, rings), own) is verdict
 

@@ -18,8 +18,7 @@ from stages.diagnose.gauge.elimination import (
     eliminate_poses,
     of_no_edge,
 )
-from stages.diagnose.gauge.feasible import expected_gain
-from stages.diagnose.gauge.formula import APART, joint_p
+from stages.diagnose.gauge.formula import joint_p
 from stages.diagnose.gauge.run import Term
 from stages.diagnose.gauge.score_spread import score_inflation
 from stages.diagnose.gauge.sets import NAMELESS
@@ -196,16 +195,6 @@ def test_deflated_evidence_counts_correlated_measurements_once():
     assert estimate(three_times, stated, sigma).deviance == pytest.approx(
         estimate(once, stated, sigma).deviance
     )
-
-
-def test_collinear_effects_are_not_distinguished_and_different_ones_are():
-    stated = Stated((), np.zeros((0, 0)))
-    columns = (Column("a", ""), Column("b", ""), Column("c", ""))
-    a, c = np.random.default_rng(8).normal(size=(2, 1000))
-    of = evidence_of(np.stack([a, 1.3 * a + 1e-3 * c, c], 1), 0 * a, columns)
-    first, size = np.array([0]), np.array([1.0])
-    assert expected_gain(of, stated, first, size, np.array([1])) < APART
-    assert expected_gain(of, stated, first, size, np.array([2])) == pytest.approx(a @ a, rel=0.01)
 
 
 @pytest.mark.parametrize(("hidden", "low", "high"), [(0.0, 1e-3, 1.0), (4.0, 0.0, 1e-6)])

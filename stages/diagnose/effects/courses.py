@@ -257,30 +257,6 @@ def with_courses(
     return {**library, **{model.name: model for model in more}}
 
 
-def shape_alike(
-    model: EffectModel, other: EffectModel, shape: Shape, amplitude: Float, duration_s: float
-) -> Shape | None:
-    """Return the shape at which a model has nearly the course of another effect; None if there is none.
-
-    A ramp and a slow drift are nearly the same curve: with a time constant of 6.4 recordings, the drift
-    differs from a straight line by 1.6 % of its size. The final size must be possible, so that a large ramp
-    can only be replaced by a quicker drift, which is bent more.
-
-    Parameters
-    ----------
-    other, shape, amplitude
-        The effect that was found, its shape and its amplitudes (Q,).
-    """
-    if isinstance(other, Drifting) and isinstance(model, Coursed):
-        ramps = model.kind is CourseKind.RAMP and model.law == other.static.law
-        return (duration_s,) if ramps else None
-    if not (isinstance(model, Drifting) and isinstance(other, Coursed) and other.kind is CourseKind.RAMP):
-        return None
-    final = amplitude * duration_s / shape[0]
-    slowest_first = reversed(model.shapes(duration_s, 0.0) if model.static.law == other.law else ())
-    return next((s for s in slowest_first if model.possible(s, final / reached(duration_s, s))), None)
-
-
 def _stands(time_s: Float, speed: Float) -> Bool:
     """Return when a probe with speeds (M,) at times (M,), in any order, stands still."""
     if not len(time_s):

@@ -173,7 +173,7 @@ def members(examined: Examined) -> tuple[str, ...]:
         return ()
     certain = {t.model.law for t, is_sure in zip(best.library_terms, sure(examined), strict=False) if is_sure}
     names = (*verdicts.likely_laws(SURE), *chain(*(j.laws for j in better_held_out(verdicts))))
-    return tuple(n for n in dict.fromkeys((*names, *chain(*examined.unsplit))) if n not in certain)
+    return tuple(n for n in dict.fromkeys(names) if n not in certain)
 
 
 def formula(examined: Examined) -> str:
@@ -201,6 +201,6 @@ def verdict_of(examined: Examined) -> Verdict:
     if any(sure(examined)):
         return Verdict.PARTLY
     # A class of effects would not include the unknown cause.
-    known = any(examined.unsplit) or not unknown_rivals(examined)
+    known = not unknown_rivals(examined)
     known &= all(beyond.odds < 1 for beyond in examined.unknown_laws)
     return Verdict.CLASS if best.named and known else Verdict.UNEXPLAINED

@@ -30,7 +30,7 @@ class Doubt:
     Attributes
     ----------
     alike : dict of str to float
-        Of each law that this run cannot tell from it or that predicts held-out measurements better.
+        Of each law that predicts held-out measurements better.
     absent : float
         That nothing is in its place.
     outside : float
@@ -64,12 +64,11 @@ def chances(examined: Examined) -> tuple[float, ...]:
 def doubts(examined: Examined) -> tuple[Doubt, ...]:
     """Return what makes each name of the likeliest hypothesis doubtful.
 
-    At least as likely as the name is each cause that this run cannot be expected to distinguish from it, and
-    each other name of a hypothesis of as many names or fewer that predicts held-out measurements better; if
-    that has no other name, so is nothing in its place. Outside are unknown laws and courses, and `UNKNOWN`
-    more where no second prediction agrees; and at even odds each sign that the hypothesis is wrong: a
-    prediction that fails, a remainder that is not noise or that moves rings or fiducials by more than the
-    effect, and poorly predicted held-out measurements.
+    At least as likely as the name is each other name of a hypothesis of as many names or fewer that predicts
+    held-out measurements better; if that has no other name, so is nothing in its place. Outside are unknown
+    laws and courses, and `UNKNOWN` more where no second prediction agrees; and at even odds each sign that
+    the hypothesis is wrong: a prediction that fails, a remainder that is not noise or that moves rings or
+    fiducials by more than the effect, and poorly predicted held-out measurements.
     """
     best, verdicts = examined.best, examined.verdicts
     if best is None or verdicts is None:
@@ -77,13 +76,13 @@ def doubts(examined: Examined) -> tuple[Doubt, ...]:
     everywhere = (verdicts.adequacy < ADEQUATE) + (not fits(examined))
     patterns = best.fit.terms[len(best.library_terms) :]
     left = max((shift_px(best.fit, t) for t in patterns), default=0.0)
-    each = zip(best.library_terms, examined.unsplit, examined.confirmed, examined.unknown_laws, strict=False)
+    each = zip(best.library_terms, examined.confirmed, examined.unknown_laws, strict=False)
     out = []
-    for term, unsplit, confirmed, beyond in each:
+    for term, confirmed, beyond in each:
         signs = everywhere + sum(not c.agrees for c in confirmed) + (left > shift_px(best.fit, term))
         unknown = beyond.odds + UNKNOWN * (not any(c.agrees for c in confirmed))
         better = _better_without(verdicts, term)
-        alike = _at_least_as_likely(verdicts, term, (*unsplit, *chain(*better)))
+        alike = _at_least_as_likely(verdicts, term, tuple(chain(*better)))
         out.append(Doubt(alike, float(() in better), signs + unknown))
     return tuple(out)
 

@@ -19,7 +19,7 @@ from stages.diagnose.effects.courses import SEARCHED, with_courses
 from stages.diagnose.effects.nameless import Nameless
 from stages.diagnose.gauge.bores import Misdrawn, misdrawn_bore
 from stages.diagnose.gauge.confirm import Sized, confirmations, sizes_of
-from stages.diagnose.gauge.feasible import ability, feasibility, not_told_apart
+from stages.diagnose.gauge.feasible import ability, feasibility
 from stages.diagnose.gauge.fit import fit
 from stages.diagnose.gauge.formula import ADEQUATE, patterns_by_chance, swings
 from stages.diagnose.gauge.heldout import fit_quality
@@ -107,9 +107,6 @@ class Examined:
         The same terms' amplitudes with their covariances.
     feasibility : tuple of Feasible
         Detectable size of each effect, computed before any residual was used.
-    unsplit : tuple of tuple of str
-        For each effect of the best hypothesis, effects that this run cannot be expected to distinguish from
-        it at its size.
     location : Location or None
     quality : FitQuality or None
     unknown_laws : tuple of Unknown
@@ -124,7 +121,6 @@ class Examined:
     verdicts: Verdicts | None
     confirmed: tuple[tuple[Confirmation, ...], ...]
     feasibility: tuple[Feasible, ...]
-    unsplit: tuple[tuple[str, ...], ...] = ()
     location: Location | None = None
     quality: FitQuality | None = None
     sizes: tuple[Sized, ...] = ()
@@ -222,12 +218,10 @@ def _judged(seen: Examined, library: Mapping[str, EffectModel], stated: Stated) 
     nothing = next(j for j in verdicts.judged if not j.fit.terms)
     terms, alike = best.library_terms, searched.inflation
     ratio = believed(best.evidence, alike)
-    unsplit = not_told_apart(run, searched.nothing, terms, library, stated, alike) if terms else ()
     shown = best if terms and verdicts.adequacy >= ADEQUATE else verdicts.formula
     return replace(
         seen,
         confirmed=confirmations(run, best, regimes, terms, stated) if terms else (),
-        unsplit=unsplit,
         sizes=sizes_of(run, best, stated, alike) if terms else (),
         unknown_laws=odds_of_unknown_laws(run, best, stated, ratio, library),
         location=location_of(run, shown, stated, ratio),

@@ -12,12 +12,9 @@ import numpy as np
 
 from pipeline.arrays import Float, Int
 from pipeline.physics.catalogue import effect
-from pipeline.physics.effect import CourseKind
 from stages.diagnose.effects.base import EffectModel, Shape
-from stages.diagnose.effects.courses import Coursed, shape_alike
 from stages.diagnose.gauge.fit import Fit, evidence
-from stages.diagnose.gauge.formula import APART
-from stages.diagnose.gauge.run import GaugeRun, Term
+from stages.diagnose.gauge.run import GaugeRun
 from stages.diagnose.gauge.scan import span
 from stages.diagnose.inference import Evidence, Stated, eliminated, instrument_places, places_of
 from stages.diagnose.result import Feasible
@@ -45,52 +42,6 @@ def feasibility(
         name: block for name, block in places.items() if _least(own_information(about, stated, block)) > 0
     }
     return tuple(_feasible(name, about, seen, library, stated) for name in seen)
-
-
-def not_told_apart(
-    run: GaugeRun, nothing: Fit, terms: Sequence[Term], library: Mapping[str, EffectModel], stated: Stated,
-    alike: float,
-) -> tuple[tuple[str, ...], ...]:  # fmt: skip
-    """Return, for each term, effects that this run cannot be expected to distinguish from it at its size."""
-    laws = {t.model.law for t in terms}
-    rivals = [
-        (model, shape)
-        for model in library.values()
-        if model.law not in laws
-        for shape in _shapes_beside(model, terms, run)
-    ]
-    asked = [*((t.model, t.shape) for t in terms), *rivals]
-    about = evidence(run, nothing, asked, with_spread=False)[0].deflated(alike)
-    blocks = [(places_of(about, t.model, t.shape), t.amplitude) for t in terms]
-    places = [(model.law, places_of(about, model, shape)) for model, shape in rivals]
-    seen = [(law, rival) for law, rival in places if np.diag(about.information)[rival].min() > 0]
-    return tuple(
-        tuple(dict.fromkeys(
-            law for law, rival in seen if expected_gain(about, stated, block, size, rival) < APART
-        ))
-        for block, size in blocks
-    )  # fmt: skip
-
-
-def _shapes_beside(model: EffectModel, terms: Sequence[Term], run: GaugeRun) -> set[Shape]:
-    """Return the shapes at which a model is a rival of terms: those of their course, else the middle one.
-
-    A law with a course is only a rival of terms with the same course, and of a drift or ramp similar to it in
-    this run.
-    """
-    beside = {t.shape for t in terms if t.model.kind is model.kind and model.kind is not CourseKind.CONSTANT}
-    middle, duration_s = _middle(model.shapes(*span(run))), span(run)[0]
-    if not beside and middle is not None and not isinstance(model, Coursed):
-        beside = {middle}
-    alike = (shape_alike(model, t.model, *t.at(t.amplitude), duration_s) for t in terms)
-    return beside | {shape for shape in alike if shape is not None}
-
-
-def expected_gain(about: Evidence, stated: Stated, block: Int, amplitude: Float, rival: Int) -> float:
-    """Return by how much χ² is expected to prefer an effect of this size over its best-fitting rival."""
-    free = np.union1d(instrument_places(about), rival)
-    own, _, _ = eliminated(about, stated, block, free)
-    return float(amplitude @ own @ amplitude)
 
 
 def own_information(about: Evidence, stated: Stated, block: Int, rival: Int | None = None) -> Float:

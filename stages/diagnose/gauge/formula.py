@@ -36,9 +36,6 @@ _MOST_TERMS = 4
 # A fit is adequate unless noise alone gives its residual with less than this probability. Debt:
 # data/debts.md.
 ADEQUATE = 1e-5
-# Twice the logarithm of the expected Bayes factor (1000 to 1) above which two causes count as
-# distinguishable.
-APART = 14.0
 # Directions with less information than this share of the best one are excluded from the test of adequacy.
 # Debt: data/debts.md.
 _WEAK = 1e-3
