@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numba
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
 from pipeline.adjustment.robust import MAD_TO_SIGMA, robust_spreads
-from pipeline.arrays import Bool, Byte, Float32
+from pipeline.arrays import Bool, Byte, Float32, Int
 from pipeline.artefacts.measured import RingSamples, RingValidity
 from stages.rings.glints import lone_runs
 from stages.rings.kernels import median, take_finite
+from stages.rings.turning import turned, turns
 
 _NEIGHBOURS = 9
 _OUTLIER_SIGMAS = 6.0
@@ -19,11 +22,24 @@ _MAJORITY = 0.5
 
 def contradicted(rings: RingSamples) -> tuple[Byte, Float32]:
     """Return validity and σ (F, A), px, of rings after every sample was compared with its neighbours."""
+    by = turns(np.where(rings.valid, rings.radius_px, np.float32(np.nan)))
+    validity, sigma = _compared(_turned(rings, -by))
+    return turned(validity, by), turned(sigma, by)
+
+
+def _compared(rings: RingSamples) -> tuple[Byte, Float32]:
+    """Return the same for rings that show the wall at the same azimuths."""
     validity = mark_outliers(rings.radius_px, rings.sigma_px, rings.validity)
     radius = np.where(validity == RingValidity.VALID, rings.radius_px, np.float32(np.nan))
     glint, sigma = lone_runs(radius, rings.sigma_px, rings.width_px, rings.amplitude)
     validity[glint] = RingValidity.GLINT
     return validity, sigma
+
+
+def _turned(rings: RingSamples, by: Int) -> RingSamples:
+    """Return rings whose samples are turned by so many sectors (F,)."""
+    names = ("radius_px", "sigma_px", "width_px", "amplitude", "validity")
+    return replace(rings, **{name: turned(getattr(rings, name), by) for name in names})
 
 
 def mark_outliers(radius_px: Float32, sigma_px: Float32, validity: Byte) -> Byte:
