@@ -20,7 +20,7 @@ from pipeline.machine.run_folder import Exporter, RunFolder, Writer, published_k
 from pipeline.machine.scratch import Scratch
 from pipeline.machine.stage import Context, plain
 from pipeline.machine.store import Provenance, Store, Stored
-from pipeline.system.native import give_back_memory
+from pipeline.system.native import give_back_memory, keep_freed_memory
 from pipeline.system.parallel import one_library_thread
 
 _LONGEST_PROBLEM = 300  # characters of an unexpected error that run.json quotes; the log has all of it
@@ -97,6 +97,7 @@ class Runner:
             For anything else that a stage or exporter raised; the traceback is in the log.
         """
         selection.check(self._plan)
+        keep_freed_memory()
         self._display.planned(1 if selection.only else len(self._plan.steps))
         try:
             with self._writer:
