@@ -14,6 +14,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import cv2
+import numba
 import numpy as np
 
 from pipeline.arrays import Bool, Float, Float32, Int
@@ -22,6 +23,7 @@ from pipeline.machine.scratch import Scratch
 from stages.defects.along import stretches
 from stages.defects.relief import WallRelief
 from stages.defects.segment import Region, instances
+from stages.defects.thinning import thinned
 
 # 1 σ of the smoothing, the larger of mm and pixels: a wide crack is 0.5 mm or two pixels of a usual photo.
 _LINE_MM, _LINE_PX = 0.25, 1.0
@@ -105,19 +107,15 @@ class _Strip:
 
     def _strengths(self) -> tuple[Float32, Float32]:
         """Return the strength of dark and bright lines (h, w) relative to the usual; 0 without a photo."""
-        grey = cv2.cvtColor(self._picture[..., :3], cv2.COLOR_BGR2GRAY).astype(np.float32)
+        grey = cv2.cvtColor(self._picture, cv2.COLOR_BGRA2GRAY).astype(np.float32)
         smooth = self._blurred(np.log(grey + _DARKEST), max(_LINE_MM, _LINE_PX * max(self._cell)))
+        ss, aa, sa = (cv2.Sobel(smooth, cv2.CV_32F, *n) for n in ((0, 2), (2, 0), (1, 1)))
         along, around = (1 / c**2 for c in self._cell)
-        ss = cv2.Sobel(smooth, cv2.CV_32F, 0, 2) * along
-        aa = cv2.Sobel(smooth, cv2.CV_32F, 2, 0) * around
-        sa = cv2.Sobel(smooth, cv2.CV_32F, 1, 1) * np.sqrt(along * around)
-        middle, half = (ss + aa) / 2, np.hypot((ss - aa) / 2, sa)
-        dark = np.maximum(middle + half - np.abs(middle - half), 0)
-        bright = np.maximum(half - middle - np.abs(middle + half), 0)
+        scale = np.array([along, around, np.sqrt(along * around)], np.float32)
+        dark, bright, power = _valleys_and_ridges(ss, aa, sa, scale)
         window = tuple(max(1, round(_AROUND_MM / c)) for c in self._cell[::-1])
-        usual = np.sqrt(np.maximum(cv2.blur((dark + bright) ** 2, window), np.finfo(np.float32).tiny))
-        seen = self._seen()
-        return dark / usual * seen, bright / usual * seen
+        _relative(dark, bright, cv2.blur(power, window), self._seen())
+        return dark, bright
 
     def _blurred(self, image: Float32, sigma_mm: float) -> Float32:
         along, around = (sigma_mm / c for c in self._cell)
@@ -131,8 +129,8 @@ class _Strip:
 
     def _lines(self, strength: Float32) -> list[_Line]:
         """Return the heaviest lines: connected pixels above the limit, thinned to a width of one pixel."""
-        thin = cv2.ximgproc.thinning(np.where(strength > _GOES_ON, 255, 0).astype(np.uint8))
-        _, label = cv2.connectedComponents(thin)
+        thin = thinned(strength > _GOES_ON)
+        _, label = cv2.connectedComponents(thin.view(np.uint8))
         row, column = np.nonzero(thin)
         number = label[row, column]
         weight = np.bincount(number, np.minimum(strength[row, column], _MOST))
@@ -154,6 +152,36 @@ class _Strip:
         j = np.rint((psi - radius_map.azimuth_rad[0]) / step).astype(int) % relief.shape[1]
         on_map = (i >= 0) & (i < relief.shape[0])
         return i[on_map], j[on_map]
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _valleys_and_ridges(ss, aa, sa, scale):  # type: ignore[no-untyped-def]
+    """Return curvature (h, w) across valleys and across ridges, and the square of their sum.
+
+    ``ss``, ``aa`` and ``sa`` (h, w), times ``scale`` (3,), are the second derivatives along the pipe, around
+    it and mixed. Across a line one principal curvature is large; the other one, whatever its sign, is not.
+    """
+    dark, bright, power = np.empty_like(ss), np.empty_like(ss), np.empty_like(ss)
+    for i in range(ss.shape[0]):
+        for j in range(ss.shape[1]):
+            s, a, m = ss[i, j] * scale[0], aa[i, j] * scale[1], sa[i, j] * scale[2]
+            middle, turn = (s + a) / np.float32(2), (s - a) / np.float32(2)
+            half = np.hypot(turn, m)
+            dark[i, j] = max(middle + half - abs(middle - half), np.float32(0))
+            bright[i, j] = max(half - middle - abs(middle + half), np.float32(0))
+            power[i, j] = (dark[i, j] + bright[i, j]) ** 2
+    return dark, bright, power
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _relative(dark, bright, power, seen):  # type: ignore[no-untyped-def]
+    """Divide strengths by the root of the mean ``power`` around, in place; 0 where no photo is ``seen``."""
+    least = np.finfo(np.float32).tiny
+    for i in range(dark.shape[0]):
+        for j in range(dark.shape[1]):
+            usual = np.sqrt(max(power[i, j], least))
+            dark[i, j] = dark[i, j] / usual if seen[i, j] else np.float32(0)
+            bright[i, j] = bright[i, j] / usual if seen[i, j] else np.float32(0)
 
 
 def lies_beside(line: Region, found: Region, relief: WallRelief) -> bool:
