@@ -126,8 +126,9 @@ def _empty(count: int, azimuth_rad: Float) -> Pictures:
 
 def combing(image: Image) -> float:
     """Return how much more neighbouring rows of a picture (H, W) differ than rows two apart; a ratio."""
-    rows = image[:, ::_EVERY_COLUMN].astype(np.float32)
-    next_row, next_but_one = (float(np.mean((rows[n:] - rows[:-n]) ** 2)) for n in (1, 2))
+    rows = np.ascontiguousarray(image[:, ::_EVERY_COLUMN])
+    squares = (cv2.norm(rows[n:], rows[:-n], cv2.NORM_L2SQR) / rows[n:].size for n in (1, 2))
+    next_row, next_but_one = squares
     return next_row / next_but_one if next_but_one > 0 else float("nan")
 
 

@@ -7,6 +7,7 @@ the picture. If motion followed them, the wall would seem to stand still.
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import dataclass
 
 import cv2
 import numpy as np
@@ -92,9 +93,10 @@ def static_places(images: Iterable[Image], wall: Bool) -> Bool:
     """Return where (h, w) something stays in grey pictures (H, W), while the ``wall`` (h, w) moves."""
     last, count = None, 0
     total, power = (np.zeros(wall.shape, np.float32) for _ in range(2))
-    for fine in in_threads(lambda image: _fine(image, wall.shape), images, _THREADS):
-        if last is None or _moved(last, fine, wall):
-            total, power, last, count = total + fine, power + fine * fine, fine, count + 1
+    on_wall = _cells(wall.astype(np.float32)) > 0.5
+    for fine in in_threads(lambda image: _Fine.of(image, wall.shape), images, _THREADS):
+        if last is None or _moved(last, fine, on_wall):
+            total, power, last, count = total + fine.contrast, power + fine.squared, fine, count + 1
     if count < _FEWEST:
         return np.zeros_like(wall)
     steady = (total / count) ** 2
@@ -117,23 +119,35 @@ def _wall_in(camera: Camera) -> Bool:
     return np.asarray((z > near) & (z < far))
 
 
-def _fine(image: Image, shape: tuple[int, ...]) -> Float32:
-    """Return the fine contrast (h, w) of a picture (H, W)."""
-    grey = cv2.resize(image, shape[::-1], interpolation=cv2.INTER_AREA).astype(np.float32)
-    light = cv2.GaussianBlur(grey, (0, 0), _FINE * min(shape))
-    return np.asarray((grey - light) / (light + _DARK), np.float32)
+@dataclass(frozen=True)
+class _Fine:
+    """The fine contrast (h, w) of a picture, its square, and the mean square of each cell."""
+
+    contrast: Float32
+    squared: Float32
+    power: Float32
+
+    @staticmethod
+    def of(image: Image, shape: tuple[int, ...]) -> _Fine:
+        """Return the contrast of a picture (H, W), reduced to a ``shape``."""
+        grey = cv2.resize(image, shape[::-1], interpolation=cv2.INTER_AREA).astype(np.float32)
+        light = cv2.GaussianBlur(grey, (0, 0), _FINE * min(shape))
+        contrast = np.asarray((grey - light) / (light + _DARK), np.float32)
+        squared = contrast * contrast
+        return _Fine(contrast, squared, _cells(squared))
 
 
-def _moved(before: Float32, now: Float32, wall: Bool) -> bool:
-    """Return whether most cells of two pictures (h, w) differ."""
-    cell = _odd(_CELL, before.shape)
-    size = (before.shape[1] // cell, before.shape[0] // cell)
-    both, one, other, seen = (
-        cv2.resize(p, size, interpolation=cv2.INTER_AREA)
-        for p in (before * now, before * before, now * now, wall.astype(np.float32))
-    )
-    on_wall = seen > 0.5
-    correlation = both[on_wall] / np.sqrt(one[on_wall] * other[on_wall] + 1e-12)
+def _cells(picture: Float32) -> Float32:
+    """Return the mean of each cell of a picture (h, w)."""
+    cell = _odd(_CELL, picture.shape)
+    size = (picture.shape[1] // cell, picture.shape[0] // cell)
+    return np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_AREA), np.float32)
+
+
+def _moved(before: _Fine, now: _Fine, on_wall: Bool) -> bool:
+    """Return whether most cells ``on_wall`` of two pictures differ."""
+    both = _cells(before.contrast * now.contrast)
+    correlation = (both / np.sqrt(before.power * now.power + 1e-12))[on_wall]
     return bool(correlation.size and np.median(correlation) < _STILL)
 
 
