@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import trim_mean
 
 from pipeline.arrays import Bool, Float, Int
 from pipeline.machine.stage import Context
@@ -59,7 +58,8 @@ def zooms(pictures: Pictures, light: Int, steps: Steps) -> list[Zoom]:
 
 def _growth(share: Float) -> tuple[Float, Bool]:
     """Return the growth (L,) of lines from that on their rays (L, R), and whether it stands out."""
-    growth = np.asarray(trim_mean(share, 0.25, axis=1))
+    quarter = share.shape[1] // 4
+    growth = np.asarray(np.sort(share, axis=1)[:, quarter : share.shape[1] - quarter].mean(1))
     alike = np.mean(share * np.sign(growth)[:, None] > np.abs(growth)[:, None] / 2, axis=1) > _ALIKE
     usual = float(np.median(np.abs(growth)))
     return growth, alike & (np.abs(growth) > max(_SIGMAS * usual, _LEAST_SHARE))
