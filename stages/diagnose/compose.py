@@ -15,6 +15,7 @@ from stages.diagnose.claims import Claim, claims_of, stretch
 from stages.diagnose.gauge import answer as of_gauge
 from stages.diagnose.gauge.doubts import sure
 from stages.diagnose.gauge.examine import Examined
+from stages.diagnose.inference import SURE
 from stages.diagnose.record_next import AGAIN, record_next
 from stages.diagnose.result import (
     Diagnosis,
@@ -36,6 +37,7 @@ _BY_LIGHT = (
     "else, such as {}, moves them was not decided."
 )
 _BORE_FIRST = "Measure the gauge's bores and correct recording.yaml; then run the diagnosis again."
+_BY_KNOWN = "With a probability of {:.0f} %, known effects alone are the cause, likeliest these: {}"
 _OF_ENCODER = "an error of the encoder that depends on distance or speed in another way"
 
 
@@ -214,7 +216,15 @@ def _identifiable(said: _Said, examined: Examined | None, other_encoder_course: 
         causes = [*(e.statement for e in said.unsure), *(_UNKNOWN.format(f) for f in unknown)]
         return "; or ".join(dict.fromkeys(w.rstrip(".") for w in causes)) + "." * bool(causes)
     nameless = said.verdict in (Verdict.UNEXPLAINED, Verdict.PARTLY) and not said.members
-    return of_gauge.formula(examined) if nameless and examined is not None else ""
+    if not nameless or examined is None:
+        return ""
+    return ". ".join(s for s in (of_gauge.formula(examined), _by_known(examined)) if s)
+
+
+def _by_known(examined: Examined) -> str:
+    """Return a sentence on the known effects that explain what has no name; empty if they surely do not."""
+    known, share = of_gauge.known_explanation(examined), 1 - weighed(examined, ()).outside
+    return _BY_KNOWN.format(100 * share, known) if known and share > 1 - SURE else ""
 
 
 def _unknown(examined: Examined | None) -> tuple[str, ...]:

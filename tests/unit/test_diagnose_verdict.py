@@ -72,6 +72,19 @@ def test_patterns_that_are_each_unlikely_make_a_name_unexplained_unless_other_na
     assert answer.unknown_rivals(seen)[:1] == ("image outward: a θ^1",) * (verdict is Verdict.UNEXPLAINED)
 
 
+@pytest.mark.parametrize(
+    ("chance", "heldout", "known"), [(0.986, 0.11, "A cone."), (0.986, 0.3, ""), (0.6, 0.11, "")]
+)
+def test_known_effects_that_explain_a_run_as_well_as_a_pattern_are_told(chance, heldout, known, monkeypatch):
+    """Of a cone beside a shorter focal length, the page said that no known effect explains it."""
+    monkeypatch.setattr(doubts, "shift_px", lambda fit, term: term.shift_px)
+    monkeypatch.setattr(answer, "effects_found", lambda of: (SimpleNamespace(statement="A cone."),))
+    seen = examined(heldout=heldout)
+    seen.verdicts.chance_of = lambda term: chance
+    seen.verdicts.instead_of = lambda term: Instead({"a θ": 0.008, "a(θ)": 0.006}, 0.014, 0.986 - chance)
+    assert answer.known_explanation(seen) == known
+
+
 def hypotheses(fitted, weighed, laws=25):
     """Return verdicts on sets of effects and of patterns, by name and by number, each with a probability."""
     models = {name: (LIBRARY[name], ()) for name in NAMES} | dict(enumerate(PATTERNS))

@@ -38,7 +38,7 @@ _OF_EVENTS = {
 _HEADLINES = {
     Verdict.CONSISTENT: "The recording agrees with the stated instrument",
     Verdict.CLASS: "Something was left out; its kind is known, its name is not certain",
-    Verdict.UNEXPLAINED: "Something was left out that no known effect explains",
+    Verdict.UNEXPLAINED: "Something was left out that has no name yet",
     Verdict.NOT_IDENTIFIABLE: "This recording cannot show whether anything was left out",
 }
 

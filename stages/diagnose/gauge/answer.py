@@ -187,14 +187,34 @@ def formula(examined: Examined) -> str:
     return "; ".join(t.model.equation(t.shape, t.amplitude) for t in terms)
 
 
+def explains(examined: Examined) -> bool:
+    """Return whether the likeliest effects explain the run, though an unknown cause may do so, too.
+
+    If held-out measurements are not predicted, something unknown was left out.
+    """
+    best, verdicts = examined.best, examined.verdicts
+    if best is None or verdicts is None or not best.library_terms:
+        return False
+    contradicted = all(any(not c.agrees for c in each) for each in examined.confirmed)
+    return verdicts.adequacy >= ADEQUATE and fits(examined) and not contradicted
+
+
+def known_explanation(examined: Examined) -> str:
+    """Return, in words, known effects that explain a run as well as an unknown cause; empty for none."""
+    best = examined.best
+    if best is None or not best.named or not explains(examined):
+        return ""
+    if verdict_of(examined) is not Verdict.UNEXPLAINED:
+        return ""
+    return " ".join(e.statement for e in effects_found(examined))
+
+
 def verdict_of(examined: Examined) -> Verdict:
     """Return the verdict from rings and fiducials alone."""
     best, verdicts = examined.best, examined.verdicts
     if best is None or verdicts is None:
         return Verdict.UNEXPLAINED if examined.repeats else Verdict.CONSISTENT
-    contradicted = [any(not c.agrees for c in each) for each in examined.confirmed]
-    # If held-out measurements are not predicted, something unknown was left out.
-    if not best.library_terms or verdicts.adequacy < ADEQUATE or not fits(examined) or all(contradicted):
+    if not explains(examined):
         return Verdict.UNEXPLAINED
     if all(sure(examined)):
         return Verdict.NAMED if best.named else Verdict.PARTLY
