@@ -138,11 +138,11 @@ class _Matched:
 
 
 def _seen(recording: Recording, probe: Probe, pictures: Pictures, context: Context) -> _Seen:
-    light = _light(recording.frames, pictures)
-    outside = off_the_pipe(pictures, light)
+    light, stated = _light(recording.frames, pictures), _lights_of(recording.frames.illumination)
+    outside = off_the_pipe(pictures, light if np.any(light != Light.UNKNOWN) else stated)
     astray = out_of_order(pictures, np.where(outside, Light.UNKNOWN, light))
     in_order = np.where(astray | outside, Light.UNKNOWN, light)
-    shown = in_order if np.any(in_order == Light.WALL) else _lights_of(recording.frames.illumination)
+    shown = in_order if np.any(in_order == Light.WALL) else stated
     stays = find_static_places(recording, probe, recording.frames.frame[shown == Light.WALL], context)
     if stays is not None:
         pictures = examine_pictures(recording, probe, context, stays)
@@ -293,6 +293,6 @@ def _report(pictures: Pictures, radius_mm: float, changes: Changes, context: Con
 
 
 PREMISES = Stage(
-    "premises", "35", PremisesParameters, check_premises,
+    "premises", "36", PremisesParameters, check_premises,
     "stated lights, times, encoder and diameter compared with the pictures and corrected",
 )  # fmt: skip
