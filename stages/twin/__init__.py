@@ -17,6 +17,7 @@ from pipeline.instrument.probe import Probe
 from pipeline.machine.stage import Context, Parameters, Stage
 from pipeline.recording.base import Illumination, Recording
 from pipeline.recording.checks import CheckedFrames
+from stages.twin.at_times import dark_spots
 from stages.twin.causes import causes
 from stages.twin.compare import Comparison, block_ratios, block_textures
 from stages.twin.dark_side import beside_dark_side
@@ -224,10 +225,8 @@ def compared_with(
     of_wall = unnamed(samples and samples.clear_of(clear), scene.surface, apart_mm, line_rad)
     placed, beside = beside_sectors((*on_window, *of_wall, *glints), (*over_time, *slow), scene.ring, samples)
     placed, of_side = beside_dark_side(placed, over_time, samples, scene)
-    found: tuple[Mismatch, ...] = (
-        *over_time, *placed, *photometry.pixels, *whole,
-        *clipped(rings, state.line_clipped, comparison.clipped_share),
-    )  # fmt: skip
+    of_whole = (*photometry.pixels, *whole, *clipped(rings, state.line_clipped, comparison.clipped_share))
+    found: tuple[Mismatch, ...] = (*over_time, *placed, *dark_spots(samples), *of_whole)
     fall, unnamed_map = left_over(None if samples is None else samples.seen_through(state.gain_map))
     comparison.after[Region.WALL] -= fall
     _report(comparison, found, context)
@@ -293,7 +292,7 @@ PHOTOMETRY = Stage(
 )
 TWIN = Stage(
     "twin",
-    "59",
+    "60",
     TwinParameters,
     compare_with_twin,
     "recorded frames beside the same frames, re-rendered from what the run has measured",

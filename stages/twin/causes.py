@@ -17,6 +17,7 @@ from pipeline.adjustment.robust import spread_about_median
 from pipeline.arrays import Float
 from pipeline.artefacts.twin import Mismatch, NamedFigure
 from pipeline.instrument.probe import Lighting
+from stages.twin.at_times import dim_at_times
 from stages.twin.cells import (
     SECTORS,
     Cells,
@@ -91,6 +92,7 @@ def causes(
             else:
                 found.append(_mismatch(best, rivals, cells, ring))
         found += _flicker_or_else(cells, base, unsure, light, ring)
+        found += dim_at_times(cells, base, ring) if light == "laser" else ()
         if unsure is not None and unsure[0].probability <= FALSE_ALARM:
             slow.append(slow_side(unsure[0], _lost(unsure[0]), cells, ring))
     return (*steps_named(steps, lit, line, ring), *found), tuple(slow)

@@ -1,0 +1,93 @@
+"""What some frames show that stays neither in the picture nor on the wall: dark spots that move, a dim line.
+
+Laws of `stages.twin.causes` act in all frames or from one frame on; a spot that crawls over the window, or a
+laser that is shaded now and then, follows none of them. Both are located without a name.
+"""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+
+from pipeline.adjustment.robust import spread_about_median
+from pipeline.arrays import Bool, Float
+from pipeline.artefacts.twin import Mismatch, NamedFigure
+from stages.twin.cells import SECTORS, Cells, fitted, sector_azimuth_rad
+from stages.twin.reference import SHOWN_PX, BlockSamples
+from stages.twin.scene import Ring
+
+_FEWEST, _FEWEST_BLOCKS, _FEWEST_SECTORS = 3, 4, 2
+_SIGMA, _LEAST_DARK, _LEAST_DIM, _MOSTLY = 8.0, 0.15, 0.25, 0.5
+"""Fewest frames; fewest joined blocks and sectors. Times the usual scatter, and least loss of light, of a
+block and of the line. A sound recording of another renderer had one block of 24,000 beyond 8, of .05. Share
+of squares from which other blocks predict a spot. Chosen."""
+
+
+def dark_spots(samples: BlockSamples | None) -> tuple[Mismatch, ...]:
+    """Return spots of lit wall that are dark in several frames and are fixed neither to image nor to wall."""
+    if samples is None:
+        return ()
+    dark = (samples.strength < -_SIGMA) & (samples.change < -_LEAST_DARK)
+    use = np.zeros(len(dark), bool)
+    for k in np.unique(samples.frame[dark]):
+        use |= _joined(samples, dark & (samples.frame == k))
+    frames, count = np.unique(samples.frame[use]), len(samples.number)
+    if len(frames) < _FEWEST or _stays(samples, use):
+        return ()
+    lost = np.array([-samples.change[use & (samples.frame == k)].min() for k in frames])
+    size = NamedFigure("darker", float(np.median(lost)), float(lost.std() / np.sqrt(len(lost))), "share")
+    first, last = (float(samples.number[frames[k]]) for k in (0, -1))
+    place = (NamedFigure("frame_from", first, 0.0), NamedFigure("frame_to", last, 0.0))
+    nan = float("nan")
+    said = (
+        f"In {len(frames)} of {count} lit frames, a spot is up to {100 * lost.max():.0f} % darker than "
+        "re-rendered, each time at another place of picture and wall: something moves on the window or in "
+        "front of the wall."
+    )
+    look = samples.look(use, SHOWN_PX)
+    return (Mismatch("", "intensity", "time", place, (size,), nan, nan, nan, said, look),)
+
+
+def _stays(samples: BlockSamples, use: Bool) -> bool:
+    """Return whether other blocks at their places of image or wall predict most of the blocks (N,)."""
+    most = _MOSTLY * float((samples.change[use] ** 2).sum())
+    return any(float(samples.explained(order, use).sum()) > most for order in ("image", "wall"))
+
+
+def _joined(samples: BlockSamples, use: Bool) -> Bool:
+    """Return the blocks (N,) of one frame that are in groups of enough blocks."""
+    picture = np.zeros((int(samples.row.max()) + 1, int(samples.column.max()) + 1), np.uint8)
+    picture[samples.row[use], samples.column[use]] = 1
+    _, label, stats, _ = cv2.connectedComponentsWithStats(picture)
+    large = stats[:, cv2.CC_STAT_AREA] >= _FEWEST_BLOCKS
+    large[0] = False
+    return np.asarray(use & large[label[samples.row, samples.column]])
+
+
+def dim_at_times(cells: Cells, base: Float, ring: Ring) -> tuple[Mismatch, ...]:
+    """Return where the line is dim in several frames and not in most, beyond base columns (K, F, S)."""
+    rest = cells.log_ratio - fitted(cells, base, np.ones(len(cells.frame), bool))
+    rest = np.where(cells.usable, rest - np.median(rest[cells.usable]), 0.0)
+    usual = max(spread_about_median(rest[cells.usable]), 1e-3)
+    dim = (rest < -_SIGMA * usual) & (rest < np.log(1 - _LEAST_DIM))
+    pairs = dim & np.roll(dim, -1, 1)
+    sector = int(pairs.sum(0).argmax())
+    frames = np.flatnonzero(pairs[:, sector])
+    if not _FEWEST <= len(frames) <= len(rest) / 2:
+        return ()
+    azimuth = float(np.degrees(sector_azimuth_rad()[sector]) + 180 / SECTORS)
+    lost = 1 - np.exp(rest[frames, sector])
+    place = (
+        NamedFigure("azimuth_deg", azimuth, 180 / SECTORS, "deg"),
+        NamedFigure("frame_from", float(cells.frame[frames[0]]), 0.0),
+        NamedFigure("frame_to", float(cells.frame[frames[-1]]), 0.0),
+    )
+    sd = float(lost.std() / np.sqrt(len(lost)))
+    size = NamedFigure("lost", float(lost.mean()), sd, "share of the light")
+    said = (
+        f"In {len(frames)} of {len(rest)} laser frames, the line about image azimuth {azimuth:.0f}° is about "
+        f"{100 * size.value:.0f} % darker than in the others: something shades the laser or the window at "
+        "times, or the wall is darker there."
+    )
+    nan, look = float("nan"), ring.at(int(cells.frame[frames[0]]), float(np.radians(azimuth)))
+    return (Mismatch("", "line", "time", place, (size,), nan, nan, nan, said, look),)

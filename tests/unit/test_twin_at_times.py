@@ -1,0 +1,59 @@
+"""What some frames alone show: a dark spot that moves, and a line that is dim at times."""
+
+import numpy as np
+import pytest
+
+from pipeline.instrument.probe import Lighting
+from stages.twin.at_times import dark_spots
+from stages.twin.causes import causes
+from stages.twin.cells import SECTORS, Cells
+from stages.twin.reference import BlockSamples
+from stages.twin.scene import Ring
+
+RING, FRAMES, ROWS, COLUMNS = Ring((400.0, 300.0), 200.0, 50.0, 23.0), 10, 24, 32
+
+
+def _samples(change, moved=2):
+    """Blocks of frames between which the wall moves on by some rows; ``change`` is that of the spot."""
+    frame, row, column = np.indices((FRAMES, ROWS, COLUMNS)).reshape(3, -1)
+    along = row + moved * frame
+    noise = 0.01 * np.random.default_rng(3).standard_normal(frame.size)
+    even = np.ones(frame.size)
+    return BlockSamples(
+        noise + change(frame, row, column, along), 4 * even, even, frame, row, column, along, column,
+        0.0, 2.0, 8 * np.arange(FRAMES), even, even,
+    )  # fmt: skip
+
+
+def _at(row, column, middle_row, middle_column):
+    return np.where(np.hypot(row - middle_row, column - middle_column) < 2, -0.5, 0.0)
+
+
+def test_a_dark_spot_that_crawls_is_told_and_one_that_stays_is_not():
+    """Nothing was told of it: the photo holds none of it, and it has no place."""
+    (spot,) = dark_spots(_samples(lambda f, r, c, a: _at(r, c, 12, 4 + 2.5 * f)))
+    assert (spot.name, spot.fixed_to) == ("", "time")
+    assert spot.parameters[0].value == pytest.approx(0.5, abs=0.05)
+    assert "In 10 of 10 lit frames" in spot.statement
+    assert dark_spots(_samples(lambda f, r, c, a: _at(r, c, 12, 16))) == ()
+    assert dark_spots(_samples(lambda f, r, c, a: _at(a, c, 16, 16))) == ()
+    assert dark_spots(_samples(lambda f, r, c, a: np.zeros(len(f)))) == ()
+    assert dark_spots(None) == ()
+
+
+@pytest.mark.parametrize(("frames", "told"), [((2, 5, 6, 11), 1), ((5,), 0), (range(14), 0)])
+def test_a_line_that_is_dim_at_times_is_told_where_it_is(frames, told):
+    """A sector of the laser is dim in all frames: nothing was told of one that some frames show."""
+    random, number = np.random.default_rng(1), 8 * np.arange(14)
+    change = np.zeros((14, SECTORS))
+    change[list(frames), 20:23] = np.log(0.3)
+    own = np.full(change.shape, 200_000.0)
+    ratio = np.exp(change + 0.03 * random.standard_normal(change.shape))
+    pixels = np.full_like(own, 500.0)
+    line = Cells(number, pixels + ratio**2 * own, ratio * own, own, pixels, 20 * pixels)
+    found = [m for m in causes(None, line, Lighting(), RING)[0] if not m.name]
+    assert len(found) == told
+    for dim in found:
+        assert (dim.channel, dim.fixed_to) == ("line", "time")
+        assert dim.place[0].value == pytest.approx(35, abs=10)
+        assert dim.parameters[0].value == pytest.approx(0.7, abs=0.05)
