@@ -21,7 +21,7 @@ from itertools import combinations
 import numpy as np
 
 from pipeline.physics.catalogue import effect
-from pipeline.physics.effect import FixedTo
+from pipeline.physics.effect import CourseKind, FixedTo
 from stages.diagnose.effects.base import EffectModel
 from stages.diagnose.effects.courses import SEARCHED, Coursed, Drifting
 from stages.diagnose.gauge.altered_laws import other_course, other_growth
@@ -103,20 +103,25 @@ def odds_of_unknown_laws(
     growth = odds_in(about, terms, [o.name for o in grown], laid_out, before, stated, GROWTH)
     around = [t.model.name if p[2] is None else p[2] for t, p in zip(terms, patterns, strict=True)]
     course = odds_in(about, terms, [o.name for o in moved], around, before, stated, _COURSE, False)
-    duration = span(run)[0]
     each = zip(growth, course, best.library_terms, strict=True)
     return tuple(
-        Unknown(g * known_alike(t.model, library), c + odds_of_slow_course(t, duration)) for g, c, t in each
+        Unknown(g * known_alike(t.model, library), c + odds_of_unseen_course(t, *span(run)))
+        for g, c, t in each
     )
 
 
-def odds_of_slow_course(term: Term, duration_s: float) -> float:
-    """Return the odds that a swing is a slow course of another kind: even where the run holds few periods.
+def odds_of_unseen_course(term: Term, duration_s: float, frame_rate: float) -> float:
+    """Return the odds that a course is of another kind: even where the run hardly shows it.
 
-    Such a course may go with the probe's roll (what hangs down, for instance), which no law here does.
+    A swing of which the run holds few periods may be slow in another way: it may go with the probe's roll
+    (what hangs down, for instance), which no law here does. A drift with the shortest time constant searched
+    may be constant: an optical axis that was not in the library was named a drifting one at .9995.
     """
-    frequency = term.model.course(*term.at(term.amplitude)).get("frequency_hz")
-    return float(frequency is not None and frequency * duration_s < _LEAST_PERIODS)
+    shape, amplitude = term.at(term.amplitude)
+    frequency = term.model.course(shape, amplitude).get("frequency_hz")
+    slow = frequency is not None and frequency * duration_s < _LEAST_PERIODS
+    drifts = term.model.kind is CourseKind.EXPONENTIAL
+    return float(slow or (drifts and shape <= min(term.model.shapes(duration_s, frame_rate))))
 
 
 def known_alike(model: EffectModel, library: Mapping[str, EffectModel]) -> float:
