@@ -38,7 +38,7 @@ _OF_CONTRAST = 0.15
 much."""
 _BLURS, _AT_LINE = ("motion_blur", "defocus"), ("window_dirt", "window_scatter")
 _STATED = {
-    "window_dirt": "dust or dirt on the window or the lens takes away {}",
+    "window_dirt": "dust or dirt on the window or the lens, or what shades it, takes away {}",
     "window_scatter": "something on the window or the lens scatters {}",
     "droplet": "a drop on the window or the lens bends {}",
 }
