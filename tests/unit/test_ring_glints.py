@@ -82,10 +82,26 @@ def test_glints_that_move_at_random_are_no_roll(drawn):
     assert (validity[glints > 0] == RingValidity.GLINT).mean() > 0.8
 
 
-def rings_of(drawn):
+@pytest.mark.parametrize("rolls_on", [False, True])
+def test_a_roll_is_not_carried_to_where_no_ring_shows_it(rolls_on):
+    """Half of a shallow pit's samples were unsure, since the probe had rolled 100 rings before."""
+    random, rings, roll = np.random.default_rng(4), 160, 20
+    radius = 300 + random.normal(0, NOISE, (rings, SECTORS))
+    turn = roll * np.minimum(np.arange(rings), rings if rolls_on else 30)
+    for first, height in ((10, 6.0), (120, 0.8), *([(150, 6.0)] if rolls_on else [])):
+        for row in range(first, first + 6):
+            radius[row] += np.roll(height * np.pad(np.hanning(12), (0, SECTORS - 12)), 400 + turn[row])
+    drawn = [radius, *(np.full_like(radius, value) for value in (NOISE, 1.2, 80.0))]
+    validity, sigma = contradicted(rings_of([x.astype(np.float32) for x in drawn], rings))
+    pit = radius[120:126] > 300.4
+    sure = (validity[120:126] == RingValidity.VALID) & (sigma[120:126] < 2 * NOISE)
+    assert sure[pit].mean() > 0.8
+
+
+def rings_of(drawn, rings=RINGS):
     """Return the drawn rings as samples, all valid."""
     validity = np.full(drawn[0].shape, RingValidity.VALID, np.uint8)
-    return RingSamples(np.arange(RINGS), AZIMUTH - np.pi, np.zeros(2), *drawn, validity)
+    return RingSamples(np.arange(rings), AZIMUTH - np.pi, np.zeros(2), *drawn, validity)
 
 
 def test_a_line_on_one_ring_only_is_kept_and_unsure(drawn):
