@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pipeline.adjustment.robust import spread_about_median
 from pipeline.arrays import Bool, Float, Int
 from pipeline.machine.stage import Context
 from stages.premises.light import Light
@@ -19,6 +20,9 @@ _RADII_PER_SHARE = 1.45
 # The wall's additional step fits the line's growth within this part of it: half-way to none, as where a bore
 # steps, and to growth of the wall alone, as where pictures are lost.
 _FITS = 0.5
+# The usual steps must scatter by so much less (robust σ) than this part, or the step of a probe that is
+# pulled by hand fits where a bore steps: as for losses of which there is other evidence.
+_SIGMAS_BESIDE = 3.5
 # The line grows alike if so many rays grow by at least half of the growth of all (chosen); lines are known
 # to a pixel only. Smaller growth is within that, and `image_scale` finds it from texture and rings.
 _ALIKE, _LEAST_SHARE = 0.8, 0.005
@@ -70,9 +74,10 @@ def _wall_grows_too(steps: Steps, first: int, last: int, growth: float) -> int |
     over = np.flatnonzero((steps.start < last) & (steps.end > first))
     if not over.size or over.size == len(steps.end):
         return None
-    expected = float(np.median(np.delete(steps.size, over))) + _RADII_PER_SHARE * growth
-    off = np.abs(steps.size[over] - expected)
-    fits = off.min() < _FITS * _RADII_PER_SHARE * abs(growth)
+    others, more = np.delete(steps.size, over), _RADII_PER_SHARE * growth
+    off = np.abs(steps.size[over] - np.median(others) - more)
+    within = _FITS * abs(more)
+    fits = off.min() < within and _SIGMAS_BESIDE * spread_about_median(others) < within
     return int(steps.end[over[off.argmin()]]) if fits else None
 
 
@@ -88,7 +93,7 @@ def warn_of_zooms(found: Sequence[Zoom], frame: Int, context: Context) -> None:
         context.warn(
             f"from about frame {frame[zoom.place]} on, the picture is "
             f"{'enlarged' if zoom.growth > 0 else 'reduced'} by {100 * abs(np.expm1(zoom.growth)):.1f} %: "
-            "laser line and wall change alike, which lost pictures or another bore cannot explain. Zoom, "
+            "laser line and wall change alike, as neither lost pictures nor another bore alone do. Zoom, "
             "stabilisation or another crop was switched on or off, or the recording was scaled. The probe "
             "file can be right on one side only: pipe, laser or encoder may seem to jump, and radii and "
             "distances on the other side are wrong by more than their σ. What to do: process the two parts "
