@@ -119,7 +119,8 @@ def _slab(radius_map: RadiusMap, station: float, spacing_mm: float) -> _Slab:
         variance = np.where(seen, random, 0).sum(0) / count**2
     excess = radius_map.common_variance(rows)[seen]
     calibration = float(excess.mean()) if excess.size else np.nan
-    return _Slab(mean, variance, calibration, radius_map.displaced_mm, float(seen.mean()))
+    displaced = float(radius_map.displaced_in(rows).max(initial=0.0))
+    return _Slab(mean, variance, calibration, displaced, float(seen.mean()))
 
 
 def _determined_harmonics(seen: Bool, most: int) -> int:
@@ -168,7 +169,8 @@ def _measures(station: float, slab: _Slab, shape: _Shape, nominal_mm: float) -> 
     """Return one row of `Sections`, in the order of its fields."""
     theta, cov = shape.coefficients, shape.covariance
     calibration = 2 * np.sqrt(slab.calibration_mm2)
-    ends_mm = np.sqrt(2) * slab.displaced_mm
+    # Both ends of a diameter, and of the two diameters of an oval, whose difference is four amplitudes.
+    ends_mm, four_mm = np.sqrt(2) * slab.displaced_mm, 2 * slab.displaced_mm
     calliper = _calliper_basis((len(theta) - 1) // 2)
     diameter = calliper @ theta
     high, low = calliper[np.argmax(diameter)], calliper[np.argmin(diameter)]
@@ -186,16 +188,16 @@ def _measures(station: float, slab: _Slab, shape: _Shape, nominal_mm: float) -> 
     def absolute(g: Float, local_mm: float = 0.0) -> float:
         return float(np.linalg.norm([noise(g), calibration, local_mm]))
 
-    def relative(g: Float, value: float, base: float, base_sigma: float) -> float:
-        return float(np.hypot(noise(g) / base, value / base**2 * base_sigma))
+    def relative(g: Float, local_mm: float, value: float, base: float, base_sigma: float) -> float:
+        return float(np.hypot(np.hypot(noise(g), local_mm) / base, value / base**2 * base_sigma))
 
     return np.array([
         station, slab.coverage,
         mean, absolute(middle), least, absolute(low, ends_mm), most, absolute(high, ends_mm),
-        span / nominal_mm, relative(high - low, span, nominal_mm, 0.0),
-        span / mean, relative(high - low, span, mean, absolute(middle)),
-        reach / mean, relative(far - middle, reach, mean, absolute(middle)),
-        amplitude, noise(direction),
+        span / nominal_mm, relative(high - low, four_mm, span, nominal_mm, 0.0),
+        span / mean, relative(high - low, four_mm, span, mean, absolute(middle)),
+        reach / mean, relative(far - middle, ends_mm, reach, mean, absolute(middle)),
+        amplitude, float(np.hypot(noise(direction), four_mm / 4)),
         _DIRECTIONS[np.argmax(diameter)], *shape.centre, np.sqrt(np.trace(cov[1:3, 1:3]) / 2),
     ])  # fmt: skip
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from pipeline.adjustment.shared_light import NOTHING_HELD, HeldOver
 from pipeline.arrays import Bool, Byte, Float, Float32, Int
-from pipeline.artefacts.motion import LaserKnock, MotionEvent, PipePiece
+from pipeline.artefacts.motion import Displaced, LaserKnock, MotionEvent, PipePiece
 from pipeline.artefacts.wall_map import FixedToProbe, WallMap
 from pipeline.geometry.axis import PipeAxis
 
@@ -162,11 +162,8 @@ class Trajectory:
     cut_sigma_mm : float
         Part of ``distance_sigma_mm`` from the unknown distance travelled at cuts of the recording; 0 without
         cuts.
-    displaced_mm : float
-        1 σ by which the wall in texture and the wall in the rings differ smoothly over places of some
-        millimetres; 0 if they agree within its error, or could not be compared.
-    displaced_for_certain : bool
-        Whether chance is excluded as the cause of this difference.
+    displaced : tuple of Displaced
+        Stretches of the run, in their order, with what walls in texture and in the rings differ by.
     """
 
     frame: Int
@@ -188,8 +185,14 @@ class Trajectory:
     radius_doubt: float = 0.0
     knock: LaserKnock | None = None
     cut_sigma_mm: float = 0.0
-    displaced_mm: float = 0.0
-    displaced_for_certain: bool = False
+    displaced: tuple[Displaced, ...] = ()
+
+    def displaced_mm(self, frame: Int) -> Float:
+        """Return the size (F,), mm, of what displaces the picture from place to place in frames (F,)."""
+        if not self.displaced:
+            return np.zeros(len(frame))
+        first = [d.frame_from for d in self.displaced[1:]]
+        return np.array([d.size_mm for d in self.displaced])[np.searchsorted(first, frame, side="right")]
 
 
 @dataclass(frozen=True)

@@ -23,6 +23,27 @@ class MotionEvent:
 
 
 @dataclass(frozen=True)
+class Displaced:
+    """A stretch of a run in which the walls in texture and in the rings differ smoothly from place to place.
+
+    Attributes
+    ----------
+    frame_from, frame_to : int
+        Frames in which the laser passes it.
+    size_mm : float
+        1 σ by which they differ over places of some millimetres; 0 if they agree within their error, or could
+        not be compared.
+    certain : bool
+        Whether chance is excluded as the cause.
+    """
+
+    frame_from: int
+    frame_to: int
+    size_mm: float
+    certain: bool
+
+
+@dataclass(frozen=True)
 class PipePiece:
     """A straight length or a bend of the pipe, found in its axis.
 

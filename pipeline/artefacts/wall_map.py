@@ -28,9 +28,9 @@ class WallMap:
     radius_mm, sigma_mm, sigma_random_mm : (S, A)
         Radius; its total 1 σ; the random part of that. NaN where nothing is known; σ is 0 in a reference
         that states none.
-    displaced_mm : float
+    displaced_mm : (S,) or None
         The part of the total 1 σ that a place shares with its surroundings alone, such as the error behind
-        water on the window. It has no mean around the pipe.
+        water on the window. It has no mean around the pipe. None where there is none.
     """
 
     distance_mm: Float
@@ -38,12 +38,17 @@ class WallMap:
     radius_mm: Real
     sigma_mm: Real
     sigma_random_mm: Real
-    displaced_mm: float = field(default=0.0, kw_only=True)
+    displaced_mm: Float | None = field(default=None, kw_only=True)
+
+    def displaced_in(self, rows: slice | NDArray[np.int64] = slice(None)) -> Float:
+        """Return the part of σ (n,), mm, that places share with their surroundings alone, in some rows."""
+        of_rows = self.distance_mm[rows]
+        return np.zeros(len(of_rows)) if self.displaced_mm is None else np.asarray(self.displaced_mm[rows])
 
     def common_variance(self, rows: slice = slice(None)) -> Float:
         """Return the variance of the radius (S, A), mm², from errors that all places share: calibration."""
         total, random = (np.asarray(v[rows], float) for v in (self.sigma_mm, self.sigma_random_mm))
-        return np.asarray(np.maximum(total**2 - random**2 - self.displaced_mm**2, 0.0))
+        return np.asarray(np.maximum(total**2 - random**2 - self.displaced_in(rows)[:, None] ** 2, 0.0))
 
     @property
     def step_mm(self) -> float:

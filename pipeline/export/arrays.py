@@ -78,11 +78,12 @@ def write_radius_map(wall: Wall, folder: Path) -> None:
     """Write ``radius_map.npz``; NaN where nothing was seen."""
     radius = wall.radius_map
     places, measured = ("distance_mm", "azimuth_rad"), ("radius_mm", "sigma_mm", "count")
+    arrays = {n: getattr(radius, n) for n in (*places, *measured, "sigma_random_mm", "misalignment_mm")}
     # Compression level 1: NumPy's default of 6 needs 2.5 times as long for 1 % less.
     with ZipFile(folder / "radius_map.npz", "w", ZIP_DEFLATED, compresslevel=1) as archive:
-        for name in (*places, *measured, "sigma_random_mm", "misalignment_mm"):
+        for name, values in (arrays | {"displaced_mm": radius.displaced_in()}).items():
             with archive.open(f"{name}.npy", "w", force_zip64=True) as stream:
-                np.lib.format.write_array(stream, np.asanyarray(getattr(radius, name)))
+                np.lib.format.write_array(stream, np.asanyarray(values))
 
 
 if TYPE_CHECKING:

@@ -41,6 +41,7 @@ class OutlineGauge:
         radius = np.where(inside | around, self.wall.radius_mm[np.ix_(rows, columns)], np.nan)
         random = self.wall.sigma_random_mm[np.ix_(rows, columns)]
         depth, sigma, peak = self._depth(radius, random, inside, around)
+        sigma = float(np.hypot(sigma, self.wall.displaced_in(rows).max(initial=0.0)))
         (first, last), (a0, a1) = np.sort(point[:, 0])[[0, -1]], np.sort(point[:, 1])[[0, -1]]
         middle = float(np.nanmedian(self.wall.radius_mm[rows]))
         clock = clock_of_azimuth(np.array([a0, a1]))
@@ -89,9 +90,7 @@ class OutlineGauge:
         extreme = float(mean[peak])
         noise = float(np.median(sigma[seen & np.isfinite(sigma)])) / np.sqrt(cells[0] * cells[1])
         spread = robust_spread(away[known])
-        sigma_mm = float(
-            np.linalg.norm([noise, spread / np.sqrt(cells[0] * cells[1]), self.wall.displaced_mm])
-        )
+        sigma_mm = float(np.hypot(noise, spread / np.sqrt(cells[0] * cells[1])))
         return extreme, sigma_mm, (int(peak[0]), int(peak[1]))
 
 
@@ -191,7 +190,8 @@ def _diameter(wall: WallMap, points: Outline) -> tuple[Reading, ...]:
     """Return the diameter through the axis at the point's azimuth, and the mean of the section."""
     s, a = points[0]
     (r0, sigma0, _), (r1, sigma1, _) = wall.radius_at(s, a), wall.radius_at(s, a + np.pi)
-    row, local = wall.row(s), wall.displaced_mm
+    row = wall.row(s)
+    local = float(wall.displaced_in(np.array([row]))[0])
     section, sigma = wall.radius_mm[row], wall.sigma_mm[row]
     common, shared0, shared1 = np.sqrt(
         np.maximum(np.array([np.nanmedian(sigma), sigma0, sigma1]) ** 2 - local**2, 0.0)

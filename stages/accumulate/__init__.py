@@ -12,7 +12,7 @@ from pydantic import Field
 
 from pipeline.adjustment.held_over import held_over
 from pipeline.adjustment.shared_light import HeldOver
-from pipeline.arrays import Float, Int
+from pipeline.arrays import Float
 from pipeline.artefacts.findings import clock_of_azimuth
 from pipeline.artefacts.measured import RingPoints, RingSamples, RingValidity, Trajectory, Wall
 from pipeline.artefacts.moved_back import kept_by_roll
@@ -22,11 +22,12 @@ from pipeline.geometry.axis import roll_at
 from pipeline.instrument.probe import Probe
 from pipeline.machine.stage import Context, Parameters, Stage
 from pipeline.pages import notation
+from stages.accumulate.displaced import displaced_on, warn_of_displaced
 from stages.accumulate.fixed import fixed_to_probe
 from stages.accumulate.grid import MapGrid, map_grid
 from stages.accumulate.shared_errors import shared_on_wall, warn_of_left_out
 from stages.accumulate.stretch import cut_stretches, empty_wall, fill, map_of
-from stages.accumulate.survey import RingsOnWall, RingSurvey, in_steady_pictures, survey_of
+from stages.accumulate.survey import RingsOnWall, RingSurvey, in_steady_pictures, nearest, survey_of
 from stages.accumulate.unmeasured import warn_of_unmeasured
 
 # Azimuths, 5° apart: the instrument's errors are harmonics up to the fourth, and linear between nodes.
@@ -44,7 +45,7 @@ class CalibrationSpread:
 
     def on(self, grid: MapGrid) -> Float:
         """Return the 1 σ (S, A): rows take the nearest distance, columns are interpolated."""
-        rows = self.sigma_mm[_nearest(self.distance_mm, grid.distance_mm)]
+        rows = self.sigma_mm[nearest(self.distance_mm, grid.distance_mm)]
         wide = np.concatenate([rows, rows[:, :1]], 1)
         fine = (grid.azimuth_rad + np.pi) / (2 * np.pi / _AZIMUTHS)
         left = np.minimum(fine.astype(int), _AZIMUTHS - 1)
@@ -78,13 +79,6 @@ def calibration_spread(
     return CalibrationSpread(survey.middle_mm[some], np.hypot(np.stack(profiles), drift[:, None]))
 
 
-def _nearest(distance: Float, wanted: Float) -> Int:
-    """Return for each wanted distance the index of the nearest of the distances, in any order."""
-    order = np.argsort(distance, kind="stable")
-    middle = (distance[order][1:] + distance[order][:-1]) / 2
-    return np.asarray(order[np.searchsorted(middle, wanted)])
-
-
 def _by_scale(probe: Probe, rings: RingSamples, row: int) -> float:
     """Return the change of a ring's radius, mm, per relative change of the picture's scale."""
     outward = np.stack([np.cos(rings.azimuth_rad), np.sin(rings.azimuth_rad)], -1)
@@ -115,8 +109,6 @@ _IMPOSSIBLE, _MOST_IMPOSSIBLE = 0.5, 0.5
 # Share from which such wall is reported. Chosen: a branch of half of the diameter in a metre of pipe has
 # more.
 _FEW_IMPOSSIBLE = 0.002
-# A part that is this share of the whole σ raises it by a tenth.
-_MATTERS = 0.42
 # Places fixed to the image that are warned of one by one; the largest first.
 _LISTED_PLACES = 4
 
@@ -167,21 +159,26 @@ def accumulate_wall(
     fixed = fixed_to_probe(survey, rings.frame, trajectory.radius_mm, grid, context.scratch)
     held = _held_in(rings, survey, trajectory.radius_mm)
     wall = empty_wall(grid, survey, trajectory.axis, fixed, context.scratch)
-    radius_map = replace(wall.radius_map, displaced_mm=trajectory.displaced_mm)
+    displaced = displaced_on(grid, trajectory, rings.frame, survey)
+    radius_map = replace(wall.radius_map, displaced_mm=displaced)
     wall = replace(wall, held=held, radius_map=radius_map)
     smoothing_mm, gap_mm = parameters.smoothing_mm, parameters.largest_gap_mm
     stretches = cut_stretches(grid, survey, smoothing_mm, gap_mm)
     for done, stretch in enumerate(stretches, 1):
-        systematic = np.hypot(spread.on(grid.rows(stretch.from_row, stretch.to_row)), trajectory.displaced_mm)
-        for departure in (None if fixed is None else fixed.departure_mm, shared):
-            if departure is not None:
-                systematic = np.hypot(systematic, departure[stretch.from_row : stretch.to_row])
+        rows = slice(stretch.from_row, stretch.to_row)
+        local = displaced[rows, None]
+        if fixed is not None:
+            # What stays at a place of the image is a part of what displaces the picture.
+            local = np.maximum(local, fixed.departure_mm[rows])
+        systematic = np.hypot(spread.on(grid.rows(rows.start, rows.stop)), local)
+        if shared is not None:
+            systematic = np.hypot(systematic, shared[rows])
         part = map_of(stretch, on_wall, survey, grid, systematic, smoothing_mm, gap_mm, held)
         fill(wall, stretch, part, on_wall, survey)
         context.progress(done, len(stretches))
     _judge_radii(wall, trajectory, context)
     _report(context, wall, spread)
-    _warn_of_displaced(trajectory, wall, context)
+    warn_of_displaced(trajectory, wall, context)
     warn_of_held(held, context)
     _warn_of_fixed(fixed, context)
     warn_of_unmeasured(wall.radius_map, trajectory.radius_mm, gap_mm, survey.middle_mm, context)
@@ -236,22 +233,6 @@ def _fixed_in_words(place: FixedPlace) -> str:
         "findings there are not counted. What to do: clean the window and record again with the probe "
         "rolled by 30° or more"
     )
-
-
-def _warn_of_displaced(trajectory: Trajectory, wall: Wall, context: Context) -> None:
-    """Warn if photo and line certainly differ, and this raises the σ of radii by more than a tenth."""
-    sigma = wall.radius_map.sigma_mm[:: max(len(wall.radius_map.distance_mm) // _REPORTED_ROWS, 1)]
-    known, apart_mm = sigma[np.isfinite(sigma)], trajectory.displaced_mm
-    if known.size and trajectory.displaced_for_certain and apart_mm > _MATTERS * float(np.median(known)):
-        context.warn(
-            "photo and laser line contradict each other: they show the same places of the wall at radii that "
-            f"differ smoothly by some {apart_mm:.2g} mm (1 σ), after a shift and a tilt are removed. Either "
-            "may be wrong: water, grease or uneven glass in front of the lens or of the laser, a lens or a "
-            "sheet of laser light that is not as stated, or strong compression. σ of the radii includes the "
-            "whole difference as a mean over the run, and is too small where only a part of the run is "
-            "affected. What to do: dry and clean the window, run boresight diagnose on a gauge run, "
-            "record with less compression"
-        )
 
 
 def _judge_radii(wall: Wall, trajectory: Trajectory, context: Context) -> None:

@@ -260,3 +260,10 @@ def _of(samples: WallSamples, image_rad: Float) -> tuple[Float, ...]:
     middle = (distance[ring, last // 2] + distance[ring, (last + 1) // 2]) / 2
     count = samples.valid.sum(1).astype(float)
     return harmonic, distance[:, 0], middle, distance[ring, last], count, roll, _in_sectors(departure)
+
+
+def nearest(distance: Float, wanted: Float) -> Int:
+    """Return for each wanted distance the index of the nearest of the distances, in any order."""
+    order = np.argsort(distance, kind="stable")
+    middle = (distance[order][1:] + distance[order][:-1]) / 2
+    return np.asarray(order[np.searchsorted(middle, wanted)])

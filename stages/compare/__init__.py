@@ -71,9 +71,8 @@ def _resolution(walls: WallPair, pair: PairedWalls) -> Resolution:
     smoothing, spacing = max(w.smoothing_mm for w in both), max(w.ring_spacing_mm for w in both)
     # the map joins neighbouring rings by a triangular kernel of that half width, whose 1 σ is width / √6
     along = float(np.hypot(smoothing, spacing / np.sqrt(6)))
-    displaced = float(np.hypot(pair.now.displaced_mm, pair.earlier.displaced_mm))
     relative = pair.calibration_mm / pair.radius_mm
-    return Resolution(along, smoothing, relative, walls.is_one_calibration, displaced)
+    return Resolution(along, smoothing, relative, walls.is_one_calibration)
 
 
 REGISTER = Stage(
@@ -231,7 +230,10 @@ def _growth(place: Place, patch: Patch, pair: PairedWalls, resolution: Resolutio
     along, turn = pair.registration.sigma_at(before_mm)
     around = turn * patch.cell_mm[1] / pair.now.step_rad
     sign = 1 if place.kind.is_metal_loss else -1
-    return measure_growth(patch, sign, resolution, (along, around))
+    walls = (pair.now, s), (pair.earlier, before_mm)
+    displaced = [float(wall.displaced_in(np.array([wall.row(at)]))[0]) for wall, at in walls]
+    here = replace(resolution, displaced_mm=float(np.linalg.norm(displaced)))
+    return measure_growth(patch, sign, here, (along, around))
 
 
 def _judged(change: Change, p_adjusted: float) -> Change:

@@ -92,8 +92,8 @@ class PairedWalls:
         before, sigma = self._before(s)
         basis = basis_of(self.now.azimuth_rad)
         rings = ring_harmonics(now - before, basis)
-        random = np.hypot(np.asarray(self.now.sigma_random_mm[rows], float), sigma)
-        return Stretch(s, now, before + rings @ basis.T, random, 2 * rings[:, 0])
+        apart = np.hypot(_apart(self.now, rows), sigma)
+        return Stretch(s, now, before + rings @ basis.T, apart, 2 * rings[:, 0])
 
     def _thinned(self, values: NDArray[Any]) -> Float:
         """Return about two hundred rows of values, evenly: enough for a median of a long wall."""
@@ -104,7 +104,7 @@ class PairedWalls:
         return slice(None, None, max(rows // 200, 1))
 
     def _before(self, s: Float) -> tuple[Float, Float]:
-        """Return the earlier wall's radius and random σ at the later grid's rows (R,) and all azimuths."""
+        """Return the earlier wall's radius and `_apart` at the later grid's rows (R,) and all azimuths."""
         wall = self.earlier
         at, psi = self.registration.to_earlier(s[:, None], self.now.azimuth_rad[None])
         row = (at - wall.distance_mm[0]) / wall.step_mm
@@ -112,8 +112,14 @@ class PairedWalls:
         last = int(np.clip(np.ceil(row.max()) + 3, first + 1, len(wall.distance_mm)))
         column = np.mod((psi - wall.azimuth_rad[0]) / wall.step_rad, len(wall.azimuth_rad))
         row = np.broadcast_to(row - first, column.shape)
-        radius, sigma = (np.asarray(v[first:last], float) for v in (wall.radius_mm, wall.sigma_random_mm))
+        radius, sigma = np.asarray(wall.radius_mm[first:last], float), _apart(wall, slice(first, last))
         return _between(radius, row, column), _between(sigma, row, column)
+
+
+def _apart(wall: WallMap, rows: slice) -> Float:
+    """Return the 1 σ (R, A), mm, of cells that they do not have in common with all others of their wall."""
+    random, local = np.asarray(wall.sigma_random_mm[rows], float), wall.displaced_in(rows)
+    return np.asarray(np.hypot(random, local[:, None]))
 
 
 def _between(values: Float, row: Float, column: Float) -> Float:

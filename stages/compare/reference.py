@@ -57,7 +57,9 @@ def read_wall_map(path: Path) -> WallMap:
     file = map_file(path)
     with _opened(file) as content:
         arrays = {
-            k: np.asarray(content[k], float) for k in content.files if k in _MAP_KEYS or k.startswith("sigma")
+            k: np.asarray(content[k], float)
+            for k in content.files
+            if k in _MAP_KEYS or k.startswith(("sigma", "displaced"))
         }
     missing = [k for k in _MAP_KEYS if k not in arrays]
     if missing:
@@ -65,7 +67,8 @@ def read_wall_map(path: Path) -> WallMap:
     distance, azimuth, radius = (arrays[k] for k in _MAP_KEYS)
     _check_grid(file, distance, azimuth, radius)
     sigma = arrays.get("sigma_mm", np.zeros_like(radius))
-    return WallMap(distance, azimuth, radius, sigma, arrays.get("sigma_random_mm", sigma))
+    random, displaced = arrays.get("sigma_random_mm", sigma), arrays.get("displaced_mm")
+    return WallMap(distance, azimuth, radius, sigma, random, displaced_mm=displaced)
 
 
 def read_wall_points(run: Path, at_most: int = 200_000) -> WallPoints:

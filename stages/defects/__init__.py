@@ -42,6 +42,7 @@ from stages.defects.along import stretches
 from stages.defects.clean import clean_wall
 from stages.defects.corroborate import Evidence, Witnesses, evidence_for
 from stages.defects.dark_lines import dark_lines, lies_beside
+from stages.defects.depth import Depth
 from stages.defects.describe import Scene, describe, describe_line
 from stages.defects.detect import Detection, detect
 from stages.defects.grow import footprint, grown
@@ -99,7 +100,6 @@ def find_defects(
         Witnesses(texture, rings, pictures, wall.held),
         recording.pipe.wall_thickness_mm,
         parameters.min_depth_mm,
-        wall.radius_map.displaced_mm,
     )
     cloud = cloud_along(wall.cloud)
     measured = MeasuredWall(relief, cloud, cloud.ring_spacing_mm())
@@ -161,7 +161,7 @@ def _described(
     """Return a region with its ``evidence``; ``measured`` with all rings, and with those that were kept."""
     whole, kept = measured
     here, surface, depth = kept.here, kept.surface, kept.allowed
-    depth = replace(depth, sigma_mm=float(np.hypot(depth.sigma_mm, scene.displaced_mm)))
+    depth = _displaced(depth, region, measurer)
     cut = abs(whole.depth.depth_mm) - abs(depth.depth_mm)
     widened = flattened(depth, here, surface, scene.seen_by.held, measurer.wall.ways_mm)
     without_them_mm = widened.sigma_mm
@@ -182,8 +182,15 @@ def _lines(measurer: Measurer, found: Sequence[Found], scene: Scene, context: Co
         beside = any(lies_beside(region, f.region, relief) for f in found)
         line = None if beside else measurer.measured(region, every_point=True)
         if line is not None:
-            depth = replace(line.depth, sigma_mm=float(np.hypot(line.depth.sigma_mm, scene.displaced_mm)))
+            depth = _displaced(line.depth, region, measurer)
             yield describe_line(line.here, depth, line.surface, scene)
+
+
+def _displaced(depth: Depth, region: Region, measurer: Measurer) -> Depth:
+    """Return a depth whose σ includes what displaces the line from place to place in the region's rows."""
+    rows = slice(region.row, region.row + len(region.mask))
+    local_mm = measurer.wall.relief.radius_map.displaced_in(rows).max(initial=0.0)
+    return replace(depth, sigma_mm=float(np.hypot(depth.sigma_mm, local_mm)))
 
 
 def _fixed_in(region: Region, fixed: FixedToProbe | None) -> Float:

@@ -76,15 +76,11 @@ def _roughness(relief: Relief, region: Region, depth: Depth) -> tuple[float, flo
 
 @dataclass(frozen=True)
 class Scene:
-    """What all defects of a run are described with: evidence, wall thickness and smallest depth, mm.
-
-    ``displaced_mm`` is the 1 σ by which smooth errors of the picture displace the line, and thus depths.
-    """
+    """What all defects of a run are described with: evidence, wall thickness and smallest depth, mm."""
 
     seen_by: Witnesses
     wall_thickness_mm: float | None
     min_depth_mm: float
-    displaced_mm: float = 0.0
 
 
 def describe(region: Region, depth: Depth, surface: Surface, scene: Scene) -> Defect:

@@ -40,7 +40,8 @@ class Relief:
     noise_mm : (S, A)
         1 σ of single cells from noise and the wall's natural roughness; NaN where nothing was seen.
     sigma_mm : (S, A)
-        1 σ of ``local_mm``: ``noise_mm``, and more in rows that scatter more about the smooth shape.
+        1 σ of ``local_mm``: ``noise_mm``, and more in rows that scatter more about the smooth shape, or whose
+        picture is displaced.
     welds : tuple of slice
         Rows of all-round beads of the whole wall, counted from the first row here.
     harmonics_mm : (S, 5)
@@ -129,11 +130,13 @@ class WallRelief:
         basis = basis_of(self.radius_map.azimuth_rad)
         local = measured - self.local_shape_mm[rows] @ basis.T
         noise = _noise(self.radius_map, rows, local, self.roughness_mm2)
+        # What displaces the picture makes rows scatter as well: it counts once.
+        sigma = np.maximum(_sigma(local, noise), self.radius_map.displaced_in(rows)[:, None])
         welds = tuple(slice(w.start - rows.start, w.stop - rows.start) for w in self.welds)
         return Relief(
             self.radius_map.distance_mm[rows], self.radius_map.azimuth_rad, self.radius_mm,
             local, measured - self.whole_shape_mm[rows] @ basis.T,
-            noise, _sigma(local, noise), welds, self.whole_shape_mm[rows], self.typical,
+            noise, sigma, welds, self.whole_shape_mm[rows], self.typical,
         )  # fmt: skip
 
 

@@ -36,6 +36,7 @@ from stages.motion.tracking.strips import WallView
 from stages.motion.trajectory import (
     SeenCentres,
     camera_trembles,
+    displaced_in,
     report_motion,
     report_steps,
     trajectory_of,
@@ -98,8 +99,7 @@ def estimate_motion(
     report_instrument(probe, trajectory, context)
     return replace(
         believed, events=events, image_scale=steady.scale, image_scale_sigma=steady.scale_sigma,
-        radius_doubt=doubt, displaced_mm=estimate.wall_twice.shared_mm,
-        displaced_for_certain=estimate.wall_twice.is_certain,
+        radius_doubt=doubt, displaced=displaced_in(estimate.wall_twice, trajectory.frame),
         knock=steady.run.knock,
     )  # fmt: skip
 

@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
 from pipeline.adjustment.motion_priors import most_trembling_of_places, trembling, trembling_of_places
 from pipeline.arrays import Float, Int
 from pipeline.artefacts.measured import Trajectory
+from pipeline.artefacts.motion import Displaced
 from pipeline.geometry.axis import PipeAxis, distance_along, frames_at, to_pipe
 from pipeline.geometry.rigid import from_parts, inverse, transform
 from pipeline.instrument.probe import Probe
 from pipeline.machine.stage import Context
 from pipeline.recording.base import FrameTable
 from stages.motion.bundle_adjustment.equations import MATCH_BIASES
+from stages.motion.bundle_adjustment.shared_difference import WallTwice
 from stages.motion.bundle_adjustment.solver import trembles
 from stages.motion.stated_probe import MOST_LASTING
 from stages.motion.tracking.landmarks import TrackedPoses
@@ -87,6 +90,17 @@ def trajectory_of(run: JoinedRun, frames: FrameTable, probe: Probe, has_encoder:
     )
 
 
+def displaced_in(twice: WallTwice, frame: Int) -> tuple[Displaced, ...]:
+    """Return what photo and line differ by in successive stretches of a run of frames (N,)."""
+    stretches = twice.stretches()
+    ends = [int((a.frame[-1] + b.frame[0]) / 2) for a, b in pairwise(stretches)]
+    limits = [-1, *ends, len(frame) - 1]
+    return tuple(
+        Displaced(int(frame[min(first + 1, last)]), int(frame[last]), s.size_mm, s.is_certain)
+        for s, (first, last) in zip(stretches, pairwise(limits), strict=True)
+    )
+
+
 def report_motion(
     context: Context,
     estimate: RunEstimate,
@@ -108,9 +122,10 @@ def report_motion(
     context.report("reprojection error against the σ of matching", estimate.excess, "times")
     context.report("part of it that lasts from picture to picture", estimate.lasting, "times")
     twice = estimate.wall_twice
-    if twice.weight > 0:
-        context.report("difference of wall in photo and rings, shared", twice.shared_mm, "mm")
+    if len(twice.frame):
+        context.report("difference of wall in photo and rings, shared", twice.size_mm, "mm")
         context.report("such a difference that noise alone may show, 1 σ", twice.noise_mm, "mm")
+        context.report("stretches of the run that differ in it", len(trajectory.displaced), "")
     _warn_of_texture(estimate.lasting, texture.poses, texture.store.spool.count, context)
     _warn_of_trembling(trajectory, texture.poses, shakes, context)
     context.report("pipe radius", trajectory.radius_mm, "mm")

@@ -41,7 +41,7 @@ def found(
     radius = RADIUS + smooth_noise(random, (len(DISTANCE), len(AZIMUTH)), noise_mm, 1.0)
     radius[30 : 30 + rings, PLACE] += depth_mm
     wall = wall_of(DISTANCE, AZIMUTH, radius, noise_mm)
-    radius_map = replace(wall.radius_map, displaced_mm=displaced_mm)
+    radius_map = replace(wall.radius_map, displaced_mm=np.full(len(DISTANCE), displaced_mm))
     wall = replace(wall, held=held, radius_map=radius_map)
     if unsure:
         sigma = wall.cloud.sigma_mm.reshape(radius.shape).copy()

@@ -142,7 +142,7 @@ def test_what_displaces_the_picture_from_place_to_place_averages_out_of_a_mean_d
     """A film of water of .13 mm widened σ of the mean diameter from .03 to .26 mm."""
     s, psi = np.arange(0, 100, 0.5), -np.pi + 2 * np.pi / 720 * np.arange(720)
     radius = np.full((len(s), len(psi)), 50.0)
-    wall = WallMap(s, psi, radius, 0 * radius + 0.05, 0 * radius + 1e-6, displaced_mm=0.04)
+    wall = WallMap(s, psi, radius, 0 * radius + 0.05, 0 * radius + 1e-6, displaced_mm=np.full(len(s), 0.04))
     across, mean = readings(wall, "diameter", ((20.0, 1.0),))
     assert mean.sigma == pytest.approx(2 * 0.03)
     assert across.sigma == pytest.approx(np.hypot(2 * 0.03, np.sqrt(2) * 0.04))

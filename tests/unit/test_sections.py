@@ -47,7 +47,8 @@ def test_the_centre_is_subtracted_before_diameters_are_read():
 def test_what_displaces_the_picture_from_place_to_place_averages_out_in_the_mean_diameter():
     """It counted as common to all places: ±.26 mm where run.json said ±.03."""
     wall = wall_of(DISTANCE, AZIMUTH, np.full((len(DISTANCE), 360), 50.0), 0.01, np.hypot(0.0166, 0.13))
-    local = replace(wall, radius_map=replace(wall.radius_map, displaced_mm=0.13))
+    displaced = np.full(len(DISTANCE), 0.13)
+    local = replace(wall, radius_map=replace(wall.radius_map, displaced_mm=displaced))
     sections = measure_sections(bare_recording(100.0), local, PARAMETERS, quiet_context())
     common = 2 * np.sqrt(0.0166**2 - 0.01**2)
     assert np.allclose(sections.mean_diameter_sigma_mm, common, rtol=0.02)

@@ -123,7 +123,7 @@ def _measured(summary: RunSummary) -> Card:
     seen = np.isfinite(radius_map.radius_mm)
     rows = seen.any(1)
     sigma, random = (float(np.median(s[seen])) for s in (radius_map.sigma_mm, radius_map.sigma_random_mm))
-    local = radius_map.displaced_mm
+    local = float(np.sqrt(np.mean(radius_map.displaced_in(np.flatnonzero(rows)) ** 2)))
     lines = [
         f"{100 * seen[rows].mean():.1f} % of the wall was seen",
         f"of this uncertainty, {random:.3f} mm is random and "

@@ -19,6 +19,7 @@ from pipeline.arrays import Bool, Float, Int
 from pipeline.geometry.axis import to_pipe
 from stages.motion.bundle_adjustment.equations import Measurements
 from stages.motion.bundle_adjustment.extra_columns import RingsInPipe
+from stages.motion.bundle_adjustment.shared_difference import WallTwice
 from stages.motion.bundle_adjustment.solver import Estimate
 
 _NEAREST, _FARTHEST = 1.0, 2.5
@@ -28,8 +29,6 @@ _BESIDE = 0.5
 """Distance of rings that are compared with a landmark, in sizes of a patch: its own wall, and half the least
 distance of neighbours, which so share no rings and no noise of them. Up to one size, waves of the wall 1 mm
 high and 40 mm long were flattened in the mean, and counted as displaced by .03 mm."""
-_SURE = 5.0
-"""Standard errors from which it is certain: chosen, far beyond chance."""
 _OF_POSE = 0.5
 """Length, in radii, over which a misfit of poses is taken for linear. Where a joint of 1 mm was not known to
 the adjustment, poses followed it over a radius, and over lengths of two radii the rest counted by 17 standard
@@ -39,54 +38,27 @@ _ITERATIONS, _REDESCENT, _CLIPPED = 8, 3.0, 3.0
 
 
 @dataclass(frozen=True)
-class WallTwice:
-    """Weighted sums over pairs of neighbouring landmarks.
+class _Compared:
+    """Landmarks at which photo and line are compared.
 
     Attributes
     ----------
-    product_mm2, square_mm4, weight : float
-        Sums of the products of their differences from the line, of these products squared, and of the
-        weights.
+    place : (L, 3)
+        On a cylinder of the pipe's radius, mm.
+    difference_mm, sigma_mm : (L,)
+        Photo minus line, and its 1 σ.
+    part : (L,) int
+        Number of the part of the pipe, each as long as the least distance of neighbours.
+    frame, azimuth_c_rad : (L,)
+        Frame of the nearest ring, and the azimuth in the image at which it passes.
     """
 
-    product_mm2: float = 0.0
-    square_mm4: float = 0.0
-    weight: float = 0.0
-
-    def with_more(self, other: WallTwice) -> WallTwice:
-        """Return the sums over the pairs of both."""
-        return WallTwice(
-            self.product_mm2 + other.product_mm2,
-            self.square_mm4 + other.square_mm4,
-            self.weight + other.weight,
-        )
-
-    @property
-    def in_errors(self) -> float:
-        """Return the shared variance over its standard error; by chance it has any sign, and a size of 1."""
-        return self.product_mm2 / np.sqrt(self.square_mm4) if self.square_mm4 > 0 else 0.0
-
-    @property
-    def is_certain(self) -> bool:
-        """Return whether neighbours share a difference beyond doubt."""
-        return self.in_errors > _SURE
-
-    @property
-    def noise_mm(self) -> float:
-        """Return the difference, 1 σ, whose square is the standard error of the shared variance."""
-        return float(np.sqrt(np.sqrt(self.square_mm4) / self.weight)) if self.weight > 0 else np.inf
-
-    @property
-    def shared_mm(self) -> float:
-        """Return the difference, 1 σ, that neighbours share.
-
-        Line and photo may both be displaced, or one alone, so that the line's own error may be all of it. The
-        variance v with its standard error e is shrunk to v (1 − e² / v²), and to 0 below one standard error
-        (the non-negative garrote of Breiman, 1995): noise alone adds less than the standard error would.
-        """
-        if self.in_errors <= 1:
-            return 0.0
-        return float(np.sqrt(self.product_mm2 / self.weight * (1 - self.in_errors**-2)))
+    place: Float
+    difference_mm: Float
+    sigma_mm: Float
+    part: Int
+    frame: Int
+    azimuth_c_rad: Float
 
 
 def wall_twice(estimate: Estimate, measured: Measurements, patch_mm: float) -> WallTwice:
@@ -96,17 +68,18 @@ def wall_twice(estimate: Estimate, measured: Measurements, patch_mm: float) -> W
     span, azimuth, _ = to_pipe(state.axis, state.xyz_p)
     rings, radius_mm = RingsInPipe.of(state, measured), state.nominal_radius_mm
     place = _on_cylinder(span, azimuth, radius_mm)
-    line_mm = _mean_near(
-        place,
-        _on_cylinder(rings.span_mm, rings.azimuth_rad, radius_mm),
-        estimate.adjusted.equations.rings.residual,
-        _BESIDE * patch_mm,
-    )
+    on_rings = _on_cylinder(rings.span_mm, rings.azimuth_rad, radius_mm)
+    line_mm = _mean_near(place, on_rings, estimate.adjusted.equations.rings.residual, _BESIDE * patch_mm)
     known = np.isfinite(line_mm + sigma_mm)
-    difference = _beyond_pose(
-        span[known], azimuth[known], (off_mm - line_mm)[known], sigma_mm[known], _OF_POSE * radius_mm
-    )
-    return _of_pairs(place[known], difference, sigma_mm[known], patch_mm)
+    if not known.any():
+        return WallTwice.none()
+    span, azimuth, place, sigma_mm = span[known], azimuth[known], place[known], sigma_mm[known]
+    difference = _beyond_pose(span, azimuth, (off_mm - line_mm)[known], sigma_mm, _OF_POSE * radius_mm)
+    part = np.floor((span - span.min()) / (_NEAREST * patch_mm)).astype(np.int64)
+    nearest = cKDTree(on_rings).query(place)[1]
+    x, y = rings.xyz_c[nearest, :2].T
+    compared = _Compared(place, difference, sigma_mm, part, measured.rings.frame[nearest], np.arctan2(y, x))
+    return _summed(compared, patch_mm, round(2 * np.pi * radius_mm / (_FARTHEST * patch_mm)))
 
 
 def _texture_alone(estimate: Estimate) -> tuple[Float, Float]:
@@ -189,12 +162,31 @@ def _without_harmonic(span_mm: Float, azimuth_rad: Float, difference_mm: Float, 
     return np.asarray(np.clip(left, -limit, limit) * sigma_mm)
 
 
-def _of_pairs(place: Float, difference_mm: Float, sigma_mm: Float, patch_mm: float) -> WallTwice:
-    if len(place) < 2:
-        return WallTwice()
+def _summed(compared: _Compared, patch_mm: float, sectors: int) -> WallTwice:
+    """Return the sums over all pairs, by parts in the order of their frames."""
+    count = int(compared.part.max()) + 1
+    landmarks = np.bincount(compared.part, minlength=count)
+    frame = np.bincount(compared.part, compared.frame, count) / np.maximum(landmarks, 1)
+    weight = compared.sigma_mm**-2.0
+    sector = np.floor((compared.azimuth_c_rad / (2 * np.pi) + 0.5) * sectors).astype(np.int64) % sectors
+    cell, cells = compared.part * sectors + sector, count * sectors
+    total, weights = (
+        np.asarray(np.bincount(cell, v, cells), float).reshape(count, sectors)
+        for v in (compared.difference_mm * weight, weight)
+    )
+    order = np.argsort(frame, kind="stable")
+    order = order[landmarks[order] > 0]
+    neighbours = _neighbours(compared, patch_mm, count)
+    return WallTwice(frame[order], neighbours[order], total[order], weights[order])
+
+
+def _neighbours(compared: _Compared, patch_mm: float, count: int) -> Float:
+    """Return the sums (K, 3) over pairs of neighbours, as in `Shared`, by the part of one of the two."""
+    place, sigma_mm = compared.place, compared.sigma_mm
     one, other = cKDTree(place).query_pairs(_FARTHEST * patch_mm, output_type="ndarray").T
     apart = np.linalg.norm(place[one] - place[other], axis=1) >= _NEAREST * patch_mm
     one, other = one[apart], other[apart]
     weight = (sigma_mm[one] * sigma_mm[other]) ** -2.0
-    product = difference_mm[one] * difference_mm[other] * weight
-    return WallTwice(float(product.sum()), float(np.sum(product**2)), float(weight.sum()))
+    product = compared.difference_mm[one] * compared.difference_mm[other] * weight
+    sums = [np.bincount(compared.part[one], v, count) for v in (product, product**2, weight)]
+    return np.stack(sums, -1)

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from functools import partial, reduce
+from dataclasses import dataclass, replace
+from functools import partial
+from itertools import pairwise
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from pipeline.adjustment.levenberg_marquardt import Watch
 from pipeline.arrays import Float
 from stages.motion.bundle_adjustment.equations import Measurements
 from stages.motion.bundle_adjustment.laser_knock import KnockTest
+from stages.motion.bundle_adjustment.shared_difference import WallTwice
 from stages.motion.bundle_adjustment.solver import (
     Estimate,
     estimate_state,
@@ -20,7 +22,7 @@ from stages.motion.bundle_adjustment.solver import (
     lasting_excess,
 )
 from stages.motion.bundle_adjustment.unknowns import State
-from stages.motion.bundle_adjustment.wall_twice import WallTwice, wall_twice
+from stages.motion.bundle_adjustment.wall_twice import wall_twice
 from stages.motion.parameters import MotionParameters
 from stages.motion.tracking.normalisation import correlated_samples
 from stages.motion.windows.first_window import EncoderCheck, FirstWindow, adjust_first
@@ -111,6 +113,12 @@ class _End:
         twice = wall_twice(estimate, measured, parameters.patch_size * step_mm)
         return _End(adjusted.trials, adjusted.settled, adjusted.equations.reprojection_px, *errors, twice)
 
+    def in_run(self, windows: Sequence[Window], number: int) -> _End:
+        """Return it as that of a window of the run, so that what two windows share counts once."""
+        limits = [0, *(handover(a, b) for a, b in pairwise(windows)), windows[-1].last]
+        twice = self.wall_twice.later(windows[number].first).between(*limits[number : number + 2])
+        return replace(self, wall_twice=twice)
+
 
 def adjust_run(
     run: MeasuredRun,
@@ -153,7 +161,7 @@ def adjust_run(
         )
         check(estimate)
         end = _End.of(estimate, measured, run.texture.grid.step_mm, parameters)
-        found.append((_submap(estimate, windows, k), end))
+        found.append((_submap(estimate, windows, k), end.in_run(windows, k)))
     joined = join_submaps([f[0] for f in found], shared).with_scale_sigma(first.distance_sigma)
     return _run_estimate(joined, [f[1] for f in found], first)
 
@@ -171,7 +179,7 @@ def _run_estimate(joined: JoinedRun, ends: Sequence[_End], first: FirstWindow) -
     error, excess, lasting = (float(np.median([getattr(end, name) for end in ends])) for name in names)
     trials, unsettled = sum(e.trials for e in ends), sum(not e.settled for e in ends)
     parts = first.encoder, first.steady, first.knock
-    twice = reduce(WallTwice.with_more, (e.wall_twice for e in ends))
+    twice = WallTwice.joined([e.wall_twice for e in ends])
     return RunEstimate(joined, trials, unsettled, error, excess, lasting, *parts, twice)
 
 
