@@ -15,7 +15,7 @@ import numpy as np
 
 from pipeline.adjustment.shared_light import NOTHING_HELD, HeldOver
 from pipeline.arrays import Bool, Byte, Float, Float32, Int
-from pipeline.artefacts.motion import Displaced, LaserKnock, MotionEvent, PipePiece
+from pipeline.artefacts.motion import Displaced, LaserKnock, MotionEvent, PipePiece, Rival
 from pipeline.artefacts.wall_map import FixedToProbe, WallMap
 from pipeline.geometry.axis import PipeAxis
 
@@ -162,6 +162,8 @@ class Trajectory:
     cut_sigma_mm : float
         Part of ``distance_sigma_mm`` from the unknown distance travelled at cuts of the recording; 0 without
         cuts.
+    rival : Rival or None
+        The motion if the probe is wrong; None if pictures and probe agree.
     displaced : tuple of Displaced
         Stretches of the run, in their order, with what walls in texture and in the rings differ by.
     """
@@ -185,7 +187,15 @@ class Trajectory:
     radius_doubt: float = 0.0
     knock: LaserKnock | None = None
     cut_sigma_mm: float = 0.0
+    rival: Rival | None = None
     displaced: tuple[Displaced, ...] = ()
+
+    def of_rival(self) -> Trajectory | None:
+        """Return the trajectory if the stated probe is wrong; None if pictures and probe agree."""
+        if self.rival is None:
+            return None
+        own = self.rival
+        return replace(self, T_pc=own.T_pc, axis=own.axis, instrument=own.instrument, rival=None)
 
     def displaced_mm(self, frame: Int) -> Float:
         """Return the size (F,), mm, of what displaces the picture from place to place in frames (F,)."""

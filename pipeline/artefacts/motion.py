@@ -8,6 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from pipeline.arrays import Float
+from pipeline.geometry.axis import PipeAxis
 
 
 @dataclass(frozen=True)
@@ -41,6 +42,23 @@ class Displaced:
     frame_to: int
     size_mm: float
     certain: bool
+
+
+@dataclass(frozen=True)
+class Rival:
+    """The motion if the stated probe is wrong: with a probe as the pictures alone demand it.
+
+    Attributes
+    ----------
+    T_pc : (N, 4, 4)
+    axis : PipeAxis
+    instrument : (P,)
+        The probe's parameters.
+    """
+
+    T_pc: Float
+    axis: PipeAxis
+    instrument: Float
 
 
 @dataclass(frozen=True)

@@ -25,6 +25,7 @@ from pipeline.pages import notation
 from stages.accumulate.displaced import displaced_on, warn_of_displaced
 from stages.accumulate.fixed import fixed_to_probe
 from stages.accumulate.grid import MapGrid, map_grid
+from stages.accumulate.rival import rival_on
 from stages.accumulate.shared_errors import shared_on_wall, warn_of_left_out
 from stages.accumulate.stretch import cut_stretches, empty_wall, fill, map_of
 from stages.accumulate.survey import RingsOnWall, RingSurvey, in_steady_pictures, nearest, survey_of
@@ -156,6 +157,7 @@ def accumulate_wall(
     grid = map_grid(survey, parameters.distance_step_mm, parameters.azimuth_samples)
     spread = calibration_spread(found, rings, trajectory, survey)
     shared = shared_on_wall(on_wall, grid, parameters.largest_gap_mm, context.scratch)
+    rival = rival_on(grid, on_wall, survey)
     fixed = fixed_to_probe(survey, rings.frame, trajectory.radius_mm, grid, context.scratch)
     held = _held_in(rings, survey, trajectory.radius_mm)
     wall = empty_wall(grid, survey, trajectory.axis, fixed, context.scratch)
@@ -171,8 +173,9 @@ def accumulate_wall(
             # What stays at a place of the image is a part of what displaces the picture.
             local = np.maximum(local, fixed.departure_mm[rows])
         systematic = np.hypot(spread.on(grid.rows(rows.start, rows.stop)), local)
-        if shared is not None:
-            systematic = np.hypot(systematic, shared[rows])
+        for more in (None if rival is None else rival[:, None], shared):
+            if more is not None:
+                systematic = np.hypot(systematic, more[rows])
         part = map_of(stretch, on_wall, survey, grid, systematic, smoothing_mm, gap_mm, held)
         fill(wall, stretch, part, on_wall, survey)
         context.progress(done, len(stretches))

@@ -13,6 +13,7 @@ from functools import partial
 
 import numpy as np
 
+from pipeline.arrays import Float
 from pipeline.artefacts.measured import RingPoints, RingSamples, Trajectory
 from pipeline.errors import UnusableError
 from pipeline.geometry.axis import distance_along, frames_at
@@ -31,7 +32,12 @@ from stages.motion.measuring import measure_run, places_of
 from stages.motion.parameters import MotionParameters
 from stages.motion.rings import looking_at_wall
 from stages.motion.route.laying import lay_route
-from stages.motion.stated_probe import report_instrument, with_doubtful_instrument
+from stages.motion.stated_probe import (
+    contradiction,
+    report_instrument,
+    with_doubtful_instrument,
+    with_rival,
+)
 from stages.motion.tracking.strips import WallView
 from stages.motion.trajectory import (
     SeenCentres,
@@ -92,6 +98,9 @@ def estimate_motion(
     seen = SeenCentres(run.circles.centre_c, probe.laser.baseline_mm)
     shakes = camera_trembles(trajectory, run.texture.poses, seen)
     doubted = shakes or run.texture.poses.much_lost
+    if (against := contradiction(trajectory, probe)).certain:
+        other = _with_probe(run, probe, against.allowed, recording, parameters, context)
+        trajectory = trajectory if other is None else with_rival(trajectory, other)
     steady, believed = estimate.steady, with_doubtful_instrument(trajectory, probe, estimate.lasting, doubted)
     report_motion(context, estimate, run.texture, believed, shakes, wider)
     require_along_pipe(trajectory)
@@ -102,6 +111,27 @@ def estimate_motion(
         radius_doubt=doubt, displaced=displaced_in(estimate.wall_twice, trajectory.frame),
         knock=steady.run.knock,
     )  # fmt: skip
+
+
+def _with_probe(
+    run: MeasuredRun,
+    probe: Probe,
+    covariance: Float,
+    recording: Recording,
+    parameters: MotionParameters,
+    context: Context,
+) -> Trajectory | None:
+    """Return the motion if the stated probe has another covariance (P, P), without loops.
+
+    It is None if the pictures do not determine such a probe.
+    """
+    allowed = replace(probe, covariance=covariance)
+    check = partial(_require_convergence, run.texture.grid.radius_mm)
+    try:
+        joined = adjust_run(replace(run, probe=allowed), parameters, check, context.progress).joined
+    except UnusableError:
+        return None
+    return trajectory_of(joined, recording.frames, allowed, run.encoder is not None)
 
 
 def _with_loops_closed(

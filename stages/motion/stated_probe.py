@@ -8,7 +8,8 @@ import numpy as np
 
 from pipeline.arrays import Float
 from pipeline.artefacts.measured import Trajectory
-from pipeline.geometry.axis import distance_along
+from pipeline.artefacts.motion import Rival
+from pipeline.geometry.axis import distance_along, frames_at
 from pipeline.instrument.probe import Probe
 from pipeline.machine.stage import Context
 from stages.motion.mirrored import mirrored_way
@@ -42,12 +43,17 @@ class Contradiction:
     moved, wanted : (P,)
         Change of the parameters by the adjustment, and that which the pictures alone ask for along the
         directions in which they contradict a correct probe.
+    allowed : (P, P)
+        Covariance of the stated parameters with which nothing contradicts by more than 1 σ: each direction
+        that does is widened until it is as far off as it should be (R. C. Paule, J. Mandel, "Consensus values
+        and weighting factors", 1982).
     """
 
     sigmas: float
     farthest: float
     moved: Float
     wanted: Float
+    allowed: Float
 
     @property
     def of_probe(self) -> bool:
@@ -72,16 +78,34 @@ def contradiction(trajectory: Trajectory, probe: Probe) -> Contradiction:
     """
     unsure = probe.principal_uncertainties()
     if trajectory.instrument is None or not unsure.size:
-        return Contradiction(0.0, 0.0, *np.zeros((2, len(probe.parameters))))
+        return Contradiction(0.0, 0.0, *np.zeros((2, len(probe.parameters))), probe.covariance)
     inverse = np.linalg.pinv(unsure)
     moved = inverse @ (trajectory.instrument - probe.parameters)
     left = 0.0 if (own := trajectory.instrument_covariance) is None else inverse @ own @ inverse.T
     gain, direction = np.linalg.eigh(np.eye(len(moved)) - left)
     along, gain = direction.T @ moved, np.where(gain > _NO_EVIDENCE, gain, 1.0)
     sigmas = np.abs(along) / np.sqrt(gain)
-    wanted = np.where(sigmas > _TOO_FAR, along / gain, along)
-    farthest = float(np.abs(moved).max())
-    return Contradiction(float(sigmas.max()), farthest, unsure @ moved, unsure @ direction @ wanted)
+    too_far = sigmas > _TOO_FAR
+    wanted = np.where(too_far, along / gain, along)
+    wider = np.where(too_far, np.sqrt(np.maximum(sigmas**2 - 1 + gain, gain) / gain), 1.0)
+    axes, farthest = unsure @ direction, float(np.abs(moved).max())
+    allowed = (axes * wider**2) @ axes.T
+    return Contradiction(float(sigmas.max()), farthest, unsure @ moved, axes @ wanted, allowed)
+
+
+def with_rival(trajectory: Trajectory, other: Trajectory) -> Trajectory:
+    """Return the trajectory with ``other`` as its rival, and their difference in distance in its σ."""
+    own, its = (distance_along(t.axis, t.T_pc) for t in (trajectory, other))
+    apart = (its - its[0]) - (own - own[0])
+    way = np.zeros((len(own), 6))
+    way[:, :3] = apart[:, None] * frames_at(trajectory.axis, own)[1][:, :, 2]
+    ends_mm = float(np.ptp(its) - np.ptp(own))
+    return replace(
+        trajectory,
+        covariance=trajectory.covariance + way[:, :, None] * way[:, None, :],
+        distance_sigma_mm=float(np.hypot(trajectory.distance_sigma_mm, ends_mm)),
+        rival=None if other.instrument is None else Rival(other.T_pc, other.axis, other.instrument),
+    )
 
 
 def with_doubtful_instrument(
@@ -141,10 +165,16 @@ def report_instrument(probe: Probe, trajectory: Trajectory, context: Context) ->
             f"pictures and stated probe contradict each other by {found.sigmas:.0f} σ: by the pictures alone "
             f"the probe would change, most of all {_most(found.wanted, probe)}. Either the pictures were "
             "shifted, cropped or scaled after the calibration, or dust, reflections or water that move with "
-            "the probe were taken for the wall. Nothing is corrected: radii, distances and roll may be wrong "
-            "by more than their σ. What to do: compare the pictures with those of the calibration, clean and "
-            "dry the window, run boresight diagnose on a gauge run"
+            f"the probe were taken for the wall. Nothing is corrected: {_consequence(trajectory)}. "
+            "What to do: compare the pictures with those of the calibration, clean and dry the window, run "
+            "boresight diagnose on a gauge run"
         )
+
+
+def _consequence(trajectory: Trajectory) -> str:
+    if trajectory.rival is None:
+        return "radii, distances and roll may be wrong by more than their σ"
+    return "σ of radii and distances includes what such a probe would change, σ of roll does not"
 
 
 def _most(change: Float, probe: Probe) -> str:
