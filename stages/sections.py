@@ -214,5 +214,5 @@ def _unmeasured(station: float, coverage: float) -> Float:
 
 
 SECTIONS = Stage(
-    "sections", "3", SectionParameters, measure_sections, "diameters, ovality and centre at every station"
+    "sections", "4", SectionParameters, measure_sections, "diameters, ovality and centre at every station"
 )

@@ -135,7 +135,8 @@ def _write_defects(run: RunFiles, folder: Path, times: int, step: float) -> None
 
 def _write_radius_map(folder: Path) -> None:
     wall = RunFiles(folder).artefact(Wall).radius_map
-    np.savez(folder / "radius_map.npz", **{f.name: getattr(wall, f.name) for f in fields(wall)})
+    arrays = {f.name: getattr(wall, f.name) for f in fields(wall)} | {"displaced_mm": wall.displaced_in()}
+    np.savez(folder / "radius_map.npz", **arrays)
 
 
 def _write_model(source: Path, target: Path, times: int, step: float) -> None:

@@ -102,8 +102,11 @@ def later(pits, seed, pipe=PIPE):
     return pipe.surface(pits, seed, SHIFT_MM, ROLL_RAD, SCALE)
 
 
-def compared(earlier_pits, later_pits, earlier_found, later_found, seed=10, resolution=FINE):
+def compared(earlier_pits, later_pits, earlier_found, later_found, seed=10, wet_mm=0.0):
+    """Return the changes; in half of the pipe the later picture is displaced by ``wet_mm`` (1 σ)."""
     before, after = PIPE.surface(earlier_pits, seed), later(later_pits, seed + 1)
     registration = register(before, after, NO_WELDS, SAME)
     places = put_together(earlier_found, [moved(f) for f in later_found], registration, RADIUS)
-    return changes(places, PairedWalls(before.wall, after.wall, registration), resolution, unseen)
+    displaced = wet_mm * (after.wall.distance_mm < LENGTH / 2)
+    wall = replace(after.wall, displaced_mm=displaced)
+    return changes(places, PairedWalls(before.wall, wall, registration), FINE, unseen)

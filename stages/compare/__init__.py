@@ -76,9 +76,9 @@ def _resolution(walls: WallPair, pair: PairedWalls) -> Resolution:
 
 
 REGISTER = Stage(
-    "register", "4", RegisterParameters, register_walls, "Register an earlier run's wall on a later one's."
+    "register", "5", RegisterParameters, register_walls, "Register an earlier run's wall on a later one's."
 )
-COMPARE = Stage("compare", "5", CompareParameters, compare_findings, "Find the change of every finding.")
+COMPARE = Stage("compare", "6", CompareParameters, compare_findings, "Find the change of every finding.")
 COMPARISON: tuple[Stage, ...] = (REGISTER, COMPARE)
 
 

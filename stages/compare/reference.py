@@ -59,7 +59,7 @@ def read_wall_map(path: Path) -> WallMap:
         arrays = {
             k: np.asarray(content[k], float)
             for k in content.files
-            if k in _MAP_KEYS or k.startswith(("sigma", "displaced"))
+            if k in (*_MAP_KEYS, "displaced_mm") or k.startswith("sigma")
         }
     missing = [k for k in _MAP_KEYS if k not in arrays]
     if missing:
@@ -68,6 +68,9 @@ def read_wall_map(path: Path) -> WallMap:
     _check_grid(file, distance, azimuth, radius)
     sigma = arrays.get("sigma_mm", np.zeros_like(radius))
     random, displaced = arrays.get("sigma_random_mm", sigma), arrays.get("displaced_mm")
+    if displaced is not None and displaced.shape != distance.shape:
+        raise InputError(file, f"displaced_mm is {displaced.shape}", place="displaced_mm",
+                         expected=f"{len(distance)} numbers, one for each distance")  # fmt: skip
     return WallMap(distance, azimuth, radius, sigma, random, displaced_mm=displaced)
 
 

@@ -235,7 +235,7 @@ def _motion_of_run(
 
 MOTION = Stage(
     "motion",
-    "62",
+    "63",
     MotionParameters,
     _motion_of_run,
     "camera pose in every frame and the pipe's axis, from texture, rings and encoder together",

@@ -9,6 +9,7 @@ import pytest
 
 from pipeline.arrays import Float
 from pipeline.artefacts.measured import Trajectory, Wall
+from pipeline.artefacts.motion import Displaced
 from pipeline.artefacts.wall_map import FixedPlace
 from pipeline.geometry.axis import straight_axis
 from pipeline.geometry.rigid import from_parts, rotation_from_vector
@@ -47,9 +48,10 @@ def gouge(s: Float, psi: Float) -> Float:
 
 def measured(
     roll_rad: float, wall=round_wall, droplet_px: float = 0.0, from_ring: int = 0, step_mm: float = STEP_MM,
-    noise_px: float = 0.05, seed: int = 0,
+    noise_px: float = 0.05, seed: int = 0, displaced: tuple[Displaced, ...] = (),
 ) -> Wall:  # fmt: skip
-    run, probe = motion(roll_rad, step_mm), replace(small_probe(), covariance=np.zeros((20, 20)))
+    run = replace(motion(roll_rad, step_mm), displaced=displaced)
+    probe = replace(small_probe(), covariance=np.zeros((20, 20)))
     rings = rings_on_wall(probe, run.T_pc, run.frame, np.random.default_rng(seed), wall, noise_px, 360)
     radius = rings.radius_px.copy()
     radius[from_ring:] += (droplet_px * bump(rings.azimuth_rad)).astype(np.float32)
@@ -67,6 +69,19 @@ def test_a_droplet_does_not_follow_the_wall(from_ring: int) -> None:
     assert place.on_probe
     assert place.azimuth_rad == pytest.approx(WHERE, abs=0.03)
     assert place.frame_from == pytest.approx(from_ring, abs=6)
+
+
+def test_a_departure_counts_once_where_photo_and_line_differ_as_well_and_only_in_its_stretch() -> None:
+    film = Displaced(0, 29, 0.3, True), Displaced(30, RINGS - 1, 0.0, False)
+    wall = measured(ROLL, droplet_px=DROPLET_PX, displaced=film)
+    assert wall.fixed is not None
+    found, departure = wall.radius_map, wall.fixed.departure_mm
+    systematic = np.sqrt(found.sigma_mm.astype(float) ** 2 - found.sigma_random_mm.astype(float) ** 2)
+    at = found.distance_mm - BASELINE
+    for rows, film_mm in ((at < 28 * STEP_MM, 0.3), (at > 32 * STEP_MM, 0.0)):
+        expected = np.where(np.isfinite(systematic), np.maximum(departure, film_mm), np.nan)
+        np.testing.assert_allclose(systematic[rows], expected[rows], atol=0.01)
+    assert departure.max() > 0.31, "control: the droplet is larger than the film"
 
 
 def test_the_sigma_of_a_departure_is_that_of_clear_places() -> None:

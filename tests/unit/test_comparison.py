@@ -86,13 +86,21 @@ def test_grown_new_and_vanished_defects_are_found_and_others_are_unchanged():
 
 
 def test_where_one_picture_was_displaced_by_water_a_change_of_that_size_is_no_growth():
-    pit = (45.0, 0.3)
-    (found,) = compared(
-        [(*pit, 0.4, 2.0)], [(*pit, 0.6, 2.0)], [finding(1, *pit)], [finding(1, *pit)],
-        resolution=replace(FINE, displaced_mm=0.2),
-    )  # fmt: skip
-    assert found.growth.depth_mm.sigma == pytest.approx(0.2, rel=0.1)
-    assert found.fate is Fate.UNCHANGED
+    wet, dry = (45.0, 0.3), (85.0, 0.3)
+    names = [finding(1, *wet), finding(2, *dry)]
+    before, after = ([(*pit, depth, 2.0) for pit in (wet, dry)] for depth in (0.4, 0.6))
+    found = sorted(compared(before, after, names, names, wet_mm=0.2), key=lambda c: c.place.middle)
+    assert found[0].growth.depth_mm.sigma == pytest.approx(0.2, rel=0.1)
+    assert [c.fate for c in found] == [Fate.UNCHANGED, Fate.GREW]
+
+
+def test_cells_of_a_displaced_picture_are_as_unsure_as_it_is_displaced():
+    before, after = PIPE.surface([], 1), later([], 2)
+    registration = register(before, after, NO_WELDS, SAME)
+    wet = replace(after.wall, displaced_mm=0.2 * (np.arange(len(after.wall.distance_mm)) < 60))
+    displaced, dry = (PairedWalls(before.wall, w, registration).stretch(40, 80) for w in (wet, after.wall))
+    np.testing.assert_allclose(displaced.sigma_mm[:20], np.hypot(dry.sigma_mm[:20], 0.2))
+    np.testing.assert_array_equal(displaced.sigma_mm[20:], dry.sigma_mm[20:])
 
 
 def test_growth_lies_in_its_95_percent_interval_in_95_percent_of_cases():

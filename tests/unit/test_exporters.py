@@ -14,10 +14,12 @@ from scipy.spatial.transform import Rotation
 
 from pipeline.artefacts.measured import PointCloud, RadiusMap, RingSamples, Trajectory, Wall
 from pipeline.artefacts.motion import PipePiece
+from pipeline.errors import InputError
 from pipeline.export.arrays import write_radius_map, write_rings
 from pipeline.export.tables import write_centreline, write_trajectory
 from pipeline.geometry.axis import PipeAxis
 from pipeline.geometry.rigid import from_parts, rotation_from_vector
+from stages.compare.reference import read_wall_map
 from tests.pose_chain import chain, curved
 
 
@@ -112,7 +114,9 @@ def test_radius_map(tmp_path: Path, random: np.random.Generator) -> None:
     radius[2, 3] = np.nan
     count = random.integers(0, 9, shape)
     azimuth = -np.pi + np.arange(12) * np.pi / 6
-    radius_map = RadiusMap(np.arange(7.0), azimuth, radius, sigma, part, count, misalignment)
+    displaced = np.linspace(0, 0.1, 7)
+    parts = radius, sigma, part, count, misalignment
+    radius_map = RadiusMap(np.arange(7.0), azimuth, *parts, displaced_mm=displaced)
     one = np.zeros(1, np.float32)
     cloud = PointCloud(
         np.zeros((1, 3), np.float32), np.zeros((1, 3), np.float32), one, one, one, one, np.zeros(1, np.int64)
@@ -122,6 +126,12 @@ def test_radius_map(tmp_path: Path, random: np.random.Generator) -> None:
         for name in ("distance_mm", "azimuth_rad", "radius_mm", "sigma_mm", "count", "misalignment_mm"):
             np.testing.assert_array_equal(read[name], getattr(radius_map, name), err_msg=name)
         np.testing.assert_array_equal(read["sigma_random_mm"], part)
+    np.testing.assert_array_equal(read_wall_map(tmp_path).displaced_mm, displaced)
+    with np.load(tmp_path / "radius_map.npz") as read:
+        arrays = dict(read)
+    np.savez(tmp_path / "radius_map.npz", **(arrays | {"displaced_mm": displaced[1:]}))
+    with pytest.raises(InputError, match="displaced_mm"):
+        read_wall_map(tmp_path)
 
 
 def test_centreline(tmp_path: Path) -> None:

@@ -53,6 +53,8 @@ def test_what_displaces_the_picture_from_place_to_place_averages_out_in_the_mean
     common = 2 * np.sqrt(0.0166**2 - 0.01**2)
     assert np.allclose(sections.mean_diameter_sigma_mm, common, rtol=0.02)
     assert np.allclose(sections.max_diameter_sigma_mm, np.hypot(common, np.sqrt(2) * 0.13), rtol=0.02)
+    assert np.allclose(sections.ovality_nominal_sigma, 2 * 0.13 / 100, rtol=0.05)
+    assert np.allclose(sections.ovality_harmonic_sigma_mm, 0.13 / 2, rtol=0.05)
 
 
 def test_the_random_part_is_the_scatter_and_the_calibration_part_stays():
