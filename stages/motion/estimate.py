@@ -90,7 +90,7 @@ def estimate_motion(
     trajectory = trajectory_of(joined, recording.frames, probe, has_encoder)
     trajectory = lay_route(trajectory, joined.turn_variance, recording, probe, context)
     grid = run.texture.grid
-    trajectory = beyond_cuts(trajectory, cut, grid.far_mm - grid.near_mm)
+    trajectory = beyond_cuts(trajectory, cut, grid.length_mm)
     events = find_events(recording.frames, trajectory, run.texture.poses, joined.slip, has_encoder)
     if run.encoder is not None:
         sigmas = probe.encoder_scale_sigma, run.encoder.sigma_mm

@@ -92,7 +92,7 @@ def test_a_small_change_of_the_rings_may_be_either() -> None:
 
 def textured(poses: TrackedPoses) -> SimpleNamespace:
     """Return texture followed with these poses in patches of 4.6 mm."""
-    return SimpleNamespace(poses=poses, grid=SimpleNamespace(step_mm=0.22))
+    return SimpleNamespace(poses=poses, grid=SimpleNamespace(step_mm=0.22, length_mm=54.0))
 
 
 def steady_run(bore: Bore, lost: float, **changes: float) -> SteadyRun:

@@ -28,7 +28,7 @@ from tests.drawn_run import drawn_run
 from tests.motion_scene import RADIUS, Scene, joint_at, scene
 from tests.quiet import quiet_context
 
-PATCH_MM, SECTORS = 4.6, 28
+PATCH_MM, SECTORS, VIEW_MM = 4.6, 28, 1.07 * RADIUS
 FRAMES, LANDMARKS = 36, 1000
 
 
@@ -95,7 +95,9 @@ def made(seed: int) -> Scene:
 
 
 def compared(measured: Measurements, seed: int) -> WallTwice:
-    return wall_twice(estimate_state(made(seed).truth, measured, MotionParameters()), measured, PATCH_MM)
+    return wall_twice(
+        estimate_state(made(seed).truth, measured, MotionParameters()), measured, PATCH_MM, VIEW_MM
+    )
 
 
 def in_errors(found: WallTwice) -> float:
@@ -158,7 +160,7 @@ def test_a_joint_half_a_ring_off_its_place_is_no_film() -> None:
     there = scene(FRAMES, LANDMARKS, noise=1.0, seed=1, bins=72, joint_mm=(3.0, 0.0))
     bore = ONE_BORE.with_joint(joint_at(FRAMES) + 0.6, (0.0, 0.0), 3.0)
     estimate = estimate_state(replace(there.truth, bore=bore), there.measured, MotionParameters())
-    assert in_errors(wall_twice(estimate, there.measured, PATCH_MM)) < 2
+    assert in_errors(wall_twice(estimate, there.measured, PATCH_MM, VIEW_MM)) < 2
 
 
 def test_a_misfit_of_poses_that_changes_along_the_pipe_is_no_film() -> None:
@@ -167,7 +169,7 @@ def test_a_misfit_of_poses_that_changes_along_the_pipe_is_no_film() -> None:
     span, azimuth = random.uniform(0, 300, 3000), random.uniform(-np.pi, np.pi, 3000)
     off = np.sin(span / 25) * (0.3 + 0.3 * np.cos(azimuth)) + 0.1 * random.standard_normal(3000)
     sigma = np.full(3000, 0.1)
-    left = wt._beyond_pose(span, azimuth, off, sigma, wt._OF_POSE * RADIUS)
+    left = wt._beyond_pose(span, azimuth, off, sigma, wt._OF_VIEW * VIEW_MM)
     assert in_errors(summed(span, azimuth, left, sigma)) < 3
 
 

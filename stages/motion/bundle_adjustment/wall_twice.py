@@ -29,10 +29,12 @@ _BESIDE = 0.5
 """Distance of rings that are compared with a landmark, in sizes of a patch: its own wall, and half the least
 distance of neighbours, which so share no rings and no noise of them. Up to one size, waves of the wall 1 mm
 high and 40 mm long were flattened in the mean, and counted as displaced by .03 mm."""
-_OF_POSE = 0.5
-"""Length, in radii, over which a misfit of poses is taken for linear. Where a joint of 1 mm was not known to
-the adjustment, poses followed it over a radius, and over lengths of two radii the rest counted by 17 standard
-errors; a film of water counted as much with lengths of 2 to .25 radii."""
+_OF_VIEW = 0.5
+"""Length over which a misfit of poses is taken for linear, in lengths of the wall in view. Poses see what
+they do not fit, such as a joint that the adjustment does not know, as long as it is in view, and follow it
+over that length: a half wave. Of it .09 of the size remain beside a line over half of the view, .32 over all
+of it; there a joint of 1 mm counted by 17 standard errors. A film of water counted as much with a quarter of
+to twice the view."""
 _ITERATIONS, _REDESCENT, _CLIPPED = 8, 3.0, 3.0
 """Reweightings, and robust spreads at which differences lose weight or are clipped: edges, false matches."""
 
@@ -61,8 +63,12 @@ class _Compared:
     azimuth_c_rad: Float
 
 
-def wall_twice(estimate: Estimate, measured: Measurements, patch_mm: float) -> WallTwice:
-    """Compare texture and line at an estimate; ``patch_mm`` is the size of a tracked patch on the wall."""
+def wall_twice(estimate: Estimate, measured: Measurements, patch_mm: float, view_mm: float) -> WallTwice:
+    """Compare texture and line at an estimate.
+
+    ``patch_mm`` is the size of a tracked patch on the wall, ``view_mm`` the length of pipe in which texture
+    is tracked in one picture.
+    """
     state = estimate.state
     off_mm, sigma_mm = _texture_alone(estimate)
     span, azimuth, _ = to_pipe(state.axis, state.xyz_p)
@@ -74,7 +80,7 @@ def wall_twice(estimate: Estimate, measured: Measurements, patch_mm: float) -> W
     if not known.any():
         return WallTwice.none()
     span, azimuth, place, sigma_mm = span[known], azimuth[known], place[known], sigma_mm[known]
-    difference = _beyond_pose(span, azimuth, (off_mm - line_mm)[known], sigma_mm, _OF_POSE * radius_mm)
+    difference = _beyond_pose(span, azimuth, (off_mm - line_mm)[known], sigma_mm, _OF_VIEW * view_mm)
     part = np.floor((span - span.min()) / (_NEAREST * patch_mm)).astype(np.int64)
     nearest = cKDTree(on_rings).query(place)[1]
     x, y = rings.xyz_c[nearest, :2].T

@@ -72,9 +72,14 @@ class StripGrid:
         return 2 * np.pi * self.radius_mm / self.columns
 
     @property
+    def length_mm(self) -> float:
+        """Length of the wall that is sampled."""
+        return self.far_mm - self.near_mm
+
+    @property
     def rows(self) -> int:
         """Number of rows, a multiple of the coarse grid's step."""
-        return int((self.far_mm - self.near_mm) / self.step_mm) // _COARSE[0] * _COARSE[0]
+        return int(self.length_mm / self.step_mm) // _COARSE[0] * _COARSE[0]
 
     def wall(self, row: Float, column: Float) -> Float:
         """Return points (..., 3) of strip positions (...) on the wall about the z-axis."""

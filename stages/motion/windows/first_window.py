@@ -280,4 +280,4 @@ def scale_by_lag(lag_px: float, grid: StripGrid, camera: Camera) -> float:
     """
     ends = np.array([[grid.radius_mm, 0, grid.far_mm + ahead] for ahead in (-0.5, 0.5)])
     px_per_mm = float(np.linalg.norm(np.diff(camera.project(ends).uv, axis=0)))
-    return lag_px / px_per_mm / (grid.far_mm - grid.near_mm)
+    return lag_px / px_per_mm / grid.length_mm

@@ -25,6 +25,7 @@ from stages.motion.bundle_adjustment.unknowns import State
 from stages.motion.bundle_adjustment.wall_twice import wall_twice
 from stages.motion.parameters import MotionParameters
 from stages.motion.tracking.normalisation import correlated_samples
+from stages.motion.tracking.strips import StripGrid
 from stages.motion.windows.first_window import EncoderCheck, FirstWindow, adjust_first
 from stages.motion.windows.measured_run import MeasuredRun
 from stages.motion.windows.steady_scale import SteadyRun
@@ -103,14 +104,14 @@ class _End:
     wall_twice: WallTwice
 
     @staticmethod
-    def of(estimate: Estimate, measured: Measurements, step_mm: float, parameters: MotionParameters) -> _End:
+    def of(estimate: Estimate, measured: Measurements, grid: StripGrid, parameters: MotionParameters) -> _End:
         adjusted = estimate.adjusted
         away_px = np.linalg.norm(measured.tracks.uv - measured.probe.camera.centre_px, axis=1)
-        alike = correlated_samples(away_px * step_mm / estimate.state.nominal_radius_mm)
+        alike = correlated_samples(away_px * grid.step_mm / estimate.state.nominal_radius_mm)
         sigma_px = measured.tracks.sigma_px * np.sqrt(alike)
         in_sigma = adjusted.equations.texture.residual / sigma_px[:, None]
         errors = excess_of(in_sigma), lasting_excess(in_sigma, measured.tracks.landmark)
-        twice = wall_twice(estimate, measured, parameters.patch_size * step_mm)
+        twice = wall_twice(estimate, measured, parameters.patch_size * grid.step_mm, grid.length_mm)
         return _End(adjusted.trials, adjusted.settled, adjusted.equations.reprojection_px, *errors, twice)
 
     def in_run(self, windows: Sequence[Window], number: int) -> _End:
@@ -141,9 +142,7 @@ def adjust_run(
     check(estimate)
     if len(windows) == 1:
         joined = joined_at_once(estimate).with_scale_sigma(first.distance_sigma)
-        return _run_estimate(
-            joined, [_End.of(estimate, measured, run.texture.grid.step_mm, parameters)], first
-        )
+        return _run_estimate(joined, [_End.of(estimate, measured, run.texture.grid, parameters)], first)
     alone = [_alone(estimate, measured)]
     for window in windows[1:]:
         watch = partial(progress, len(alone), steps)
@@ -160,7 +159,7 @@ def adjust_run(
             own.state, measured, shared.value, own.smooth_sigma, parameters, watch
         )
         check(estimate)
-        end = _End.of(estimate, measured, run.texture.grid.step_mm, parameters)
+        end = _End.of(estimate, measured, run.texture.grid, parameters)
         found.append((_submap(estimate, windows, k), end.in_run(windows, k)))
     joined = join_submaps([f[0] for f in found], shared).with_scale_sigma(first.distance_sigma)
     return _run_estimate(joined, [f[1] for f in found], first)

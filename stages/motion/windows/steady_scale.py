@@ -93,8 +93,8 @@ def with_steady_scale(
         return SteadyRun(run, estimate, measured, drift, corrected=False)
     contradicted = replace(drift, contradicted=True)
     unchanged = SteadyRun(run, estimate, measured, contradicted, corrected=False)
-    patch_mm = parameters.patch_size * run.texture.grid.step_mm
-    if wall_twice(estimate, measured, patch_mm).is_certain:
+    grid = run.texture.grid
+    if wall_twice(estimate, measured, parameters.patch_size * grid.step_mm, grid.length_mm).is_certain:
         return unchanged
     first = drift
     for _ in range(_ROUNDS):
