@@ -162,8 +162,8 @@ class Trajectory:
     cut_sigma_mm : float
         Part of ``distance_sigma_mm`` from the unknown distance travelled at cuts of the recording; 0 without
         cuts.
-    rival : Rival or None
-        The motion if the probe is wrong; None if pictures and probe agree.
+    rivals : tuple of Rival
+        The motion with each of the probes that the pictures allow; empty if they allow the stated one.
     displaced : tuple of Displaced
         Stretches of the run, in their order, with what walls in texture and in the rings differ by.
     """
@@ -187,15 +187,12 @@ class Trajectory:
     radius_doubt: float = 0.0
     knock: LaserKnock | None = None
     cut_sigma_mm: float = 0.0
-    rival: Rival | None = None
+    rivals: tuple[Rival, ...] = ()
     displaced: tuple[Displaced, ...] = ()
 
-    def of_rival(self) -> Trajectory | None:
-        """Return the trajectory if the stated probe is wrong; None if pictures and probe agree."""
-        if self.rival is None:
-            return None
-        own = self.rival
-        return replace(self, T_pc=own.T_pc, axis=own.axis, instrument=own.instrument, rival=None)
+    def of_rival(self, rival: Rival) -> Trajectory:
+        """Return the trajectory with another probe."""
+        return replace(self, T_pc=rival.T_pc, axis=rival.axis, instrument=rival.instrument, rivals=())
 
     def displaced_mm(self, frame: Int) -> Float:
         """Return the size (F,), mm, of what displaces the picture from place to place in frames (F,)."""

@@ -46,7 +46,7 @@ class Displaced:
 
 @dataclass(frozen=True)
 class Rival:
-    """The motion if the stated probe is wrong: with a probe as the pictures alone demand it.
+    """The motion if some stated parameters of the probe are wrong, and as the pictures demand them.
 
     Attributes
     ----------

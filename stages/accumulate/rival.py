@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.adjustment.robust import basis_of
-from pipeline.arrays import Float
+from pipeline.arrays import Float, Int
+from pipeline.artefacts.motion import Rival
 from stages.accumulate.grid import MapGrid
 from stages.accumulate.survey import RingsOnWall, RingSurvey, nearest, wall_samples
 
@@ -18,20 +19,26 @@ _HARMONICS = 4
 def rival_on(grid: MapGrid, on_wall: RingsOnWall, survey: RingSurvey) -> Float | None:
     """Return the 1 σ (S,), mm, of the radius from a contradicted probe; None if the pictures agree with it.
 
-    It is the root mean square around a ring of what the motion and the probe that the pictures demand would
-    change, without the first harmonic, because the pipe's axis follows the rings' centres. Both walls are
-    computed, since the change is not linear: it is a product of the probe's error and the camera's tilt.
+    It is the root mean square around a ring of what the probe and motion that the pictures demand would
+    change, without the first harmonic, because the pipe's axis follows the rings' centres; if the pictures
+    allow several, it is the largest. Both walls are computed, since the change is not linear: it is a product
+    of the probe's error and the camera's tilt.
     """
-    rival = on_wall.trajectory.of_rival()
-    if rival is None:
+    if not on_wall.trajectory.rivals:
         return None
     used = np.flatnonzero(survey.count)
     rows = used[np.unique(np.linspace(0, len(used) - 1, min(len(used), _MOST_RINGS)).astype(int))]
-    probe, rings, points = on_wall.probe.as_found_in(rival), on_wall.rings, on_wall.points
-    own, its = on_wall.samples(rows), wall_samples(probe, rings, points, rival, rows)
-    change_mm = np.where(own.valid & its.valid, its.radius_mm - own.radius_mm, np.nan)
-    size_mm = np.array([_size(*ring) for ring in zip(own.azimuth_rad, change_mm, strict=True)])
+    size_mm = np.max([_changes(on_wall, rival, rows) for rival in on_wall.trajectory.rivals], axis=0)
     return np.asarray(size_mm[nearest(survey.middle_mm[rows], grid.distance_mm)])
+
+
+def _changes(on_wall: RingsOnWall, rival: Rival, rows: Int) -> Float:
+    """Return the size (n,), mm, of what a rival would change in rings ``rows`` (n,)."""
+    trajectory = on_wall.trajectory.of_rival(rival)
+    probe = on_wall.probe.as_found_in(trajectory)
+    own, its = on_wall.samples(rows), wall_samples(probe, on_wall.rings, on_wall.points, trajectory, rows)
+    change_mm = np.where(own.valid & its.valid, its.radius_mm - own.radius_mm, np.nan)
+    return np.array([_size(*ring) for ring in zip(own.azimuth_rad, change_mm, strict=True)])
 
 
 def _size(azimuth_rad: Float, change_mm: Float) -> float:

@@ -13,7 +13,6 @@ from functools import partial
 
 import numpy as np
 
-from pipeline.arrays import Float
 from pipeline.artefacts.measured import RingPoints, RingSamples, Trajectory
 from pipeline.errors import UnusableError
 from pipeline.geometry.axis import distance_along, frames_at
@@ -36,7 +35,7 @@ from stages.motion.stated_probe import (
     contradiction,
     report_instrument,
     with_doubtful_instrument,
-    with_rival,
+    with_rivals,
 )
 from stages.motion.tracking.strips import WallView
 from stages.motion.trajectory import (
@@ -50,6 +49,7 @@ from stages.motion.trajectory import (
 from stages.motion.windows.measured_run import MeasuredRun
 from stages.motion.windows.sliding_window import adjust_run, joined_at_once
 from stages.motion.windows.submap_joining import JoinedRun
+from stages.motion.wrong_parameters import wrong_parameters
 
 _LARGEST_CHANGE = 0.1
 """Relative difference of the radius from that of the rings from which the adjustment counts as diverged: the
@@ -59,6 +59,9 @@ _MOST_TURNED = np.radians(45)
 In the sharpest elbow (short radius, a diameter, by ASME B16.9) a probe as long as the pipe is wide turns
 by 30°."""
 _OBSERVATIONS_AT_ONCE = 1 << 16
+_STEPS = 20
+"""Most steps of an adjustment with another probe, as in the test for a knock of the laser: with a right one it
+takes 5 to 10, with a wrong one it may never converge."""
 
 
 def estimate_motion(
@@ -98,9 +101,11 @@ def estimate_motion(
     seen = SeenCentres(run.circles.centre_c, probe.laser.baseline_mm)
     shakes = camera_trembles(trajectory, run.texture.poses, seen)
     doubted = shakes or run.texture.poses.much_lost
-    if (against := contradiction(trajectory, probe)).certain:
-        other = _with_probe(run, probe, against.allowed, recording, parameters, context)
-        trajectory = trajectory if other is None else with_rival(trajectory, other)
+    if contradiction(trajectory, probe).certain:
+        allowed = [replace(probe, covariance=w.covariance) for w in wrong_parameters(trajectory, probe)]
+        few = parameters.model_copy(update={"iterations": min(_STEPS, parameters.iterations)})
+        others = (_with_probe(run, p, recording, few, context) for p in allowed)
+        trajectory = with_rivals(trajectory, [t for t in others if t is not None])
     steady, believed = estimate.steady, with_doubtful_instrument(trajectory, probe, estimate.lasting, doubted)
     report_motion(context, estimate, run.texture, believed, shakes, wider)
     require_along_pipe(trajectory)
@@ -116,22 +121,17 @@ def estimate_motion(
 def _with_probe(
     run: MeasuredRun,
     probe: Probe,
-    covariance: Float,
     recording: Recording,
     parameters: MotionParameters,
     context: Context,
 ) -> Trajectory | None:
-    """Return the motion if the stated probe has another covariance (P, P), without loops.
-
-    It is None if the pictures do not determine such a probe.
-    """
-    allowed = replace(probe, covariance=covariance)
+    """Return the motion with another stated probe, without loops; None if pictures do not determine it."""
     check = partial(_require_convergence, run.texture.grid.radius_mm)
     try:
-        joined = adjust_run(replace(run, probe=allowed), parameters, check, context.progress).joined
+        joined = adjust_run(replace(run, probe=probe), parameters, check, context.progress).joined
     except UnusableError:
         return None
-    return trajectory_of(joined, recording.frames, allowed, run.encoder is not None)
+    return trajectory_of(joined, recording.frames, probe, run.encoder is not None)
 
 
 def _with_loops_closed(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -43,17 +44,12 @@ class Contradiction:
     moved, wanted : (P,)
         Change of the parameters by the adjustment, and that which the pictures alone ask for along the
         directions in which they contradict a correct probe.
-    allowed : (P, P)
-        Covariance of the stated parameters with which nothing contradicts by more than 1 σ: each direction
-        that does is widened until it is as far off as it should be (R. C. Paule, J. Mandel, "Consensus values
-        and weighting factors", 1982).
     """
 
     sigmas: float
     farthest: float
     moved: Float
     wanted: Float
-    allowed: Float
 
     @property
     def of_probe(self) -> bool:
@@ -78,33 +74,31 @@ def contradiction(trajectory: Trajectory, probe: Probe) -> Contradiction:
     """
     unsure = probe.principal_uncertainties()
     if trajectory.instrument is None or not unsure.size:
-        return Contradiction(0.0, 0.0, *np.zeros((2, len(probe.parameters))), probe.covariance)
+        return Contradiction(0.0, 0.0, *np.zeros((2, len(probe.parameters))))
     inverse = np.linalg.pinv(unsure)
     moved = inverse @ (trajectory.instrument - probe.parameters)
     left = 0.0 if (own := trajectory.instrument_covariance) is None else inverse @ own @ inverse.T
     gain, direction = np.linalg.eigh(np.eye(len(moved)) - left)
     along, gain = direction.T @ moved, np.where(gain > _NO_EVIDENCE, gain, 1.0)
     sigmas = np.abs(along) / np.sqrt(gain)
-    too_far = sigmas > _TOO_FAR
-    wanted = np.where(too_far, along / gain, along)
-    wider = np.where(too_far, np.sqrt(np.maximum(sigmas**2 - 1 + gain, gain) / gain), 1.0)
-    axes, farthest = unsure @ direction, float(np.abs(moved).max())
-    allowed = (axes * wider**2) @ axes.T
-    return Contradiction(float(sigmas.max()), farthest, unsure @ moved, axes @ wanted, allowed)
+    wanted = np.where(sigmas > _TOO_FAR, along / gain, along)
+    farthest = float(np.abs(moved).max())
+    return Contradiction(float(sigmas.max()), farthest, unsure @ moved, unsure @ direction @ wanted)
 
 
-def with_rival(trajectory: Trajectory, other: Trajectory) -> Trajectory:
-    """Return the trajectory with ``other`` as its rival, and their difference in distance in its σ."""
-    own, its = (distance_along(t.axis, t.T_pc) for t in (trajectory, other))
-    apart = (its - its[0]) - (own - own[0])
+def with_rivals(trajectory: Trajectory, others: Sequence[Trajectory]) -> Trajectory:
+    """Return the trajectory with others as its rivals, and the largest difference in distance in its σ."""
+    if not others:
+        return trajectory
+    own, *its = (distance_along(t.axis, t.T_pc) for t in (trajectory, *others))
+    apart = max((s - s[0] - (own - own[0]) for s in its), key=lambda d: float(np.abs(d).max()))
     way = np.zeros((len(own), 6))
     way[:, :3] = apart[:, None] * frames_at(trajectory.axis, own)[1][:, :, 2]
-    ends_mm = float(np.ptp(its) - np.ptp(own))
     return replace(
         trajectory,
         covariance=trajectory.covariance + way[:, :, None] * way[:, None, :],
-        distance_sigma_mm=float(np.hypot(trajectory.distance_sigma_mm, ends_mm)),
-        rival=None if other.instrument is None else Rival(other.T_pc, other.axis, other.instrument),
+        distance_sigma_mm=float(np.hypot(trajectory.distance_sigma_mm, np.abs(apart).max())),
+        rivals=tuple(Rival(t.T_pc, t.axis, t.instrument) for t in others if t.instrument is not None),
     )
 
 
@@ -163,16 +157,22 @@ def report_instrument(probe: Probe, trajectory: Trajectory, context: Context) ->
     elif found.certain:
         context.warn(
             f"pictures and stated probe contradict each other by {found.sigmas:.0f} σ: by the pictures alone "
-            f"the probe would change, most of all {_most(found.wanted, probe)}. Either the pictures were "
-            "shifted, cropped or scaled after the calibration, or dust, reflections or water that move with "
-            f"the probe were taken for the wall. Nothing is corrected: {_consequence(trajectory)}. "
+            f"the probe would change, most of all {_demanded(found, trajectory, probe)}. Either the pictures "
+            "were shifted, cropped or scaled after the calibration, or dust, reflections or water that move "
+            f"with the probe were taken for the wall. Nothing is corrected: {_consequence(trajectory)}. "
             "What to do: compare the pictures with those of the calibration, clean and dry the window, run "
             "boresight diagnose on a gauge run"
         )
 
 
+def _demanded(found: Contradiction, trajectory: Trajectory, probe: Probe) -> str:
+    """Return what the pictures demand of the probe; they may not tell several answers apart."""
+    changes = [r.instrument - probe.parameters for r in trajectory.rivals] or [found.wanted]
+    return ", or ".join(_most(change, probe) for change in changes)
+
+
 def _consequence(trajectory: Trajectory) -> str:
-    if trajectory.rival is None:
+    if not trajectory.rivals:
         return "radii, distances and roll may be wrong by more than their σ"
     return "σ of radii and distances includes what such a probe would change, σ of roll does not"
 
