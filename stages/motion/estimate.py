@@ -60,8 +60,8 @@ In the sharpest elbow (short radius, a diameter, by ASME B16.9) a probe as long 
 by 30°."""
 _OBSERVATIONS_AT_ONCE = 1 << 16
 _STEPS = 20
-"""Most steps of an adjustment with another probe, as in the test for a knock of the laser: with a right one it
-takes 5 to 10, with a wrong one it may never converge."""
+"""Most steps of an adjustment with another probe, as in the test for a knock of the laser: with a right one
+it takes 5 to 10, with a wrong one it may never converge."""
 
 
 def estimate_motion(
