@@ -45,27 +45,35 @@ class WrongParameters:
 
 
 def wrong_parameters(trajectory: Trajectory, probe: Probe) -> tuple[WrongParameters, ...]:
-    """Return what may be wrong with a contradicted probe, the likeliest first.
+    """Return the kinds of parameters that may be wrong in a contradicted probe, the likeliest first.
+
+    There is none if the pictures demand changes of several kinds at once: then the pictures themselves are
+    likelier to be wrong, as behind water, and no probe is what they demand.
 
     The evidence of the pictures is what the adjustment has added to the stated covariance. Of every kind of
     parameter, and of all of them, the stated σ is multiplied by the factor that makes the pictures likeliest
     (type II maximum likelihood: I. J. Good, "The Estimation of Probabilities", 1965).
     """
     evidence = _Evidence.of(trajectory, probe)
+    sigma = np.sqrt(np.diagonal(probe.covariance))
+    several = evidence.with_wider(np.diag(sigma)[:, sigma > 0])
     found = sorted((evidence.with_wider(w) for w in _kinds(probe)), key=lambda f: -f.log_evidence)
-    share = np.exp([f.log_evidence - found[0].log_evidence for f in found])
-    return tuple(f for f, s in zip(found, share / share.sum(), strict=True) if s >= _LEAST_SHARE)
+    evidences = np.array([several.log_evidence, *(f.log_evidence for f in found)])
+    share = np.exp(evidences - evidences.max())
+    share /= share.sum()
+    if share[0] > 0.5:
+        return ()
+    return tuple(f for f, s in zip(found, share[1:], strict=True) if s >= _LEAST_SHARE)
 
 
 def _kinds(probe: Probe) -> Iterator[Float]:
-    """Yield 1 σ (P, K) of the uncertain parameters of each kind, and of all of them."""
+    """Yield 1 σ (P, K) of the uncertain parameters of each kind."""
     sigma = np.sqrt(np.diagonal(probe.covariance))
     kinds = [_kind(name) for name in probe.parameter_names]
     for kind in dict.fromkeys(kinds):
         of = np.array([k == kind for k in kinds]) & (sigma > 0)
         if of.any():
             yield np.diag(sigma)[:, of]
-    yield np.diag(sigma)[:, sigma > 0]
 
 
 def _kind(name: str) -> str:
