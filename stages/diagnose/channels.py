@@ -279,7 +279,7 @@ def _of_geometry(
 
 LINE_PROFILE = Stage("line_profile", "5", Parameters, examine_line, "effects that the line's profile shows")
 FIDUCIALS = Stage(
-    "fiducials", "8", GaugeParameters, measure_fiducials, "a gauge run's rings and fiducials", "gauge"
+    "fiducials", "9", GaugeParameters, measure_fiducials, "a gauge run's rings and fiducials", "gauge"
 )
 FREE_MOTION = Stage(
     "free_motion", "2", MotionParameters, adjust_freely, "an inspection's motion without encoder", "motion"

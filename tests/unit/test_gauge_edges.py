@@ -34,6 +34,19 @@ def test_an_edge_is_found_at_its_place_with_the_stated_sigma() -> None:
     assert 0.8 < error.std() / noise < 1.25
 
 
+@pytest.mark.parametrize(("beyond", "white_px"), [(50.0, 3.3), (80.0, 3.0), (50.0, 5.0), (110.0, 3.3)])
+def test_a_darker_wall_beyond_a_narrow_white_border_does_not_move_the_edge(beyond, white_px) -> None:
+    """Edges of a gauge whose white border was narrower than a cell lay .35 px outside, with σ .07 px."""
+    random = np.random.default_rng(4)
+    t = np.broadcast_to(np.linspace(-4, 4, 21), (400, 21)).copy()
+    place = random.uniform(-0.5, 0.5, 400)[:, None]
+    step, end = (0.5 * (1 + erf((t - place - at) / 0.9 / np.sqrt(2))) for at in (0.0, white_px))
+    grey = 20 + 90 * step - (110 - beyond) * end + random.normal(0, 1.0, t.shape)
+    found, sigma = fit_steps(t, grey)
+    assert np.isfinite(found).mean() > 0.9
+    assert abs(np.nanmean(found - place[:, 0])) < np.nanmedian(sigma)
+
+
 def _black_squares(gauge: Gauge, marker: int, T_pc: Float, white: float, brightest: int) -> Image:
     """Return a picture of a fiducial's black square on white wall, blurred and clipped at ``brightest``."""
     camera = stated_probe().camera

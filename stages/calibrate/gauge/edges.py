@@ -35,6 +35,8 @@ _CONTOUR_PX = 0.5
 # below this part of the step, and its blur in this range, px. With half and twice of each, at most 2 % of
 # 3703 edges of open-1's gauge run are left out.
 _LEAST_STEP_GREY, _INSIDE, _MOST_NOISE, _BLUR_PX = 8.0, 0.6, 0.12, (0.3, 2.5)
+# White ends where it falls by this part of the step (chosen: noise of 1 % of it seldom makes that fall).
+_WHITE_ENDS = 0.03
 # White counts as overexposed so few grey levels below the brightest, of which compression takes a few off.
 BELOW_WHITE_GREY = 5
 # Pictures are clipped below the range's white where so many times more pixels lie within 5 levels of the
@@ -47,8 +49,7 @@ LOOKED_AT = 6
 _LEAST_SIGMA_PX, _OF_BORDER = 0.03, 0.85
 # Markers are drawn in cells; the outermost is black all round.
 _BORDER_CELLS = 2
-_THREADS = 2
-_SMALL = 1e-3
+_THREADS, _SMALL = 2, 1e-3
 
 
 @dataclass(frozen=True)
@@ -213,12 +214,12 @@ def fit_steps(t: Float, grey: Float) -> tuple[Float, Float]:
 
     Model: (a + b Φ((t - δ) / w)) (1 + s t), dark before bright; s is the slope of the light.
     """
-    half = t[:, -1]
+    half, used = t[:, -1], _before_white_ends(grey)
     third = t.shape[1] // 3
     low, high = grey[:, :third].mean(1), grey[:, -third:].mean(1)
     p = np.stack([low, high - low, 0 * low, 0 * low, np.full(len(t), 0.9)], -1)
     for _ in range(12):
-        residual, jacobian = _step_model(p, t, grey)
+        residual, jacobian = _step_model(p, t, grey, used)
         normal = np.einsum("mki,mkj->mij", jacobian, jacobian)
         normal += 1e-6 * np.trace(normal, axis1=1, axis2=2)[:, None, None] * np.eye(5) / 5
         step = np.linalg.solve(normal, -np.einsum("mki,mk->mi", jacobian, residual)[..., None])[..., 0]
@@ -227,8 +228,8 @@ def fit_steps(t: Float, grey: Float) -> tuple[Float, Float]:
         p = p + step
         p[:, 4] = np.clip(p[:, 4], 0.25, 3.0)
         p[:, 3] = np.clip(p[:, 3], -half, half)
-    residual, jacobian = _step_model(p, t, grey)
-    noise = np.sqrt(np.mean(residual**2, 1) * t.shape[1] / (t.shape[1] - 5))
+    residual, jacobian = _step_model(p, t, grey, used)
+    noise = np.sqrt(np.sum(residual**2, 1) / (used.sum(1) - 5))
     normal = np.einsum("mki,mkj->mij", jacobian, jacobian)
     normal += 1e-9 * np.trace(normal, axis1=1, axis2=2)[:, None, None] * np.eye(5)
     sigma = noise * np.sqrt(np.linalg.inv(normal)[:, 3, 3])
@@ -242,14 +243,23 @@ def fit_steps(t: Float, grey: Float) -> tuple[Float, Float]:
     return np.where(clear, p[:, 3], np.nan), np.hypot(np.where(clear, sigma, np.nan), _LEAST_SIGMA_PX)
 
 
-def _step_model(p: Float, t: Float, grey: Float) -> tuple[Float, Float]:
+def _before_white_ends(grey: Float) -> Bool:
+    """Return the samples (M, K) up to where the white ends, before a darker wall beyond a narrow border."""
+    smooth = (grey[:, :-2] + grey[:, 1:-1] + grey[:, 2:]) / 3
+    top, bright = smooth.max(1), grey.shape[1] // 2 + smooth[:, grey.shape[1] // 2 - 1 :].argmax(1)
+    ends = top - smooth[:, -1] > _WHITE_ENDS * (top - smooth[:, 0])
+    return np.asarray(np.arange(grey.shape[1]) <= np.where(ends, bright, np.inf)[:, None])
+
+
+def _step_model(p: Float, t: Float, grey: Float, used: Bool) -> tuple[Float, Float]:
+    """Return residuals (M, K) and their derivatives (M, K, 5); 0 where a sample is not ``used``."""
     a, b, s, d, w = (x[:, None] for x in p.T)
     x = (t - d) / w
     phi, density = 0.5 * (1 + erf(x / np.sqrt(2))), np.exp(-0.5 * x * x) / np.sqrt(2 * np.pi)
     light = 1 + s * t
     value = (a + b * phi) * light
     by = [light, phi * light, (a + b * phi) * t, -b * density / w * light, -b * density * x / w * light]
-    return value - grey, np.stack(by, -1)
+    return np.where(used, value - grey, 0.0), np.where(used[..., None], np.stack(by, -1), 0.0)
 
 
 def predicted_edges(
