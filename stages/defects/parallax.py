@@ -6,7 +6,8 @@ the longer the slower the drop. A lit picture taken before or after shows the sa
 the image, beside the drop. Projected onto the wall as the rings measured it, such pictures agree with each
 other where the depth is true. A false depth shifts them against each other by its size times the distance
 between the camera positions over the pipe's radius. Where that is less than the texture shows, with and
-without the finding they agree equally well, and nothing is concluded.
+without the finding they agree equally well, and nothing is concluded; nor is it where they do not agree
+without the finding as on the wall beside it, as in front of a steep pit.
 """
 
 from __future__ import annotations
@@ -35,8 +36,11 @@ _WINDOW_MM, _FARTHEST_MM, _CLEAR_MM = 8.0, 15.0, 2.0
 # for that.
 _PICTURES, _LEAST_PICTURES, _LEAST_PIXELS, _PIXEL_MM, _BROAD_PX, _BESIDE_MM = 8, 2, 60, 0.25, 8.0, 3.0
 # If the disagreement is larger by this factor with the finding than without it, the finding is not on the
-# wall. Debt: data/debts.md.
-_DISAGREE = 1.5
+# wall, provided that pictures agree without it nearly as on the wall beside. Into a steep pit every picture
+# looks differently, so that they agree nowhere, and by chance better at its opening. Debt: data/debts.md.
+_DISAGREE, _AS_BESIDE = 1.5, 1.3
+# Variance of rounding to grey levels.
+_ROUNDING = 1 / 12
 
 
 @dataclass(frozen=True)
@@ -60,29 +64,41 @@ class LitPictures:
         rows = max(1, round(_WINDOW_MM / relief.cell_mm[0]))
         parts = [slice(k, min(k + rows, len(mask))) for k in range(0, len(mask), rows)]
         compared = [t for part in parts if (t := self._disagreement(wide, relief, part)) is not None]
-        pixels, logs = np.array(compared, float).reshape(-1, 2).T
-        return bool(pixels.sum() > 0 and np.exp(pixels @ logs / pixels.sum()) > _DISAGREE)
+        if not compared:
+            return False
+        pixels, with_it, without = np.array(compared, float).T
+        falser, rougher = (np.exp(np.average(logs, weights=pixels)) for logs in (with_it, without))
+        return bool(falser > _DISAGREE and rougher < _AS_BESIDE)
 
-    def _disagreement(self, region: Region, relief: Relief, rows: slice) -> tuple[int, float] | None:
-        """Return a part's pixels and ln(disagreement with the finding / without it); None if unseen."""
+    def _disagreement(self, region: Region, relief: Relief, rows: slice) -> tuple[int, float, float] | None:
+        """Return a part's pixels and ln of two ratios of disagreement; None if unseen.
+
+        The first is that with the finding over that without it, as parts of the texture's variance; the
+        second that without it over that of the wall beside it, in grey levels.
+        """
         part = Region(region.row + rows.start, region.column, region.mask[rows], region.sign)
         height = np.nan_to_num(part.cut(relief.local_mm))
         core = part.mask & (np.abs(height) > np.abs(height[part.mask]).max(initial=0.0) / 2)
         bare, found = self._places(part, relief, height)
         size = bare.shape[1::-1]
-        inside = cv2.resize(core.astype(np.uint8), size, interpolation=cv2.INTER_NEAREST) > 0
+        inside, own = (
+            cv2.resize(cells.astype(np.uint8), size, interpolation=cv2.INTER_NEAREST) > 0
+            for cells in (core, part.mask)
+        )
         if inside.sum() < _LEAST_PIXELS:
             return None
         s = relief.distance_mm[part.row : part.row + len(part.mask)]
+        places = ((bare, inside), (found, inside), (bare, ~own))
         seen = [
-            (self._seen(bare, inside, pose, image), self._seen(found, inside, pose, image))
+            [self._seen(xyz_p, cells, pose, image) for xyz_p, cells in places]
             for pose, image in self._near(s)
         ]
-        both = [(one, other) for one, other in seen if one is not None and other is not None]
-        if len(both) < _LEAST_PICTURES:
+        shown = [textures for textures in seen if not any(t is None for t in textures)]
+        if len(shown) < _LEAST_PICTURES:
             return None
-        without, with_it = (1 - _agreement(np.array(p)) for p in zip(*both, strict=True))
-        return int(inside.sum()), float(np.log(with_it / without))
+        without, with_it, beside = (np.array(p, float) for p in zip(*shown, strict=True))
+        falser = (1 - _agreement(with_it)) / (1 - _agreement(without))
+        return int(inside.sum()), float(np.log(falser)), float(np.log(_misfit(without) / _misfit(beside)))
 
     def drove_through(self, region: Region, depth: Depth, relief: Relief) -> bool:
         """Whether the camera passed the top of an inward finding at less than the radius of its own lamps."""
@@ -126,7 +142,7 @@ class LitPictures:
                 yield inverse(self.motion.T_pc[k]), np.asarray(image, np.float32)
 
     def _seen(self, xyz_p: Float, inside: Bool, T_cp: Float, image: Float) -> Float | None:
-        """Return the normalised fine texture (n,) of wall points in a picture; None unless it shows all."""
+        """Return the fine texture (n,) of wall points in a picture, of mean 0; None unless it shows all."""
         uv, valid = self.probe.camera.project(transform(T_cp, xyz_p))
         u, v = (uv[..., k].astype(np.float32) for k in (0, 1))
         within = valid & (u > 1) & (v > 1) & (u < image.shape[1] - 2) & (v < image.shape[0] - 2)
@@ -134,10 +150,16 @@ class LitPictures:
             return None
         grey = cv2.remap(image, u, v, cv2.INTER_LINEAR)
         fine = (grey - cv2.GaussianBlur(grey, (0, 0), _BROAD_PX))[inside]
-        return np.asarray((fine - fine.mean()) / fine.std(), float) if fine.std() > 1 else None
+        return np.asarray(fine - fine.mean(), float) if fine.std() > 1 else None
 
 
 def _agreement(pictures: Float) -> float:
-    """Return the mean correlation between pairs of pictures (P, n), each of zero mean and unit variance."""
+    """Return the mean correlation between pairs of pictures (P, n), each of zero mean."""
     one, other = np.triu_indices(len(pictures), 1)
-    return float(np.mean(pictures[one] * pictures[other]))
+    unit = pictures / pictures.std(1, keepdims=True)
+    return float(np.mean(unit[one] * unit[other]))
+
+
+def _misfit(pictures: Float) -> float:
+    """Return the variance that pictures (P, n) do not share, with that of rounding; grey levels²."""
+    return (1 - _agreement(pictures)) * float(pictures.var(axis=1).mean()) + _ROUNDING

@@ -88,6 +88,46 @@ def test_pictures_contradict_what_a_drop_makes_but_not_what_is_in_the_wall(depth
     assert pictures(0.0, half_mm).contradict(region, rows)
 
 
+def steep_pit(s, psi):
+    """Return the change of radius by a pit of 4 mm × 4 mm with steep sides, 2 mm deep."""
+    return 2.0 * np.exp(-(((s - 53) / 2) ** 4) - (RADIUS * psi / 2) ** 4)
+
+
+def picture_of_steep_pit(camera_s, deep):
+    """Return the picture of the wall around a pit with a dark ground, of which its sides hide a part."""
+    v, u = np.mgrid[HALF - 60 : HALF + 60, HALF + 60 : 2 * HALF]
+    psi, slope = np.arctan2(v - HALF, u - HALF), 1 / np.tan(np.hypot(u - HALF, v - HALF) / FOCAL)
+    radius, free = np.full(psi.shape, RADIUS), np.ones(psi.shape, bool)
+    for _ in range(50):
+        free &= radius < RADIUS + deep * steep_pit(camera_s + radius * slope, psi)
+        radius += 0.04 * free
+    s = camera_s + radius * slope
+    row, column = ((s + 20) / 0.2).astype(np.float32), ((psi + np.pi) / 2 / np.pi * 1440).astype(np.float32)
+    paint = 150 + cv2.remap(PAINT.astype(np.float32), column, row, cv2.INTER_LINEAR)
+    image = np.full((int(2 * HALF), int(2 * HALF)), 100.0)
+    image[int(HALF) - 60 : int(HALF) + 60, int(HALF) + 60 :] = paint * (1 - 0.4 * steep_pit(s, psi))
+    return cv2.GaussianBlur(image, (0, 0), 0.8)
+
+
+@pytest.mark.parametrize("deep", [0, 1])
+def test_pictures_do_not_contradict_a_steep_pit_whose_sides_hide_its_dark_ground(deep):
+    """Its opening looked alike from several places, but worse alike than the wall beside it."""
+    s, psi = np.meshgrid(DISTANCE, AZIMUTH, indexing="ij")
+    radius = RADIUS + steep_pit(s, psi) + smooth_noise(np.random.default_rng(1), s.shape, 0.02, 1.0)
+    known = steep_pit(s, psi) > 0.02
+    relief = smooth_shape_removed(wall_of(DISTANCE, AZIMUTH, radius).radius_map, DefectParameters(), known)
+    region = Region(102, 354, np.ones((9, 13), bool), 1.0)
+    lit, noise = pictures(0.0), np.random.default_rng(3)
+
+    def read(frames, planes):
+        for k in frames:
+            image = picture_of_steep_pit(CAMERA_S[k], deep)
+            yield int(k), image + noise.normal(0, 2, image.shape)
+
+    lit = replace(lit, recording=SimpleNamespace(frames=lit.recording.frames, read=read))
+    assert lit.contradict(region, relief.rows(slice(0, len(DISTANCE)))) == (not deep)
+
+
 @pytest.mark.parametrize("places", [1, 2])
 def test_drops_are_named_where_pictures_contradict_several_findings(places):
     told = []
