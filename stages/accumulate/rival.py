@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
-from pipeline.adjustment.robust import basis_of
 from pipeline.arrays import Float, Int
 from pipeline.artefacts.motion import Rival
 from stages.accumulate.grid import MapGrid
-from stages.accumulate.survey import RingsOnWall, RingSurvey, nearest, wall_samples
+from stages.accumulate.survey import RingsOnWall, RingSurvey, WallSamples, nearest, smooth_shape, wall_samples
 
 _MOST_RINGS = 400
 """Rings for which it is computed at most, evenly along the run: a bound on time and memory alone."""
-_HARMONICS = 4
-"""Highest harmonic of the change around a ring: the errors of an instrument have no higher one."""
 
 
 def rival_on(grid: MapGrid, on_wall: RingsOnWall, survey: RingSurvey) -> Float | None:
@@ -36,13 +35,18 @@ def _changes(on_wall: RingsOnWall, rival: Rival, rows: Int) -> Float:
     """Return the size (n,), mm, of what a rival would change in rings ``rows`` (n,)."""
     trajectory = on_wall.trajectory.of_rival(rival)
     probe = on_wall.probe.as_found_in(trajectory)
-    own, its = on_wall.samples(rows), wall_samples(probe, on_wall.rings, on_wall.points, trajectory, rows)
-    change_mm = np.where(own.valid & its.valid, its.radius_mm - own.radius_mm, np.nan)
-    return np.array([_size(*ring) for ring in zip(own.azimuth_rad, change_mm, strict=True)])
+    its = wall_samples(probe, on_wall.rings, on_wall.points, trajectory, rows)
+    return sizes_of_change(on_wall.samples(rows), its)
 
 
-def _size(azimuth_rad: Float, change_mm: Float) -> float:
-    """Return the root mean square of a ring's change (A,), mm, beside its first harmonic."""
-    seen = np.isfinite(change_mm)
-    fit = np.linalg.lstsq(basis_of(azimuth_rad[seen], _HARMONICS), change_mm[seen], rcond=None)[0]
-    return float(np.sqrt(fit[0] ** 2 + np.sum(fit[3:] ** 2) / 2))
+def sizes_of_change(own: WallSamples, its: WallSamples) -> Float:
+    """Return the root mean square (F,), mm, of a change over the seen part of rings, which are centred.
+
+    A ring that is seen to less than a half is not centred, and the first harmonic of its change counts.
+    """
+    both = own.valid & its.valid
+    change_mm = np.where(both, its.radius_mm - own.radius_mm, 0.0)
+    shift_mm, _ = smooth_shape(replace(own, radius_mm=change_mm, valid=both))
+    psi = np.where(both, own.azimuth_rad, 0.0)
+    left = change_mm - shift_mm[:, :1] * np.cos(psi) - shift_mm[:, 1:] * np.sin(psi)
+    return np.asarray(np.sqrt(np.sum(both * left**2, axis=1) / np.maximum(both.sum(1), 1)))
