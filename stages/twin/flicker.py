@@ -11,7 +11,7 @@ from pipeline.adjustment.robust import robust_spread
 from pipeline.arrays import Float, Int
 from pipeline.artefacts.twin import Mismatch, NamedFigure
 from stages.twin.cells import SECTORS, Cells, Law, best_column, drift, fitted
-from stages.twin.laws import ramps_of
+from stages.twin.laws import ends_apart, ramps_of
 from stages.twin.locate import FALSE_ALARM
 from stages.twin.scene import Ring
 
@@ -70,16 +70,23 @@ def slowly(flickers: Mismatch, cells: Cells, base: Float, light: str, ring: Ring
     """Return flicker, or a slow change without a name if that explains most of it, and more than a step."""
     columns, first, last = ramps_of(len(cells.frame))
     ramps = Law("ramp", columns, np.stack([first, last], 1))
-    k, size, sd = best_column(cells, base, ramps, np.ones(len(cells.frame), bool))
+    k = best_column(cells, base, ramps, np.ones(len(cells.frame), bool))[0]
     more = np.concatenate([base, columns[[k]]])
     before, after = (float(np.std(_rest(cells, b)[1].mean(1))) for b in (base, more))
     if after > _EXPLAINED * before or last[k] == first[k] + 1:
         return flickers
+    # It may begin and end anywhere about the frames that were tried.
+    sd = ends_apart(len(cells.frame)) * float(np.median(np.diff(cells.frame))) / 2
     place = tuple(
-        NamedFigure(n, float(cells.frame[int(at[k])]), 0.0)
+        NamedFigure(n, float(cells.frame[int(at[k])]), sd, "frame")
         for n, at in (("frame_from", first), ("frame_to", last))
     )
-    change = NamedFigure("change", float(np.expm1(size)), float(np.exp(size)) * sd, "relative")
+    # As the frames themselves show it: a size beside a drift may be the difference of two large ones.
+    mean, ends = cells.log_ratio.sum(1) / np.maximum(cells.usable.sum(1), 1), (int(first[k]), int(last[k]))
+    size = float(mean[ends[1]] - mean[ends[0]])
+    change = NamedFigure(
+        "change", float(np.expm1(size)), float(np.exp(size) * np.sqrt(2) * after), "relative"
+    )
     said = (
         f"Between frames {place[0].value:.0f} and {place[1].value:.0f}, those lit by the {light} get about "
         f"{100 * abs(change.value):.0f} % {'brighter' if size > 0 else 'darker'}, as it seems not at once: "

@@ -23,6 +23,8 @@ _MOST_OWN = 1 / 3
 fifth, whenever between two frames the change came; at three quarters, by a factor of up to 2.4."""
 TRIED = slice(2, -1)
 """First frames of a step that are tried: two frames or more lie on each side."""
+_MOST_ENDS = 50
+"""Most frames at which a slow change may begin or end: usually fewer of one light are compared. Chosen."""
 _LEAST_AHEAD = 0.05
 """Least distance ahead of the LEDs, in radii, from which they are taken to light the wall."""
 
@@ -113,11 +115,27 @@ def steps_of(frames: int) -> tuple[Float, Float]:
 
 
 def ramps_of(frames: int) -> tuple[Float, Float, Float]:
-    """Return columns (C, F, S) of changes within one step or over more, and first and last frames of each."""
-    both = [(f, f + k) for k in range(1, frames // 2 + 1) for f in range(frames - k)]
-    first, last = np.array(both, float).reshape(-1, 2).T
+    """Return columns (C, F, S) of changes within one step or over more, and first and last frames of each.
+
+    Two frames or more lie on each side of a change over several: another is a kink of the drift.
+    Of many frames, those over more than one step begin and end at every n-th frame: their number grows with
+    the square of it, and those of 300 frames took 3 GB.
+    """
+    every = ends_apart(frames)
+    one = [(f, f + 1) for f in range(frames - 1)]
+    several = [
+        (f, f + k)
+        for k in range(every, frames // 2 + 1, every) for f in range(1, frames - k - 1, every)
+        if k > 1
+    ]  # fmt: skip
+    first, last = np.array([*one, *several], float).reshape(-1, 2).T
     course = np.clip((np.arange(frames) - first[:, None]) / (last - first)[:, None], 0, 1)
     return np.repeat(course[..., None], SECTORS, 2), first, last
+
+
+def ends_apart(frames: int) -> int:
+    """Return from how many frames to the next a slow change is tried to begin or end."""
+    return -(-frames // _MOST_ENDS)
 
 
 def led_share(lighting: Lighting, azimuth_rad: Float, ring: Ring) -> Float:

@@ -286,6 +286,7 @@ def cannot_tell(state: PhotometricState, silent: bool = False) -> tuple[str, ...
         said += [
             "The sheet's thickness is the stated one: in one diameter it looks like the lens's blur.",
             "A second line, or a mirror image of the line on the wall, is told only if darkness lies between "
-            f"it and the line, and from {100 * LEAST_SECOND:.0f} % of the line's brightness on.",
+            f"it and the line, and from {100 * LEAST_SECOND:.0f} % of the line's brightness on; beside a "
+            "faint line, only if it also stands out from the noise.",
         ]
     return tuple(said)

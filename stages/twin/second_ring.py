@@ -27,10 +27,11 @@ _RATIOS, _REACH, _FAR_WIDTHS, LEAST_SECOND, _BESIDE_PEAK = 400, 0.8, 14.0, 0.01,
 """Number of bins and largest ln(radius over the line's radius); width about the line, px, that belongs to it;
 least share of a second line that is told; bins beside a peak that still belong to it. Sound recordings of two
 renderers leave up to .002 of the line."""
-_WIDEST, _SMOOTH, _ALIKE, _OF_HEIGHT = 65, 3, 2, 0.2
+_WIDEST, _SMOOTH, _ALIKE, _OF_HEIGHT, _OF_NOISE = 65, 3, 2, 0.2, 8.0
 """Bins of the widest band that is searched for (a quarter of the line's radius), bins over which profiles are
 smoothed, bins by which the quadrants of one ring may differ, and share of a band's height from which a bin
-counts. Chosen."""
+counts; all chosen. σ of one bin by which light must stand out: noise alone spans 5.5 σ from its lowest to its
+highest of two hundred bins, and 8 σ in 3 of 10 000 quadrants."""
 
 
 def ring_profile(ring: Ring, above: Float32, twin: TwinFrame, use: Bool) -> Float | None:
@@ -152,7 +153,8 @@ def _band(stack: Float, mean: Float, use: Bool, line: float) -> _Band | None:
     inside *= (height / np.maximum((inside * more).sum(1), 1e-12))[:, None]
     each = ((stack - (mean - more)) * inside).sum(-1)
     sd = each.std(0) / np.sqrt(len(stack))
-    seen = (height > _SURE * sd) & (height > LEAST_SECOND * line)
+    noise = np.median(stack[..., use].std(0, ddof=1), axis=-1) / np.sqrt(len(stack) * _SMOOTH)
+    seen = (height > _SURE * sd) & (height > LEAST_SECOND * line) & (height > _OF_NOISE * noise)
     if seen.sum() < 3:  # a glint is in one quadrant, at most two
         return None
     return _Band(more, peak, seen, each[:, seen].mean(1) / line)
