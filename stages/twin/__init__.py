@@ -292,7 +292,7 @@ PHOTOMETRY = Stage(
 )
 TWIN = Stage(
     "twin",
-    "62",
+    "63",
     TwinParameters,
     compare_with_twin,
     "recorded frames beside the same frames, re-rendered from what the run has measured",

@@ -20,7 +20,7 @@ _FEWEST, _FEWEST_BLOCKS, _FEWEST_SECTORS = 3, 4, 2
 _SIGMA, _LEAST_DARK, _LEAST_DIM, _MOSTLY = 8.0, 0.15, 0.25, 0.5
 """Fewest frames; fewest joined blocks and sectors. Times the usual scatter, and least loss of light, of a
 block and of the line. A sound recording of another renderer had one block of 24,000 beyond 8, of .05. Share
-of squares from which other blocks predict a spot. Chosen."""
+of squares from which other blocks predict a spot, and of the frames from which a sector is dim. Chosen."""
 
 
 def dark_spots(samples: BlockSamples | None) -> tuple[Mismatch, ...]:
@@ -75,19 +75,29 @@ def dim_at_times(cells: Cells, base: Float, ring: Ring) -> tuple[Mismatch, ...]:
     frames = np.flatnonzero(pairs[:, sector])
     if not _FEWEST <= len(frames) <= len(rest) / 2:
         return ()
-    azimuth = float(np.degrees(sector_azimuth_rad()[sector]) + 180 / SECTORS)
+    wide = dim[frames].mean(0) >= _MOSTLY
+    turn = np.exp(1j * sector_azimuth_rad())[wide].sum()
+    azimuth, width = float(np.degrees(np.angle(turn))), 360 / SECTORS * float(wide.sum())
     lost = 1 - np.exp(rest[frames, sector])
-    place = (
+    around = (
         NamedFigure("azimuth_deg", azimuth, 180 / SECTORS, "deg"),
+        NamedFigure("width_deg", width, 360 / SECTORS, "deg"),
+    )
+    place = (
+        *(() if wide.all() else around),
         NamedFigure("frame_from", float(cells.frame[frames[0]]), 0.0),
         NamedFigure("frame_to", float(cells.frame[frames[-1]]), 0.0),
     )
     sd = float(lost.std() / np.sqrt(len(lost)))
     size = NamedFigure("lost", float(lost.mean()), sd, "share of the light")
+    part = f"the line about image azimuth {azimuth:.0f}°, {width:.0f}° wide,"
     said = (
-        f"In {len(frames)} of {len(rest)} laser frames, the line about image azimuth {azimuth:.0f}° is about "
+        f"In {len(frames)} of {len(rest)} laser frames, {'the whole line' if wide.all() else part} is about "
         f"{100 * size.value:.0f} % darker than in the others: something shades the laser or the window at "
-        "times, or the wall is darker there."
+        "times, the laser is weaker in them, or the wall is darker there."
     )
-    nan, look = float("nan"), ring.at(int(cells.frame[frames[0]]), float(np.radians(azimuth)))
+    look = ring.whole(int(cells.frame[frames[0]]))
+    if not wide.all():
+        look = ring.at(int(cells.frame[frames[0]]), float(np.radians(azimuth)))
+    nan = float("nan")
     return (Mismatch("", "line", "time", place, (size,), nan, nan, nan, said, look),)

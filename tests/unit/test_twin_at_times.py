@@ -44,16 +44,31 @@ def test_a_dark_spot_that_crawls_is_told_and_one_that_stays_is_not():
 @pytest.mark.parametrize(("frames", "told"), [((2, 5, 6, 11), 1), ((5,), 0), (range(14), 0)])
 def test_a_line_that_is_dim_at_times_is_told_where_it_is(frames, told):
     """A sector of the laser is dim in all frames: nothing was told of one that some frames show."""
-    random, number = np.random.default_rng(1), 8 * np.arange(14)
-    change = np.zeros((14, SECTORS))
-    change[list(frames), 20:23] = np.log(0.3)
-    own = np.full(change.shape, 200_000.0)
-    ratio = np.exp(change + 0.03 * random.standard_normal(change.shape))
-    pixels = np.full_like(own, 500.0)
-    line = Cells(number, pixels + ratio**2 * own, ratio * own, own, pixels, 20 * pixels)
-    found = [m for m in causes(None, line, Lighting(), RING)[0] if not m.name]
+    found = _dim(14, frames, slice(20, 23))
     assert len(found) == told
     for dim in found:
         assert (dim.channel, dim.fixed_to) == ("line", "time")
         assert dim.place[0].value == pytest.approx(35, abs=10)
         assert dim.parameters[0].value == pytest.approx(0.7, abs=0.05)
+
+
+def test_a_line_that_is_dim_all_round_at_times_or_on_one_side_is_not_told_at_one_place():
+    """Each was told at an azimuth of −170 ± 5°, the first of many sectors."""
+    (side,) = _dim(40, (6, 17, 29), slice(0, 24))
+    assert side.place[0].value == pytest.approx(-60, abs=10)
+    assert side.place[1].value == pytest.approx(240, abs=20)
+    (whole,) = _dim(40, (6, 17, 29), slice(None))
+    assert [p.name for p in whole.place] == ["frame_from", "frame_to"]
+    assert "the whole line is about 70 % darker" in whole.statement
+
+
+def _dim(count, frames, sectors):
+    """Return what is told without a name of a line that lost 70 % of its light in frames and sectors."""
+    random, number = np.random.default_rng(1), 8 * np.arange(count)
+    change = np.zeros((count, SECTORS))
+    change[list(frames), sectors] = np.log(0.3)
+    own = np.full(change.shape, 200_000.0)
+    ratio = np.exp(change + 0.03 * random.standard_normal(change.shape))
+    pixels = np.full_like(own, 500.0)
+    line = Cells(number, pixels + ratio**2 * own, ratio * own, own, pixels, 20 * pixels)
+    return [m for m in causes(None, line, Lighting(), RING)[0] if not m.name]
