@@ -1,4 +1,4 @@
-"""Aligns rings of a probe that rolls fast, so that neighbouring rings are compared at one place of the wall.
+"""Aligns rings of a probe that rolls fast, so that neighbours are also compared at one place of the wall.
 
 Rings are compared by azimuth in the picture. A roll between two rings by more than the width of a pit puts it
 elsewhere in the next ring, and it would be alone in each. What the rings show of the wall moves alike from
@@ -42,7 +42,8 @@ def turns(radius_px: Float32) -> Int:
     known = np.flatnonzero(_steady(step, alike, sectors))
     if not known.size or np.abs(step[known]).max() <= _SLOW:
         return np.zeros(rings, np.int64)
-    return np.concatenate([[0], np.cumsum(_everywhere(step, known, sectors))])
+    nearest = known[np.abs(np.arange(rings - 1)[:, None] - known).argmin(1)]
+    return np.concatenate([[0], np.cumsum(step[nearest])])
 
 
 def turned(values: NDArray[Number], by: Int) -> NDArray[Number]:
@@ -68,20 +69,6 @@ def _steps(fine: Float) -> tuple[Int, Float]:
     size = np.linalg.norm(fine, axis=1)
     alike = product / np.maximum(size[:-1] * size[1:], 1e-12)[:, None]
     return shifts[alike.argmax(1)], alike.max(1)
-
-
-def _everywhere(step: Int, known: Int, sectors: int) -> Int:
-    """Return all steps (F - 1,): the nearest ``known`` (K,) one, or 0 where the roll may be another one.
-
-    Between known steps that agree, the roll is taken to be steady; elsewhere it is known beside them only.
-    """
-    pairs = np.arange(len(step))
-    before = known[np.maximum(np.searchsorted(known, pairs, side="right") - 1, 0)]
-    after = known[np.minimum(np.searchsorted(known, pairs), len(known) - 1)]
-    nearest = np.where(np.abs(pairs - before) <= np.abs(after - pairs), before, after)
-    between = (before <= pairs) & (pairs <= after)
-    steady = between & (np.abs(step[before] - step[after]) <= _WITHIN * sectors)
-    return np.where(steady | (np.abs(nearest - pairs) <= _STEPS), step[nearest], 0)
 
 
 def _steady(step: Int, alike: Float, sectors: int) -> Bool:

@@ -21,10 +21,19 @@ _MAJORITY = 0.5
 
 
 def contradicted(rings: RingSamples) -> tuple[Byte, Float32]:
-    """Return validity and σ (F, A), px, of rings after every sample was compared with its neighbours."""
+    """Return validity and σ (F, A), px, of rings after every sample was compared with its neighbours.
+
+    Where something turns from ring to ring, neighbours may confirm a sample at its azimuth or turned: it may
+    be the probe that rolls, or a spiral seam in front of a probe that does not.
+    """
+    validity, sigma = _compared(rings)
     by = turns(np.where(rings.valid, rings.radius_px, np.float32(np.nan)))
-    validity, sigma = _compared(_turned(rings, -by))
-    return turned(validity, by), turned(sigma, by)
+    if not by.any():
+        return validity, sigma
+    aligned = _compared(_turned(rings, -by))
+    other, its = turned(aligned[0], by), turned(aligned[1], by)
+    own = (validity == RingValidity.VALID) & ((other != RingValidity.VALID) | (sigma <= its))
+    return np.where(own, validity, other), np.where(own, sigma, its)
 
 
 def _compared(rings: RingSamples) -> tuple[Byte, Float32]:

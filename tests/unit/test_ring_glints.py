@@ -82,15 +82,18 @@ def test_glints_that_move_at_random_are_no_roll(drawn):
     assert (validity[glints > 0] == RingValidity.GLINT).mean() > 0.8
 
 
-@pytest.mark.parametrize("rolls_on", [False, True])
-def test_a_roll_is_not_carried_to_where_no_ring_shows_it(rolls_on):
-    """Half of a shallow pit's samples were unsure, since the probe had rolled 100 rings before."""
-    random, rings, roll = np.random.default_rng(4), 160, 20
+@pytest.mark.parametrize(("rolls", "spiral"), [(30, False), (160, False), (0, True)])
+def test_a_pit_is_sure_where_something_else_turns(rolls, spiral):
+    """Half of a shallow pit was unsure where the probe had rolled before, or a spiral seam went by."""
+    random, rings, by_ring = np.random.default_rng(4), 160, 20
     radius = 300 + random.normal(0, NOISE, (rings, SECTORS))
-    turn = roll * np.minimum(np.arange(rings), rings if rolls_on else 30)
-    for first, height in ((10, 6.0), (120, 0.8), *([(150, 6.0)] if rolls_on else [])):
-        for row in range(first, first + 6):
-            radius[row] += np.roll(height * np.pad(np.hanning(12), (0, SECTORS - 12)), 400 + turn[row])
+    turn = by_ring * np.minimum(np.arange(rings), rolls)
+    shapes = [(10, 6, 6.0, turn), (120, 6, 0.8, turn)]
+    shapes += [(0, rings, -2.0, by_ring * np.arange(rings))] if spiral else []
+    for first, count, height, at in shapes:
+        for row in range(first, first + count):
+            shape = height * np.pad(np.hanning(12), (0, SECTORS - 12))
+            radius[row] += np.roll(shape, (100 if height < 0 else 400) + at[row])
     drawn = [radius, *(np.full_like(radius, value) for value in (NOISE, 1.2, 80.0))]
     validity, sigma = contradicted(rings_of([x.astype(np.float32) for x in drawn], rings))
     pit = radius[120:126] > 300.4
