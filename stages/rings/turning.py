@@ -20,8 +20,9 @@ Number = TypeVar("Number", bound=np.generic)
 # Fastest roll from ring to ring that is looked for, as a part of the circle. Half of it is twice that of a
 # probe which turns once in 70 frames.
 _FASTEST = 1 / 18
-# Two rings show the same wall if their fine structures correlate by this. Those of noise alone do by up to .2
-# at some of the shifts, rings of a pit with noise by .86; rings of good recordings share up to .16.
+# Two rings show the same wall turned if their fine structures correlate by so much more than unturned. Those
+# of noise alone do by up to .2 at some of the shifts, rings of a pit with noise by .86; rings of good
+# recordings share up to .16.
 _ALIKE = 0.3
 # A roll is steady if three of five steps agree within 1 % of the circle: two glints in a row agree with a
 # third step by chance in one case of 30, three in one of a thousand.
@@ -60,7 +61,11 @@ def _fine(radius: Float) -> Float:
 
 
 def _steps(fine: Float) -> tuple[Int, Float]:
-    """Return the shift (F - 1,) in sectors at which each ring is most like the one before, and how much."""
+    """Return the shift (F - 1,) in sectors at which each ring is most like the one before, and how much more.
+
+    That is by how much their correlation exceeds that without a shift: rows of an interlaced picture make
+    rings alike at many shifts.
+    """
     sectors = fine.shape[1]
     reach = int(sectors * _FASTEST)
     shifts = np.arange(-reach, reach + 1)
@@ -68,7 +73,7 @@ def _steps(fine: Float) -> tuple[Int, Float]:
     product = irfft(np.conj(spectrum[:-1]) * spectrum[1:], sectors, axis=1)[:, shifts]
     size = np.linalg.norm(fine, axis=1)
     alike = product / np.maximum(size[:-1] * size[1:], 1e-12)[:, None]
-    return shifts[alike.argmax(1)], alike.max(1)
+    return shifts[alike.argmax(1)], alike.max(1) - alike[:, reach]
 
 
 def _steady(step: Int, alike: Float, sectors: int) -> Bool:
