@@ -114,14 +114,16 @@ def odds_of_unseen_course(term: Term, duration_s: float, frame_rate: float) -> f
     """Return the odds that a course is of another kind: even where the run hardly shows it.
 
     A swing of which the run holds few periods may be slow in another way: it may go with the probe's roll
-    (what hangs down, for instance), which no law here does. A drift with the shortest time constant searched
-    may be constant: an optical axis that was not in the library was named a drifting one at .9995.
+    (what hangs down, for instance), which no law here does. A drift whose time constant is nearest to the
+    shortest searched may be constant: an optical axis that was not in the library was named a drifting one
+    at .9995.
     """
     shape, amplitude = term.at(term.amplitude)
+    if term.model.kind is CourseKind.EXPONENTIAL:
+        fastest, second = sorted(time_s for time_s, *_ in term.model.shapes(duration_s, frame_rate))[:2]
+        return float(shape[0] < np.sqrt(fastest * second))
     frequency = term.model.course(shape, amplitude).get("frequency_hz")
-    slow = frequency is not None and frequency * duration_s < _LEAST_PERIODS
-    drifts = term.model.kind is CourseKind.EXPONENTIAL
-    return float(slow or (drifts and shape <= min(term.model.shapes(duration_s, frame_rate))))
+    return float(frequency is not None and frequency * duration_s < _LEAST_PERIODS)
 
 
 def known_alike(model: EffectModel, library: Mapping[str, EffectModel]) -> float:
