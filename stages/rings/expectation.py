@@ -45,7 +45,7 @@ def warn_of_rings(samples: RingSamples, wander_px: float, stepped: bool, context
         context.warn(
             f"{len(frames)} of {len(ring)} laser frames show no ring: frame "
             f"{', '.join(str(f) for f in frames[:_NAMED_FRAMES])}{more}. Their wall is not measured. What to "
-            "do: look at these pictures; the laser may have been off or blocked"
+            "do: look at these pictures; the laser may have been off or blocked, or the pipe ends there"
         )
     validity = samples.validity[ring]
     missing = np.asarray((validity != RingValidity.VALID).mean(0))

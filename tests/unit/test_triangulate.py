@@ -111,7 +111,7 @@ def test_counts_are_reported():
 
 
 def test_the_stage_is_connected_by_type():
-    assert list(TRIANGULATE.inputs()) == ["rings", "probe"]
+    assert list(TRIANGULATE.inputs()) == ["recording", "rings", "probe"]
 
 
 WIDE = np.linspace(-np.pi, np.pi, 1440, endpoint=False)

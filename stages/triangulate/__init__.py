@@ -14,7 +14,15 @@ from pipeline.artefacts.measured import RingPoints, RingSamples, RingValidity
 from pipeline.instrument.probe import Probe
 from pipeline.machine.stage import Context, Parameters, Stage
 from pipeline.pages import notation
+from pipeline.recording.base import PipeFacts, Recording
 from pipeline.system.parallel import in_threads
+from stages.triangulate.possible import (
+    beyond_the_wall,
+    farthest_wall_mm,
+    judge_impossible,
+    rings_at_an_end,
+    warn_of_end,
+)
 
 # Frames a thread takes at a time.
 _CHUNK_FRAMES = 16
@@ -45,7 +53,11 @@ class TriangulateParameters(Parameters):
 
 
 def triangulate_rings(
-    rings: RingSamples, probe: Probe, parameters: TriangulateParameters, context: Context
+    rings: RingSamples,
+    probe: Probe,
+    parameters: TriangulateParameters,
+    context: Context,
+    pipe: PipeFacts | None = None,
 ) -> RingPoints:
     """Intersect the ray of every valid ring sample with the laser sheet.
 
@@ -55,33 +67,53 @@ def triangulate_rings(
         Ring samples, px.
     probe
         Camera and laser sheet.
+    pipe
+        The stated pipe; without it, wall may lie at any distance.
 
     Returns
     -------
     RingPoints
-        mm in C; NaN where the sample is invalid, its ray misses the sheet, or it is off the ring.
+        mm in C; NaN where the sample is invalid, its ray misses the sheet, it is off the ring, or it cannot
+        lie on the pipe's wall.
+
+    Raises
+    ------
+    UnusableError
+        When most samples lie farther away than the stated pipe is wide.
     """
     shape = rings.validity.shape
+    farthest_mm = farthest_wall_mm(pipe)
+    impossible = np.zeros(shape[0], np.int64)
     xyz, noise = (context.scratch.zeros((*shape, 3), np.float32) for _ in range(2))
 
     def place(frames: slice) -> Int:
         found = _triangulate_chunk(rings, frames, probe)
         hit = np.isfinite(found[0][..., 0])
-        apart = off_the_ring(np.hypot(*np.moveaxis(found[0][..., :2], -1, 0)), parameters.largest_departure)
+        rho = np.hypot(*np.moveaxis(found[0][..., :2], -1, 0))
+        beyond = beyond_the_wall(rho, farthest_mm)
+        impossible[frames] = beyond.sum(1)
+        rho[beyond] = np.nan
+        apart = off_the_ring(rho, parameters.largest_departure)
         for whole, part in zip((xyz, noise), found, strict=True):
-            part[apart] = np.nan
+            part[apart | beyond] = np.nan
             whole[frames] = part
-        return np.array([(hit & ~apart).sum(), (_valid(rings, frames) & ~hit).sum(), apart.sum()])
+        placed = hit & ~apart & ~beyond
+        return np.array([placed.sum(), (_valid(rings, frames) & ~hit).sum(), apart.sum()])
 
     chunks = [slice(a, a + _CHUNK_FRAMES) for a in range(0, len(rings.frame), _CHUNK_FRAMES)]
     counts = np.zeros(3, np.int64)
     for done, count in enumerate(in_threads(place, chunks, context.workers), 1):
         counts += count
         context.progress(done, len(chunks))
+    judge_impossible(impossible, int(counts[[0, 2]].sum()), rings, farthest_mm, context)
     mirrored = outside_the_pipe(xyz)
     for whole in (xyz, noise):
         whole[mirrored] = np.nan
     _warn_of_mirrored(mirrored, rings, context)
+    for end in rings_at_an_end(xyz):
+        for whole in (xyz, noise):
+            whole[end] = np.nan
+        warn_of_end(rings.frame[end], context)
     _report(context, counts, noise)
     return RingPoints(rings.frame, rings.azimuth_rad, xyz, noise)
 
@@ -192,10 +224,20 @@ def _report(context: Context, counts: Int, noise: Float32) -> None:
         context.report("median point noise", float(np.median(length)), "mm")
 
 
+def _triangulated(
+    recording: Recording,
+    rings: RingSamples,
+    probe: Probe,
+    parameters: TriangulateParameters,
+    context: Context,
+) -> RingPoints:
+    return triangulate_rings(rings, probe, parameters, context, recording.pipe)
+
+
 TRIANGULATE = Stage(
     "triangulate",
-    "5",
+    "6",
     TriangulateParameters,
-    triangulate_rings,
+    _triangulated,
     "ring samples and instrument to wall points with their noise",
 )
