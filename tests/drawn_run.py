@@ -100,7 +100,7 @@ def _texture(contrast: float) -> Float32:
 def _picture(
     probe: Probe, T_pc: Float, wall: Float32, random: np.random.Generator, radius_at: WallRadius
 ) -> Byte:
-    xyz = _wall_hits(probe, T_pc, radius_at)
+    xyz = wall_hits(probe, T_pc, radius_at)
     row = ((xyz[..., 2] + 20) / _TEXEL_MM).astype(np.float32)
     column = ((np.arctan2(xyz[..., 1], xyz[..., 0]) + np.pi) * RADIUS / _TEXEL_MM).astype(np.float32)
     wide = np.concatenate([wall, wall[:, :2]], 1)
@@ -110,7 +110,8 @@ def _picture(
     return np.clip(np.rint(image + random.standard_normal(image.shape)), 0, 255).astype(np.uint8)
 
 
-def _wall_hits(probe: Probe, T_pc: Float, radius_at: WallRadius) -> Float:
+def wall_hits(probe: Probe, T_pc: Float, radius_at: WallRadius = round_wall) -> Float:
+    """Return the point of the wall (H, W, 3), mm in P, that each pixel shows from a pose (4, 4)."""
     width, height = probe.camera.image_size
     uv = np.stack(np.meshgrid(np.arange(width), np.arange(height)), -1).astype(float)
     ray = probe.camera.unproject(uv).ray @ T_pc[:3, :3].T

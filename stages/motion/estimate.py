@@ -29,6 +29,7 @@ from stages.motion.loops.loop_closure import LoopReport, close_loops
 from stages.motion.loops.revisits import Passage, WallFeatures, bands_in_rings, texture_at
 from stages.motion.measuring import measure_run, places_of
 from stages.motion.parameters import MotionParameters
+from stages.motion.pipe_end import last_on_wall, without_pictures_behind
 from stages.motion.rings import looking_at_wall
 from stages.motion.route.laying import lay_route
 from stages.motion.stated_probe import (
@@ -72,18 +73,21 @@ def estimate_motion(
     parameters: MotionParameters,
     context: Context,
     cut: tuple[int, ...] = (),
+    left_out: int = 0,
 ) -> Trajectory:
     """Estimate the camera's pose in every frame, with the axis of the pipe and corrections of the probe.
 
-    From the first of the frames ``cut`` on, distances are not known (`beyond_cuts`).
+    From the first of the frames ``cut`` on, distances are not known (`beyond_cuts`). ``left_out`` is the
+    number of pictures left out behind the last, as in `last_on_wall`.
 
     Raises
     ------
     UnusableError
         When neither rings nor texture and encoder determine the motion.
     """
-    recording = looking_at_wall(recording, rings, points)
-    run = measure_run(recording, probe, rings, points, parameters, context)
+    last = last_on_wall(recording, points, left_out)
+    recording = without_pictures_behind(looking_at_wall(recording, rings, points), last)
+    run = measure_run(recording, probe, rings, points, parameters, context, last=last)
     check = partial(_require_convergence, run.texture.grid.radius_mm)
     estimate = adjust_run(run, parameters, check, context.progress)
     joined, loops = _with_loops_closed(estimate.joined, run, recording, probe, parameters, context)
@@ -230,12 +234,13 @@ def _motion_of_run(
 ) -> Trajectory:
     """Estimate the motion from the frames and encoder as corrected by the stage premises."""
     checked = frames.applied_to(recording)
-    return estimate_motion(checked, probe, rings, points, parameters, context, frames.cut)
+    left_out = int(np.sum(recording.frames.frame > frames.frame[-1]))
+    return estimate_motion(checked, probe, rings, points, parameters, context, frames.cut, left_out)
 
 
 MOTION = Stage(
     "motion",
-    "63",
+    "64",
     MotionParameters,
     _motion_of_run,
     "camera pose in every frame and the pipe's axis, from texture, rings and encoder together",

@@ -23,6 +23,7 @@ from stages.motion.encoder import (
 )
 from stages.motion.frame_times import frame_times
 from stages.motion.parameters import MotionParameters
+from stages.motion.pipe_end import end_in_view
 from stages.motion.rings import RingCircles, circles_in_rings
 from stages.motion.tracking.landmarks import TrackedPoses
 from stages.motion.tracking.strips import StripGrid, WallView
@@ -46,10 +47,12 @@ def measure_run(
     parameters: MotionParameters,
     context: Context,
     use_encoder: bool = True,
+    last: int | None = None,
 ) -> MeasuredRun:
     """Track the wall's texture and gather the measurements: texture, rings, times and encoder.
 
-    Without ``use_encoder`` the encoder is left out, so that it can be compared with the pictures.
+    Without ``use_encoder`` the encoder is left out, so that it can be compared with the pictures. ``last`` is
+    the place, in the list of frames, of the last ring on the wall, if the run goes on behind it.
 
     Raises
     ------
@@ -57,7 +60,8 @@ def measure_run(
         When the rings do not place the pipe, or neither texture nor encoder determines the distance.
     """
     circles, rings = circles_in_rings(points), rings.placed_in(points)
-    view = WallView(recording, probe, strip_grid(circles.usual_radius_mm, parameters))
+    grid = strip_grid(circles.usual_radius_mm, parameters)
+    view = WallView(recording, probe, grid, end_in_view(recording, last, grid.far_mm, context))
     tracked = _tracked(view, circles, parameters, context, use_encoder)
     encoder = tracked.encoder
     followed = _in_bore(circles, tracked.texture, tracked.predictor, view, encoder)

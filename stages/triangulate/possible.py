@@ -20,7 +20,7 @@ _MOST_IMPOSSIBLE = 0.5
 # pipe has more.
 _FEW_IMPOSSIBLE = 0.002
 # Rings without a circle at either end of a run that are an end, and not a few bad pictures: as in premises.
-_A_WHILE = 8
+A_WHILE = 8
 
 
 def farthest_wall_mm(pipe: PipeFacts | None) -> float:
@@ -52,7 +52,7 @@ def rings_at_an_end(xyz_c: Float32) -> list[slice]:
     if not covered.size:
         return []
     ends = slice(0, int(covered[0])), slice(int(covered[-1]) + 1, len(xyz_c))
-    return [end for end in ends if end.stop - end.start > _A_WHILE]
+    return [end for end in ends if end.stop - end.start > A_WHILE]
 
 
 def judge_impossible(
@@ -86,7 +86,5 @@ def warn_of_end(frame: Int, context: Context) -> None:
     context.warn(
         f"from frame {frame[0]} to {frame[-1]} no ring shows more than {100 * LEAST_COVERED:.0f} % of its "
         "circle: the end of the pipe or an opening is in view, or the laser is off or hidden. Nothing there "
-        "is taken for wall. Lit pictures show the end before the laser reaches it, and what lies beyond it "
-        "does not move as the wall does: distance and roll may err by more than their σ near these frames. "
-        "What to do: look at these pictures; keep only the part of the recording without the end in view"
+        "is taken for wall. What to do: nothing, if the pipe ends there; else look at these pictures"
     )

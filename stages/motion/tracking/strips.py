@@ -8,7 +8,7 @@ hardly depends on the camera's pose, so that patches can be compared over many f
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numba
@@ -41,6 +41,8 @@ _LINE_HALF_WIDTH_SIGMA = 12
 """Half width, in σ of the laser line, of the wall hidden under it: the line is below 1e-4 of its peak beyond
 4.3 σ; its glow reaches farther, a gradient that `without_illumination` removes. Not measured."""
 _DECODED_AHEAD = 4
+NEVER = 1 << 62
+"""Larger than the index of any picture."""
 
 
 @dataclass(frozen=True)
@@ -126,7 +128,7 @@ class Strip:
 
 @dataclass(frozen=True)
 class Hidden:
-    """Parts of a picture that hide the wall.
+    """Parts of a picture that hide the wall, or do not show it.
 
     Attributes
     ----------
@@ -134,10 +136,17 @@ class Hidden:
         Range of wall ahead of the camera under the laser line; empty if equal.
     stays : (H, W) uint8 or None
         Above 0 where something stays in the picture while the wall moves.
+    end_from : int
+        Index, in the list of all frames, of the first picture in which the pipe may end behind the line.
     """
 
     line_mm: tuple[float, float] = (0.0, 0.0)
     stays: Byte | None = None
+    end_from: int = NEVER
+
+    def at(self, place: int) -> Hidden:
+        """Return the parts for one picture, by its index in the list of all frames."""
+        return self if place < self.end_from else replace(self, line_mm=(self.line_mm[0], np.inf))
 
 
 @dataclass(frozen=True)
@@ -147,6 +156,7 @@ class WallView:
     recording: Recording
     probe: Probe
     grid: StripGrid
+    end_from: int = NEVER
 
     @property
     def lit(self) -> Int:
@@ -160,7 +170,7 @@ class WallView:
         half = _LINE_HALF_WIDTH_SIGMA * self.probe.laser.line_sigma_mm if self._both else 0.0
         at_mm = self.probe.laser.baseline_mm
         stays = in_full(self.recording.stays, self.recording.source.image_size)
-        return Hidden((at_mm - half, at_mm + half), stays)
+        return Hidden((at_mm - half, at_mm + half), stays, self.end_from)
 
     def images(self, place: Int) -> Iterator[tuple[int, Image | None]]:
         """Yield indices and softened grey pictures; with the laser on, of the colour its light reaches least.

@@ -164,12 +164,12 @@ class TextureTracker:
 
         Where few are found at the predicted pose, the last strip as a whole tells where to look instead.
         """
-        strip = unroll(image, self._probe, T_pc, self._grid, self._hidden)
+        strip = unroll(image, self._probe, T_pc, self._grid, self._hidden.at(frame))
         self._await_renewal()
         found = self._matched(strip, frame)
         if found.agreeing < _FEWEST_AGREEING and self._last is not None:
             T_moved = self._shifted(T_pc, _displacement(self._last, strip))
-            other = unroll(image, self._probe, T_moved, self._grid, self._hidden)
+            other = unroll(image, self._probe, T_moved, self._grid, self._hidden.at(frame))
             found_there = self._matched(other, frame)
             if found_there.agreeing > max(found.agreeing, _FEWEST_AGREEING):
                 return T_moved, other, found_there
