@@ -107,6 +107,9 @@ class CheckedFrames:
     cut : tuple of int
         First frames that may lie behind a place where the recording was cut: the wall does not continue
         there, and how far the probe went is not known.
+    behind_end : int
+        Number of last pictures that were left out because they show neither line nor wall that moves on as
+        before: the pipe has ended.
     """
 
     frame: Int
@@ -119,6 +122,7 @@ class CheckedFrames:
     stays: Bool | None = None
     interlaced: bool = False
     cut: tuple[int, ...] = ()
+    behind_end: int = 0
 
     def applied_to(self, recording: Recording) -> Recording:
         """Return the recording with these frames, and its encoder in mm and with the motion's sign.

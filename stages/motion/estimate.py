@@ -73,19 +73,19 @@ def estimate_motion(
     parameters: MotionParameters,
     context: Context,
     cut: tuple[int, ...] = (),
-    left_out: int = 0,
+    behind_end: int = 0,
 ) -> Trajectory:
     """Estimate the camera's pose in every frame, with the axis of the pipe and corrections of the probe.
 
-    From the first of the frames ``cut`` on, distances are not known (`beyond_cuts`). ``left_out`` is the
-    number of pictures left out behind the last, as in `last_on_wall`.
+    From the first of the frames ``cut`` on, distances are not known (`beyond_cuts`). ``behind_end``
+    is as in `CheckedFrames`.
 
     Raises
     ------
     UnusableError
         When neither rings nor texture and encoder determine the motion.
     """
-    last = last_on_wall(recording, points, left_out)
+    last = last_on_wall(recording, points, behind_end)
     recording = without_pictures_behind(looking_at_wall(recording, rings, points), last)
     run = measure_run(recording, probe, rings, points, parameters, context, last=last)
     check = partial(_require_convergence, run.texture.grid.radius_mm)
@@ -234,13 +234,12 @@ def _motion_of_run(
 ) -> Trajectory:
     """Estimate the motion from the frames and encoder as corrected by the stage premises."""
     checked = frames.applied_to(recording)
-    left_out = int(np.sum(recording.frames.frame > frames.frame[-1]))
-    return estimate_motion(checked, probe, rings, points, parameters, context, frames.cut, left_out)
+    return estimate_motion(checked, probe, rings, points, parameters, context, frames.cut, frames.behind_end)
 
 
 MOTION = Stage(
     "motion",
-    "64",
+    "65",
     MotionParameters,
     _motion_of_run,
     "camera pose in every frame and the pipe's axis, from texture, rings and encoder together",

@@ -18,16 +18,15 @@ from stages.motion.tracking.strips import NEVER
 from stages.triangulate.possible import A_WHILE, rings_at_an_end
 
 
-def last_on_wall(recording: Recording, points: RingPoints, left_out: int) -> int | None:
+def last_on_wall(recording: Recording, points: RingPoints, behind_end: int) -> int | None:
     """Return the place, in the list of frames, of the last ring if the run goes on behind it without wall.
 
-    ``left_out`` is the number of pictures behind the recording's last that the stage premises left out. None
-    if there is no sign of an end.
+    ``behind_end`` is as in `CheckedFrames`. None if there is no sign of an end.
     """
     count = len(points.frame)
     behind = [end for end in rings_at_an_end(points.xyz_c) if end.stop == count and end.start > 0]
     last = behind[0].start - 1 if behind else count - 1
-    if not behind and left_out <= A_WHILE:
+    if not behind and behind_end <= A_WHILE:
         return None
     return int(np.searchsorted(recording.frames.frame, points.frame[last]))
 

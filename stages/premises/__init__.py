@@ -28,7 +28,7 @@ from stages.premises.clock import ClockJump, clock_jumps, warn_of_clock, without
 from stages.premises.cuts import cuts, warn_of_cuts
 from stages.premises.light import Light, light_seen, look_the_same, pattern_breaks, rhythm_of
 from stages.premises.losses import Steps, row_times, rows_by_motion, steps_of_wall, sway_of_line
-from stages.premises.order import off_the_pipe, out_of_order
+from stages.premises.order import behind_the_end, off_the_pipe, out_of_order
 from stages.premises.pictures import Pictures, examine_pictures
 from stages.premises.repeats import copies, repeated, rows_of_repeats, rows_that_follow_encoder
 from stages.premises.rows import Alignment, Lights, aligned
@@ -100,6 +100,7 @@ def check_premises(
         recording.frames.frame[keep], changes.time_s[keep], changes.label[keep], factor,
         int(changes.relabelled.sum()), int(changes.retimed.sum()),
         withheld if withheld.any() else None, seen.stays, combed, tuple(behind.tolist()),
+        behind_the_end(pictures, seen.outside, seen.light),
     )  # fmt: skip
 
 
@@ -293,6 +294,6 @@ def _report(pictures: Pictures, radius_mm: float, changes: Changes, context: Con
 
 
 PREMISES = Stage(
-    "premises", "37", PremisesParameters, check_premises,
+    "premises", "38", PremisesParameters, check_premises,
     "stated lights, times, encoder and diameter compared with the pictures and corrected",
 )  # fmt: skip

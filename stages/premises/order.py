@@ -157,3 +157,20 @@ def off_the_pipe(pictures: Pictures, light: Int) -> Bool:
     for end in (slice(0, lines[0]), slice(lines[-1] + 1, None)):
         out[end] = pictures.seen[end].sum() > many
     return out
+
+
+def behind_the_end(pictures: Pictures, outside: Bool, light: Int) -> int:
+    """Return how many of the last pictures, which are `off_the_pipe`, show that the pipe has ended.
+
+    Where the lit wall still moves at least half as fast as usual in most of them, the pipe goes on, and only
+    the laser was off. Pictures that are not lit show neither; if no `Light` (F,) is known, all are lit.
+    """
+    inside = np.flatnonzero(~outside)
+    if not inside.size or inside[-1] == len(outside) - 1:
+        return 0
+    lit, step = (light == Light.WALL) | np.all(light == Light.UNKNOWN), np.abs(pictures.step)
+    before, behind = step[lit & ~outside], step[inside[-1] + 1 :][lit[inside[-1] + 1 :]]
+    if not behind.size or not np.any(np.isfinite(before)):
+        return 0
+    goes_on = np.mean(behind > np.nanmedian(before) / 2) > 0.5
+    return 0 if goes_on else len(outside) - 1 - int(inside[-1])

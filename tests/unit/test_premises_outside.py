@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from stages.premises.light import Light
-from stages.premises.order import off_the_pipe
+from stages.premises.order import behind_the_end, off_the_pipe
 from stages.premises.pictures import Pictures
 from tests.premises_run import COUNT, checked, ring_image
 from tests.ring_images import MemorySource
@@ -69,3 +69,26 @@ def test_pictures_behind_the_end_of_a_pipe_are_left_out_where_most_show_no_line(
     found, told = checked(spoiled, run.probe)
     assert found.frame.max() in (18, 19)
     assert sum("before the first laser line or after the last" in t for t in told) == 1
+
+
+@pytest.mark.parametrize(("still", "count"), [(True, COUNT - 39), (False, 0)])
+def test_the_pipe_has_ended_only_if_the_wall_no_longer_moves(still, count, good, run):
+    """The laser was switched off before the end of a run, and texture of the wall ahead was not used."""
+    dark = np.random.default_rng(1)
+    size = good.source.images[0].shape
+    changed = {k: dark.integers(0, 4, size).astype(np.uint8) for k in range(40, COUNT, 2)}
+    if still:
+        changed |= {k: good.source.images[39] for k in range(41, COUNT, 2)}
+    source = MemorySource({**good.source.images, **changed}, run.probe.camera.image_size)
+    found, _ = checked(replace(good, source=source), run.probe)
+    assert found.behind_end == count
+
+
+def test_where_nothing_is_lit_behind_the_last_line_there_is_no_sign_of_an_end():
+    outside, step = np.arange(COUNT) >= 40, np.full(COUNT, 0.1)
+    light = np.where(np.arange(COUNT) % 2 == 0, Light.LINE, Light.WALL)
+    nothing = np.full(COUNT, np.nan)
+    seen = Pictures(nothing, nothing, nothing, nothing, nothing, np.full(COUNT, -1), nothing, step)
+    assert behind_the_end(seen, outside, np.where(outside, Light.LINE, light)) == 0
+    assert behind_the_end(seen, np.zeros(COUNT, bool), light) == 0
+    assert behind_the_end(replace(seen, step=np.where(outside, 0.0, step)), outside, light) == COUNT - 40
