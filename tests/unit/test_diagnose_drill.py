@@ -157,7 +157,7 @@ def test_answers_and_truth_are_read_and_refused(tmp_path):
     with pytest.raises(InputError, match="verdict"):
         read_answer(file)
     file.write_text('{"verdict": "cla')
-    with pytest.raises(InputError, match="cut short"):
+    with pytest.raises(InputError, match="may be incomplete"):
         read_answer(file)
     with pytest.raises(InputError, match="No such file"):
         read_answer(tmp_path / "none.json")
