@@ -5,14 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, field_validator
 
 from pipeline.arrays import Bool, Float, Int
-from pipeline.errors import UnusableError
 from pipeline.instrument.probe import Probe
 from pipeline.machine.stage import Context, Parameters, Stage
-from pipeline.recording.base import FrameTable, Illumination, Recording
+from pipeline.recording.base import FrameTable, Recording
 from pipeline.recording.checks import CheckedFrames, withheld_frames
 from pipeline.recording.one_field import OneField
 from stages.premises.backwards import runs_forwards
@@ -26,12 +24,19 @@ from stages.premises.changes import (
 )
 from stages.premises.clock import ClockJump, clock_jumps, warn_of_clock, without_jumps, without_stretch
 from stages.premises.cuts import cuts, warn_of_cuts
-from stages.premises.light import Light, light_seen, look_the_same, pattern_breaks, rhythm_of
+from stages.premises.labels import (
+    labels_shown,
+    light_of_pictures,
+    rows_by_light,
+    stated_labels,
+    stated_lights,
+    whole_table,
+)
+from stages.premises.light import Light, rhythm_of
 from stages.premises.losses import Steps, row_times, rows_by_motion, steps_of_wall, sway_of_line
 from stages.premises.order import behind_the_end, off_the_pipe, out_of_order
 from stages.premises.pictures import Pictures, examine_pictures
-from stages.premises.repeats import copies, repeated, rows_of_repeats, rows_that_follow_encoder
-from stages.premises.rows import Alignment, Lights, aligned
+from stages.premises.repeats import copies, rows_that_follow_encoder
 from stages.premises.scale import (
     check_diameter,
     encoder_factor,
@@ -43,14 +48,6 @@ from stages.premises.scale import (
 )
 from stages.premises.stays import find_static_places
 from stages.premises.zoom import Zoom, warn_of_zooms, without_zooms
-
-_LASER, _LED, _BOTH = Illumination.LASER.value, Illumination.LED.value, Illumination.BOTH.value
-Labels = NDArray[np.str_]
-# If all pictures look the same, the light that at least this share of the rows states is taken as true, and
-# the other rows count as mistakes. If no light has such a share, the table is refused.
-_MOST_ROWS = 2 / 3
-# Lights that change more often than this from picture to picture are switched on purpose.
-_SWITCHED = 0.1
 
 
 class PremisesParameters(Parameters):
@@ -139,12 +136,13 @@ class _Matched:
 
 
 def _seen(recording: Recording, probe: Probe, pictures: Pictures, context: Context) -> _Seen:
-    light, stated = _light(recording.frames, pictures), _lights_of(recording.frames.illumination)
+    frames = recording.frames
+    light, stated = light_of_pictures(frames, pictures), stated_lights(frames.illumination)
     outside = off_the_pipe(pictures, light if np.any(light != Light.UNKNOWN) else stated)
     astray = out_of_order(pictures, np.where(outside, Light.UNKNOWN, light))
     in_order = np.where(astray | outside, Light.UNKNOWN, light)
     shown = in_order if np.any(in_order == Light.WALL) else stated
-    stays = find_static_places(recording, probe, recording.frames.frame[shown == Light.WALL], context)
+    stays = find_static_places(recording, probe, frames.frame[shown == Light.WALL], context)
     if stays is not None:
         pictures = examine_pictures(recording, probe, context, stays)
     return _Seen(pictures, light, in_order, shown, outside, astray, stays)
@@ -152,10 +150,12 @@ def _seen(recording: Recording, probe: Probe, pictures: Pictures, context: Conte
 
 def _matched(recording: Recording, probe: Probe, seen: _Seen) -> _Matched:
     """Find the row of every picture by the lights, then by the motion of the wall, then the clock's jumps."""
-    table, pictures, light, encoder = _table(recording), seen.pictures, seen.in_order, recording.encoder
-    alignment = _aligned(recording.frames, table, pictures, light)
+    table, pictures, light, encoder = whole_table(recording), seen.pictures, seen.in_order, recording.encoder
+    alignment = rows_by_light(recording.frames, table, pictures, light)
     copy = _copies(recording, table, pictures, light, alignment.row)
-    label = np.where(copy, _stated(table, alignment.row), _labels(table, alignment, light, pictures))
+    label = np.where(
+        copy, stated_labels(table, alignment.row), labels_shown(table, alignment, light, pictures)
+    )
     steps, zoomed = without_zooms(steps_of_wall(pictures, seen.shown, copy), pictures, light)
     sway = sway_of_line(pictures, light)
     again = copy | (np.diff(alignment.row, prepend=-1) < 1)
@@ -177,7 +177,7 @@ def _compared(recording: Recording, probe: Probe, seen: _Seen, found: _Matched, 
     """Warn of every wrong statement; return the factor by which the encoder's readings are multiplied."""
     frame, pictures, changes = recording.frames.frame, seen.pictures, found.changes
     shown = np.where(seen.outside & np.any(seen.light != Light.UNKNOWN), Light.WALL, seen.light)
-    warn_of_frames(changes, pictures, shown, _table(recording), context)
+    warn_of_frames(changes, pictures, shown, whole_table(recording), context)
     found.left_out.warn(frame, context)
     warn_of_cuts(found.cut, pictures, frame, context)
     warn_of_zooms(found.zoomed, frame, context)
@@ -203,87 +203,8 @@ def _progressive(
 
 def _copies(recording: Recording, table: FrameTable, pictures: Pictures, light: Int, row: Int) -> Bool:
     """Return which pictures (F,) repeat an earlier one."""
-    stated, time_s = _lights_of(_stated(table, row)), row_times(table, row)
+    stated, time_s = stated_lights(stated_labels(table, row)), row_times(table, row)
     return copies(pictures, light, stated, row, time_s, recording.encoder)
-
-
-def _table(recording: Recording) -> FrameTable:
-    """Return the whole table of frames if its first rows are the pictures' frames, else only their rows."""
-    frame, listed = recording.frames.frame, recording.listed
-    whole = listed is not None and np.array_equal(listed.frame[: len(frame)], frame)
-    return listed if whole and listed is not None else recording.frames
-
-
-def _lights_of(illumination: Labels) -> Int:
-    return np.where(illumination == _LASER, int(Light.LINE), int(Light.WALL))
-
-
-def _stated(table: FrameTable, row: Int) -> Labels:
-    return np.asarray(table.illumination[np.clip(row, 0, len(table.frame) - 1)])
-
-
-def _light(frames: FrameTable, pictures: Pictures) -> Int:
-    """Return the `Light` (F,) of every picture.
-
-    If all look the same although the table states two lights, the light of most rows is returned.
-    """
-    light, stated = light_seen(pictures), _lights_of(frames.illumination)
-    _refuse_one_light(frames, stated, light)
-    line, wall = stated == Light.LINE, stated == Light.WALL
-    two = line.any() and wall.any()
-    if np.any(light != Light.UNKNOWN) or not (two and look_the_same(pictures, line, wall)):
-        return light
-    if max(line.mean(), wall.mean()) < _MOST_ROWS:
-        raise UnusableError(
-            "premises",
-            f"frames.csv states two lights, {line.sum()} times laser and {wall.sum()} times led or both, but "
-            "all pictures look the same",
-            hint="state in frames.csv which light was on in each frame",
-        )
-    return np.where(pictures.seen, Light.LINE if line.mean() > 0.5 else Light.WALL, Light.UNKNOWN)
-
-
-def _refuse_one_light(frames: FrameTable, stated: Int, light: Int) -> None:
-    """Refuse a table that states a single light, where the pictures show two that alternate."""
-    names, known = np.unique(frames.illumination), light[light != Light.UNKNOWN]
-    if len(names) != 1 or names[0] == _BOTH or not known.size or np.mean(np.diff(known) != 0) < _SWITCHED:
-        return
-    wrong = frames.frame[(light != Light.UNKNOWN) & (light != stated)]
-    other = "the lit wall" if names[0] == _LASER else "a laser line in the dark"
-    raise UnusableError(
-        "premises",
-        f"frames.csv says {names[0]} of every frame, but {len(wrong)} pictures show {other}",
-        frames=wrong.tolist(),
-        hint="state in frames.csv which light was on in each frame: laser, led or both",
-    )
-
-
-def _aligned(frames: FrameTable, table: FrameTable, pictures: Pictures, light: Int) -> Alignment:
-    """Return the row of each picture; with a single stated light, each picture has the row of its number."""
-    rows, stated = np.arange(len(frames.frame)), _lights_of(table.illumination)
-    wrong = (light != Light.UNKNOWN) & (light != stated[rows])
-    if len(np.unique(stated)) < 2:
-        lit = len(rows) > 2 and stated[0] == Light.WALL
-        return Alignment(rows_of_repeats(rows, pictures) if lit else rows, np.zeros(len(rows), bool))
-    if not wrong.any():
-        return Alignment(rows, np.zeros(len(rows), bool))
-    again = repeated(pictures, light)
-    known_light = np.where(again, Light.UNKNOWN, light)  # a repeated picture does not show its own light
-    return aligned(Lights(known_light, stated, pattern_breaks(light), again))
-
-
-def _labels(table: FrameTable, alignment: Alignment, light: Int, pictures: Pictures) -> Labels:
-    """Return the illumination (F,) of every picture as it shows it; if it shows none, that of its row."""
-    stated = _stated(table, alignment.row)
-    led, both = stated == _LED, stated == _BOTH
-    wall = _LED if led.sum() >= both.sum() else _BOTH
-    if led.any() and both.any() and look_the_same(pictures, led, both):
-        stated = np.where(stated == _LASER, _LASER, wall)
-    believed = np.where(alignment.swapped, np.where(stated == _LASER, wall, _LASER), stated)
-    if len(np.unique(_lights_of(table.illumination))) < 2:
-        return np.asarray(believed)
-    shown = np.where(light == Light.LINE, _LASER, np.where(believed == _LASER, wall, believed))
-    return np.asarray(np.where(light == Light.UNKNOWN, believed, shown))
 
 
 def _report(pictures: Pictures, radius_mm: float, changes: Changes, context: Context) -> None:
