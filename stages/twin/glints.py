@@ -23,6 +23,7 @@ from stages.twin.discs import Disc, disc_of, meet
 from stages.twin.locate import FALSE_ALARM
 from stages.twin.render import Region, TwinFrame
 from stages.twin.scene import Ring
+from stages.twin.seen_in_photo import photographed_through
 
 _LEAST_GREY, _LEAST_SIGMA = 40.0, 8.0
 """Grey levels, and σ, by which each pixel of a spot exceeds its twin. Chosen: a photo displaced by its own σ
@@ -45,13 +46,22 @@ _OR_DROP = ", or a drop on the window bends light of the line there"
 
 @dataclass(frozen=True)
 class Spot:
-    """A spot in one frame: place in the image and on the wall (px, at the ring), radius, and excess."""
+    """A spot in one frame: place in the image and on the wall (px, at the ring), radius, and excess.
+
+    ``share`` is the excess over the light that is recorded there.
+    """
 
     frame: int
     image: tuple[float, float]
     wall: tuple[float, float]
     radius_px: float
     grey: float
+    share: float = 1.0
+
+    @property
+    def disc(self) -> Disc:
+        """Where it lies in the image."""
+        return Disc(*self.image, self.radius_px)
 
     def at(self, order: str) -> tuple[float, float]:
         """Return its place in the image or on the wall, px."""
@@ -118,24 +128,28 @@ class SpotsOfFrames:
             if not _PIXELS[0] <= area <= _PIXELS[1]:
                 continue
             box, at = (slice(top, top + height), slice(left, left + width)), centre[k].astype(int)[::-1]
-            grey = float(more[box][label[box] == k].mean())
+            here = label[box] == k
+            grey, dark = (float(a[box][here].mean()) for a in (more, twin.level))
             wall = self._on_wall(twin.distance_mm[tuple(at)], twin.azimuth_rad[tuple(at)])
             image = float(centre[k][0]), float(centre[k][1])
-            found.append(
-                Spot(frame, image, (float(wall[0]), float(wall[1])), float(np.sqrt(area / np.pi)), grey)
-            )
+            place, radius = (float(wall[0]), float(wall[1])), float(np.sqrt(area / np.pi))
+            found.append(Spot(frame, image, place, radius, grey, grey / max(grey + dark, 1.0)))
         return found
 
-    def found(self, lit_wall: float = 0.0, bent: Sequence[Mismatch] = ()) -> tuple[Mismatch, ...]:
+    def found(
+        self, lit_wall: float = 0.0, bent: Sequence[Mismatch] = (), dim: Sequence[Mismatch] = ()
+    ) -> tuple[Mismatch, ...]:
         """Return the places where spots recur, and a count of the other spots.
 
         ``lit_wall`` is the brightness, in grey levels, that other light gives to wall that is dark in the
         twin: a spot not far brighter than that is the palest wall. Spots at places of the image where light
-        is ``bent`` are wall from elsewhere.
+        is ``bent`` are wall from elsewhere; beside what is ``dim`` on the window, wall may be too dark in its
+        photo.
         """
         places, left = list[Mismatch](), [s for s in self.spots if s.grey > _PALEST * lit_wall]
         discs = [d for d in map(disc_of, bent) if d is not None]
-        left = [s for s in left if not any(d.touches(Disc(*s.image, s.radius_px)) for d in discs)]
+        left = [s for s in left if not any(d.touches(s.disc) for d in discs)]
+        left = [s for s in left if not photographed_through(s.disc, s.share, dim, self.ring)]
         while left:
             tried = {order: _largest_group(left, order) for order in ("image", "wall")}
             count = {order: _frames_of(group) for order, group in tried.items()}
