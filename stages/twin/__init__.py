@@ -18,14 +18,12 @@ from pipeline.machine.stage import Context, Parameters, Stage
 from pipeline.recording.base import Illumination, Recording
 from pipeline.recording.checks import CheckedFrames
 from stages.twin.at_times import dark_spots
-from stages.twin.causes import causes
 from stages.twin.compare import Comparison, block_ratios, block_textures
 from stages.twin.dark_side import beside_dark_side
 from stages.twin.fixed_line import on_line
 from stages.twin.fixed_pattern import pattern_figures
 from stages.twin.glints import window_and_glints
 from stages.twin.lamp_power import lamp_power
-from stages.twin.lamps import faded, flicker_of_measured
 from stages.twin.locate import (
     LEAST_CONTRAST,
     ImagePlace,
@@ -36,6 +34,7 @@ from stages.twin.locate import (
 )
 from stages.twin.name import cannot_tell, clipped, left_over, noise_figures, state_figures
 from stages.twin.on_wall import ring_step_mm, unnamed
+from stages.twin.over_time import changes_over_time
 from stages.twin.photo_course import hidden_failures
 from stages.twin.pixels import defective_pixels
 from stages.twin.render import Region, Renderer
@@ -51,7 +50,7 @@ from stages.twin.state import (
     sample_frames,
 )
 from stages.twin.sums import Sums
-from stages.twin.window import or_on_window, separated_from_blur
+from stages.twin.window import separated_from_blur
 from stages.twin.worst import maps_of, worst_places
 
 _EVERY, _COLOURED, _CLIPPED_FRAMES = 10, 3, 8
@@ -211,10 +210,7 @@ def compared_with(
     if not comparison.views:
         raise UnusableError("twin", "no frame could be decoded", hint="copy the video again")
     state, samples = photometry.state, sums.blocks.samples()
-    over_time, slow = causes(*sums.cells(), scene.probe.lighting, scene.ring, samples)
-    over_time = or_on_window(over_time)
-    for also in (flicker_of_measured, faded):
-        over_time = (*over_time, *also(photometry.state, over_time, scene.ring))
+    over_time, slow = changes_over_time(sums, samples, scene, photometry.state)
     whole, withdrawn = sums.named(samples, recording, any("led_dead" in m.name for m in over_time))
     on_window, of_photo = separated_from_photo(sums.on_window(samples), scene.ring)
     on_window, unsure = separated_from_blur(on_window, whole)
@@ -292,7 +288,7 @@ PHOTOMETRY = Stage(
 )
 TWIN = Stage(
     "twin",
-    "63",
+    "64",
     TwinParameters,
     compare_with_twin,
     "recorded frames beside the same frames, re-rendered from what the run has measured",

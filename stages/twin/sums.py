@@ -15,6 +15,7 @@ from pipeline.recording.base import Illumination, Recording
 from stages.twin.cells import Cells, CellsOfFrames, sectors_of
 from stages.twin.compare import Comparison, exposure_of
 from stages.twin.dead_led import dead_led
+from stages.twin.fine_noise import FineNoise
 from stages.twin.gate import Suspected, judged
 from stages.twin.glints import SpotsOfFrames
 from stages.twin.lamp_power import power_of_lamps
@@ -51,7 +52,7 @@ class Sums:
         self.window = [WindowPlace(p, aside_px=p.most_of(state.aside)) for p in places]
         self.blocks = BlocksOfFrames(scene.ring)
         self.lit, self.line = CellsOfFrames(), CellsOfFrames()
-        self.whole = WholePictures(scene)
+        self.whole, self.fine = WholePictures(scene), FineNoise()
         self.spots = [SpotsOfFrames(kind, scene.ring) for kind in (Illumination.LED, Illumination.LASER)]
         self._sector = sectors_of(scene.polar[1])
 
@@ -78,6 +79,7 @@ class Sums:
             for place in self.window:
                 place.add(frame, above, exposed, free, drawn)
             self.whole.add_lit(frame, above, after, free)
+            self.fine.add(frame, above, after, free)
             self.spots[0].add(frame, above, exposed)
         if kind != Illumination.LED:
             self.whole.frame["line"].append(frame)
@@ -103,13 +105,13 @@ class Sums:
     def glints(self, whole: Sequence[Mismatch], on_window: Sequence[Mismatch] = ()) -> tuple[Mismatch, ...]:
         """Return spots far brighter than predicted; ``whole`` are confirmed effects on the whole picture.
 
-        Spots of lit frames are left out where something ``on_window`` surely bends light: a drop, or what
-        displaces the line.
+        Spots of lit frames are left out where something ``on_window`` surely bends light (a drop, or what
+        displaces the line), and beside what dims it, through which the photo was made.
         """
         stray = [m.parameters[0].value for m in whole if set(m.names) & set(STRAY_NAMES)]
         bends = [m for m in on_window if m.name == "droplet" or m.channel == "line"]
         lit, laser = self.spots
-        return (*lit.found(bent=bends), *laser.found(max(stray, default=0.0)))
+        return (*lit.found(0.0, bends, on_window), *laser.found(max(stray, default=0.0)))
 
     def cells(self) -> tuple[Cells | None, Cells | None]:
         """Return the sectors of lit frames and of the line, twins having steady lamps and an even laser.
