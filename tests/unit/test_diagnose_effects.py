@@ -10,7 +10,7 @@ from pipeline.instrument.camera.fisheye import KannalaBrandt
 from pipeline.instrument.laser import LaserSheet
 from pipeline.instrument.probe import Probe
 from pipeline.physics.catalogue import EFFECTS
-from pipeline.physics.effect import CourseKind
+from pipeline.physics.effect import CourseKind, FixedTo
 from stages.diagnose.effects.base import Travel
 from stages.diagnose.effects.library import (
     LIBRARY,
@@ -22,7 +22,7 @@ from stages.diagnose.effects.library import (
     texture_shift_px,
     without,
 )
-from stages.diagnose.effects.nameless import GENERIC, STEADY, Moves, PatternInCourse
+from stages.diagnose.effects.nameless import GENERIC, STEADY, VOCABULARY, GenericTerm, Moves, PatternInCourse
 from tests.unit.wall_points import Bore, plain_probe, ring_points, texture_points
 
 # What an effect on positions or readings must not change.
@@ -231,6 +231,22 @@ def test_ovality_stays_with_the_pipe_when_the_camera_rolls():
     rolled = replace(points, wall_azimuth_rad=points.azimuth_rad + 0.7)
     shift = LIBRARY["ovality"].wall_shift_mm(rolled, (), np.array([0.1, 0.0]))
     assert shift == pytest.approx(0.1 * np.cos(2 * (points.azimuth_rad + 0.7)))
+
+
+def test_what_hangs_keeps_its_azimuth_in_the_pipe_when_the_probe_rolls():
+    """Of a sheet that sagged by .2° while the probe rolled by 290°, the formula was a swing of .17 Hz."""
+    (sags,) = (m for m, _ in VOCABULARY if isinstance(m, GenericTerm) and m.hangs and m.exponent == 2)
+    (tilts,) = (m for m in GENERIC if (m.moves, m.harmonic, m.exponent) == (Moves.LINE, 1, 2))
+    points = line()
+    of_wall = np.arctan2(points.normal_c[:, 1], points.normal_c[:, 0])
+    rolled = replace(points, wall_azimuth_rad=of_wall + 0.7)
+    seen = ring_shift_px(sags, rolled, STEADY, np.array([0.1, 0.0]))
+    assert seen == pytest.approx(
+        ring_shift_px(tilts, points, STEADY, 0.1 * np.array([np.cos(0.7), -np.sin(0.7)])), abs=1e-9
+    )
+    assert np.abs(seen - ring_shift_px(tilts, points, STEADY, np.array([0.1, 0.0]))).max() > 0.1
+    assert sags.goes_with(STEADY)[0] is FixedTo.GRAVITY
+    assert "hangs by its weight" in sags.equation(STEADY, np.array([0.1, 0.0]))
 
 
 def test_a_reduced_library_has_the_remaining_effects():

@@ -132,6 +132,11 @@ class ImagePoints:
         return np.asarray(np.arctan2(self.normal_c[:, 1], self.normal_c[:, 0]))
 
     @cached_property
+    def roll_rad(self) -> Float:
+        """(M,) azimuth in P minus that in C of a direction across the pipe; 0 where unknown."""
+        return np.asarray(self.azimuth_p_rad - np.arctan2(self.normal_c[:, 1], self.normal_c[:, 0]))
+
+    @cached_property
     def outward(self) -> Float:
         """(M, 2) unit direction of the image radius."""
         away = self.uv - self.probe.camera.centre_px

@@ -17,6 +17,7 @@ _REFERENCE_MM = 50.0
 _HARMONICS = (0, 1, 2, 3, 4)
 _EXPONENTS = (0, 1, 2, 3)
 STEADY: Shape = ()
+_HANGS = " (always toward this azimuth of the pipe while the probe rolls, like what hangs by its weight)"
 # Reference values for the units of a pattern's size; any would do.
 _REFERENCE_S, _REFERENCE_MM_S = 10.0, 20.0
 
@@ -92,13 +93,17 @@ _FIXED_TO = {
 
 @dataclass(frozen=True)
 class GenericTerm(Nameless):
-    """One harmonic with one power of the radius (line), of θ (image), or of the distance (wall)."""
+    """One harmonic with one power of the radius (line), of θ (image), or of the distance (wall).
+
+    What ``hangs`` keeps its direction in the pipe while the probe rolls.
+    """
 
     name: str
     moves: Moves
     harmonic: int
     exponent: int
     amplitudes: tuple[Amplitude, ...]
+    hangs: bool = False
 
     @property
     def radial_exponent(self) -> float | None:
@@ -111,7 +116,8 @@ class GenericTerm(Nameless):
             return _along(points, self.exponent) * self._wave(points.azimuth_p_rad, amplitude)
         if self.moves is not Moves.LINE or not points.on_line:
             return np.zeros(len(points.uv))
-        return np.asarray(growth(points, self.exponent) * self._wave(points.azimuth_rad, amplitude))
+        azimuth_rad = points.azimuth_rad + (points.roll_rad if self.hangs else 0.0)
+        return np.asarray(growth(points, self.exponent) * self._wave(azimuth_rad, amplitude))
 
     def image_shift_px(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
         """Return a θ^p cos m(ψ − ψ₀) outward or around, px."""
@@ -123,7 +129,8 @@ class GenericTerm(Nameless):
 
     def formula(self, shape: Shape) -> str:
         """Return the pattern as a formula."""
-        wave = f" cos {self.harmonic}(ψ − ψ₀)" if self.harmonic else ""
+        azimuth = "ψ + roll − ψ₀" if self.hangs else "ψ − ψ₀"
+        wave = f" cos {self.harmonic}({azimuth})" if self.harmonic else ""
         if self.moves is Moves.WALL:
             return f"wall: a cos {self.harmonic}(ψ_P − ψ₀){' s/50' * self.exponent}"
         if self.moves is Moves.LINE:
@@ -132,7 +139,11 @@ class GenericTerm(Nameless):
 
     def goes_with(self, shape: Shape) -> tuple[FixedTo, str, int | None]:
         """Return what it displaces."""
-        return _FIXED_TO[self.moves], "static", self.harmonic
+        return FixedTo.GRAVITY if self.hangs else _FIXED_TO[self.moves], "static", self.harmonic
+
+    def equation(self, shape: Shape, amplitude: Float) -> str:
+        """Return the formula with its numbers, and what a direction that does not roll means."""
+        return super().equation(shape, amplitude) + (_HANGS if self.hangs else "")
 
     def _wave(self, azimuth_rad: Float, amplitude: Float) -> Float:
         return cosine(azimuth_rad, np.array([*amplitude, 0.0])[:2], self.harmonic)
@@ -251,11 +262,12 @@ class FractionTerm(Nameless):
         return "line: a cos(2πρ − φ₀), ρ its image radius in px"
 
 
-def _term(moves: Moves, harmonic: int, exponent: int) -> GenericTerm:
+def _term(moves: Moves, harmonic: int, exponent: int, hangs: bool = False) -> GenericTerm:
     in_mm = moves in (Moves.LINE, Moves.WALL)
     amplitudes = two_parts("mm", 0.05) if in_mm else two_parts("px", 0.2)
     kept = amplitudes if harmonic else amplitudes[:1]
-    return GenericTerm(f"generic_{moves}_{harmonic}_{exponent}", moves, harmonic, exponent, kept)
+    name = f"generic_{moves}_{harmonic}_{exponent}{'_hangs' if hangs else ''}"
+    return GenericTerm(name, moves, harmonic, exponent, kept, hangs)
 
 
 GENERIC: tuple[GenericTerm, ...] = tuple(
@@ -274,6 +286,8 @@ def _vocabulary() -> tuple[tuple[Nameless, Shape], ...]:
         out.append((term, STEADY))
         out += [(PatternInCourse(term, kind), shape) for kind, shape in courses.get(term.moves, ())]
     out += [(_term(Moves.WALL, m, power), STEADY) for m in (1, 2, 3, 4) for power in (0, 1)]
+    # A sheet that shifts or tilts by its weight.
+    out += [(_term(Moves.LINE, 1, power, hangs=True), STEADY) for power in (1, 2)]
     return (*out, (RowTerm(), STEADY), (FractionTerm(), STEADY))
 
 
