@@ -23,7 +23,7 @@ import numpy as np
 from pipeline.physics.catalogue import effect
 from pipeline.physics.effect import CourseKind, FixedTo
 from stages.diagnose.effects.base import EffectModel
-from stages.diagnose.effects.courses import SEARCHED, Coursed, Drifting
+from stages.diagnose.effects.courses import SEARCHED, Coursed, Drifting, InCourse
 from stages.diagnose.gauge.altered_laws import other_course, other_growth
 from stages.diagnose.gauge.fit import evidence
 from stages.diagnose.gauge.hypotheses import Judged
@@ -92,7 +92,10 @@ def odds_of_unknown_laws(
     at, terms = best.fit.linearised, best.fit.terms
     grown = [other_growth(t, at, _kind(t.model)[1]) for t in best.library_terms]
     moved = [other_course(t, at, span(run)[0]) for t in best.library_terms]
-    asked = [(o, ()) for o in (*grown, *moved)]
+    steady = [steady_term(t) for t in best.library_terms]
+    own = {(t.model, t.shape) for t in terms}
+    constant = dict.fromkeys((s.model, s.shape) for s in steady if s is not None)
+    asked = [*((o, ()) for o in (*grown, *moved)), *(c for c in constant if c not in own)]
     about = evidence(run, best.fit, asked, with_spread=False)[0].deflated(believed)
 
     def before(kept: Sequence[Term]) -> float:
@@ -103,26 +106,41 @@ def odds_of_unknown_laws(
     growth = odds_in(about, terms, [o.name for o in grown], laid_out, before, stated, GROWTH)
     around = [t.model.name if p[2] is None else p[2] for t, p in zip(terms, patterns, strict=True)]
     course = odds_in(about, terms, [o.name for o in moved], around, before, stated, _COURSE, False)
-    each = zip(growth, course, best.library_terms, strict=True)
+    each = zip(growth, course, best.library_terms, steady, strict=True)
     return tuple(
-        Unknown(g * known_alike(t.model, library), c + odds_of_unseen_course(t, *span(run)))
-        for g, c, t in each
+        Unknown(
+            g * known_alike(t.model, library),
+            c + odds_of_unseen_course(t, span(run)[0]) + odds_of_steady(about, terms, t, s, before, stated),
+        )
+        for g, c, t, s in each
     )
 
 
-def odds_of_unseen_course(term: Term, duration_s: float, frame_rate: float) -> float:
-    """Return the odds that a course is of another kind: even where the run hardly shows it.
+def steady_term(term: Term) -> Term | None:
+    """Return a drift's law as a constant effect of its size; None where nothing drifts."""
+    if not isinstance(term.model, InCourse) or term.model.kind is not CourseKind.EXPONENTIAL:
+        return None
+    return Term(term.model.static, term.model.own, term.at(term.amplitude)[1])
 
-    A swing of which the run holds few periods may be slow in another way: it may go with the probe's roll
-    (what hangs down, for instance), which no law here does. A drift whose time constant is nearest to the
-    shortest searched may be constant: an optical axis that was not in the library was named a drifting one
-    at .9995.
+
+def odds_of_steady(
+    about: Evidence, terms: Sequence[Term], drift: Term, steady: Term | None,
+    before: Callable[[Sequence[Term]], float], stated: Stated,
+) -> float:  # fmt: skip
+    """Return the odds, relative to a drift, that its law is ``steady``, even if the library lacks that.
+
+    A shifted optical axis that was not in the library was named one that drifts within .8 s, at .9995.
     """
-    shape, amplitude = term.at(term.amplitude)
-    if term.model.kind is CourseKind.EXPONENTIAL:
-        fastest, second = sorted(time_s for time_s, *_ in term.model.shapes(duration_s, frame_rate))[:2]
-        return float(shape[0] < np.sqrt(fastest * second))
-    frequency = term.model.course(shape, amplitude).get("frequency_hz")
+    if steady is None:
+        return 0.0
+    kept = [steady if t is drift else t for t in terms]
+    gain = _surprise(about, terms, "", 0.0, stated) + before(terms) - before(kept)
+    return NAMELESS * float(np.exp((gain - _surprise(about, kept, "", 0.0, stated)) / 2))
+
+
+def odds_of_unseen_course(term: Term, duration_s: float) -> float:
+    """Return even odds that a swing of which the run holds few periods is slow in another way."""
+    frequency = term.model.course(*term.at(term.amplitude)).get("frequency_hz")
     return float(frequency is not None and frequency * duration_s < _LEAST_PERIODS)
 
 
