@@ -12,7 +12,7 @@ from stages.diagnose.effects.library import LIBRARY
 from stages.diagnose.field.run import warn_of_knock
 from stages.diagnose.gauge import answer, doubts
 from stages.diagnose.gauge.confirm import passes_again
-from stages.diagnose.gauge.examine import Examined
+from stages.diagnose.gauge.examine import Examined, chance_of
 from stages.diagnose.gauge.hypotheses import Instead, Judged
 from stages.diagnose.gauge.judge import Unfitted, Verdicts
 from stages.diagnose.gauge.run import Term
@@ -325,3 +325,15 @@ def test_the_reason_why_a_run_could_not_be_examined_is_printed_too():
     assert "gauge run were not examined: the fiducials measure 4.00 mm" in warned[0]
     assert warned[0] in seen.shortcomings
     assert "inspection say nothing about the instrument: the probe stands still" in warned[1]
+
+
+def test_a_run_in_which_nothing_is_rarer_than_expected_has_a_probability_of_one():
+    """The largest p of 144 sound runs was .88."""
+    expected = np.linspace(0.0, 8.0, 400)
+    p = np.array([chance_of(e) for e in expected])
+    assert p[0] == 0.0
+    assert p[-1] == 1.0
+    assert np.all(np.diff(p) > 0)
+    assert chance_of(1e-4) == pytest.approx(0.265e-4, rel=1e-3)
+    # Between these, the counts of sound runs are uniform.
+    assert p[expected > 2] == pytest.approx(expected[expected > 2] / 8, abs=0.01)
