@@ -55,10 +55,13 @@ class Agreement:
     ratio : float
         Likelihood of the second measurement if the cause of the first one made both, over its likelihood if
         it had a similar size but, including its sign, nothing to do with the first.
+    elsewhere : bool
+        Whether the second measurement is of another recording, with pictures of its own.
     """
 
     confirmation: Confirmation
     ratio: float
+    elsewhere: bool = False
 
 
 def agreement(
@@ -125,14 +128,15 @@ def chance_of_name(
     O. Berger, "Calibration of p values for testing precise null hypotheses", Am. Stat., 2001). Each
     undistinguished rival, and each other doubt about the name, has the same weight as the name. An unknown
     cause loses weight by the likelihood ratio of the best second measurement, or gains by that of one that
-    disagrees; measurements from one recording share its pictures and count once. An unknown cause also gains
-    weight if the residual beside the named cause is not noise (``fits_p``, the chance that noise makes it),
-    and by its likelihood with a course of its own, relative to the name (``other_courses``).
+    disagrees: measurements from one recording share its pictures and count once, those of another recording
+    count beside them. An unknown cause also gains weight if the residual beside the named cause is not noise
+    (``fits_p``, the chance that noise makes it), and by its likelihood with a course of its own, relative to
+    the name (``other_courses``).
     """
     nothing = _at_most(p_value)
-    ratios = [a.ratio for a in agreements]
     failed = [a.ratio for a in agreements if not a.confirmation.agrees]
-    ratio = min(failed) if failed else max(ratios, default=1.0)
+    here, there = (max((a.ratio for a in agreements if a.elsewhere is e), default=1.0) for e in (False, True))
+    ratio = min(failed) if failed else here * there
     unknown = UNKNOWN * (1 / (ratio * _at_most(fits_p)) + other_courses)
     return float(1 / (1 + nothing + doubts + unknown))
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 
 import numpy as np
 
@@ -23,7 +24,7 @@ def agreements(
             continue
         found = agreement(_part(where, name, value, of), _part(elsewhere, name, others[name], of))
         if found is not None:
-            yield found
+            yield replace(found, elsewhere=True)
 
 
 def _part(where: str, name: str, value: Value, of: str) -> Part:

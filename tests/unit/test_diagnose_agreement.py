@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from stages.diagnose.agreement import sized
+from stages.diagnose.agreement import chance_of_name, sized
 from stages.diagnose.effects.library import LIBRARY
+from tests.diagnosed import AGREES, DIFFERS
 
 
 @pytest.mark.parametrize("direction_deg", [25.0, 180.0])
@@ -30,3 +32,12 @@ def test_size_and_direction_each_have_the_right_sigma(direction_deg: float) -> N
         off = np.array([f[name] - middle[name] for f in found])
         assert sigma == pytest.approx(np.std((off + 180) % 360 - 180), rel=0.1)
     assert set(told) == {"tilt_deg", "direction_deg"}
+
+
+def test_another_recording_confirms_a_name_beside_the_halves_of_the_first() -> None:
+    """A delay of .0247 s (true .025) had .9886: its inspection counted for nothing beside its gauge run."""
+    there = replace(AGREES, ratio=7.7, elsewhere=True)
+    alone, both = (chance_of_name(1e-70, 0, of, fits_p=0.054) for of in ([AGREES], [AGREES, AGREES, there]))
+    assert alone == pytest.approx(chance_of_name(1e-70, 0, [AGREES, AGREES], fits_p=0.054))
+    assert (1 / both - 1) * 7.7 == pytest.approx(1 / alone - 1)
+    assert chance_of_name(1e-70, 0, [AGREES, replace(DIFFERS, elsewhere=True)]) < 0.1
