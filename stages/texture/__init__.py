@@ -213,7 +213,7 @@ def _texture_of_run(
 
 TEXTURE = Stage(
     "texture",
-    "11",
+    "12",
     TextureParameters,
     _texture_of_run,
     "lit frames to the wall's photo as a flat picture, evenly lit, as bright as recorded",
