@@ -21,9 +21,9 @@ from stages.texture.surface import WallSurface
 from stages.texture.views import LitViews, TileViews
 
 _LEFT = np.sqrt(0.5**2 - 1 / 12)
-"""1 σ, grey levels, of noise that together with the photo's rounding to 8 bits (1 / √12) is half a grey level,
-which is not visible. Where it has to be no more than the rounding alone, open-1-field needs 23 instead of 16
-views, a third of the stage's time, for 0.1 dB of 44.6."""
+"""1 σ, grey levels, of noise that with the rounding of the photo to 8 bits (1 / √12) is half a grey level,
+which is not visible. For noise as small as the rounding alone, open-1-field would need 23 views instead of
+16, a third of the stage's time, for 0.1 dB of 44.6."""
 _FEWEST = 16
 """Number of views blended even without noise, so that a glint or a drop in some of them is distinguished from
 the wall. In open-1-field 16 instead of 48 views cost 0.1 dB of 44.7, 24 cost 0.04 dB."""

@@ -14,12 +14,13 @@ from pipeline.artefacts.measured import Wall
 from pipeline.artefacts.model import VARIANTS, TexturedMesh
 from pipeline.export.arrays import write_cloud
 from pipeline.export.glb import write_model
+from pipeline.export.overlay_figure import overlay_figure
 from pipeline.export.pictures import write_overlays
 from stages.mesh import MeshParameters, make_mesh
 from stages.overlays import OverlayParameters, overlays_of
 from tests.model_picture import inside_view, render
 from tests.quiet import quiet_context
-from tests.unit.small_wall import RADIUS, small_wall, smooth_photo
+from tests.unit.small_wall import PIT, RADIUS, small_wall, smooth_photo
 
 
 @pytest.fixture(scope="module")
@@ -141,3 +142,20 @@ def test_the_picture_from_inside_shows_wall_around_an_opening(mesh: TexturedMesh
     assert shown.shape == (120, 160, 3)
     assert shown[:20].mean() > 60
     assert shown[55:65, 75:85].mean() < 50
+
+
+def test_an_overlay_picture_shows_the_pit_at_its_distance_and_clock(wall: Wall) -> None:
+    overlays = overlays_of(wall.radius_map, 2 * RADIUS, OverlayParameters())
+    figure = overlay_figure(overlays, overlays.deviation)
+    flat = figure[49:527, 91:809]  # within the frame of a wall of 720 by 480 px
+    assert np.all(figure[48, 90:810] == 0)
+    assert np.all(figure[48:528, 809] == 0)
+    blue, _, red = np.moveaxis(flat.astype(int), 2, 0)
+    row, column = (np.mean(x) for x in np.nonzero((red - blue > 80) & (red < 200)))
+    distance = overlays.distance_mm
+    at_mm = distance[0] + column / flat.shape[1] * np.ptp(distance)
+    hours = 6 - 12 * row / flat.shape[0]
+    pit_mm, pit_rad = PIT[:2]
+    clock = (np.degrees(pit_rad) + 90) / 30
+    assert at_mm == pytest.approx(pit_mm, abs=0.5)
+    assert hours == pytest.approx((clock + 6) % 12 - 6, abs=0.1)
