@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from types import MappingProxyType
@@ -14,6 +15,7 @@ from pipeline.artefacts.measured import RingSamples
 from pipeline.errors import UnusableError
 from pipeline.instrument.probe import Probe
 from pipeline.machine.stage import Context, Of, Parameters, Stage
+from pipeline.physics.catalogue import EFFECTS
 from pipeline.recording.base import Encoder, Recording
 from pipeline.recording.checks import CheckedFrames
 from stages.diagnose.channels import FreeMotion, Seen
@@ -123,6 +125,9 @@ CHANGES: Mapping[str, Change] = MappingProxyType({
 })  # fmt: skip
 
 
+_NO_CAUSE = "a pattern without a known cause"
+
+
 @dataclass(frozen=True)
 class Correction:
     """The stated probe with the effects that a gauge run found.
@@ -137,6 +142,12 @@ class Correction:
     probe: Probe
     applied: tuple[str, ...]
     inexpressible: tuple[str, ...]
+
+    @property
+    def beyond_probe(self) -> str:
+        """What a probe file cannot express, in words: effects by name, patterns without a cause once."""
+        laws = (n if re.split("[ ,]", n)[0] in EFFECTS else _NO_CAUSE for n in self.inexpressible)
+        return " and ".join(dict.fromkeys(laws))
 
 
 def correction_by_gauge(examined: Examined, probe: Probe, stated: Stated, source: str) -> Correction:

@@ -134,7 +134,7 @@ def _by_correction(
         # The scale of the motion seen depends on the instrument: an error of that is not the encoder's.
         field = _with_travel(field, travel_of_run(corrected, "field with the corrected probe", without))
     if field is not None and correction is not None and correction.inexpressible:
-        field = _without_scale(field, correction.inexpressible)
+        field = _without_scale(field, correction.beyond_probe)
     sheet = sheet_by_rings(gauge, correction, probe)
     if sheet is not None:
         gauge, field = (compared_with_rings(s, sheet) if s else None for s in (gauge, field))
@@ -159,14 +159,14 @@ def _with_travel(seen: Seen, travel: TravelEvidence | None) -> Seen:
     return replace(seen, travel=travel, shortcomings=(*kept, *new))
 
 
-def _without_scale(seen: Seen, inexpressible: Sequence[str]) -> Seen:
+def _without_scale(seen: Seen, beyond_probe: str) -> Seen:
     """Return the inspection's evidence without the encoder's scale, if the instrument is partly wrong."""
     if seen.travel is None:
         return seen
     kept = tuple(e for e in seen.travel.estimates if e.effect != "encoder_scale")
     words = (
-        f"The encoder's scale was not examined in the inspection: a probe file cannot express "
-        f"{' and '.join(inexpressible)}, so that the motion was found with a partly wrong instrument."
+        "The encoder's scale was not examined in the inspection: a probe file cannot express "
+        f"{beyond_probe}, so that the motion was found with a partly wrong instrument."
     )
     travel = replace(seen.travel, estimates=kept)
     return replace(seen, travel=travel, shortcomings=(*seen.shortcomings, words))

@@ -8,9 +8,10 @@ import pytest
 
 from pipeline.api.diagnosis.apply import GeometryChange, consequence, geometry_change
 from pipeline.recording.base import Encoder, FrameTable, PipeFacts, Recording
-from stages.diagnose.correct import encoder_effects, with_true_readings
+from stages.diagnose.correct import Correction, encoder_effects, with_true_readings
 from stages.diagnose.residual import AZIMUTHS, RingResidual, azimuths_rad, wall_distances_mm
 from stages.diagnose.result import EffectFound, Value
+from tests.unit.wall_points import plain_probe
 
 AZIMUTH = np.radians(np.arange(-180.0, 180.0, 2.0))
 DISTANCE = np.arange(0.0, 50.0, 0.5)
@@ -133,3 +134,10 @@ def test_residuals_without_a_usable_ring_give_an_empty_picture_and_azimuths_wrap
     assert np.isnan(rings.over_wall(wall_distances_mm(rings))).all()
     over = replace(rings, usable=ones > 0).over_frames(np.array([7]))
     assert over[np.isfinite(over)] == pytest.approx([1.0])
+
+
+def test_what_a_probe_file_cannot_express_is_told_without_internal_names():
+    """The page said "a probe file cannot express generic_line_1_2_hangs"."""
+    found = "laser_tilt, step", "generic_line_1_2_hangs", "generic_line_0_3", "sheet_waviness 2, ramp"
+    told = Correction(plain_probe(), (), found).beyond_probe
+    assert told == "laser_tilt, step and a pattern without a known cause and sheet_waviness 2, ramp"
