@@ -24,7 +24,6 @@ import numpy as np
 from scipy.stats import beta, poisson
 
 from pipeline.api.job import open_job, run_job
-from pipeline.arrays import Float
 from pipeline.errors import UnusableError
 from pipeline.export.catalogue import EXPORTERS
 from pipeline.machine.configuration import resolve
@@ -34,6 +33,7 @@ from pipeline.simulator.scene import Scene, scene_from
 from stages.catalogue import PIPELINE
 from tests.benchmarks.bench_hard_footage import repaint
 from tests.benchmarks.hard_kinds import Image
+from tests.benchmarks.true_wall import TrueWall, true_wall
 from tests.simulated import SCENES, rendered, shipped, smaller
 
 _STAGES = tuple(s for s in PIPELINE if s.name not in ("overlays", "mesh", "sections"))
@@ -42,13 +42,8 @@ _SHRINK, _FRAMES, _WAY_MM = 3, 100, (50.0, 110.0)
 _BASES = ("straight-4-inch", "oval-3-inch", "welded-4-inch")
 _INTO = ("pit", "corrosion", "gouge")
 _KINDS = (*_INTO, "deposit", "dent")
-# Positions of a finding and of the true wall may differ by the motion's error and half a ring's spacing.
-# Beside
-# a joint, whose edges are relief too, nothing is counted.
-_NEAR_MM, _JOINT_MM = 2.0, 14.0
-# A finding is real where the true wall departs by half of the smallest depth that is reported, and by a share
-# of the finding's own depth.
-_LEAST_MM, _LEAST_SHARE = 0.1, 0.3
+# Beside a joint, whose edges are relief too, nothing is counted.
+_JOINT_MM = 14.0
 _BINS = (0.0, 0.2, 0.5, 0.8, 0.95, 1.0)
 # A table is refused where chance would give the counts of a bin less often than this.
 _REFUSED = 1e-3
@@ -189,39 +184,6 @@ def run(recording: Path, folder: Path) -> None:
     run_job(job, Selection(), SilentDisplay())
 
 
-@dataclass(frozen=True)
-class TrueWall:
-    """The drawn wall's relief (S, A), mm, positive into the wall, over distance and azimuth."""
-
-    distance_mm: Float
-    azimuth_rad: Float
-    relief_mm: Float
-
-    def extreme(self, found: dict[str, float]) -> float:
-        """Return the largest relief with a finding's sign, within its outline or up to 2 mm beside it."""
-        rows = self.distance_mm > found["distance_from_mm"] - _NEAR_MM
-        rows &= self.distance_mm < found["distance_to_mm"] + _NEAR_MM
-        first, last = (np.radians(30 * found[clock] - 90) for clock in ("clock_from", "clock_to"))
-        half = (last - first) % (2 * np.pi) / 2
-        aside = (self.azimuth_rad - first - half + np.pi) % (2 * np.pi) - np.pi
-        here = self.relief_mm[np.ix_(rows, np.abs(aside) < half + _NEAR_MM / 40)]
-        return float((np.sign(found["depth_mm"]) * here).max(initial=0.0))
-
-
-def true_wall(folder: Path) -> TrueWall:
-    """Read the drawn wall without its oval, which is fitted in every row robustly against defects."""
-    with np.load(folder / "truth_wall.npz") as file:
-        distance, azimuth, radius = (
-            file[n].astype(float) for n in ("distance_mm", "azimuth_rad", "radius_mm")
-        )
-    basis = np.stack([f(k * azimuth) for k in range(3) for f in (np.cos, np.sin)], -1)[:, [0, 2, 3, 4, 5]]
-    own = np.linalg.pinv(basis).T @ basis.T
-    relief = radius - radius @ own
-    for _ in range(8):
-        relief = radius - np.where(np.abs(relief) < 0.1, radius, radius - relief) @ own
-    return TrueWall(distance, azimuth, cv2.blur(relief, (5, 5)))
-
-
 def counted(scene: Scene, folder: Path, wall: TrueWall) -> list[Counted]:
     """Return the findings of a run, each compared with the true wall, without joints and welds."""
     ends = [w.distance_mm for w in (*scene.pipe.welds, *scene.pipe.joints)]
@@ -231,9 +193,8 @@ def counted(scene: Scene, folder: Path, wall: TrueWall) -> list[Counted]:
             middle = (found["distance_from_mm"] + found["distance_to_mm"]) / 2
             if found["kind"] == "weld" or min((abs(middle - e) for e in ends), default=99.0) < _JOINT_MM:
                 continue
-            real = wall.extreme(found) > max(_LEAST_MM, _LEAST_SHARE * abs(found["depth_mm"]))
             stated, depth, sigma = (found[n] for n in ("probability", "depth_mm", "depth_sigma_mm"))
-            out.append(Counted(scene.name, name == "defects", stated, real, depth, sigma))
+            out.append(Counted(scene.name, name == "defects", stated, wall.shows(found), depth, sigma))
     return out
 
 

@@ -6,7 +6,8 @@ N] [--probe FILE] [--spoil-answers]
 Without KIND all kinds are made. Footage, runs and scores that are in OUT are not made again. The footage of
 `SPOILT` is that of the shared `harder.py`; that of `hard_kinds` is ours, so that nothing is fitted to the
 former. With `--spoil-answers` existing runs are scored once more with a wall 0.3 mm too wide and findings
-moved by 30 mm: then every figure must be bad.
+moved by 30 mm: then every figure must be bad. "Not in the wall" counts the findings at whose place the true
+wall has no such relief (`true_wall`); "false" is the shared score's figure, which counts some real ones too.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 
 import av
@@ -38,6 +40,7 @@ from tests.benchmarks.hard_files import (
     held_still,
 )
 from tests.benchmarks.hard_kinds import PAINTED, Paint, unspoilt
+from tests.benchmarks.true_wall import errors, not_in_wall, true_wall
 from tests.shared_data import shared
 
 CAREFUL = {"crf": "16", "preset": "veryfast"}
@@ -122,8 +125,8 @@ def scored(footage: Path, run: Path, more: list[str]) -> dict[str, dict[str, flo
     return out
 
 
-def spoilt(footage: Path, run: Path) -> dict[str, dict[str, float]]:
-    """Score the run's answers with a wrong wall and wrong findings."""
+def spoilt_line(name: str, footage: Path, run: Path) -> str:
+    """Return the line of the run's answers with a wrong wall and wrong findings."""
     with tempfile.TemporaryDirectory() as folder:
         wrong = Path(folder) / "run"
         shutil.copytree(run, wrong, ignore=shutil.ignore_patterns(".boresight", "tileset", "*.glb", "*.ply"))
@@ -135,7 +138,7 @@ def spoilt(footage: Path, run: Path) -> dict[str, dict[str, float]]:
             defect["distance_from_mm"] += 30
             defect["distance_to_mm"] += 30
         (wrong / "defects.json").write_text(json.dumps(found), "utf-8")
-        return score_of(wrong, footage)
+        return line(name, score_of(wrong, footage), footage, wrong)
 
 
 def score_of(run: Path, footage: Path) -> dict[str, dict[str, float]]:
@@ -146,15 +149,19 @@ def score_of(run: Path, footage: Path) -> dict[str, dict[str, float]]:
     return out
 
 
-def line(name: str, score: dict[str, dict[str, float]], run: Path) -> str:
+def line(name: str, score: dict[str, dict[str, float]], footage: Path, run: Path) -> str:
     wall, defects, apart = score["wall"], score["defects"], json.loads((run / "unconfirmed.json").read_text())
+    truth = true_wall(footage)
+    off = errors(run, truth, wall)
     warned = json.loads((run / "run.json").read_text("utf-8"))["warnings"]
     return (
         f"{name:28s} random {wall['radius_mad_sigma_mm']:.3f} bias {wall['radius_bias_mm']:+.3f} mm, "
         f"inside 95 % {100 * wall['within_1.96_sigma']:.1f}, "
+        f"mean {off.mean_sigmas:+.1f} of the common σ, {100 * off.inside_apart:.1f} apart from it, "
         f"axial {score['trajectory']['axial_end_error_percent']:+.2f} %, "
         f"that is {axial_sigmas(score, run):+.1f} σ, "
-        f"missed {defects['missed']}, false {defects['unmatched']}, unconfirmed {len(apart)}, "
+        f"missed {defects['missed']}, false {defects['unmatched']}, "
+        f"not in the wall {len(not_in_wall(run, truth, wall))}, unconfirmed {len(apart)}, "
         f"registration {score['texture']['registration_median_mm']:.3f} mm, "
         f"warned by {', '.join(sorted({w.split(':')[0] for w in warned})) or 'none'}"
     )
@@ -189,7 +196,8 @@ def main() -> None:
             if score is None:
                 print(f"{name:28s} FAILED: {run.with_suffix('.log').read_text('utf-8')[-300:]}", flush=True)
                 continue
-            print(line(name, spoilt(footage, run) if asked.spoil_answers else score, run), flush=True)
+            told = spoilt_line if asked.spoil_answers else partial(line, score=score)
+            print(told(name, footage=footage, run=run), flush=True)
 
 
 if __name__ == "__main__":

@@ -28,8 +28,9 @@ from pipeline.artefacts.measured import Trajectory, Wall
 from pipeline.geometry.axis import to_pipe
 from pipeline.review.run_files import RunFiles
 from pipeline.simulator.scene import read_scene, write_scene
-from tests.benchmarks.bench_findings import counted, true_wall
+from tests.benchmarks.bench_findings import counted
 from tests.benchmarks.long_scene import lengthened
+from tests.benchmarks.true_wall import true_wall
 from tests.benchmarks.watch import Progress, Watch
 
 ROOT = Path(__file__).resolve().parents[2]

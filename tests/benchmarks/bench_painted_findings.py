@@ -30,7 +30,7 @@ from pipeline.artefacts.findings import Defect, Defects
 from pipeline.artefacts.measured import RingSamples
 from pipeline.machine.stage import Context
 from stages.defects import DefectParameters, find_defects
-from tests.benchmarks.bench_findings import Counted, TrueWall, table
+from tests.benchmarks.bench_findings import Counted, table
 from tests.benchmarks.painted_rings import (
     Background,
     Painted,
@@ -40,6 +40,7 @@ from tests.benchmarks.painted_rings import (
     turned,
     walled,
 )
+from tests.benchmarks.true_wall import TrueWall
 from tests.quiet import quiet_context
 
 _ASKED_MM = 0.4

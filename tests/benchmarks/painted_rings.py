@@ -18,7 +18,7 @@ from pipeline.review.run_files import RunFiles
 from stages.accumulate import AccumulateParameters, accumulate_wall
 from stages.accumulate.survey import wall_samples
 from stages.triangulate import TriangulateParameters, triangulate_rings
-from tests.benchmarks.bench_findings import TrueWall, true_wall
+from tests.benchmarks.true_wall import TrueWall, true_wall
 from tests.quiet import quiet_context
 
 _KINDS = ("pit", "corrosion", "gouge", "groove", "deposit", "ridge", "dent")
@@ -98,7 +98,7 @@ def background(run: Path, truth: Path) -> Background:
     known = (truth / "truth_wall.npz").stat().st_size > 0
     wall = true_wall(truth) if known else None
     if wall is not None:
-        wall = TrueWall(wall.distance_mm + shift, wall.azimuth_rad + turn, wall.relief_mm.astype(np.float32))
+        wall = replace(wall, distance_mm=wall.distance_mm + shift, azimuth_rad=wall.azimuth_rad + turn)
     points = triangulate_rings(rings, probe, TriangulateParameters(), quiet_context())
     name = run.parent.name if run.name == "run" else run.name
     photo, own = files.artefact(WallTexture), _own_defects(read, shift, turn)
