@@ -115,7 +115,7 @@ def find_defects(
     expected = sum(1 - d.probability for d in items)
     report_found(len(items), expected, context)
     report_unconfirmed(len(items), len(unconfirmed), len(lines), context)
-    warn_of_drops(sum(f.evidence.contradicted for f in found), context)
+    warn_of_drops(sum(f.evidence.moved_over for f in found), context)
     rejected = len(regions) - len(found)
     context.report("rejected: shallower than the smallest depth or between rings", rejected, "detections")
     smallest_mm = _smallest_depth(seeds, parameters)
@@ -241,5 +241,5 @@ def _defects_of_run(
 
 
 DEFECTS = Stage(
-    "defects", "58", DefectParameters, _defects_of_run, "defects as instances with depth, clock and kind"
+    "defects", "59", DefectParameters, _defects_of_run, "defects as instances with depth, clock and kind"
 )

@@ -17,6 +17,7 @@ from scipy.ndimage import label
 from pipeline.adjustment.shared_light import NOTHING_HELD, HeldOver
 from pipeline.arrays import Bool, Float, Int
 from pipeline.artefacts.measured import PointCloud, RingSamples, RingValidity, WallTexture
+from stages.defects.behind_drop import shows_drop
 from stages.defects.depth import Depth
 from stages.defects.neighbours import frames_at_peak
 from stages.defects.parallax import LitPictures
@@ -67,8 +68,9 @@ class Evidence:
         six or more rings show it, of most of them.
     contradicted : bool
         Whether lit pictures, taken when the line was elsewhere, show the wall without it.
-    in_probe_path : bool
-        Whether the probe would have collided with it.
+    in_probe_path, behind_drop : bool
+        Whether the probe would have collided with it; whether lit pictures show the wall displaced there, but
+        only while the line passed it.
     """
 
     rings: int
@@ -79,11 +81,17 @@ class Evidence:
     bright: bool = False
     contradicted: bool = False
     in_probe_path: bool = False
+    behind_drop: bool = False
 
     @property
     def on_wall(self) -> bool:
         """Whether it belongs to the wall, and is not explained by the probe or by the end of the line."""
-        return not (self.fixed or self.edge or self.contradicted or self.in_probe_path)
+        return not (self.fixed or self.edge or self.moved_over or self.in_probe_path)
+
+    @property
+    def moved_over(self) -> bool:
+        """Whether lit pictures tell that something moved over the window while the line passed."""
+        return self.contradicted or self.behind_drop
 
     @property
     def corroborated(self) -> bool:
@@ -102,6 +110,11 @@ class Evidence:
             return (
                 "Lit pictures taken before and after, when the line was elsewhere, show the wall without it: "
                 "a drop or dirt on the window may have moved the line while it passed"
+            )
+        if self.behind_drop:
+            return (
+                "Lit pictures show the wall displaced there, but only while the line passed it: a drop or "
+                "dirt on the window may have moved the line as well"
             )
         if self.in_probe_path:
             return (
@@ -164,8 +177,11 @@ def evidence_for(
         in_probe_path=pictures is not None and pictures.drove_through(region, depth, relief),
     )
     # Pictures are read only for what would count without them: with glints there may be hundreds of others.
-    contradicted = pictures is not None and evidence.corroborated and pictures.contradict(region, relief)
-    return replace(evidence, contradicted=contradicted)
+    if pictures is None or not evidence.corroborated:
+        return evidence
+    contradicted = pictures.contradict(region, relief)
+    behind_drop = not contradicted and shows_drop(pictures, region, relief)
+    return replace(evidence, contradicted=contradicted, behind_drop=behind_drop)
 
 
 def line_is_bright(region: Region, depth_mm: float, surface: Surface, rings: RingSamples) -> bool:

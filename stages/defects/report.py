@@ -53,9 +53,10 @@ def warn_of_drops(contradicted: int, context: Context) -> None:
     if contradicted >= _SPLASHES:
         context.warn(
             f"at {contradicted} places the line departs from the wall as at a defect, but lit pictures "
-            "taken before and after show the wall without it: drops or dirt moved over the window. These "
-            "places are unconfirmed. Others may be false as well, and the depth of a defect under a drop may "
-            "be wrong. What to do: look at each finding's pictures; dry the window and record again"
+            "show the wall without it, or displaced while the line passed and not before and after: drops or "
+            "dirt moved over the window. These places are unconfirmed. Others may be false as well, and the "
+            "depth of a defect under a drop may be wrong. What to do: look at each finding's pictures; dry "
+            "the window and record again"
         )
 
 
