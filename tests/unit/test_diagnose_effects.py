@@ -239,12 +239,16 @@ def test_what_hangs_keeps_its_azimuth_in_the_pipe_when_the_probe_rolls():
     (tilts,) = (m for m in GENERIC if (m.moves, m.harmonic, m.exponent) == (Moves.LINE, 1, 2))
     points = line()
     of_wall = np.arctan2(points.normal_c[:, 1], points.normal_c[:, 0])
-    rolled = replace(points, wall_azimuth_rad=of_wall + 0.7)
-    seen = ring_shift_px(sags, rolled, STEADY, np.array([0.1, 0.0]))
-    assert seen == pytest.approx(
-        ring_shift_px(tilts, points, STEADY, 0.1 * np.array([np.cos(0.7), -np.sin(0.7)])), abs=1e-9
+    roll = np.random.default_rng(1).uniform(0.0, 5.0, len(of_wall))
+    seen = ring_shift_px(sags, replace(points, wall_azimuth_rad=of_wall + roll), STEADY, np.array([0.1, 0.0]))
+    along, across = (
+        ring_shift_px(tilts, points, STEADY, a) for a in (np.array([0.1, 0.0]), np.array([0.0, 0.1]))
     )
-    assert np.abs(seen - ring_shift_px(tilts, points, STEADY, np.array([0.1, 0.0]))).max() > 0.1
+    assert seen == pytest.approx(along * np.cos(roll) - across * np.sin(roll), abs=0.05 * np.abs(seen).max())
+    assert np.abs(seen - along).max() > 0.5 * np.abs(seen).max()
+    # If the probe hardly rolls, what hangs is not told from what is fixed to the probe.
+    hardly = replace(points, wall_azimuth_rad=of_wall + 0.1 * roll)
+    assert not ring_shift_px(sags, hardly, STEADY, np.array([0.1, 0.0])).any()
     assert sags.goes_with(STEADY)[0] is FixedTo.GRAVITY
     assert "hangs by its weight" in sags.equation(STEADY, np.array([0.1, 0.0]))
 

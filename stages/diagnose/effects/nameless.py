@@ -17,6 +17,9 @@ _REFERENCE_MM = 50.0
 _HARMONICS = (0, 1, 2, 3, 4)
 _EXPONENTS = (0, 1, 2, 3)
 STEADY: Shape = ()
+# Where a probe rolls so little that a pattern fixed to it shares more than this of one fixed to gravity, only
+# the former is tested. At an SNR of 8, which is detected, the rest decides at exp(8² (1 − .95²) / 2) = 23:1.
+_ROLLS_LITTLE = 0.95
 _HANGS = " (always toward this azimuth of the pipe while the probe rolls, like what hangs by its weight)"
 # Reference values for the units of a pattern's size; any would do.
 _REFERENCE_S, _REFERENCE_MM_S = 10.0, 20.0
@@ -115,6 +118,8 @@ class GenericTerm(Nameless):
         if self.moves is Moves.WALL:
             return _along(points, self.exponent) * self._wave(points.azimuth_p_rad, amplitude)
         if self.moves is not Moves.LINE or not points.on_line:
+            return np.zeros(len(points.uv))
+        if self.hangs and abs(np.mean(np.exp(1j * points.roll_rad))) > _ROLLS_LITTLE:
             return np.zeros(len(points.uv))
         azimuth_rad = points.azimuth_rad + (points.roll_rad if self.hangs else 0.0)
         return np.asarray(growth(points, self.exponent) * self._wave(azimuth_rad, amplitude))
