@@ -49,7 +49,7 @@ from stages.twin.state import (
     estimate_state,
     sample_frames,
 )
-from stages.twin.sums import Sums
+from stages.twin.sums import MOST_STRAY, Sums
 from stages.twin.window import separated_from_blur
 from stages.twin.worst import maps_of, worst_places
 
@@ -201,7 +201,9 @@ def compared_with(
     step = max(len(laser) // _CLIPPED_FRAMES, 1) if photometry.state.line_clipped else len(laser) + 1
     colour = recording.read(np.array(laser[step - 1 :: step], np.int64), "bgr")
     places = (*photometry.places, *photometry.blurred)
-    sums = Sums(scene, photometry.state, places, clipped_pixels(colour))
+    sums = Sums(
+        scene, photometry.state, places, clipped_pixels(colour), laser[:: -(-len(laser) // MOST_STRAY) or 1]
+    )
     for done, (frame, image) in enumerate(recording.read(compared, "grey")):
         context.progress(done, len(compared))
         if image is not None:
@@ -288,7 +290,7 @@ PHOTOMETRY = Stage(
 )
 TWIN = Stage(
     "twin",
-    "64",
+    "65",
     TwinParameters,
     compare_with_twin,
     "recorded frames beside the same frames, re-rendered from what the run has measured",

@@ -16,6 +16,7 @@ import numpy as np
 from scipy.stats import t
 
 from pipeline.arrays import Bool, Byte, Float, Float32, Int
+from stages.twin.darkness import level_beside_line
 from stages.twin.render import Region, TwinFrame
 
 Angle = TypeVar("Angle", float, Float)
@@ -97,10 +98,12 @@ class CellsOfFrames:
         """Add the light of a laser frame within the band about the line, wherever across the line it lies.
 
         A line beside its predicted place, because sheet or radius are wrong, is not darker for that: sectors
-        are compared by their whole light, as if the line had its twin's place and profile.
+        are compared by their whole light, as if the line had its twin's place and profile. Light beside the
+        line, as from lamps that are not quite off, is subtracted: it is not the laser's.
         """
         sums = self._sums(above, twin, white, sector, (Region.LINE_CORE, Region.LINE_FLANK))
         own, pixels, light, predicted = sums[2:]
+        light = light - pixels * level_beside_line(above, twin, sector, SECTORS)
         ratio = light / np.where(predicted > 0, predicted, np.inf)
         self.frame.append(frame)
         self.parts.append(np.stack([pixels + ratio**2 * own, ratio * own, own, pixels, predicted]))

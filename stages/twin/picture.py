@@ -21,6 +21,7 @@ from stages.twin.cells import chance_of, sigmas
 from stages.twin.compare import of_blocks
 from stages.twin.darkness import level_of_no_wall
 from stages.twin.gate import Suspected
+from stages.twin.glow import LEAST_LEVEL, glow
 from stages.twin.locate import FALSE_ALARM
 from stages.twin.render import Region, TwinFrame
 from stages.twin.scene import Scene
@@ -36,8 +37,6 @@ _ONE_WAY = 0.6
 OF_LAW = 0.2
 """Relative 1 σ of a blur because its shape is simplified: texture as fine as the blur bends more than its
 second derivative says."""
-_LEAST_LEVEL = 1.0
-"""Smallest stray light that is named, grey levels: rounding alone cannot make as much."""
 _OF_MEAN = (0.3, 0.6, 0.3)
 """Share by which the wall's mean brightness may differ from what each of the `stray_lights` predicts from its
 pattern. Chosen: simulated light that is even, or the lamps' own, differs by .00 to .08, a glow that is not
@@ -159,7 +158,7 @@ class WholePictures:
         """Return effects on which frames agree; ``sharpness`` (Z,) is their blur beyond the photo's."""
         made = (
             self._motion_blur(sharpness),
-            self._stray(),
+            self._stray() or glow(self.stray, self.frames_of("stray"), self.scene.ring),
             self._bloom(),
             second_ring(self.scene.ring, self.ghost, self.frames_of("ghost")),
         )
@@ -222,7 +221,7 @@ class WholePictures:
         k = int(np.argmax(fall.sum(0)))
         # The best of several laws looks more significant by chance than a single one.
         chance, share = min(len(STRAY_NAMES) * chance_of(size[:, k]), 1.0), float(size[:, k].mean())
-        if chance > FALSE_ALARM or share * level[:, k].mean() < _LEAST_LEVEL:
+        if chance > FALSE_ALARM or share * level[:, k].mean() < LEAST_LEVEL:
             return None
         if not _brings_light(k, mean[:, k], more[:, k]):
             return None

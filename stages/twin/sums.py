@@ -30,22 +30,23 @@ from stages.twin.state import PhotometricState
 from stages.twin.switched import STRAY_NAMES, Shown
 from stages.twin.window import WindowPlace
 
-_MOST_STRAY = 8
+MOST_STRAY = 8
 """Most laser frames that are examined for stray light: each takes as long as a lit frame."""
 
 
 class Sums:
     """Sums over the compared frames: χ², blocks, places of dirt, and brightness in sectors.
 
-    ``clipped`` gives, by frame number, pixels (H, W) that clip in at least one colour.
+    ``clipped`` gives, by frame number, pixels (H, W) that clip in at least one colour; ``examined``
+    are the laser frames that are examined for stray light.
     """
 
     def __init__(
         self, scene: Scene, state: PhotometricState, places: tuple[ImagePlace, ...],
-        clipped: Mapping[int, Bool] | None = None,
+        clipped: Mapping[int, Bool] | None = None, examined: Sequence[int] = (),
     ) -> None:  # fmt: skip
         scene = replace(scene, outside=state.outside)
-        self._clipped = {} if clipped is None else clipped
+        self._clipped, self._examined = {} if clipped is None else clipped, set(examined)
         self._scene, self._state, self._light = scene, state, dict[int, Illumination]()
         self._renderer = Renderer(scene, state)
         self.comparison = Comparison()
@@ -85,7 +86,7 @@ class Sums:
             self.whole.frame["line"].append(frame)
         if kind == Illumination.LASER:
             self.spots[1].add(frame, above, after)
-        if kind == Illumination.LASER and len(self.whole.stray) < _MOST_STRAY:
+        if frame in self._examined:
             lit = self._renderer.frame(frame, Illumination.LED)
             self.whole.add_laser(frame, above, after, free, lit)
         self.whole.add_clipped(frame, above, after, free)

@@ -289,6 +289,26 @@ def test_a_displaced_line_is_not_darker():
     np.testing.assert_allclose(taken.cells().log_ratio, np.log(0.8), atol=1e-3)
 
 
+def test_light_beside_the_line_is_none_of_the_laser():
+    """Lamps that stay on from the middle of a run on were a laser that gains 167 %."""
+    random = np.random.default_rng(1)
+    across = np.arange(-12.0, 13.0)[:, None] + np.zeros(720)
+    sector = np.tile(np.arange(720) // 20, (25, 1))
+    level = (30 * np.exp(-0.5 * across**2)).astype(np.float32)
+    unknown = np.full(level.shape, np.nan, np.float32)
+    region = np.where(np.abs(across) < 2, Region.LINE_CORE, Region.LINE_FLANK).astype(np.uint8)
+    taken = CellsOfFrames()
+    for frame in range(16):
+        light = 20.0 if frame >= 8 else 0.0
+        seen = np.round(level + light + random.standard_normal(level.shape)).astype(np.float32)
+        taken.add_line(
+            frame, seen, TwinFrame(level, np.ones_like(level), region, unknown, unknown), 250, sector
+        )
+    ratio = taken.cells().log_ratio
+    assert abs(ratio[8:].mean() - ratio[:8].mean()) < 0.01
+    assert ratio.std() < 0.05
+
+
 def test_a_dim_sector_has_the_right_depth_and_width_though_the_rendered_line_contains_it():
     """One of .8 over 20° was .988 ± .085 over 10°: the rendered power falls between the sectors' middles."""
     degree = np.arange(-180.0, 180.0, 0.5) + 0.25
