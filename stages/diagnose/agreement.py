@@ -10,6 +10,8 @@ import numpy as np
 from scipy import stats
 
 from pipeline.arrays import Float
+from pipeline.physics.catalogue import EFFECTS
+from pipeline.physics.effect import CourseKind
 from stages.diagnose.effects.base import EffectModel, Shape
 from stages.diagnose.inference import DEGREES, UNKNOWN
 from stages.diagnose.result import Confirmation, Value
@@ -149,17 +151,29 @@ def _at_most(p_value: float) -> float:
 
 def sized(model: EffectModel, shape: Shape, amplitude: Float, covariance: Float) -> str:
     """Return an effect's quantities, each with its 1 σ, as text, from amplitudes (Q,)."""
-    sizes = drawn(partial(model.quantities, shape), amplitude, covariance)
+    sizes = drawn(partial(model.quantities, shape), amplitude, covariance, turn_deg(model, shape, amplitude))
     words = {name: f" ± {v.sd:.2g}" if v.sd > 0 else "" for name, v in sizes.items()}
     return ", ".join(
         f"{name} {v.value:.4g}{words[name]}" for name, v in sizes.items() if np.isfinite(v.value)
     )
 
 
+def turn_deg(model: EffectModel, shape: Shape, amplitude: Float) -> float:
+    """Return the angle after which a direction means the same again: a swing has two, m waves have m."""
+    if model.kind is CourseKind.SINUSOID:
+        return 180.0
+    known = EFFECTS.get(model.law)
+    harmonic = known.harmonic if known is not None else None
+    return 360.0 / max(model.quantities(shape, amplitude).get("order", harmonic or 1), 1)
+
+
 def drawn(
-    numbers: Callable[[Float], dict[str, float]], amplitude: Float, covariance: Float
+    numbers: Callable[[Float], dict[str, float]], amplitude: Float, covariance: Float, turn: float = 360.0
 ) -> dict[str, Value]:
-    """Return numbers computed from amplitudes (Q,), with 1 σ by random draws; NaN if it is unknown."""
+    """Return numbers computed from amplitudes (Q,), with 1 σ by random draws; NaN if it is unknown.
+
+    Directions and phases are the same again after ``turn``, degrees.
+    """
     middle, random = numbers(amplitude), np.random.default_rng(0)
     if not np.isfinite(covariance).all():
         return {name: Value(value, float("nan")) for name, value in middle.items()}
@@ -168,7 +182,7 @@ def drawn(
     for name, value in middle.items():
         apart = np.array([d[name] for d in each]) - value
         if name in ("direction_deg", "phase_deg"):
-            # A direction may wrap from 180 to −180 degrees between draws.
-            apart = (apart + 180) % 360 - 180
+            # A direction may wrap from half a turn to minus half a turn between draws.
+            apart = (apart + turn / 2) % turn - turn / 2
         out[name] = Value(value, float(np.sqrt(np.mean(apart**2))))
     return out

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
 
-from stages.diagnose.agreement import chance_of_name, sized
+from stages.diagnose.agreement import chance_of_name, drawn, sized, turn_deg
 from stages.diagnose.effects.library import LIBRARY
 from tests.diagnosed import AGREES, DIFFERS
 
@@ -41,3 +42,22 @@ def test_another_recording_confirms_a_name_beside_the_halves_of_the_first() -> N
     assert alone == pytest.approx(chance_of_name(1e-70, 0, [AGREES, AGREES], fits_p=0.054))
     assert (1 / both - 1) * 7.7 == pytest.approx(1 / alone - 1)
     assert chance_of_name(1e-70, 0, [AGREES, replace(DIFFERS, elsewhere=True)]) < 0.1
+
+
+@pytest.mark.parametrize(
+    ("name", "shape", "amplitude", "turn"),
+    [
+        ("laser_rocking", (4.75,), [1e-6, 2e-3, 1e-6, 1e-3], 180.0),
+        ("sheet_waviness", (3.0,), [-1e-3, 1e-6], 120.0),
+        ("sheet_waviness", (2.0,), [-1e-3, 1e-6], 180.0),
+        ("laser_tilt", (), [-6e-3, 1e-6], 360.0),
+    ],
+)
+def test_a_direction_at_the_edge_of_its_range_is_as_well_known_as_any(name, shape, amplitude, turn) -> None:
+    """A sheet rocking toward 88.0° was told to rock toward -90.6 ± 110.8°, which is 89.4 ± 1.4°."""
+    model = LIBRARY[name]
+    middle = np.array(amplitude)
+    assert turn_deg(model, shape, middle) == turn
+    covariance = (0.01 * np.linalg.norm(middle)) ** 2 * np.eye(len(middle))
+    found = drawn(partial(model.quantities, shape), middle, covariance, turn)["direction_deg"]
+    assert 0.1 < found.sd < 1.0

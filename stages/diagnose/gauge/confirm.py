@@ -11,7 +11,7 @@ import numpy as np
 from pipeline.arrays import Float
 from pipeline.physics.effect import CourseKind
 from stages.diagnose.agreement import Part as Measured
-from stages.diagnose.agreement import agreement, drawn, sized
+from stages.diagnose.agreement import agreement, drawn, sized, turn_deg
 from stages.diagnose.effects.base import Shape
 from stages.diagnose.effects.library import ring_shift_px
 from stages.diagnose.gauge.elimination import EDGE, RING, Part
@@ -204,4 +204,5 @@ def course_of(sized: Sized) -> CourseFound:
 
 def _numbers(sized: Sized, numbers: Callable[[Shape, Float], dict[str, float]]) -> dict[str, Value]:
     term = sized.term
-    return drawn(lambda a: numbers(*term.at(a)), term.amplitude, sized.covariance)
+    turn = turn_deg(term.model, *term.at(term.amplitude))
+    return drawn(lambda a: numbers(*term.at(a)), term.amplitude, sized.covariance, turn)
