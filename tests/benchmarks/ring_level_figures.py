@@ -22,6 +22,7 @@ Line = dict[str, Any]
 _NEAR_S = 0.1
 _BINS = (0.0, 1e-3, 0.01, 0.1, 0.5, 0.9, 0.99, 1.000001)
 _CREDIBLE = 0.9
+_EXPECTED = (0.1, 0.5, 4.0, 8.0)
 
 
 def more_figures(lines: Sequence[Line], trials: Sequence[Trial]) -> Iterator[str]:
@@ -56,11 +57,11 @@ def _of_nulls(nulls: Sequence[Line]) -> Iterator[str]:
 
 
 def _expected(nulls: Sequence[Line]) -> Iterator[str]:
-    """Yield how many scores are expected by chance to count as one."""
-    expected = [e for line in nulls if (e := line.get("expected")) is not None]
-    if expected:
-        one = 1 / np.mean(expected)
-        yield f"one over the mean number expected by chance, {len(expected)} nulls: {one:.3f}"
+    """Yield the density of the numbers of scores that are expected by chance, from which p is made."""
+    expected = np.array([e for line in nulls if (e := line.get("expected")) is not None])
+    if len(expected):
+        shares = ", ".join(f"{most:g}: {np.mean(expected < most) / most:.3f}" for most in _EXPECTED)
+        yield f"share of {len(expected)} nulls per unit of the number expected by chance, up to {shares}"
 
 
 def _of_courses(lines: Sequence[Line]) -> Iterator[str]:
