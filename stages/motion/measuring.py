@@ -30,6 +30,8 @@ from stages.motion.tracking.strips import StripGrid, WallView
 from stages.motion.tracking.tracker import TextureTracker, TrackedTexture, track_texture
 from stages.motion.windows.measured_run import MeasuredRun
 
+_OFTEN_AMBIGUOUS = 0.1
+"""Share of the lit frames in which the step may be ambiguous without a warning (chosen)."""
 _LEAST_TRACKED = 0.5
 """Share of the lit frames in which texture must be followed if there is no encoder. Not measured."""
 _FEWEST_COLUMNS = 240
@@ -108,7 +110,22 @@ def _tracked(
     if encoder is not None:
         warn_of_unread(encoder, texture.poses, recording.frames.frame, context)
     _require_distance(texture.poses, encoder)
+    if encoder is None:
+        _warn_of_repetition(texture, context)
     return _Tracked(texture, predictor, encoder, recording.frames.time_s)
+
+
+def _warn_of_repetition(texture: TrackedTexture, context: Context) -> None:
+    lit = len(texture.poses.frames)
+    if texture.ambiguous <= _OFTEN_AMBIGUOUS * lit:
+        return
+    context.warn(
+        f"the texture of the wall repeats along the pipe, and there is no encoder: in {texture.ambiguous} of "
+        f"{lit} lit frames another step, longer or shorter by one period, fits the pictures as well. The "
+        "nearest step was taken; distances may be wrong by one period for each of these frames, which their "
+        "σ does not include. What to do: record with an encoder, or let the probe move by less than half a "
+        "period between two lit frames"
+    )
 
 
 def strip_grid(radius_mm: float, parameters: MotionParameters) -> StripGrid:

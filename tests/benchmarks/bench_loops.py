@@ -28,7 +28,8 @@ from pipeline.recording.base import Recording
 from pipeline.simulator.produce import Order, Places, produce
 from stages.accumulate import AccumulateParameters, accumulate_wall
 from stages.motion import MotionParameters, estimate_motion
-from stages.motion.loops.strip_registration import ExpectedShift, StoredStrip, Verdict, register
+from stages.motion.loops.strip_registration import ExpectedShift, Verdict, register
+from stages.motion.tracking.overlap import StoredStrip
 from stages.motion.tracking.strips import Strip, StripGrid, WallView
 from stages.rings import RingParameters, extract_rings
 from stages.triangulate import TriangulateParameters, triangulate_rings

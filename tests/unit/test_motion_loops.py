@@ -20,8 +20,9 @@ from stages.motion.loops.revisits import (
     texture_at,
     widened,
 )
-from stages.motion.loops.strip_registration import ExpectedShift, Registration, StoredStrip, Verdict, register
+from stages.motion.loops.strip_registration import ExpectedShift, Registration, Verdict, register
 from stages.motion.parameters import MotionParameters
+from stages.motion.tracking.overlap import StoredStrip
 from stages.motion.windows.submap_joining import JoinedRun
 from tests.drawn_run import drawn_run, without_encoder
 from tests.looped_run import FRAMES, GRID, DrawnView, LoopedRun, looped_run, rough_wall

@@ -20,9 +20,10 @@ from pipeline.machine.stage import Context
 from stages.motion.loops.loop_geometry import LoopEnds, PipeFrames
 from stages.motion.loops.pose_graph import Closures, conditioned, contradicted_places, corrected
 from stages.motion.loops.revisits import Passage, Revisit, WallFeatures, choose_revisits, widened
-from stages.motion.loops.strip_registration import ExpectedShift, Registration, StoredStrip, Verdict, register
+from stages.motion.loops.strip_registration import ExpectedShift, Registration, Verdict, register
 from stages.motion.parameters import MotionParameters
 from stages.motion.rings import CORRELATED_FRAMES
+from stages.motion.tracking.overlap import StoredStrip
 from stages.motion.tracking.strips import Strip, StripGrid
 from stages.motion.windows.error_chain import ErrorChain, ErrorSums
 from stages.motion.windows.submap_joining import JoinedRun

@@ -12,22 +12,17 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import Enum
 
-import cv2
 import numpy as np
-from scipy.fft import irfft2, rfft2
 
 from pipeline.adjustment.robust import robust_spread
-from pipeline.arrays import Bool, Float, Float32, Int
+from pipeline.arrays import Bool, Float, Int
 from stages.motion.parameters import MotionParameters
+from stages.motion.tracking.overlap import MOST_RIVAL, Overlap, StoredStrip
 from stages.motion.tracking.patches import cornerness, cut, whole_patches
 from stages.motion.tracking.strips import Strip
 
 # The limits below rejected all of 422 wrong pairs of equal welds at equal spacing and accepted 77 of 77 right
 # ones (`python -m tests.benchmarks.bench_loops OUT`); their margins were not measured.
-_LEAST_OVERLAP = 0.3
-"""Share of the usable samples of the poorer strip that must be usable in both."""
-_MOST_RIVAL = 0.75
-"""Correlation, as a share of the best, from which another shift makes the best one doubtful."""
 _FEWEST_PATCHES = 30
 """Patches that must be found, or else there is too little texture."""
 _FEWEST_AGREE = 0.5
@@ -56,24 +51,6 @@ class Verdict(Enum):
     OTHER = "the wall is not recognised"
     UNREADABLE = "a frame could not be read"
     CONTRADICTED = "contradicted by the motion or by other places"
-
-
-@dataclass(frozen=True)
-class StoredStrip:
-    """The stored part of a strip: its first row and its contrast (H, W), NaN where unusable."""
-
-    first_row: int
-    contrast: Float32
-
-    @property
-    def usable(self) -> Bool:
-        """Return where (H, W) the wall is seen."""
-        return np.isfinite(self.contrast)
-
-    @staticmethod
-    def of(strip: Strip) -> StoredStrip:
-        """Return the stored part of a strip."""
-        return StoredStrip(strip.first_row, np.where(strip.usable, strip.contrast, np.float32(np.nan)))
 
 
 @dataclass(frozen=True)
@@ -149,7 +126,7 @@ def register(
         return found
     apart = 2 * parameters.patch_half_px
     rivals = [p.height for p in peaks if np.max(np.abs(p.shift - best.shift)) > apart]
-    if max(rivals, default=0.0) > _MOST_RIVAL * best.height:
+    if max(rivals, default=0.0) > MOST_RIVAL * best.height:
         return Registration.refused(Verdict.REPEATED)
     return found
 
@@ -158,11 +135,8 @@ def _peaks(
     earlier: StoredStrip, later: StoredStrip, expected: ExpectedShift, parameters: MotionParameters
 ) -> list[_Peak]:
     """Return the best shift within reach, and the best one elsewhere."""
-    height = _correlation(earlier, later)
-    rows, columns = height.shape
-    lag = later.first_row - earlier.first_row
-    shift_row = lag + 2 * ((np.arange(rows) + rows // 2) % rows - rows // 2)[:, None]
-    shift_column = 2 * ((np.arange(columns) + columns // 2) % columns - columns // 2)[None]
+    overlap = Overlap.of(earlier, later)
+    height, shift_row, shift_column = overlap.height, overlap.row, overlap.column
     off = [np.abs(s - e) for s, e in zip((shift_row, shift_column), expected.shift, strict=True)]
     beyond = expected.reach + _BEYOND * (2 * parameters.patch_half_px + 1)
     height = np.where((off[0] <= beyond[0]) & (off[1] <= beyond[1]), height, -1.0)
@@ -177,34 +151,6 @@ def _peaks(
             at = np.array([shift_row[r, 0], shift_column[0, c]], float)
             found.append(_Peak(earlier, at, float(height[r, c])))
     return found
-
-
-def _correlation(earlier: StoredStrip, later: StoredStrip) -> Float32:
-    """Return the normalised correlation (H, W/2) at all shifts by two samples; 0 where little overlaps."""
-    (a, seen_a), (b, seen_b) = (_halved(p) for p in (earlier, later))
-    size = (2 * a.shape[0], a.shape[1])
-    fa, fa2, fm = (np.conj(rfft2(x, size)) for x in (a, a * a, seen_a))
-    gb, gb2, gm = (rfft2(x, size) for x in (b, b * b, seen_b))
-    product, power_a, power_b, common = (
-        irfft2(x, size) for x in (fa * gb, fa2 * gm, fm * gb2, fm * gm)
-    )  # fmt: skip
-    enough = common > _LEAST_OVERLAP * min(float(seen_a.sum()), float(seen_b.sum()))
-    scale = np.sqrt(np.maximum(power_a * power_b, 1e-12))
-    return np.asarray(np.where(enough, product / scale, 0.0), np.float32)
-
-
-def _halved(strip: StoredStrip) -> tuple[Float32, Float32]:
-    """Return contrast and usability at half resolution, without structures that run all along the pipe.
-
-    A seam or a streak has no information on distance and would fit everywhere.
-    """
-    seen = strip.usable
-    value = np.where(seen, np.clip(np.nan_to_num(strip.contrast), -1, 1), 0).astype(np.float32)
-    value -= (value.sum(0) / np.maximum(seen.sum(0), 1)).astype(np.float32)
-    size = (value.shape[1] // 2, value.shape[0] // 2)
-    parts = (np.where(seen, value, 0).astype(np.float32), seen.astype(np.float32))
-    a, b = (cv2.resize(x, size, interpolation=cv2.INTER_AREA) for x in parts)
-    return np.asarray(a, np.float32), np.asarray(b, np.float32)
 
 
 def _corners(strip: Strip, parameters: MotionParameters) -> tuple[Int, Int]:

@@ -7,7 +7,6 @@ from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property
 
-import cv2
 import numpy as np
 
 from pipeline.arrays import Bool, Float, Image, Int
@@ -17,6 +16,7 @@ from pipeline.machine.scratch import Scratch
 from stages.motion.encoder import PosePredictor
 from stages.motion.parameters import MotionParameters
 from stages.motion.tracking.landmarks import LandmarkMap, ObservationStore, TrackedPoses, Tracks
+from stages.motion.tracking.overlap import displacement, repeats, rival_of
 from stages.motion.tracking.patches import best_of_cells, cornerness, cut, whole_patches
 from stages.motion.tracking.strips import Hidden, Strip, StripGrid, unroll
 
@@ -25,6 +25,9 @@ _FEWEST = 12
 _FEWEST_AGREEING = 0.25
 """Share of the landmarks in view that must move like their neighbour. On noise without texture up to 0.12 do
 by chance (`test_no_roll_is_found_on_a_plain_wall`), in HEVC at crf 32 0.3 to 0.6, else nearly all."""
+_SURELY_AGREEING = 0.5
+"""Share from which the motion is not compared with that of whole strips, unless the wall repeats: on a drawn
+pattern with other marks of half its contrast, patches matched one period too far agreed to 0.4 at most."""
 _AGREEING_PX = 1.5
 """Difference, strip samples, up to which neighbours move together: five times ``landmark_sigma_px``."""
 _LARGEST_SIGMA = 3.0
@@ -35,10 +38,8 @@ _MOST_MISSES = 8
 """Frames in a row without the landmark after which it is retired. Not measured."""
 _BORDER_PX = 3
 """Rows and columns around a patch that must be usable too: ten times ``landmark_sigma_px``."""
-_FEWEST_ROWS = 32
-"""Rows two strips must have in common to be correlated as a whole: one patch and a half. Not measured."""
-_LEAST_RESPONSE = 0.05
-"""Peak of the phase correlation below which two strips are taken for unrelated. Not measured."""
+_LOOKED_EVERY = 8
+"""Lit frames after which it is checked again whether the wall repeats: fewer than pass through the view."""
 
 
 @dataclass(frozen=True)
@@ -51,11 +52,14 @@ class TrackedTexture:
     grid : StripGrid
         Of the landmarks' strip positions.
     poses : TrackedPoses
+    ambiguous : int
+        Frames in which another step along a wall that repeats fits as well.
     """
 
     store: ObservationStore
     grid: StripGrid
     poses: TrackedPoses
+    ambiguous: int = 0
 
     def between(self, first: int, last: int) -> Tracks:
         """Return the tracks through frames ``first`` to ``last`` (exclusive), counted from ``first``."""
@@ -136,6 +140,7 @@ class TextureTracker:
         self._store = ObservationStore.on(scratch or Scratch(), parameters.most_observations)
         self._poses: list[tuple[int, Float, bool]] = []
         self._last: Strip | None = None
+        self._last_drift, self._repeating, self._ambiguous = np.zeros(2), False, 0
         self._renewal: Future[None] | None = None
 
     def follow(self, frame: int, image: Image, T_pc: Float, aside: Executor) -> Float:
@@ -147,7 +152,7 @@ class TextureTracker:
         T_better = self._shifted(T_pc, found.drift)
         self._renewal = aside.submit(self._renew, found, strip, frame)
         self._poses.append((frame, T_better, found.lost))
-        self._last = strip
+        self._last, self._last_drift = strip, found.drift
         return T_better
 
     def result(self) -> TrackedTexture:
@@ -157,23 +162,40 @@ class TextureTracker:
         frames = np.array([p[0] for p in self._poses], np.int64)
         T_pc = np.array([p[1] for p in self._poses]).reshape(-1, 4, 4)
         lost = np.array([p[2] for p in self._poses], bool)
-        return TrackedTexture(self._store, self._grid, TrackedPoses(frames, T_pc, lost))
+        return TrackedTexture(self._store, self._grid, TrackedPoses(frames, T_pc, lost), self._ambiguous)
 
     def _located(self, frame: int, image: Image, T_pc: Float) -> tuple[Float, Strip, _Matched]:
         """Return the pose from which landmarks were found, the strip and the matches there.
 
-        Where few are found at the predicted pose, the last strip as a whole tells where to look instead.
+        Where few are found at the predicted pose, or another step fits much better, the last strip as a whole
+        tells where to look instead.
         """
         strip = unroll(image, self._probe, T_pc, self._grid, self._hidden.at(frame))
         self._await_renewal()
         found = self._matched(strip, frame)
-        if found.agreeing < _FEWEST_AGREEING and self._last is not None:
-            T_moved = self._shifted(T_pc, _displacement(self._last, strip))
+        moved = self._moved(strip, found)
+        if moved is not None:
+            T_moved = self._shifted(T_pc, moved)
             other = unroll(image, self._probe, T_moved, self._grid, self._hidden.at(frame))
             found_there = self._matched(other, frame)
-            if found_there.agreeing > max(found.agreeing, _FEWEST_AGREEING):
+            if found_there.agreeing > _FEWEST_AGREEING:
                 return T_moved, other, found_there
         return T_pc, strip, found
+
+    def _moved(self, strip: Strip, found: _Matched) -> Float | None:
+        """Return the displacement (2,) of the strip as a whole; None if what was found is beyond doubt."""
+        if self._last is None:
+            return None
+        if found.agreeing < _FEWEST_AGREEING:
+            return self._last_drift + displacement(self._last, strip)
+        apart = self._map.half
+        if len(self._poses) % _LOOKED_EVERY == 1:
+            self._repeating = repeats(self._last, apart)
+        if not self._repeating and found.agreeing > _SURELY_AGREEING:
+            return None
+        rival = rival_of(found.drift[0] - self._last_drift[0], self._last, strip, apart)
+        self._ambiguous += rival.fits_as_well
+        return np.array([rival.shift + self._last_drift[0], found.drift[1]]) if rival.fits_better else None
 
     def _matched(self, strip: Strip, frame: int) -> _Matched:
         """Match every landmark that should be in the strip."""
@@ -275,18 +297,3 @@ def _px_per_sample(strip: Strip, at: Float) -> Float:
     du = strip.pixel(at[:, 0] + 1, at[:, 1]) - strip.pixel(at[:, 0], at[:, 1])
     dv = strip.pixel(at[:, 0], at[:, 1] + 1) - strip.pixel(at[:, 0], at[:, 1])
     return np.asarray(np.sqrt((np.sum(du * du, 1) + np.sum(dv * dv, 1)) / 2))
-
-
-def _displacement(before: Strip, now: Strip) -> Float:
-    """Return rows and columns (2,) from where ``before`` has the wall to where ``now`` has it, or 0."""
-    lag = now.first_row - before.first_row
-    rows = before.contrast.shape[0] - abs(lag)
-    if rows < _FEWEST_ROWS:
-        return np.zeros(2)
-    a = before.contrast[max(lag, 0) : max(lag, 0) + rows]
-    b = now.contrast[max(-lag, 0) : max(-lag, 0) + rows]
-    size = (a.shape[1] // 2, a.shape[0] // 2)
-    halves = [cv2.resize(np.clip(x, -1, 1), size, interpolation=cv2.INTER_AREA) for x in (a, b)]
-    window = np.broadcast_to(np.hanning(halves[0].shape[0])[:, None], halves[0].shape)
-    (dx, dy), response = cv2.phaseCorrelate(*(np.asarray(h * window, np.float32) for h in halves))
-    return np.array([2 * dy, 2 * dx]) if response > _LEAST_RESPONSE else np.zeros(2)
