@@ -56,6 +56,7 @@ def scene(
     picture_grows: float = 0.0,
     joint_mm: tuple[float, float] = (0.0, 0.0),
     bins: int = 24,
+    pairs_mm: float = 0.0,
 ) -> Scene:
     """Return a scene; ``noise`` is in units of the stated σ, ``shake`` in those of `SHAKE`.
 
@@ -63,7 +64,7 @@ def scene(
     times the distance, and pictures are larger at the end than at the beginning by the share
     ``picture_grows``. From a joint on (`joint_at`) the pipe is wider and lies farther along x by
     ``joint_mm``.
-    Rings are condensed to so many ``bins``.
+    Rings are condensed to so many ``bins``. Every odd frame lies nearer to the one before, by ``pairs_mm``.
     """
     random = np.random.default_rng(seed)
     instrument = probe()
@@ -73,6 +74,7 @@ def scene(
     t = np.stack(
         [1.0 * np.sin(0.2 * k), 0.8 * np.cos(0.25 * k) - 0.8, 1.2 * k + swing_mm * np.sin(k / 9)], -1
     )
+    t[1::2, 2] -= pairs_mm / 2
     move = shake * SHAKE * np.random.default_rng(seed + 1000).standard_normal((frames, 6))
     turn, t = turn + move[:, 3:], t + move[:, :3]
     T_pc = from_parts(rotation_from_vector(turn), t)

@@ -9,12 +9,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pipeline.arrays import Bool
+from pipeline.arrays import Bool, Float
 from pipeline.instrument.probe import Probe
 from pipeline.recording.base import Encoder, FrameTable
 from stages.motion.bore import ONE_BORE, Bore
-from stages.motion.bundle_adjustment.encoder_scale import EncoderScale
+from stages.motion.bundle_adjustment.encoder_scale import EncoderScale, uneven_scale
 from stages.motion.encoder import EncoderReadings, contradicted, encoder_at_frames, warn_of_unread
+from stages.motion.parameters import MotionParameters
 from stages.motion.tracking.landmarks import TrackedPoses
 from stages.motion.windows import first_window
 from stages.motion.windows.submaps import Window
@@ -224,6 +225,7 @@ class Adjusted:
     measured: Held
     window: Window
     estimate: SimpleNamespace
+    parameters: MotionParameters = field(default_factory=MotionParameters)
 
     def again(self, start: object) -> Adjusted:
         return self
@@ -249,7 +251,7 @@ def test_texture_lost_in_many_pictures_is_no_evidence_against_an_encoder(
     _, scale, unsure = first_window.with_scale(window_that_lost(np.arange(20, 0, -1) <= lost), 0.001)
     assert scale is not None
     assert (scale.sigma > found.sigma) == doubted
-    assert unsure == (scale.sigma if doubted else 0.001)
+    assert unsure == (scale.sigma if doubted else np.hypot(0.001, found.doubt))
 
 
 def test_a_difference_from_lost_texture_within_its_sigma_does_not_widen_the_encoders(
@@ -306,3 +308,70 @@ def test_sigma_of_distances_from_lost_texture_alone_covers_their_error(
     monkeypatch.setattr(first_window, "scale_of_encoder", lambda *_: None)
     unsure = first_window.with_scale(window_that_lost(np.arange(20, 0, -1) <= lost), 0.001)[2]
     assert unsure == pytest.approx(sigma, rel=0.1)
+
+
+BY_TEXTURE, STATED = 0.0024, 0.002
+
+
+def errors_in_sigma(encoder_off: float) -> tuple[Float, Float]:
+    """Return drawn errors of distances from texture and encoder, in the whole σ and in that without doubt."""
+    random = np.random.default_rng(7)
+    texture = BY_TEXTURE * random.standard_normal(4000)
+    encoder = encoder_off + STATED * random.standard_normal(4000)
+    weight = BY_TEXTURE**2 / (BY_TEXTURE**2 + STATED**2)
+    found = [EncoderScale(1 + d, BY_TEXTURE, STATED) for d in texture - encoder]
+    error = np.where([f.contradicted for f in found], texture, texture + weight * (encoder - texture))
+    sigma = np.where([f.contradicted for f in found], BY_TEXTURE, STATED * np.sqrt(weight))
+    return error / np.hypot(sigma, [f.doubt for f in found]), error / sigma
+
+
+@pytest.mark.parametrize("off", [0.004, 0.006, 0.008, 0.01, 0.015])
+def test_sigma_of_distances_holds_beside_an_encoder_off_by_more_than_stated(off: float) -> None:
+    """An encoder 1 % off where .2 % was stated moved distances by 4 σ, and nothing told of it."""
+    whole, alone = errors_in_sigma(off)
+    assert np.mean(np.abs(whole) < 2) > 0.78
+    assert np.sqrt(np.mean(whole**2)) < 1.7
+    assert np.mean(np.abs(alone) < 2) < np.mean(np.abs(whole) < 2), "control"
+
+
+def test_a_sound_encoder_is_hardly_doubted() -> None:
+    whole, alone = errors_in_sigma(0.0)
+    assert 0.9 < np.sqrt(np.mean(whole**2)) < 1
+    assert np.median(alone / whole) == 1
+    assert np.mean(alone / whole) < 1.2
+
+
+@pytest.mark.parametrize(("scale", "warned"), [(1.003, False), (1.009, False), (1.0105, True), (1.03, True)])
+def test_a_difference_that_may_be_no_chance_is_told(scale: float, warned: bool) -> None:
+    told: list[str] = []
+    EncoderScale(scale, BY_TEXTURE, STATED).warn(replace(quiet_context(), warn=told.append), 0.0)
+    assert len(told) == warned
+
+
+def slipping(part: slice, creep: float, jump_mm: float = 0.0) -> float:
+    """Return how uneven the scale is with ``creep`` in a part of 80 frames, and a jump in the middle."""
+    read, step = np.full(79, 0.6), 0.0004 * np.random.default_rng(3).standard_normal(79)
+    step[part] += creep * read[part]
+    step[40] += jump_mm
+    distance = np.concatenate([[0.0], np.cumsum(read)])
+    return uneven_scale(
+        np.concatenate([[0.0], np.cumsum(step)]), EncoderReadings(distance, 0.015, np.ones(80, bool)), 0.002
+    )
+
+
+def test_an_encoder_that_creeps_in_a_part_of_the_run_is_uneven() -> None:
+    """One that read 1 % too much over half a run moved distances by 2 σ, and nothing told of it."""
+    assert slipping(slice(0, 40), 0.008) == pytest.approx(0.0045, abs=0.001)
+    assert slipping(slice(40, 60), 0.008) == pytest.approx(0.004, abs=0.001)
+    assert slipping(slice(0, 79), 0.008) < 2e-4, "a scale that is wrong everywhere is even"
+    assert slipping(slice(0, 0), 0.0) < 2e-4
+    assert slipping(slice(0, 0), 0.0, jump_mm=2.0) < 5e-4, "a sudden slip is no creep"
+
+
+def test_an_encoder_that_creeps_is_told_once() -> None:
+    told: list[str] = []
+    EncoderScale(1.001, BY_TEXTURE, STATED, uneven=0.004).warn(
+        replace(quiet_context(), warn=told.append), 0.0
+    )
+    assert len(told) == 1
+    assert "creeps" in told[0]

@@ -11,8 +11,9 @@ import pytest
 from pipeline.arrays import Float
 from pipeline.instrument.probe import Probe
 from stages.motion.bore import ONE_BORE, Bore
-from stages.motion.bundle_adjustment.encoder_delay import find_delay
+from stages.motion.bundle_adjustment.encoder_delay import delay_of_encoder, find_delay
 from stages.motion.bundle_adjustment.equations import MATCH_BIASES, Measurements
+from stages.motion.bundle_adjustment.solver import estimate_state
 from stages.motion.bundle_adjustment.unknowns import State
 from stages.motion.encoder import EncoderReadings
 from stages.motion.parameters import MotionParameters
@@ -44,6 +45,17 @@ def test_the_delay_is_found_with_its_sigma_even_if_the_wheel_slips(late_s: float
     assert found is not None
     assert abs(found.delay_s - late_s) < 3 * found.sigma_s + 1e-3
     assert found.sigma_s < 0.02
+    assert found.matters == (late_s != 0)
+
+
+@pytest.mark.parametrize("late_s", [0.0, 0.2, -0.2])
+def test_the_delay_is_found_in_a_short_run(late_s: float) -> None:
+    """Within a second of both ends nothing was compared: in 80 frames no delay was ever found."""
+    late, short = readings(late_s), slice(0, 80)
+    encoder = EncoderReadings(late.distance_mm[short], late.sigma_mm, late.known[short])
+    found = find_delay(TIME_S[short], way(TIME_S[short]), encoder)
+    assert found is not None
+    assert abs(found.delay_s - late_s) < 3 * found.sigma_s + 1e-3
     assert found.matters == (late_s != 0)
 
 
@@ -113,6 +125,23 @@ def test_a_window_is_adjusted_with_the_corrected_encoder() -> None:
     assert got.encoder.delay.delay_s == pytest.approx(0.2, abs=4 * got.encoder.delay.sigma_s)
     z = got.estimate.state.T_pc[:, 2, 3] - given.truth.T_pc[:, 2, 3]
     assert np.ptp(z) < 0.3, "with the late encoder it is 5 mm"
+
+
+def test_an_estimate_that_follows_a_late_encoder_still_shows_its_delay() -> None:
+    """With little texture the poses follow the readings, and the likeliest delay of these was 0."""
+    made = scene(60, 40, noise=4.0, swing_mm=1.0)
+    sound, time_s = made.measured.encoder, made.measured.time_s
+    assert sound is not None
+    late = np.interp(time_s - 0.2, time_s, made.truth.T_pc[:, 2, 3])
+    measured = replace(made.measured, encoder=replace(sound, distance_mm=late - late[0], sigma_mm=0.015))
+    estimate = estimate_state(made.truth, measured, MotionParameters())
+    joint = find_delay(time_s, estimate.state.T_pc[:, 2, 3], measured.encoder)
+    assert joint is not None
+    assert not joint.matters, "control: poses with the encoder do not show it"
+    found = delay_of_encoder(estimate, measured)
+    assert found is not None
+    assert found.matters
+    assert found.delay_s == pytest.approx(0.2, abs=4 * found.sigma_s)
 
 
 def test_readings_that_scatter_by_more_than_their_rounding_get_a_larger_sigma() -> None:

@@ -123,6 +123,25 @@ def test_without_texture_a_growing_picture_may_be_a_pipe_that_widens() -> None:
     assert lost.scale_sigma is not None
 
 
+def test_an_encoder_whose_scale_changes_is_not_a_picture_that_shrinks() -> None:
+    """One that was .2 s early made "the picture shrink by 1.34 %", and "no lens changes so much"."""
+    made = scene(FRAMES, LANDMARKS, noise=2.0)
+    sound, share = made.measured.encoder, np.arange(FRAMES) / FRAMES
+    assert sound is not None
+    creeps = replace(sound, distance_mm=sound.distance_mm * (1 + 0.03 * share), sigma_mm=0.015)
+    measured = replace(made.measured, encoder=creeps)
+    estimate = estimate_state(made.truth, measured, PARAMETERS)
+    assert drift_of_scale(estimate, measured).certain, "control: with the encoder it seems so"
+    poses = TrackedPoses(np.arange(FRAMES), made.truth.T_pc, np.zeros(FRAMES, bool))
+    run = SimpleNamespace(bore=ONE_BORE, whole=WHOLE, image_scale=None, texture=textured(poses))
+    part, nobody, told = Window(0, FRAMES), cast(Any, None), list[str]()
+    steady = with_steady_scale(cast(Any, run), part, estimate, measured, PARAMETERS, nobody)
+    assert not steady.drift.certain
+    steady.warn(replace(quiet_context(), warn=told.append))
+    assert len(told) == 1
+    assert "or the encoder's does" in told[0]
+
+
 FEW = 16
 WHOLE = Window(0, FEW)
 
@@ -162,7 +181,7 @@ def test_a_drift_that_is_not_found_again_is_not_removed(
     """Behind a noise filter a drift of .55 % was removed, and .07 % were found by the next estimate."""
     made, parameters = scene(FEW, 100, noise=0.1, picture_grows=GROWS), MotionParameters()
     estimate = estimate_state(made.truth, made.measured, parameters)
-    drift, found = drift_of_scale(estimate, made.measured), iter([1.0, 1.0, again])
+    drift, found = drift_of_scale(estimate, made.measured), iter([1.0, 1.0, 1.0, again])
     monkeypatch.setattr(
         steady_scale, "drift_of_scale", lambda *_: replace(drift, at_frames=next(found) * drift.at_frames)
     )

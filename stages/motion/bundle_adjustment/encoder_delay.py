@@ -24,6 +24,8 @@ _LONGEST_S = 1.0
 """Longest delay tried: an encoder that is off by more than a second shows another motion and is left out
 (`stages.motion.encoder.contradicted`). Delays are tried by whole frames, because between two frames the
 rounding of both would be averaged."""
+_OF_RUN = 0.2
+"""Longest delay tried as a share of the run: three fifths of it are then compared. Chosen."""
 _WALKS_MM = np.geomspace(0.002, 0.064, 6)
 """Strengths of the walk tried, mm per frame: motion from texture walks by .002 in open-1, slips by more."""
 _FRAMES = 400
@@ -31,9 +33,10 @@ _FRAMES = 400
 _FEWEST = 30
 _SURE = 5.0
 """Delays of fewer σ count as none: one in a million is larger by chance."""
-_MOVES = 3.0
-"""A delay matters if it moves the readings, after a shift and a scale, by more than three times their
-rounding. Less does no harm; at even speed any delay moves them by 1.4 times, since both are rounded."""
+_MOVES = 2.0
+"""A delay matters if it moves the readings, after a shift and a scale, by more than twice their rounding. At
+even speed any delay moves them by 1.4 times, since both are rounded; one of .2 s that moved them by 2.5
+times was taken for a picture that shrinks (open-3 at half size)."""
 _ROUNDS = 5
 _STANDS = 1e-12
 """Share of the readings' mean square that must remain after removal of their mean, for them to move at
@@ -82,22 +85,30 @@ class EncoderDelay:
 
 
 def delay_of_encoder(estimate: Estimate, measured: Measurements) -> EncoderDelay | None:
-    """Return the delay of the encoder relative to an estimate of the motion; None without evidence."""
-    if measured.encoder is None:
+    """Return the delay of the encoder relative to the motion in the pictures; None without evidence.
+
+    Where texture is weak, the estimate follows a late encoder. So one linear step without it is made first.
+    """
+    if measured.encoder is None or measured.tracks.poses.much_lost:
         return None
-    z = distance_along(estimate.state.axis, estimate.state.T_pc)
-    return find_delay(measured.time_s, z, measured.encoder)
+    try:
+        step = estimate.without_encoder().adjusted.equations.step(0.0)
+    except np.linalg.LinAlgError:
+        return None
+    state = estimate.state.step(step.frames, step.border, step.landmarks)
+    return find_delay(measured.time_s, distance_along(state.axis, state.T_pc), measured.encoder)
 
 
 def find_delay(time_s: Float, distance_mm: Float, encoder: EncoderReadings) -> EncoderDelay | None:
     """Return the delay of readings (N,) relative to distances (N,); None without evidence."""
-    inside = (time_s > time_s[0] + _LONGEST_S) & (time_s < time_s[-1] - _LONGEST_S) & encoder.known
+    longest = min(_LONGEST_S, _OF_RUN * float(time_s[-1] - time_s[0]))
+    inside = (time_s > time_s[0] + longest) & (time_s < time_s[-1] - longest) & encoder.known
     used = np.flatnonzero(inside)
     if len(used) < _FEWEST:
         return None
     used = used[:: -(-len(used) // _FRAMES)]
     step = float(np.median(np.diff(time_s)))
-    delays = step * np.arange(-int(_LONGEST_S / step), int(_LONGEST_S / step) + 1)
+    delays = step * np.arange(-int(longest / step), int(longest / step) + 1)
     reading = np.interp(time_s[used] + delays[:, None], time_s, encoder.distance_mm).T
     costs = [_costs(distance_mm[used], reading, encoder.sigma_mm, walk) for walk in _WALKS_MM]
     cost = min(costs, key=np.min)

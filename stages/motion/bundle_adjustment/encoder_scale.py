@@ -6,22 +6,29 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pipeline.adjustment.robust import spread_about_median
+from pipeline.adjustment.robust import Cauchy, spread_about_median
+from pipeline.arrays import Float
 from pipeline.geometry.axis import distance_along
 from pipeline.machine.stage import Context
 from stages.motion.bundle_adjustment.equations import Measurements
 from stages.motion.bundle_adjustment.solver import Estimate
 from stages.motion.bundle_adjustment.unknowns import ENCODER_SCALE
+from stages.motion.encoder import EncoderReadings
 
 _TOO_FAR = 4.0
 """Difference, in σ, from which the encoder's scale counts as wrong: by chance once in 16 000 recordings. A
 smaller one shifts distances by 4 σ_pictures² / σ_encoder at most: .15 % at .09 and .2 %."""
 _DOUBTFUL, _SERIOUS = 3.0, 5.0
 """Differences, in σ, from which texture that was mostly lost widens the σ of distances, and from which there
-is a warning (chosen): by chance once in 370 and once in 1.7 million recordings."""
+is a warning (chosen): by chance once in 370 and once in 1.7 million recordings. Other texture is warned of
+from the first on."""
 _TELLS_NOTHING = 10.0
 """If texture's σ is this many times the encoder's, a contradiction of 3 to 5 σ moves distances by half of the
 encoder's σ at most, namely by 3 to 5 / √(1 + 10²) of it."""
+_STRETCHES, _FEWEST_STEPS = 4, 5
+"""Stretches of a run whose scales are compared (chosen: creep over a quarter of the run shifts distances by a
+quarter of its rate), and steps that each must have."""
+_ROUNDS = 10
 _ALIKE = 2.0
 """Factor within which errors of diameter and distance agree. A zoomed picture changes radii by θ / sin θ cos
 θ times as much, 3.0 at 65°, and distances by about as much: 2.6 and 2.0 % for 1 % of zoom (open-1-field)."""
@@ -40,12 +47,15 @@ class EncoderScale:
     lost_in_sigma : float
         Difference of the scale from 1, in σ, by texture that was mostly lost, before its σ was widened; 0
         for other texture.
+    uneven : float
+        Rms difference of the scale between stretches of the run.
     """
 
     scale: float
     sigma: float
     stated_sigma: float
     lost_in_sigma: float = 0.0
+    uneven: float = 0.0
 
     @property
     def in_sigma(self) -> float:
@@ -56,6 +66,21 @@ class EncoderScale:
     def contradicted(self) -> bool:
         """Whether the pictures contradict the stated scale."""
         return self.in_sigma > _TOO_FAR
+
+    @property
+    def doubt(self) -> float:
+        """Return the relative 1 σ of distances for an encoder, or pictures, off by more than their σ.
+
+        If both differ by more than their σ, either may be wrong: the σ of their weighted mean is widened by
+        the ratio (R. T. Birge, "The calculation of errors by the method of least squares", 1932). An encoder
+        whose scale changes over the run shows no scale better than it changes. Once the pictures contradict
+        the encoder, it has lost its weight.
+        """
+        if self.contradicted:
+            return self.uneven
+        of_mean = self.sigma * self.stated_sigma / float(np.hypot(self.sigma, self.stated_sigma))
+        beyond = float(np.sqrt(max(self.in_sigma**2 - 1, 0.0)))
+        return float(np.hypot(of_mean * beyond, self.uneven))
 
     @property
     def doubted(self) -> bool:
@@ -69,22 +94,49 @@ class EncoderScale:
 
     def without_trust_in_texture(self) -> EncoderScale:
         """Return the scale with a σ as large as the difference between texture and encoder."""
-        return replace(self, sigma=float(np.hypot(self.sigma, abs(self.scale - 1))))
+        return replace(self, sigma=float(np.hypot(self.sigma, abs(self.scale - 1))), uneven=0.0)
 
     def warn(self, context: Context, wider: float) -> None:
         """Warn of an encoder that the pictures contradict; ``wider``: diameter over the nominal, minus 1."""
         if self.lost_in_sigma > _SERIOUS:
             self._warn_beside_lost_texture(context)
-        if not self.contradicted:
-            return
-        more = "more" if self.scale < 1 else "less"
+        if self.contradicted:
+            self._warn_of_contradiction(context, wider)
+        if self.uneven > self.stated_sigma:
+            self._warn_of_creep(context)
+        elif self.in_sigma > _DOUBTFUL and not self.contradicted:
+            self._warn_of_doubt(context)
+
+    def _warn_of_contradiction(self, context: Context, wider: float) -> None:
         context.warn(
-            f"the encoder shows {100 * abs(1 / self.scale - 1):.2f} % {more} than laser and texture do "
+            f"the encoder shows {self._difference} than laser and texture do "
             f"({self.in_sigma:.0f} σ): its wheel, unit or clock is not as stated, and distances are based on "
             "baseline and camera instead. If the probe is wrong and the encoder right, distances and "
             f"radii are wrong by as much{self._diameter_evidence(wider)}. What to do: measure the wheel and "
             "compare the clocks of encoder.csv and frames.csv; compare the diameter with a known one"
         )
+
+    def _warn_of_creep(self, context: Context) -> None:
+        context.warn(
+            f"by the wall's texture the encoder's scale differs by {100 * self.uneven:.2f} % (1 σ) "
+            f"between stretches of the run, more than the {100 * self.stated_sigma:.2f} % by which it may "
+            "be wrong as a whole: the wheel creeps, or the clocks of encoder and pictures differ. σ of "
+            "distances includes it. What to do: clean the wheel and press it to the wall, compare the clocks "
+            "of encoder.csv and frames.csv, compare the distance with a known one"
+        )
+
+    def _warn_of_doubt(self, context: Context) -> None:
+        context.warn(
+            f"the encoder shows {self._difference} than laser and texture do ({self.in_sigma:.1f} σ): either "
+            "this is chance, or the scale of the encoder or the probe is wrong by more than its σ. This run "
+            "does not show which: distances lie between the two, and their σ includes the difference. What "
+            "to do: measure the wheel, compare the distance with a known one, record a longer run"
+        )
+
+    @property
+    def _difference(self) -> str:
+        more = "more" if self.scale < 1 else "less"
+        return f"{100 * abs(1 / self.scale - 1):.2f} % {more}"
 
     def _warn_beside_lost_texture(self, context: Context) -> None:
         context.warn(
@@ -115,10 +167,13 @@ class EncoderScale:
         )
 
 
-def scale_of_encoder(estimate: Estimate, measured: Measurements, unsure: float) -> EncoderScale | None:
+def scale_of_encoder(
+    estimate: Estimate, measured: Measurements, unsure: float, creep_mm: float
+) -> EncoderScale | None:
     """Return the encoder's scale from the other measurements of an estimate; None without encoder.
 
-    ``unsure`` is the relative 1 σ of distances by texture that its residuals do not show.
+    ``unsure`` is the relative 1 σ of distances by texture that its residuals do not show; ``creep_mm`` is the
+    1 σ of the encoder's creep from frame to frame.
     """
     if measured.encoder is None:
         return None
@@ -126,7 +181,34 @@ def scale_of_encoder(estimate: Estimate, measured: Measurements, unsure: float) 
     variance = float(estimate.factor.border_covariance()[ENCODER_SCALE, ENCODER_SCALE])
     information = max(1 / variance - stated**-2, 1e-6 * stated**-2)
     off = (float(estimate.state.globals[ENCODER_SCALE]) - 1) / variance / information
-    return EncoderScale(1 + off, float(np.hypot(information**-0.5, unsure)), stated)
+    sigma = float(np.hypot(information**-0.5, unsure))
+    uneven = uneven_scale(estimate.state.slip, measured.encoder, creep_mm)
+    return EncoderScale(1 + off, sigma, stated, uneven=uneven)
+
+
+def uneven_scale(slip: Float, encoder: EncoderReadings, creep_mm: float) -> float:
+    """Return the rms difference of the scale between stretches of a run by its slip (N,), beyond usual creep.
+
+    The scale of a stretch is that of most of its steps: sudden slips do not count. Usual creep is a random
+    walk of ``creep_mm`` from frame to frame.
+    """
+    step, read = np.diff(slip), np.diff(encoder.distance_mm)
+    used = np.flatnonzero(encoder.known[1:] & encoder.known[:-1] & (read != 0))
+    if len(used) < _STRETCHES * _FEWEST_STEPS:
+        return 0.0
+    parts = np.array_split(used, _STRETCHES)
+    scale = np.array([_scale_of(step[k], read[k], creep_mm) for k in parts])
+    usual = creep_mm**2 * np.mean([1 / (read[k] @ read[k]) for k in parts])
+    return float(np.sqrt(max(np.var(scale, ddof=1) - usual, 0.0)))
+
+
+def _scale_of(step: Float, read: Float, creep_mm: float) -> float:
+    """Return the scale by which most steps (K,) of the slip follow those of the readings."""
+    scale, one = 0.0, np.ones_like(step)
+    for _ in range(_ROUNDS):
+        weight = Cauchy().weight((step - scale * read) / creep_mm, one)
+        scale = float((weight * read) @ step / ((weight * read) @ read))
+    return scale
 
 
 def noise_of_encoder(estimate: Estimate, measured: Measurements) -> float:

@@ -44,6 +44,8 @@ _DAMPED = 1e-5
 """Relative damping with which covariances are computed if rounding made the equations singular."""
 LEAST_REACH = 4
 """Smallest number of coupled frames: a third difference has four."""
+_NO_EVIDENCE_MM = 1e3
+"""1 σ of readings that have no weight: it only keeps the slip, which nothing else determines, regular."""
 _AT_ONCE, _THREADS = 16384, 2
 
 
@@ -119,12 +121,24 @@ class Equations:
         Equations without landmarks, with known σ.
     rings : Rows
     texture : LandmarkRows
+    readings : int or None
+        Place of the encoder's readings in ``rows``.
     """
 
     frames: int
     rows: tuple[Rows, ...]
     rings: Rows
     texture: LandmarkRows
+    readings: int | None = None
+
+    def without_encoder(self) -> Equations:
+        """Return the equations without weight of the encoder's readings."""
+        if self.readings is None:
+            return self
+        rows = list(self.rows)
+        reading = rows[self.readings]
+        rows[self.readings] = replace(reading, sigma=np.full_like(reading.sigma, _NO_EVIDENCE_MM))
+        return replace(self, rows=tuple(rows), readings=None)
 
     @property
     def cost(self) -> float:
@@ -199,6 +213,7 @@ def linearised(
     ]
     rows.append(residuals.turn_rows(state, parameters.turn_sigma_rad))
     rows.append(residuals.view_rows(state))
+    readings = None if measured.encoder is None else len(rows)
     if measured.encoder is None:
         rows.append(residuals.no_slip_rows(state))
     else:
@@ -210,7 +225,7 @@ def linearised(
         loss = GemanMcClure(_REDESCENT * scales.wall_mm)
         rings = beside.submit(residuals.ring_rows, state, measured.rings, loss)
         texture = landmark_rows(state, measured, parameters)
-    equations = Equations(len(state.T_pc), tuple(rows), rings.result(), texture)
+    equations = Equations(len(state.T_pc), tuple(rows), rings.result(), texture, readings)
     return rescaled(equations, measured.tracks, scales)
 
 

@@ -31,6 +31,9 @@ _SURE_P = 1e-4
 """Probability below which a steady scale is rejected: that of 4 σ."""
 _MAY_BE_P = 1e-3
 """Probability above which the rings' course may be due to the scale alone: that of 3 σ."""
+_CONFIRMED_P = 0.05
+"""Probability of a steady scale below which pictures without encoder confirm a drift that it shows: 2 σ.
+Drifts of .5 and .8 % had 1e-6 and .002, encoders .2 s late or early .9."""
 _ONE_WAY = 0.5
 """Share of its range by which a scale that drifts must have changed from first to last: warming up and coming
 loose go one way. Grooves of a gauge left a fifth in a healthy probe (a01), drifts have 0.9."""
@@ -66,6 +69,8 @@ class ScaleDrift:
         1 σ of the pipe's radius without a drift.
     contradicted : bool
         Whether the run with the drift corrected did not confirm it: see `with_steady_scale`.
+    by_encoder : bool
+        Whether it is ``contradicted`` since only the encoder shows it, and no picture without it.
     """
 
     at_frames: Float
@@ -77,6 +82,7 @@ class ScaleDrift:
     ring_mm: float
     stated_mm: float
     contradicted: bool = False
+    by_encoder: bool = False
 
     @property
     def certain(self) -> bool:
@@ -91,6 +97,11 @@ class ScaleDrift:
     def indistinct_from_width(self) -> ScaleDrift:
         """Return the drift as one that a widening pipe explains equally well."""
         return replace(self, p_steady=1.0, p_even=1.0)
+
+    @property
+    def may_be_steady(self) -> bool:
+        """Whether the scale may have been steady all the same."""
+        return self.p_steady > _CONFIRMED_P
 
     @property
     def change(self) -> float:
@@ -126,6 +137,14 @@ class ScaleDrift:
         """Warn of a scale that drifts, or of rings that may change because of it."""
         if self.certain:
             context.warn(self._words(corrected))
+        elif self.by_encoder:
+            context.warn(
+                "encoder and rings contradict each other along the run: either the picture's scale drifts by "
+                f"{100 * float(np.ptp(self.at_frames)):.2f} %, or the encoder's does, because its wheel "
+                "creeps or its clock is not that of the pictures. The pictures alone do not show which. "
+                "Nothing is corrected: σ of the radii includes it. What to do: compare the clocks of "
+                "encoder.csv and frames.csv, clean the wheel, measure the diameters at both ends"
+            )
         elif self.contradicted:
             context.warn(
                 f"it seems that {self._what}. But texture and rings do not agree, as with a noise filter "

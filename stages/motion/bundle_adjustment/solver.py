@@ -25,6 +25,7 @@ from stages.motion.bundle_adjustment.equations import (
     rescaled,
     scales_of,
 )
+from stages.motion.bundle_adjustment.uneven_steps import uneven_steps
 from stages.motion.bundle_adjustment.unknowns import State, moved
 from stages.motion.parameters import MotionParameters
 
@@ -76,6 +77,11 @@ class Estimate:
         """Return the state at the optimum."""
         return self.adjusted.state
 
+    def without_encoder(self) -> Estimate:
+        """Return the estimate with equations in which the encoder's readings have no weight, for one step."""
+        equations = self.adjusted.equations.without_encoder()
+        return replace(self, adjusted=replace(self.adjusted, equations=equations))
+
 
 def estimate_state(
     start: State, measured: Measurements, parameters: MotionParameters, watch: Watch = unwatched
@@ -89,13 +95,16 @@ def estimate_state(
     UnusableError
         When the motion is not determined.
     """
+    uneven = uneven_steps(measured.encoder, measured.tracks.poses, measured.time_s)
     with _refusing_undetermined():
+        measured = replace(measured, smooth_sigma=np.hypot(measured.smooth_sigma, uneven))
         loose = _loosely(start, measured, parameters, watch)
         loose = loose.with_bore_in_place(measured.probe.laser.baseline_mm)
-        sigma = _smoothness(loose.T_pc, measured.time_s, measured.tracks.poses.known)
+        known = measured.tracks.poses.known
+        sigma = np.hypot(_smoothness(loose.T_pc, measured.time_s, known), uneven)
         smooth = adjust(loose, replace(measured, smooth_sigma=sigma), parameters, CLOSELY, watch)
         for _ in range(_ROUNDS):
-            looser = _looser(sigma, smooth.state.T_pc, measured.time_s, measured.tracks.poses.known)
+            looser = _looser(sigma, smooth.state.T_pc, measured.time_s, known)
             if np.all(looser < _MORE * sigma):
                 break
             sigma = looser

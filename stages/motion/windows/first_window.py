@@ -215,7 +215,8 @@ def _with_noise(first: _Adjusted) -> _Adjusted:
 
 def with_scale(first: _Adjusted, unsure: float) -> tuple[_Adjusted, EncoderScale | None, float]:
     """Widen the encoder scale's σ by its contradiction to the pictures; return it and texture's 1 σ."""
-    scale = scale_of_encoder(first.estimate, first.measured, unsure)
+    creep_mm = first.parameters.encoder_slip_sigma_mm
+    scale = scale_of_encoder(first.estimate, first.measured, unsure, creep_mm)
     if scale is None:
         return first, None, float(np.hypot(unsure, _unseen_error(first.run)))
     if _lost_much(first):
@@ -227,7 +228,7 @@ def with_scale(first: _Adjusted, unsure: float) -> tuple[_Adjusted, EncoderScale
         probe = replace(first.run.probe, encoder_scale_sigma=abs(scale.scale - 1))
         run, measured = replace(first.run, probe=probe), replace(first.measured, probe=probe)
         first = replace(first, run=run, measured=measured).again(first.estimate.state)
-    return first, scale, unsure
+    return first, scale, float(np.hypot(unsure, scale.doubt))
 
 
 def _unseen_error(run: MeasuredRun) -> float:

@@ -76,8 +76,9 @@ def with_steady_scale(
 
     A large drift is reported and not corrected. In a reducer nothing is reported, because rings and texture
     differ there in the same way as with a drift. If most pictures show no texture, a drift cannot be
-    distinguished from a pipe that widens. A correction that the corrected run does not confirm is undone, and
-    none is made where water or glass displaces the picture differently from place to place.
+    distinguished from a pipe that widens. A drift that only an encoder shows, and the pictures without it do
+    not, may be the encoder's. A correction that the corrected run does not confirm is undone, and none is
+    made where water or glass displaces the picture differently from place to place.
 
     Raises
     ------
@@ -89,6 +90,8 @@ def with_steady_scale(
         drift = drift.without_evidence()
     elif run.texture.poses.mostly_lost:
         drift = drift.indistinct_from_width()
+    if drift.certain and drift_of_scale(estimate.without_encoder(), measured).may_be_steady:
+        drift = replace(drift, contradicted=True, by_encoder=True)
     if not drift.certain or window != run.whole or drift.large:
         return SteadyRun(run, estimate, measured, drift, corrected=False)
     contradicted = replace(drift, contradicted=True)
