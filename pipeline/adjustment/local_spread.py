@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
-from scipy.ndimage import median_filter
 
 from pipeline.adjustment.robust import robust_spread
 from pipeline.arrays import Float, Float32
-from pipeline.system.parallel import side_by_side
 
 # Length of a place along the pipe, and sectors around it: each is 13 mm wide in a pipe of 100 mm. A place
 # holds some 300 independent cells, which give its spread to 6 %; 10 mm of defect fill less than half of it.
@@ -61,15 +60,14 @@ def _spread_of(values: Float | Float32) -> float:
     return robust_spread(known) if known.size >= _FEWEST_CELLS else float("nan")
 
 
-def running_median(value: Float32, size: tuple[int, int]) -> Float32:
-    """Return the median (S, A) over ``size`` rows and columns, both odd, around each of finite values (S, A).
+def running_median(value: Float32) -> Float32:
+    """Return the median (S, A) of 25 cells around each of finite values (S, A): every other of 9 by 9.
 
-    Both halves are processed at once, each with the rows of the other that its windows reach.
+    OpenCV sorts 25 cells at once, a hundred times faster than a sliding window of 81 goes.
     """
-    half, reach = len(value) // 2, size[0] // 2
-    before = min(half, reach)
-    medians = side_by_side(
-        lambda part: median_filter(part, size=size, mode="nearest"),
-        (value[: half + reach], value[half - before :]),
-    )
-    return np.concatenate([medians[0][:half], medians[1][before:]])
+    out = np.empty_like(value)
+    for i, j in np.ndindex(2, 2):
+        part = np.ascontiguousarray(value[i::2, j::2])
+        if part.size:
+            out[i::2, j::2] = cv2.medianBlur(part, 5)
+    return out

@@ -277,7 +277,7 @@ def _report(context: Context, wall: Wall, spread: CalibrationSpread) -> None:
 
 ACCUMULATE = Stage(
     "accumulate",
-    "25",
+    "26",
     AccumulateParameters,
     accumulate_wall,
     "point cloud and radius map around the pipe's own axis, with σ",

@@ -25,8 +25,6 @@ _BLOCK, _THREADS = 64, 2
 # Least 1 σ of the kernel in ring spacings: narrower ones leave rows between rings with one ring. Debt:
 # data/debts.md.
 WIDTH_IN_RINGS = 0.4
-# Cells of the running median relative to which roughness is measured. Debt: data/debts.md.
-_FINE_CELLS = (9, 9)
 # Share of a ring from which its distance belongs to the map: half and twice as much change nothing on open-1
 # and open-3, whose rings end within a cell.
 _SEEN_SHARE = 0.1
@@ -197,7 +195,7 @@ def _roughness(radius: Float32, sigma: Float32, grid: MapGrid) -> Float32:
     Relief finer than a few cells cannot be distinguished from it and counts as noise.
     """
     filled = np.where(np.isfinite(radius), radius, np.nanmedian(radius))
-    fine = radius - running_median(filled, _FINE_CELLS)
+    fine = radius - running_median(filled)
     return _spread_by_place(np.abs(fine) / sigma, grid)
 
 

@@ -239,7 +239,8 @@ class _AxialMotion:
         light = cv2.GaussianBlur(grey * moves, (0, 0), _BROAD)
         fine = (grey - light / self._share_known(rows)) * moves
         fine -= fine.mean(1, keepdims=True)
-        fine /= np.maximum(fine.std(1, keepdims=True), 1.0)
+        spread = np.sqrt(np.einsum("ij,ij->i", fine, fine) / fine.shape[1])
+        fine /= np.maximum(spread, 1.0)[:, None]
         if moves.all():
             return np.asarray(fine, np.float32)
         noise = np.random.default_rng(strip.place).standard_normal(fine.shape)
@@ -272,7 +273,7 @@ def change_between(one: Float32, other: Float32) -> float:
     """
     power = float(np.vdot(one, one)), float(np.vdot(other, other))
     brighter = np.float32((power[1] / power[0]) ** 0.25 if min(power) > 0 else 1.0)
-    return float(np.abs(other / brighter - brighter * one).mean())
+    return cv2.norm(other / brighter, brighter * one, cv2.NORM_L1) / one.size
 
 
 def _in_like_light(one: _Strip, other: _Strip) -> bool:

@@ -26,6 +26,8 @@ _HEIGHT_PX = 600
 """Pictures are reduced by a whole factor to about this height: motion takes finer detail for noise."""
 _FARTHEST_DEG, _NEAREST_DEG = 35.0, 80.0
 """Polar angles between which the wall is examined; the stage motion uses the same."""
+_EVERY = 4
+"""Of so many pixels of the reduced picture, each way, one is unprojected; others are interpolated."""
 _FINE, _CELL, _BOX, _GAP = 4 / 600, 16 / 600, 9 / 600, 15 / 600
 """In heights of the picture: σ of the blur against which contrast is taken, size of the cells in which motion
 is detected, size of the box over which what stays is summed, and gap between two places that count as one. A
@@ -113,10 +115,12 @@ def _wall_in(camera: Camera) -> Bool:
     """Return where (h, w), on the reduced picture, the wall is examined."""
     width, height = camera.image_size
     by = max(round(min(width, height) / _HEIGHT_PX), 1)
-    v, u = np.mgrid[: height // by, : width // by]
-    z = camera.unproject((np.stack([u, v], -1) + 0.5) * by - 0.5).ray[..., 2]
+    w, h = width // by, height // by
+    v, u = np.mgrid[:h:_EVERY, :w:_EVERY] + _EVERY / 2
+    z = camera.unproject(np.stack([u, v], -1) * by - 0.5).ray[..., 2].astype(np.float32)
+    fine = cv2.resize(z, None, fx=_EVERY, fy=_EVERY, interpolation=cv2.INTER_LINEAR)[:h, :w]
     near, far = np.cos(np.radians([_NEAREST_DEG, _FARTHEST_DEG]))
-    return np.asarray((z > near) & (z < far))
+    return np.asarray((fine > near) & (fine < far))
 
 
 @dataclass(frozen=True)

@@ -157,14 +157,17 @@ def _flat_picture(picture: Blended, grid: FlatGrid, white_quantile: float, conte
     brightness, views = np.zeros(1 << 16, np.int64), np.zeros(1 << 8, np.int64)
     for part in parts:
         count = picture.count[part]
-        brightness += np.bincount(picture.colour[part].max(2)[count > 0], minlength=len(brightness))
+        blue, green, red = (picture.colour[part, :, c] for c in range(3))
+        brightest = np.maximum(np.maximum(blue, green), red)
+        brightness += np.bincount(brightest[count > 0], minlength=len(brightness))
         views += np.bincount(count.ravel(), minlength=len(views))
     white = brightest_wall(brightness, white_quantile)
     gain = np.float32(min(1 / REFLECTANCE_SCALE, _WHITE / white))
     context.report("brightness of the photo over the recorded frames", float(gain * REFLECTANCE_SCALE), "")
     bgra = context.scratch.zeros((grid.rows, grid.columns, 4), np.uint8)
+    shown = np.minimum(np.arange(len(brightness), dtype=np.float32) * gain + 0.5, 255).astype(np.uint8)
     for part in parts:
-        bgra[part, :, :3] = np.minimum(picture.colour[part] * gain + 0.5, 255)
+        bgra[part, :, :3] = shown[picture.colour[part]]
         bgra[part, :, 3] = np.where(picture.count[part] > 0, 255, 0)
     context.report("wall textured", float(1 - views[0] / views.sum()), "fraction")
     context.report("views behind a pixel, median", quantile_of_counts(views, 0.5), "views")
