@@ -64,20 +64,22 @@ def shows_drop(pictures: LitPictures, region: Region, relief: Relief) -> bool:
     half = max(len(columns), 2 * _HALF_MM / relief.cell_mm[1]) / 2
     around = columns.mean() + np.arange(-half, half, _PIXEL_MM / relief.cell_mm[1])
     turn = len(relief.azimuth_rad) / (_TURNS + 1)
-    gained = []
-    for k in _some(np.flatnonzero((lit.line_mm >= s[0]) & (lit.line_mm <= s[-1])), _PASSING):
-        others = _some(lit.beside(k), _OTHERS)
-        if len(others) < _LEAST_OTHERS:
-            continue
-        windows = [_window(relief, lit.line_mm[k], around + n * turn) for n in range(_TURNS + 1)]
-        own, *elsewhere = (_gains(pictures, lit, k, others, w) for w in windows)
-        known = [g[0] for g in elsewhere if g is not None]
-        if own is not None and known:
-            gained.append((*own, float(np.quantile(known, _UPPER))))
-    if not gained:
+
+    def gains(k: int, places: range) -> list[tuple[float, float] | None]:
+        windows = (_window(relief, lit.line_mm[k], around + n * turn) for n in places)
+        return [_gains(pictures, lit, k, _some(lit.beside(k), _OTHERS), window) for window in windows]
+
+    passing = _some(np.flatnonzero((lit.line_mm >= s[0]) & (lit.line_mm <= s[-1])), _PASSING)
+    found = {k: gains(k, range(1))[0] for k in passing if len(lit.beside(k)) >= _LEAST_OTHERS}
+    own = {k: gain for k, gain in found.items() if gain is not None}
+    if not own:
         return False
-    there, at_other_times, at_other_places = np.median(gained, axis=0)
-    return bool(there > max(_LARGER * max(at_other_times, at_other_places), _LEAST_GAIN))
+    there, at_other_times = np.median(list(own.values()), axis=0)
+    if there <= max(_LARGER * at_other_times, _LEAST_GAIN):
+        return False  # as almost always: other places need not be compared
+    known = [[g[0] for g in gains(k, range(1, _TURNS + 1)) if g is not None] for k in own]
+    elsewhere = [np.quantile(gain, _UPPER) for gain in known if gain]
+    return bool(elsewhere and there > _LARGER * np.median(elsewhere))
 
 
 def _pictures(pictures: LitPictures, first_mm: float, last_mm: float) -> _Pictures:
@@ -146,7 +148,9 @@ def _texture(pictures: LitPictures, xyz_p: Float, image: Byte, T_cp: Float) -> F
     within = valid & (u > 1) & (v > 1) & (u < image.shape[1] - 2) & (v < image.shape[0] - 2)
     if not within.all():
         return None
-    grey = cv2.remap(image.astype(np.float32), u, v, cv2.INTER_LINEAR)
+    left, top = int(u.min()), int(v.min())
+    part = image[top : int(v.max()) + 2, left : int(u.max()) + 2].astype(np.float32)
+    grey = cv2.remap(part, u - left, v - top, cv2.INTER_LINEAR)
     return np.asarray(grey - cv2.GaussianBlur(grey, (0, 0), _BROAD_PX), np.float32)
 
 
