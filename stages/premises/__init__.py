@@ -36,7 +36,7 @@ from stages.premises.light import Light, rhythm_of
 from stages.premises.losses import Steps, row_times, rows_by_motion, steps_of_wall, sway_of_line
 from stages.premises.order import behind_the_end, off_the_pipe, out_of_order
 from stages.premises.pictures import Pictures, examine_pictures
-from stages.premises.repeats import copies, rows_that_follow_encoder
+from stages.premises.repeats import best_followed, copies, rows_that_follow_encoder
 from stages.premises.scale import (
     check_diameter,
     encoder_factor,
@@ -165,6 +165,9 @@ def _matched(recording: Recording, probe: Probe, seen: _Seen) -> _Matched:
     forwards = runs_forwards(encoder, time_s := row_times(table, first), steps)
     one_bore, read = recording.kind != "gauge", in_mm(encoder, time_s, steps, radius_mm)
     row = rows_by_motion(first, steps, rhythm_of(light), table, read, sway, along_mm, one_bore)
+    row = best_followed(
+        (row, first), table, steps, encoder
+    )  # a crawler that moves in steps loses no pictures
     stated_s = without_stretch(row_times(table, row), row, table, recording.frame_rate)
     jumps = clock_jumps(stated_s, steps, encoder)
     changes = Changes(recording.frames, label, row, without_jumps(stated_s, jumps))
@@ -215,6 +218,6 @@ def _report(pictures: Pictures, radius_mm: float, changes: Changes, context: Con
 
 
 PREMISES = Stage(
-    "premises", "38", PremisesParameters, check_premises,
+    "premises", "39", PremisesParameters, check_premises,
     "stated lights, times, encoder and diameter compared with the pictures and corrected",
 )  # fmt: skip

@@ -59,14 +59,23 @@ def rows_that_follow_encoder(
         return row
     as_stored = row + np.cumsum(np.diff(row, prepend=-1) < 1)
     put_in = np.maximum(as_stored - np.cumsum(again), 0)
-    rows = (row, as_stored, put_in)
+    return best_followed((row, as_stored, put_in), table, steps, encoder)
+
+
+def best_followed(rows: tuple[Int, ...], table: FrameTable, steps: Steps, encoder: Encoder | None) -> Int:
+    """Return those of several rows (F,) by which the encoder follows the wall much better than by the first.
+
+    Without such rows, or without evidence, the first are returned.
+    """
+    if encoder is None:
+        return rows[0]
     times = [row_times(table, r) for r in rows]
     known = steps.of(np.all([_in_table(steps, encoder, t) for t in times], 0))
     if len(known.end) < _LEAST_STEPS:
-        return row
+        return rows[0]
     off = [_off_the_wall(known, encoder, t) for t in times]
     best = int(np.argmin(off))
-    return rows[best] if off[best] < _FOLLOWS * off[0] else row
+    return rows[best] if off[best] < _FOLLOWS * off[0] else rows[0]
 
 
 def _in_table(steps: Steps, encoder: Encoder, time_s: Float) -> Bool:

@@ -11,7 +11,7 @@ from pipeline.recording.base import Encoder, FrameTable
 from stages.premises.light import Light
 from stages.premises.losses import Steps
 from stages.premises.pictures import Pictures, change_between
-from stages.premises.repeats import copies, rows_that_follow_encoder
+from stages.premises.repeats import best_followed, copies, rows_that_follow_encoder
 
 
 def test_pictures_with_equal_exposure_by_chance_are_not_copies() -> None:
@@ -93,3 +93,16 @@ def test_rows_without_an_encoder_reading_do_not_follow_the_wall(copied: slice, c
 def test_rows_move_up_behind_inserted_pictures_if_an_encoder_of_most_rows_shows_it(covered: slice) -> None:
     told, true = rows_told(1, slice(100, 110), covered, put_in=True)
     np.testing.assert_array_equal(told, true)
+
+
+@pytest.mark.parametrize("crawls", [True, False])
+def test_a_crawler_that_moves_in_steps_loses_no_pictures(crawls: bool) -> None:
+    """Every second step was twice as long, in the encoder too, and 34 pictures "were lost"."""
+    at, random = np.arange(80), np.random.default_rng(8)
+    way = np.cumsum(np.where(at % 2, 1.0, 0.5))
+    mended = at + np.cumsum(at % 2)
+    size = np.diff(way) / 25 * (1 + 0.05 * random.standard_normal(79))
+    table = FrameTable(at, at / 30, np.full(80, "both"))
+    encoder = Encoder((at if crawls else mended) / 30, np.round(way / 0.05) * 0.05)
+    found = best_followed((mended, at), table, Steps(at[:-1], at[1:], size), encoder)
+    np.testing.assert_array_equal(found, at if crawls else mended)
