@@ -51,7 +51,7 @@ class Mismatch:
     name : str
         Of the effect; empty where none explains it.
     channel : str
-        ``intensity`` or ``line``.
+        ``intensity``, ``colour`` or ``line``.
     fixed_to : str
         ``image``, ``wall``, ``time``, ``line`` or ``rows``; ``image or wall`` where both may be.
     place : tuple of NamedFigure

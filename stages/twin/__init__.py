@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import Field
 from threadpoolctl import threadpool_limits
 
-from pipeline.arrays import Bool, Float32, Int
+from pipeline.arrays import Bool, Int
 from pipeline.artefacts.measured import RingSamples, Trajectory, Wall, WallTexture
 from pipeline.artefacts.twin import Mismatch, Twin
 from pipeline.artefacts.wall_map import FixedToProbe
@@ -18,8 +18,11 @@ from pipeline.machine.stage import Context, Parameters, Stage
 from pipeline.recording.base import Illumination, Recording
 from pipeline.recording.checks import CheckedFrames
 from stages.twin.at_times import dark_spots
-from stages.twin.compare import Comparison, block_ratios, block_textures
+from stages.twin.blocks import blocks_of
+from stages.twin.colours import beside_colour, few_lit
+from stages.twin.compare import Comparison
 from stages.twin.dark_side import beside_dark_side
+from stages.twin.fine_noise import beside_coding
 from stages.twin.fixed_line import on_line
 from stages.twin.fixed_pattern import pattern_figures
 from stages.twin.glints import window_and_glints
@@ -37,12 +40,11 @@ from stages.twin.on_wall import ring_step_mm, unnamed
 from stages.twin.over_time import changes_over_time
 from stages.twin.photo_course import hidden_failures
 from stages.twin.pixels import defective_pixels
-from stages.twin.render import Region, Renderer
+from stages.twin.render import Region
 from stages.twin.scene import Scene, scene_of
 from stages.twin.seen_in_photo import beside_sectors, separated_from_photo
 from stages.twin.state import (
     PhotometricState,
-    Sampled,
     black_of_photo,
     clipped_line,
     clipped_pixels,
@@ -145,7 +147,7 @@ def photometry_of(
         sampled[k] = replace(one, image=defects.mended(one.image))
     displaced: tuple[ImagePlace, ...] = ()
     for _ in range(_ROUNDS):
-        ratios, textures = _blocks(scene, state, sampled)
+        ratios, textures = blocks_of(scene, state, sampled)
         found, aside = places_displaced([place for _, place in textures])
         if aside is None:
             break
@@ -212,11 +214,14 @@ def compared_with(
     if not comparison.views:
         raise UnusableError("twin", "no frame could be decoded", hint="copy the video again")
     state, samples = photometry.state, sums.blocks.samples()
-    over_time, slow = changes_over_time(sums, samples, scene, photometry.state)
+    few = few_lit([n for n in compared.tolist() if light[n] in state.shows_wall])
+    over_time, slow = changes_over_time(sums, samples, scene, state, recording.read(few, "bgr"))
     whole, withdrawn = sums.named(samples, recording, any("led_dead" in m.name for m in over_time))
+    whole, of_colour = beside_colour(whole, over_time)
     on_window, of_photo = separated_from_photo(sums.on_window(samples), scene.ring)
     on_window, unsure = separated_from_blur(on_window, whole)
-    on_window = (*on_window, *on_line(fixed, rings, scene.ring, on_window))
+    of_line, coded = beside_coding(on_line(fixed, rings, scene.ring, on_window), over_time)
+    on_window = (*on_window, *of_line)
     on_window, glints = window_and_glints(on_window, sums.glints(whole, on_window))
     apart_mm, clear = ring_step_mm(rings, scene.trajectory), (*on_window, *glints, *of_photo)
     line_rad = float(np.arctan2(scene.ring.radius_mm, scene.ring.ahead_mm))
@@ -237,7 +242,7 @@ def compared_with(
         comparison.seen / max(comparison.view, 1.0),
         (*cannot_tell(state, comparison.silent), *hidden_failures(samples, scene.ring)),
         tuple(comparison.views), maps_of(samples), comparison.levels(), worst_places(samples),
-        (*withdrawn, *slow, *unsure, *of_photo, *beside, *of_side),
+        (*withdrawn, *of_colour, *slow, *coded, *unsure, *of_photo, *beside, *of_side),
     )  # fmt: skip
 
 
@@ -262,17 +267,6 @@ def _split(frames: CheckedFrames, trajectory: Trajectory, most: int) -> tuple[In
     return compared[few], measured
 
 
-def _blocks(
-    scene: Scene, state: PhotometricState, sampled: list[Sampled]
-) -> tuple[list[Float32], list[tuple[Float32, Float32]]]:
-    """Return, for blocks of the sampled lit frames, recorded over predicted brightness, and texture."""
-    noise, renderer = state.noise, Renderer(replace(scene, outside=state.outside), state)
-    lit = [s for s in sampled if s.light in state.shows_wall]
-    twins = [renderer.frame(s.frame, s.light).drawn_aside(state.aside) for s in lit]
-    made = [(noise.above_black(s.image), t, noise.full_scale) for s, t in zip(lit, twins, strict=True)]
-    return [block_ratios(*m) for m in made], [block_textures(*m) for m in made]
-
-
 def _report(comparison: Comparison, found: tuple[Mismatch, ...], context: Context) -> None:
     for region in comparison.regions():
         context.report(f"chi-square per pixel, {region.name}", region.chi2_after, "")
@@ -290,7 +284,7 @@ PHOTOMETRY = Stage(
 )
 TWIN = Stage(
     "twin",
-    "65",
+    "66",
     TwinParameters,
     compare_with_twin,
     "recorded frames beside the same frames, re-rendered from what the run has measured",

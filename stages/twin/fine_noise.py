@@ -24,8 +24,9 @@ _BESIDE, _FEWEST = 3, 2
 _LEAST, _SURE = 0.22, 6.0
 """Least change of the noise's logarithm, and its least size in spreads of the other steps between frames.
 Chosen: sound recordings of two renderers change by .05 between frames, crf 34 after 16 by .5 and 2.2."""
-_OF_MEDIAN = 1.483
-"""1 σ of normal numbers over the median of their sizes."""
+_NOISE, _OF_MEDIAN = "noise", 1.483
+"""Name of the figure by which a change of the coding is known; 1 σ of normal numbers over the median of their
+sizes."""
 
 
 @dataclass
@@ -68,7 +69,7 @@ class FineNoise:
         last, here = self.frame[first - 1], self.frame[first]
         change, nan = float(np.expm1(size)), float("nan")
         at = NamedFigure("frame_from", (here + last) / 2, (here - last) / np.sqrt(12), "frame")
-        noise = NamedFigure("noise", change, float(np.exp(size)) * scatter, "relative")
+        noise = NamedFigure(_NOISE, change, float(np.exp(size)) * scatter, "relative")
         said = (
             f"From frame {at.value:.0f} on, lit frames have {100 * abs(change):.0f} % "
             f"{'more' if change > 0 else 'less'} noise between neighbouring pixels than before, beside what "
@@ -80,12 +81,14 @@ class FineNoise:
 
 
 def beside_coding(
-    found: Sequence[Mismatch], coding: Sequence[Mismatch]
+    found: Sequence[Mismatch], over_time: Sequence[Mismatch]
 ) -> tuple[tuple[Mismatch, ...], tuple[Mismatch, ...]]:
-    """Return the causes over time that remain beside a change of the coding, and those withdrawn for it.
+    """Return the findings that remain beside a change of the coding, and those withdrawn for it.
 
-    Withdrawn are those of the line, which is faint, and those of lit frames that begin with the change.
+    It is among what changes ``over_time``. Withdrawn are those of the line, which is faint, and those of
+    lit frames that begin with the change.
     """
+    coding = [c for c in over_time if any(p.name == _NOISE for p in c.parameters)]
     left = tuple(m for m in found if any(m.channel == "line" or _begins_with(m, c) for c in coding))
     said = "{} But the recording is coded differently from frame {:.0f} on, which changes faint light, too."
     withdrawn = tuple(

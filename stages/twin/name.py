@@ -253,7 +253,8 @@ def cannot_tell(state: PhotometricState, silent: bool = False) -> tuple[str, ...
         "If all frames move alike during their exposure, their blur is also in the wall's photo: motion blur "
         "is found only in frames that are more blurred than the others, and from a 1 σ of "
         f"{LEAST_BLUR_PX} px on: lens and pixels blur as much.",
-        "Frames are compared in grey: light whose colour changes during the run is not examined.",
+        "Frames are compared in grey: a change of colour during the run is told only as far as wall ahead "
+        "and wall near the camera differ by it from their photo.",
     ]
     if silent:
         said.append(

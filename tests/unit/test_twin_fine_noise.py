@@ -77,4 +77,8 @@ def test_beside_another_coding_no_light_is_named_for_it():
     assert left == (other, blink)
     assert all("coded differently from frame 44" in m.statement for m in withdrawn)
     assert len(withdrawn) == 2
+    # Crf 34 in the first half made up to six places "where the line is displaced in all frames".
+    place = _cause("", "line", None)
+    assert beside_coding((place,), (*coding, blink))[0] == ()
+    assert beside_coding((place,), (blink,)) == ((place,), ())
     assert beside_coding((sector, same), ()) == ((sector, same), ())
