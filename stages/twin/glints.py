@@ -23,7 +23,6 @@ from stages.twin.discs import Disc, disc_of, meet
 from stages.twin.locate import FALSE_ALARM
 from stages.twin.render import Region, TwinFrame
 from stages.twin.scene import Ring
-from stages.twin.seen_in_photo import photographed_through
 
 _LEAST_GREY, _LEAST_SIGMA = 40.0, 8.0
 """Grey levels, and σ, by which each pixel of a spot exceeds its twin. Chosen: a photo displaced by its own σ
@@ -38,6 +37,9 @@ _REACH_PX, _MORE, _FEWEST, _SURE = 16.0, 2, 3, 3.0
 many frames spots must recur more often on the wall than in the image, or less often, to decide to which they
 are fixed; fewest frames; σ by which other frames must confirm it."""
 
+_BESIDE_PX, _ORDINARY, _OF_EXCESS = 8, 0.75, 0.5
+"""Least reach, px, of what is around a spot; quantile of the brightness there that is ordinary wall, although
+up to three quarters may lie in a shade; share of its excess by which a spot must be brighter. Chosen."""
 _PALEST = 2.0
 """Brightness of the palest wall over the 95 % quantile of the wall; chosen."""
 _OR_DROP = ", or a drop on the window bends light of the line there"
@@ -46,22 +48,13 @@ _OR_DROP = ", or a drop on the window bends light of the line there"
 
 @dataclass(frozen=True)
 class Spot:
-    """A spot in one frame: place in the image and on the wall (px, at the ring), radius, and excess.
-
-    ``share`` is the excess over the light that is recorded there.
-    """
+    """A spot in one frame: place in the image and on the wall (px, at the ring), radius, and excess."""
 
     frame: int
     image: tuple[float, float]
     wall: tuple[float, float]
     radius_px: float
     grey: float
-    share: float = 1.0
-
-    @property
-    def disc(self) -> Disc:
-        """Where it lies in the image."""
-        return Disc(*self.image, self.radius_px)
 
     def at(self, order: str) -> tuple[float, float]:
         """Return its place in the image or on the wall, px."""
@@ -107,7 +100,7 @@ class SpotsOfFrames:
         wall = [a[middle][: shape[0], : shape[1]] for a in (twin.distance_mm, twin.azimuth_rad)]
         self.wall.append(np.stack(self._on_wall(*wall)))
         if beyond.any() and beyond.sum() < _MOST_OF_VIEW * known.sum():
-            self.spots += self._spots(frame, beyond, more, twin)
+            self.spots += self._spots(frame, beyond, more, known, twin)
 
     def _on_wall(self, distance_mm: Float32, azimuth_rad: Float32) -> tuple[Float32, Float32]:
         scale = np.float32(self.ring.radius_px / self.ring.radius_mm)
@@ -115,7 +108,7 @@ class SpotsOfFrames:
             self.ring.radius_px
         )
 
-    def _spots(self, frame: int, beyond: Bool, more: Float32, twin: TwinFrame) -> list[Spot]:
+    def _spots(self, frame: int, beyond: Bool, more: Float32, known: Bool, twin: TwinFrame) -> list[Spot]:
         joined = cv2.morphologyEx(beyond.astype(np.uint8), cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8))
         count, label, stats, centre = cv2.connectedComponentsWithStats(joined)
         line = np.isin(twin.region, (Region.LINE_CORE, Region.LINE_FLANK)).astype(np.uint8)
@@ -128,28 +121,25 @@ class SpotsOfFrames:
             if not _PIXELS[0] <= area <= _PIXELS[1]:
                 continue
             box, at = (slice(top, top + height), slice(left, left + width)), centre[k].astype(int)[::-1]
-            here = label[box] == k
-            grey, dark = (float(a[box][here].mean()) for a in (more, twin.level))
+            grey = float(more[box][label[box] == k].mean())
+            if not _stands_out(label == k, box, grey, twin.level + more, known):
+                continue
             wall = self._on_wall(twin.distance_mm[tuple(at)], twin.azimuth_rad[tuple(at)])
             image = float(centre[k][0]), float(centre[k][1])
             place, radius = (float(wall[0]), float(wall[1])), float(np.sqrt(area / np.pi))
-            found.append(Spot(frame, image, place, radius, grey, grey / max(grey + dark, 1.0)))
+            found.append(Spot(frame, image, place, radius, grey))
         return found
 
-    def found(
-        self, lit_wall: float = 0.0, bent: Sequence[Mismatch] = (), dim: Sequence[Mismatch] = ()
-    ) -> tuple[Mismatch, ...]:
+    def found(self, lit_wall: float = 0.0, bent: Sequence[Mismatch] = ()) -> tuple[Mismatch, ...]:
         """Return the places where spots recur, and a count of the other spots.
 
         ``lit_wall`` is the brightness, in grey levels, that other light gives to wall that is dark in the
         twin: a spot not far brighter than that is the palest wall. Spots at places of the image where light
-        is ``bent`` are wall from elsewhere; beside what is ``dim`` on the window, wall may be too dark in its
-        photo.
+        is ``bent`` are wall from elsewhere.
         """
         places, left = list[Mismatch](), [s for s in self.spots if s.grey > _PALEST * lit_wall]
         discs = [d for d in map(disc_of, bent) if d is not None]
-        left = [s for s in left if not any(d.touches(s.disc) for d in discs)]
-        left = [s for s in left if not photographed_through(s.disc, s.share, dim, self.ring)]
+        left = [s for s in left if not any(d.touches(Disc(*s.image, s.radius_px)) for d in discs)]
         while left:
             tried = {order: _largest_group(left, order) for order in ("image", "wall")}
             count = {order: _frames_of(group) for order, group in tried.items()}
@@ -239,6 +229,22 @@ class SpotsOfFrames:
             "than predicted, each time elsewhere: glints, sparks, or drops and dust in flight.",
             Look(brightest.frame, *brightest.image, 4 * brightest.radius_px),
         ),)  # fmt: skip
+
+
+def _stands_out(spot: Bool, box: tuple[slice, slice], grey: float, recorded: Float32, known: Bool) -> bool:
+    """Return whether a spot (H, W) of excess ``grey`` stands out in the recorded picture as well.
+
+    A glint does. Wall that only its photo shows too dark, made through a shade on the window, is as bright as
+    other wall around it.
+    """
+    reach = max(_BESIDE_PX, *((s.stop - s.start) // 2 for s in box))
+    wide = tuple(slice(max(s.start - reach, 0), s.stop + reach) for s in box)
+    near = cv2.dilate(spot[wide].astype(np.uint8), np.ones((2 * reach + 1,) * 2, np.uint8)) > 0
+    around = recorded[wide][near & ~spot[wide] & known[wide]]
+    if len(around) < _PIXELS[0]:
+        return True
+    usual = float(np.quantile(around, _ORDINARY))
+    return float(recorded[wide][spot[wide]].mean()) - usual > _OF_EXCESS * grey
 
 
 def _frames_of(spots: Sequence[Spot]) -> int:

@@ -19,9 +19,8 @@ from stages.twin.reference import BlockSamples
 from stages.twin.scene import Ring
 
 _DIMS = ("window_dirt", "window_scatter", "droplet")
-SIDE_DEG, _SURE = 90.0, 2.0
-"""Half the width of a side: a lamp lights at least half of the picture. σ that are allowed for in the place
-and in the size of dirt."""
+SIDE_DEG = 90.0
+"""Half the width of a side: a lamp lights at least half of the picture."""
 
 
 def separated_from_photo(
@@ -36,25 +35,6 @@ def separated_from_photo(
     said = "{} But the photo may be darker there, as it was made through what lies at the same azimuth."
     withdrawn = tuple(replace(m, statement=said.format(m.statement)) for m in left)
     return tuple(m for m in found if m not in left), withdrawn
-
-
-def photographed_through(place: Disc, brighter: float, on_window: Sequence[Mismatch], ring: Ring) -> bool:
-    """Return whether wall at a place may be brighter than in its photo because that was made through dirt.
-
-    ``brighter`` is its excess over its own light, which is at most the share that the dirt takes. Dirt on the
-    window is known to within the σ of its place.
-    """
-    azimuth, half = place.around(ring.centre_px)
-    for one in on_window:
-        share = next((p for p in one.parameters if p.name == "share"), None)
-        disc = disc_of(one)
-        if share is None or disc is None or not set(one.names) & set(_DIMS):
-            continue
-        sd = next(p.sd for p in one.place if p.name == "radius_px")
-        at, more = disc._replace(radius_px=disc.radius_px + _SURE * sd).around(ring.centre_px)
-        if abs(half_turn(azimuth - at)) < half + more and brighter < share.value + _SURE * share.sd:
-            return True
-    return False
 
 
 def beside_sectors(

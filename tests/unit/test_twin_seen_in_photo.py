@@ -4,8 +4,6 @@ import numpy as np
 import pytest
 
 from pipeline.artefacts.twin import Look, Mismatch, NamedFigure
-from pipeline.recording.base import Illumination
-from stages.twin.glints import Spot, SpotsOfFrames
 from stages.twin.scene import Ring
 from stages.twin.seen_in_photo import beside_sectors, separated_from_photo
 
@@ -36,25 +34,6 @@ def test_dirt_contained_in_the_photo_is_withdrawn_at_its_azimuth(bright, left):
     assert len(withdrawn) == left
     assert all("darker there" in m.statement for m in withdrawn)
     assert separated_from_photo((bright,), _RING) == ((bright,), ())
-
-
-@pytest.mark.parametrize(
-    ("azimuth_deg", "share", "left"),
-    [(55.0, 0.4, True), (55.0, 0.9, False), (-120.0, 0.4, False)],
-)
-def test_wall_beside_a_shade_in_its_photo_is_no_glint(azimuth_deg, share, left):
-    """A housing that shades the border made "spots far brighter than predicted, each time elsewhere"."""
-    shade = _place("window_dirt", 497.0, 468.0, 0.5)  # at 60.3°
-    spots, turn = SpotsOfFrames(Illumination.LED, _RING), np.radians(azimuth_deg)
-    for frame in range(8):
-        spots.frame.append(frame)
-        spots.excess.append(np.zeros((75, 100), np.float32))
-        away = 100 + 20 * frame
-        at = (400 + away * np.cos(turn), 298 + away * np.sin(turn))
-        spots.spots.append(Spot(frame, at, (90.0 * frame, 40.0 * frame), 6.0, 70.0, share))
-    assert spots.found()
-    assert bool(spots.found(dim=[shade])) != left
-    assert spots.found(dim=[_place("", 497.0, 468.0, 0.5)])
 
 
 @pytest.mark.parametrize(

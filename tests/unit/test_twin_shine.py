@@ -59,6 +59,20 @@ def test_a_lamp_reflected_at_one_place_of_the_image_is_a_glint():
     assert found.chi2_after < found.chi2_before / 2
 
 
+@pytest.mark.parametrize("shaded_px", [0, 40])
+def test_wall_too_dark_in_its_photo_is_no_glint(shaded_px):
+    """A housing that shades the border made a glint where wall was photographed through the shade."""
+    random, spots = np.random.default_rng(4), SpotsOfFrames(Illumination.LED, RING)
+    place, shade = _spot(120, 90, 1.0) > 0, np.abs(U - 120 - 8 - shaded_px) < 0.5 * shaded_px
+    for number in range(FRAMES):
+        twin = _twin(number)
+        twin.level[place] = 30.0
+        twin.level[shade & ~place] = 20.0
+        seen = np.where(shade & ~place, np.float32(20), np.float32(80))
+        spots.add(number, seen + 2 * random.standard_normal(SHAPE).astype(np.float32), twin)
+    assert spots.found() == ()
+
+
 @pytest.mark.parametrize(("away_px", "glints"), [(0, 0), (14, 1)])
 def test_light_connected_to_the_line_is_not_a_glint(away_px, glints):
     """A line displaced at a defect, or wide where it clips, was reported as a glint or a droplet."""
