@@ -9,9 +9,10 @@ from functools import cached_property
 
 import numpy as np
 from scipy.fft import irfft2, next_fast_len, rfft2
+from scipy.ndimage import maximum_filter
 from scipy.optimize import brentq
 
-from pipeline.adjustment.robust import robust_spread
+from pipeline.adjustment.robust import robust_spread, row_median
 from pipeline.arrays import Bool, Complex64, Float, Float32
 from pipeline.machine.scratch import Scratch
 from pipeline.machine.stage import Progress
@@ -23,6 +24,9 @@ _ROUND_MM = (0.7, 1.4, 2.8, 5.6, 11.2)
 _LONG_MM = ((4.0, 0.6), (8.0, 0.8))
 _DIRECTIONS = 8
 _THREADS = 2
+_PIECE_MM = 16.0
+"""Length around the pipe, mm, of pieces of a row whose median σ bounds that of their cells: twice the width
+of defects that only few rings cross; on wider ones, rings lie on a smooth wall (chosen)."""
 _SMALL = 1  # index of the template for a bump of 3 mm × 3 mm: round, 1.4 mm
 
 
@@ -218,8 +222,23 @@ def _threshold(area_mm2: float, bank: tuple[Template, ...], false_alarms: float)
 
 def weighed(relief: Relief, reach: int) -> Weighed:
     """Return the relief as the filters need it; ``reach`` is the largest half length of a template, rows."""
-    weight = np.where(relief.seen, 1 / relief.sigma_mm**2, 0.0)
+    weight = np.where(relief.seen, 1 / usual_sigma_mm(relief) ** 2, 0.0)
     return Weighed(weight * np.nan_to_num(relief.local_mm), weight, relief.seen, reach)
+
+
+def usual_sigma_mm(relief: Relief) -> Float:
+    """Return 1 σ (S, A) of the relief, in each row at most the largest median of the pieces beside a cell.
+
+    Rings that cross a narrow defect do not lie on one smooth wall, so that σ is larger there. Weighed with
+    it, a defect would hide itself from the search.
+    """
+    count = max(1, round(2 * np.pi * relief.radius_mm / _PIECE_MM))
+    pieces = np.array_split(relief.sigma_mm, count, axis=1)
+    median = np.stack([row_median(piece) for piece in pieces], -1)
+    # Where noise is larger behind a part of the window, pieces at its border count as noisy.
+    size = 2 * round(_PIECE_MM / 2 / relief.cell_mm[0]) + 1, 3
+    bound = maximum_filter(np.nan_to_num(median), size, mode=("nearest", "wrap"))
+    return np.concatenate([np.minimum(p, bound[:, [k]]) for k, p in enumerate(pieces)], 1)
 
 
 def _fitted(relief: WallRelief, kernels: list[Float], overlap: int) -> Iterator[tuple[Filter, Float]]:
