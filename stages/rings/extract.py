@@ -25,7 +25,7 @@ from stages.rings.noise import QUANTISATION_VARIANCE, SURELY_UNCLIPPED, clip_lev
 from stages.rings.seam import seam_of, warn_of_seam
 from stages.rings.search import BAND_WIDTHS
 from stages.rings.sectors import Sectors, sectors_of
-from stages.rings.trace import RingTrace, trace_ring
+from stages.rings.trace import LOST, RingTrace, trace_ring
 from stages.rings.validity import contradicted
 from stages.rings.wander import Wander, wander_of
 
@@ -140,10 +140,16 @@ def _lit_traces(images: Images, probe: Probe, sectors: Sectors) -> Iterator[Foun
         if bgr is None:
             yield frame, None
             continue
-        if trace is None:
-            weights = _first_weights(bgr, sectors, probe)
-        image = mix(bgr, weights)
-        trace = trace_ring(image, sectors, np.inf, trace)
+        before = trace
+        if before is not None:
+            image = mix(bgr, weights)
+            trace = trace_ring(image, sectors, np.inf, before)
+        if before is None or trace is None or trace.coverage < before.coverage - LOST:
+            # Colours may have changed, so that weights learned from the pictures before hide the line.
+            own = _first_weights(bgr, sectors, probe)
+            alone = trace_ring(mix(bgr, own), sectors, np.inf)
+            if trace is None or (alone is not None and alone.coverage > trace.coverage):
+                weights, image, trace = own, mix(bgr, own), alone
         yield frame, None if trace is None else _without_dips(trace, bgr, sectors, channel)
         if trace is not None:
             weights = discriminant_weights(bgr, sectors, trace, weights)

@@ -30,7 +30,7 @@ _MOST = 0.5
 _RIVAL = 0.5
 # A ring that lost more than this share of its circle from one image to the next may have left the band, or
 # the image's noise may no longer be that of the image before. A new search costs time and does no harm.
-_LOST = 0.1
+LOST = 0.1
 # Sectors of the running median, as for outliers (`stages.rings.validity`): five or more that leave it are
 # wall.
 _EXPECTED_SECTORS = 9
@@ -78,7 +78,7 @@ def trace_ring(
     only if they are brighter than other light of the picture.
     """
     found = None if before is None else follow_ring(image, sectors, before)
-    if found is None or before is None or found.coverage < before.coverage - _LOST:
+    if found is None or before is None or found.coverage < before.coverage - LOST:
         anew = discover_ring(image, sectors, clip_level)
         found = max((t for t in (found, anew) if t is not None), key=lambda t: t.coverage, default=None)
     return _without_other_light(found, image, sectors) if found is not None and found.coverage > 0 else None

@@ -102,7 +102,15 @@ def test_a_run_traces_all_frames_of_the_first_unit_in_either_order(tmp_path, bac
     assert coverage[1] > 0.95
 
 
-def as_recording(folder, backwards):
+def test_a_run_traces_pictures_lit_by_both_lights_whose_colours_differ(tmp_path):
+    """Of frame 2, by the mixture of channels learned from frame 11, a quarter was traced."""
+    recording = as_recording(tmp_path, False, "both")
+    probe = read_probe(tmp_path / "probe.yaml")
+    rings = extract_rings(recording, probe, RingParameters(), quiet_context())
+    assert (rings.validity == RingValidity.VALID).mean(1).min() > 0.85
+
+
+def as_recording(folder, backwards, light="laser"):
     """Write the frames, in an order in which neighbours differ much, as a recording with its probe."""
     (folder / "frames").mkdir()
     files = sorted(shared("real", "pipeblaser_cmu", "rings_v1").glob("*.png"), reverse=backwards)
@@ -122,7 +130,7 @@ def as_recording(folder, backwards):
         "standard_uncertainty": {"focal_px": 0.5, "centre_px": 0.5, "baseline_mm": 1.0},
     }  # fmt: skip
     (folder / "probe.yaml").write_text(yaml.safe_dump(values), "utf-8")
-    rows = [f"{k},{k / 10},laser" for k in range(len(files))]
+    rows = [f"{k},{k / 10},{light}" for k in range(len(files))]
     (folder / "frames.csv").write_text("\n".join(["frame,time_s,illumination", *rows]) + "\n", "utf-8")
     run = {"name": "rings", "kind": "inspection", "video": "frames/%06d.png", "frames": "frames.csv"}
     more = {"frame_rate": 10.0, "probe": "probe.yaml", "pipe": {"nominal_diameter_mm": 725.0}}
