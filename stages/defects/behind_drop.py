@@ -5,7 +5,8 @@ the line passes the finding then show the wall displaced there, and those taken 
 not. Displaced texture agrees better with these after a shift. Noise gains by the best of many shifts, too,
 and a wrong depth, pose or lens displaces texture at any time or all around. So the gain is compared with that
 of the other pictures at the same place, and with that of the same pictures at other places around the pipe:
-it counts only where it is larger than both.
+it counts only where it is larger than both. On a plain wall only the defect may have texture: no other place
+can then show that the pose was wrong, and nothing is told.
 """
 
 from __future__ import annotations
@@ -32,8 +33,9 @@ _HALF_MM, _PIXEL_MM, _SHIFT_PX, _LINE_MM, _BROAD_PX = 4.0, 0.25, 6, 1.5, 8.0
 # places: 8 around the pipe.
 _PASSING, _OTHERS, _LEAST_OTHERS, _READ, _FARTHEST_MM, _TURNS = 6, 8, 4, 12, 15.0, 8
 # The gain must be larger by this factor, and .01 at least. Of other places the upper quartile counts: more of
-# them may lie under drops. Debt: data/debts.md.
-_LARGER, _LEAST_GAIN, _UPPER = 2.0, 0.01, 0.75
+# them may lie under drops. Debt: data/debts.md. A plain wall is not seen to be displaced: places count whose
+# pictures agree, after the best shift, at least half as well as those of the finding (chosen).
+_LARGER, _LEAST_GAIN, _UPPER, _TEXTURED = 2.0, 0.01, 0.75, 0.5
 
 
 @dataclass(frozen=True)
@@ -65,7 +67,7 @@ def shows_drop(pictures: LitPictures, region: Region, relief: Relief) -> bool:
     around = columns.mean() + np.arange(-half, half, _PIXEL_MM / relief.cell_mm[1])
     turn = len(relief.azimuth_rad) / (_TURNS + 1)
 
-    def gains(k: int, places: range) -> list[tuple[float, float] | None]:
+    def gains(k: int, places: range) -> list[tuple[float, float, float] | None]:
         windows = (_window(relief, lit.line_mm[k], around + n * turn) for n in places)
         return [_gains(pictures, lit, k, _some(lit.beside(k), _OTHERS), window) for window in windows]
 
@@ -74,10 +76,11 @@ def shows_drop(pictures: LitPictures, region: Region, relief: Relief) -> bool:
     own = {k: gain for k, gain in found.items() if gain is not None}
     if not own:
         return False
-    there, at_other_times = np.median(list(own.values()), axis=0)
+    there, at_other_times, agrees = np.median(list(own.values()), axis=0)
     if there <= max(_LARGER * at_other_times, _LEAST_GAIN):
         return False  # as almost always: other places need not be compared
-    known = [[g[0] for g in gains(k, range(1, _TURNS + 1)) if g is not None] for k in own]
+    around_pipe = [[g for g in gains(k, range(1, _TURNS + 1)) if g is not None] for k in own]
+    known = [[g[0] for g in places if g[2] > _TEXTURED * agrees] for places in around_pipe]
     elsewhere = [np.quantile(gain, _UPPER) for gain in known if gain]
     return bool(elsewhere and there > _LARGER * np.median(elsewhere))
 
@@ -118,8 +121,10 @@ def _window(relief: Relief, line_mm: float, column: Float) -> tuple[Float, Float
 
 def _gains(
     pictures: LitPictures, lit: _Pictures, k: int, others: Int, window: tuple[Float, Float, Float, Float]
-) -> tuple[float, float] | None:
-    """Return what the picture ``k`` gains by a shift, and the median of the others; None if unseen.
+) -> tuple[float, float, float] | None:
+    """Return the gain of picture ``k`` by a shift, the median gain of others, and how well ``k`` then agrees.
+
+    None is returned if too few pictures show the window.
 
     The wall is taken with the measured relief or without it, whichever lets the others agree better.
     """
@@ -138,7 +143,8 @@ def _gains(
     _, own, known = max(seen, key=lambda each: each[0])
     used = np.abs(s - lit.line_mm[k]) > _LINE_MM * lit.both[k]
     total = known.sum(0)
-    return _gain(own, total, used), float(np.median([_gain(t, total - t, used) for t in known]))
+    gain, agrees = _gain(own, total, used)
+    return gain, float(np.median([_gain(t, total - t, used)[0] for t in known])), agrees
 
 
 def _texture(pictures: LitPictures, xyz_p: Float, image: Byte, T_cp: Float) -> Float32 | None:
@@ -154,11 +160,14 @@ def _texture(pictures: LitPictures, xyz_p: Float, image: Byte, T_cp: Float) -> F
     return np.asarray(grey - cv2.GaussianBlur(grey, (0, 0), _BROAD_PX), np.float32)
 
 
-def _gain(texture: Float32, others: Float32, used: Bool) -> float:
-    """Return by how much the correlation with the others (n, m) grows by the best shift, ``used`` alone."""
+def _gain(texture: Float32, others: Float32, used: Bool) -> tuple[float, float]:
+    """Return by how much the correlation with the others (n, m) grows by the best shift, and how large it is.
+
+    Only points that are ``used`` count.
+    """
     inner = (slice(_SHIFT_PX, -_SHIFT_PX),) * 2
     found = cv2.matchTemplate(
         others, texture[inner], cv2.TM_CCOEFF_NORMED, mask=used[inner].astype(np.float32)
     )
     found = np.nan_to_num(found)
-    return float(found.max() - found[_SHIFT_PX, _SHIFT_PX])
+    return float(found.max() - found[_SHIFT_PX, _SHIFT_PX]), float(found.max())

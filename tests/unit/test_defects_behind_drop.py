@@ -108,5 +108,13 @@ def test_a_camera_that_shakes_while_the_line_passes_a_pit_is_not_a_drop():
     assert not shows_drop(pictures(1.5, shaken), REGION, measured(1.5))
 
 
+def test_a_shaken_camera_makes_no_drop_of_the_only_texture_on_a_plain_wall(monkeypatch):
+    """No other place showed that the camera had moved, and a pit in smooth enamel was under a drop."""
+    row, column = np.arange(600) / 5 - 20, RADIUS * (np.arange(1440) / 720 - 1) * np.pi
+    near = np.exp(-((row[:, None] - 53.5) ** 4 + column**4) / 5**4)
+    monkeypatch.setattr(f"{__name__}.PAINT", (near * PAINT).astype(np.float32))
+    assert not shows_drop(pictures(1.5, shaken), REGION, measured(1.5))
+
+
 def test_what_goes_all_round_is_not_judged():
     assert not shows_drop(pictures(0.0, under_drop), replace(REGION, all_round=True), measured(0.4))
