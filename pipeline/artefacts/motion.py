@@ -68,13 +68,13 @@ class PipePiece:
     Attributes
     ----------
     kind : str
-        ``straight`` or ``bend``.
+        ``straight``, ``bend``, or ``undecided`` where the way is too short to tell them apart.
     from_mm, to_mm : float
         Distances along the axis.
     sigma_mm : float
         1 σ of each of these limits; for the ends of the run, of the distance between them.
     angle_rad, angle_sigma_rad : float
-        Angle by which the piece turns the pipe; 0 for a straight length.
+        Angle by which the piece turns the pipe; 0 for a straight length, NaN where undecided.
     toward_rad : float
         Azimuth in P toward which a bend turns; NaN for a straight length.
     radius_mm, radius_sigma_mm : float

@@ -107,7 +107,7 @@ _PIECE = (
 def write_centreline(trajectory: Trajectory, folder: Path) -> None:
     """Write ``centreline.csv``, ``.geojson`` and ``.dxf``, and ``route.csv``: straight lengths and bends."""
     distance, xyz, sigma = _points(trajectory)
-    pieces = trajectory.pieces or (PipePiece("straight", float(distance[0]), float(distance[-1]), math.nan),)
+    pieces = trajectory.pieces or (_undecided(float(distance[0]), float(distance[-1])),)
     with (folder / "centreline.csv").open("w", newline="", encoding="utf-8") as stream:
         rows = csv.writer(stream, lineterminator="\n")
         rows.writerow(_POINT)
@@ -132,6 +132,11 @@ def _points(trajectory: Trajectory) -> tuple[Float, Float, Float]:
     own = np.sqrt(np.diagonal(trajectory.covariance, axis1=1, axis2=2)[order, :3])
     sigma = np.stack([np.interp(distance, s[order], own[:, i]) for i in range(3)], -1)
     return distance, frames_at(trajectory.axis, distance)[0], sigma
+
+
+def _undecided(from_mm: float, to_mm: float) -> PipePiece:
+    """Return the whole way as one piece, where it is too short to tell a bend from a straight length."""
+    return PipePiece("undecided", from_mm, to_mm, math.nan, math.nan, math.nan)
 
 
 def _piece_at(pieces: tuple[PipePiece, ...], distance_mm: float) -> str:

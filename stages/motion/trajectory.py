@@ -126,7 +126,9 @@ def report_motion(
         context.report("difference of wall in photo and rings, shared", twice.size_mm, "mm")
         context.report("such a difference that noise alone may show, 1 σ", twice.noise_mm, "mm")
         context.report("stretches of the run that differ in it", len(trajectory.displaced), "")
-    _warn_of_texture(estimate.lasting, texture.poses, texture.store.spool.count, context)
+    encoder = bool(np.isfinite(trajectory.encoder_scale))
+    warn_of_lost_texture(texture.poses, texture.store.spool.count, encoder, context)
+    _warn_of_contradictions(estimate.lasting, context)
     _warn_of_trembling(trajectory, texture.poses, shakes, context)
     context.report("pipe radius", trajectory.radius_mm, "mm")
     context.report("encoder scale", trajectory.encoder_scale, "")
@@ -149,21 +151,26 @@ def report_steps(context: Context, steps: int, unsettled: int) -> None:
         )
 
 
-def _warn_of_texture(lasting: float, tracked: TrackedPoses, observations: int, context: Context) -> None:
-    """Warn where texture was lost, or where its matches contradict each other more than is usual."""
+def warn_of_lost_texture(tracked: TrackedPoses, observations: int, encoder: bool, context: Context) -> None:
+    """Warn where texture was lost, and say what then gives the motion; ``encoder``: whether there is one."""
     lost = tracked.frames[1:][tracked.lost[1:]]
+    known = "rings, encoder and smoothness" if encoder else "rings and smoothness"
+    distance = "distance depends on the encoder alone" if encoder else "distance is not measured"
     if len(lost) > _MOST_LOST * len(tracked.frames):
         context.warn(
             f"in {len(lost)} of {len(tracked.frames)} lit frames too little texture was found, first in "
-            f"frame {lost[0]}: there rings, encoder and smoothness give the motion. What to do: look at "
-            "these pictures; more light, a sharper lens or a slower pull show more texture"
+            f"frame {lost[0]}: there {known} give the motion. What to do: look at these pictures; more "
+            "light, a sharper lens or a slower pull show more texture"
         )
     elif not observations:
         context.warn(
-            "no place of the wall was seen again from picture to picture: distance depends on the encoder "
-            "alone, and roll is not measured. What to do: pull more slowly, record lit frames more often, or "
-            "light the wall better"
+            f"no place of the wall was seen again from picture to picture: {distance}, and roll is not "
+            "measured. What to do: pull more slowly, record lit frames more often, or light the wall better"
         )
+
+
+def _warn_of_contradictions(lasting: float, context: Context) -> None:
+    """Warn where matches of texture contradict each other more than is usual."""
     if lasting > MOST_LASTING:
         context.warn(
             f"matches of texture contradict the motion by {lasting:.1f} times their σ, in the same way in "

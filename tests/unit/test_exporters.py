@@ -167,3 +167,11 @@ def test_centreline(tmp_path: Path) -> None:
     assert [r["standard"] for r in route] == ["", "3 D", ""]
     assert float(route[1]["angle_deg"]) == pytest.approx(57.3, abs=0.01)
     assert float(route[1]["toward_clock"]) == pytest.approx((np.degrees(0.5) + 90) / 30, abs=1e-4)
+
+
+def test_a_way_too_short_for_a_decision_is_no_straight_length(tmp_path: Path) -> None:
+    """80 mm of a bend that turned by 17.5° were written as a straight length that turns by 0°."""
+    write_centreline(replace(chain(curved((80.0, 0.004, 0.0))).seen, pieces=()), tmp_path)
+    (piece,) = csv.DictReader((tmp_path / "route.csv").read_text().splitlines())
+    assert (piece["kind"], piece["angle_deg"], piece["angle_sigma_deg"]) == ("undecided", "", "")
+    assert float(piece["length_mm"]) > 70

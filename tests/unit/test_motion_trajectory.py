@@ -17,7 +17,7 @@ from pipeline.instrument.probe import Probe
 from stages.motion.cuts import beyond_cuts
 from stages.motion.stated_probe import report_instrument
 from stages.motion.tracking.landmarks import TrackedPoses
-from stages.motion.trajectory import SeenCentres, camera_trembles
+from stages.motion.trajectory import SeenCentres, camera_trembles, warn_of_lost_texture
 from tests.quiet import quiet_context
 
 COUNT = 20
@@ -202,3 +202,14 @@ def test_sigma_at_a_cut_is_at_least_the_distance_that_a_picture_shows_even_if_th
     found = beyond_cuts(run_of([5.0, 5.0, 5.0, 5.0]), (2,), 20.0)
     np.testing.assert_allclose(np.sqrt(found.covariance[:, 2, 2]), [0.1, 0.1, 20.0, 20.0], rtol=1e-4)
     assert found.distance_sigma_mm == pytest.approx(20.0, rel=1e-4)
+
+
+@pytest.mark.parametrize("encoder", [True, False])
+@pytest.mark.parametrize("lost", [True, False])
+def test_where_texture_is_lost_an_encoder_is_named_only_if_there_is_one(encoder: bool, lost: bool) -> None:
+    """A run without an encoder was told that rings and encoder give the motion."""
+    words: list[str] = []
+    poses = TrackedPoses(np.arange(9), np.tile(np.eye(4), (9, 1, 1)), np.full(9, lost))
+    warn_of_lost_texture(poses, 0, encoder, replace(quiet_context(), warn=words.append))
+    (text,) = words
+    assert ("encoder" in text) is encoder
