@@ -15,7 +15,6 @@ import numpy as np
 
 from pipeline.arrays import Byte, Float, Int
 from pipeline.artefacts.twin import Look, Mismatch, NamedFigure
-from pipeline.recording.base import Illumination
 from stages.twin.cells import sigmas
 from stages.twin.render import Region, Renderer
 from stages.twin.scene import Scene
@@ -25,8 +24,8 @@ Coloured = Iterable[tuple[int, Byte | None]]
 _FEW = 8
 """Most lit frames whose colours are compared: decoding colour takes three times as long."""
 _EVERY_PX, _BRIGHT, _CLIPPED = 8, 8.0, 250
-"""Spacing of the pixels that are compared, and the grey levels between which each of their colours lies:
-darker ones are changed by an error of the black level. Chosen."""
+"""Spacing of the pixels that are compared; grey levels above black from which each of their colours is, since
+an error of the black level changes darker ones; grey level from which a colour is clipped. Chosen."""
 _LEAST, _SURE, _FEWEST, _FEWEST_PIXELS = 0.1, 3.0, 4, 200
 """Least change of a colour's logarithm within a view that is reported, its σ from frame to frame, fewest
 frames and pixels. Chosen: sound recordings of another renderer leave up to .04."""
@@ -70,11 +69,12 @@ def _mismatch(colour: str, slopes: Float, look: Look) -> Mismatch:
 def _slopes(scene: Scene, renderer: Renderer, number: int, image: Byte) -> Float | None:
     """Return by how much ln of blue and of red over green grows ahead, beside those of the photo (2,)."""
     some = (slice(None, None, _EVERY_PX),) * 2
-    twin = renderer.frame(number, Illumination.LED)
-    seen = image[some].astype(float)
-    use = (twin.region[some] == Region.WALL) & (seen.min(-1) > _BRIGHT) & (seen.max(-1) < _CLIPPED)
+    # Under both lights the line is left out.
+    twin, black = renderer.frame(number, renderer.state.shows_wall[-1]), _black(renderer.state)
+    seen = image[some].astype(float) - black
+    use = (twin.region[some] == Region.WALL) & (seen.min(-1) > _BRIGHT) & (image[some].max(-1) < _CLIPPED)
     distance = twin.distance_mm[some][use]
-    photo = scene.reflectance.coloured(distance, twin.azimuth_rad[some][use]).astype(float)
+    photo = scene.reflectance.coloured(distance, twin.azimuth_rad[some][use]).astype(float) - black
     known = np.isfinite(photo).all(0) & (photo.min(0) > _BRIGHT)
     if known.sum() < _FEWEST_PIXELS:
         return None
@@ -84,6 +84,11 @@ def _slopes(scene: Scene, renderer: Renderer, number: int, image: Byte) -> Float
     lean = away - away.mean()
     each = (ratio[[0, 2]] - ratio[1]) @ lean / max(float(lean @ lean), 1e-9)
     return np.asarray(wide * each)
+
+
+def _black(state: PhotometricState) -> float:
+    """Return the black level, which each colour of frames and photo contains: it pales what is dark."""
+    return state.noise.black.value if np.isnan(state.photo_black) else state.photo_black
 
 
 def beside_colour(
