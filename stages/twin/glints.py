@@ -115,14 +115,15 @@ class SpotsOfFrames:
         # What touches the line is the line itself: displaced where the wall is elsewhere, or wide where it
         # clips.
         of_line = set(np.unique(label[cv2.dilate(line, np.ones((3, 3), np.uint8)) > 0]).tolist())
-        found = []
+        found, recorded = [], twin.level + more
         for k in sorted(set(range(1, count)) - of_line):
             left, top, width, height, area = (int(x) for x in stats[k])
             if not _PIXELS[0] <= area <= _PIXELS[1]:
                 continue
             box, at = (slice(top, top + height), slice(left, left + width)), centre[k].astype(int)[::-1]
+            wide = _about(box)
             grey = float(more[box][label[box] == k].mean())
-            if not _stands_out(label == k, box, grey, twin.level + more, known):
+            if not _stands_out(label[wide] == k, grey, recorded[wide], known[wide]):
                 continue
             wall = self._on_wall(twin.distance_mm[tuple(at)], twin.azimuth_rad[tuple(at)])
             image = float(centre[k][0]), float(centre[k][1])
@@ -231,20 +232,23 @@ class SpotsOfFrames:
         ),)  # fmt: skip
 
 
-def _stands_out(spot: Bool, box: tuple[slice, slice], grey: float, recorded: Float32, known: Bool) -> bool:
-    """Return whether a spot (H, W) of excess ``grey`` stands out in the recorded picture as well.
+def _about(box: tuple[slice, slice]) -> tuple[slice, slice]:
+    """Return a spot's box and what lies within half its size, or at least `_BESIDE_PX`, around it."""
+    reach = max(_BESIDE_PX, *((s.stop - s.start) // 2 for s in box))
+    down, right = (slice(max(s.start - reach, 0), s.stop + reach) for s in box)
+    return down, right
+
+
+def _stands_out(spot: Bool, grey: float, recorded: Float32, known: Bool) -> bool:
+    """Return whether a spot of excess ``grey`` in a cut-out (h, w) stands out in the recorded picture, too.
 
     A glint does. Wall that only its photo shows too dark, made through a shade on the window, is as bright as
     other wall around it.
     """
-    reach = max(_BESIDE_PX, *((s.stop - s.start) // 2 for s in box))
-    wide = tuple(slice(max(s.start - reach, 0), s.stop + reach) for s in box)
-    near = cv2.dilate(spot[wide].astype(np.uint8), np.ones((2 * reach + 1,) * 2, np.uint8)) > 0
-    around = recorded[wide][near & ~spot[wide] & known[wide]]
+    around = recorded[~spot & known]
     if len(around) < _PIXELS[0]:
         return True
-    usual = float(np.quantile(around, _ORDINARY))
-    return float(recorded[wide][spot[wide]].mean()) - usual > _OF_EXCESS * grey
+    return float(recorded[spot].mean()) - float(np.quantile(around, _ORDINARY)) > _OF_EXCESS * grey
 
 
 def _frames_of(spots: Sequence[Spot]) -> int:
