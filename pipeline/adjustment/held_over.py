@@ -2,8 +2,9 @@
 
 Speckle, shot noise and texture finer than the distance of two rings differ in every ring. If they are the
 same at the same place of the image, a codec has repeated old light: such rings share their errors, so that
-neither their scatter nor their number shows their uncertainty. The wall's own shape has no influence, because
-it is wider than the compared structure.
+neither their scatter nor their number shows their uncertainty. Errors that stay at one place of the image do
+the same where the line hardly moves in it; they are not told apart. The wall's own shape has no influence,
+because it is wider than the compared structure.
 """
 
 from __future__ import annotations

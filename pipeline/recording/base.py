@@ -247,6 +247,8 @@ class Recording:
     stays : (h, w) bool or None
         Pixels of the lit pictures, reduced by a whole factor, at which something stays while the wall moves;
         None if there are none, or if they were not examined.
+    predicted : bool
+        Whether a codec may repeat light of other pictures: not if each is coded alone, or without loss.
     """
 
     name: str
@@ -265,6 +267,7 @@ class Recording:
     inspection: InspectionFacts = InspectionFacts()
     imu: Imu | None = None
     stays: Bool | None = None
+    predicted: bool = False
 
     def read(self, frames: Sequence[int] | Int, planes: Planes) -> Iterator[tuple[int, Image | None]]:
         """See `FrameSource.read`."""

@@ -250,6 +250,7 @@ def assembled(section: Section, frames_file: Path, parts: FolderParts) -> Record
         listed=table,
         inspection=described.inspection,
         imu=parts.imu,
+        predicted=isinstance(parts.source, VideoSource) and parts.source.index.predicted,
     )  # fmt: skip
 
 

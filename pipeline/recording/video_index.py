@@ -45,6 +45,8 @@ class VideoIndex:
         Numbers of unreliable frames: with a wrong checksum, or predicted from frames that the file lacks.
     expendable : (N,) bool
         Frames that no other frame is predicted from: they need not be decoded unless they are wanted.
+    predicted : bool
+        Whether a lossy codec predicts frames from others, so that they may repeat light of these.
     """
 
     pts: Int
@@ -54,6 +56,7 @@ class VideoIndex:
     timed: bool
     broken: Int
     expendable: Bool
+    predicted: bool
 
     @property
     def intra(self) -> bool:
@@ -131,6 +134,7 @@ def index_of(
     timed = times_kept and all(p.pts is not None for p in packets)
     pts = np.array([p.pts for p in packets] if timed else range(len(packets)), np.int64)
     order = np.argsort(pts, kind="stable")
+    codec = stream.codec_context.codec
     key = np.array([timed and p.key for p in packets], bool)[order]
     free = np.array([not p.reference for p in packets], bool)[order]
     intact = np.array([p.sound for p in packets], bool)[order]
@@ -142,6 +146,7 @@ def index_of(
         timed=timed,
         broken=np.flatnonzero(~intact & intact.any()),
         expendable=free | bool(key.all()),
+        predicted=codec.lossy and not codec.intra_only and not key.all(),
     )
 
 

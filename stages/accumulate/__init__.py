@@ -10,8 +10,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from pydantic import Field
 
-from pipeline.adjustment.held_over import held_over
-from pipeline.adjustment.shared_light import HeldOver
 from pipeline.arrays import Float
 from pipeline.artefacts.findings import clock_of_azimuth
 from pipeline.artefacts.measured import RingPoints, RingSamples, RingValidity, Trajectory, Wall
@@ -22,9 +20,11 @@ from pipeline.geometry.axis import roll_at
 from pipeline.instrument.probe import Probe
 from pipeline.machine.stage import Context, Parameters, Stage
 from pipeline.pages import notation
+from pipeline.recording.base import Recording
 from stages.accumulate.displaced import displaced_on, warn_of_displaced
 from stages.accumulate.fixed import fixed_to_probe
 from stages.accumulate.grid import MapGrid, map_grid
+from stages.accumulate.held import held_in, warn_of_held
 from stages.accumulate.rival import rival_on
 from stages.accumulate.shared_errors import shared_on_wall, warn_of_left_out
 from stages.accumulate.stretch import cut_stretches, empty_wall, fill, map_of
@@ -159,7 +159,7 @@ def accumulate_wall(
     shared = shared_on_wall(on_wall, grid, parameters.largest_gap_mm, context.scratch)
     rival = rival_on(grid, on_wall, survey)
     fixed = fixed_to_probe(survey, rings.frame, trajectory.radius_mm, grid, context.scratch)
-    held = _held_in(rings, survey, trajectory.radius_mm)
+    held = held_in(rings, survey, trajectory.radius_mm)
     wall = empty_wall(grid, survey, trajectory.axis, fixed, context.scratch)
     displaced = displaced_on(grid, trajectory, rings.frame, survey)
     radius_map = replace(wall.radius_map, displaced_mm=displaced)
@@ -182,31 +182,9 @@ def accumulate_wall(
     _judge_radii(wall, trajectory, context)
     _report(context, wall, spread)
     warn_of_displaced(trajectory, wall, context)
-    warn_of_held(held, context)
     _warn_of_fixed(fixed, context)
     warn_of_unmeasured(wall.radius_map, trajectory.radius_mm, gap_mm, survey.middle_mm, context)
     return wall
-
-
-def _held_in(rings: RingSamples, survey: RingSurvey, radius_mm: float) -> HeldOver:
-    """Return the share of the line's light that a codec repeated, from its height, width and position."""
-    lines = (np.log(np.maximum(rings.amplitude, 1.0)), rings.width_px, rings.radius_px)
-    known = [np.where(rings.valid, line, np.nan).astype(float) for line in lines]
-    return held_over(known, survey.middle_mm, 2 * np.pi * radius_mm / len(rings.azimuth_rad))
-
-
-def warn_of_held(held: HeldOver, context: Context) -> None:
-    """Report the correlation of neighbouring rings' finest structure, and warn of a codec that repeats it."""
-    alike = float(held.likeness[1:2].sum())
-    context.report("correlation of neighbouring rings in their finest structure", alike, "")
-    if held.more_than_usual:
-        context.warn(
-            f"neighbouring rings share {100 * alike:.0f} % of the line's finest structure (good recordings: "
-            "16 % at most): the codec, or a noise filter, repeats light of earlier pictures. The σ of radii "
-            "includes this, and such rings count as one when they confirm a finding. But single findings may "
-            "be false, and small pits may be missed or too shallow, which their σ includes. What to do: look "
-            "at the picture of every finding, record with less compression and without noise reduction"
-        )
 
 
 def _warn_of_fixed(fixed: FixedToProbe | None, context: Context) -> None:
@@ -275,10 +253,25 @@ def _report(context: Context, wall: Wall, spread: CalibrationSpread) -> None:
     context.report("1 σ of the radius, calibration, median", float(np.median(spread.sigma_mm)), "mm")
 
 
+def _wall_of_run(
+    recording: Recording,
+    probe: Probe,
+    rings: RingSamples,
+    points: RingPoints,
+    trajectory: Trajectory,
+    parameters: AccumulateParameters,
+    context: Context,
+) -> Wall:
+    """Accumulate a run's wall, and warn of rings that share light, in words that fit its recording."""
+    wall = accumulate_wall(probe, rings, points, trajectory, parameters, context)
+    warn_of_held(wall.held, recording.predicted, context)
+    return wall
+
+
 ACCUMULATE = Stage(
     "accumulate",
-    "26",
+    "27",
     AccumulateParameters,
-    accumulate_wall,
+    _wall_of_run,
     "point cloud and radius map around the pipe's own axis, with σ",
 )

@@ -73,14 +73,14 @@ def warn_of_missed(smallest_mm: float, asked_mm: float, context: Context) -> Non
 
 
 def warn_of_short_ones(held: HeldOver, ring_spacing_mm: float, context: Context) -> None:
-    """Warn where the codec repeats so much light that a short defect is not seen by two independent rings."""
+    """Warn where rings share so much light that a short defect is not seen by two independent ones."""
     enough = (n for n in range(LEAST_RINGS, _MOST_RINGS) if held.independent(n) >= LEAST_RINGS)
     rings = next(enough, _MOST_RINGS)
     length_mm = rings * ring_spacing_mm
     if length_mm > _SHORT_MM and rings > LEAST_RINGS:
         context.warn(
-            f"the codec repeats so much light that {rings} rings in a row are worth no more than "
-            f"{LEAST_RINGS} of a good recording: defects shorter than {length_mm:.2g} mm along the pipe "
-            "count only where the photo also shows them, and are unconfirmed elsewhere. What to do: record "
-            "with less compression"
+            f"neighbouring rings share so much that {rings} in a row are worth no more than {LEAST_RINGS} "
+            f"of a good recording: defects shorter than {length_mm:.2g} mm along the pipe count only where "
+            "the photo also shows them, and are unconfirmed elsewhere. What to do: record with less "
+            "compression and without noise reduction"
         )

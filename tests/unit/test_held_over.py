@@ -14,8 +14,8 @@ import pytest
 from pipeline.adjustment.held_over import held_over
 from pipeline.adjustment.shared_light import HeldOver
 from pipeline.arrays import Float
-from stages.accumulate import warn_of_held
 from stages.accumulate.grid import MapGrid, RingColumns, gridded
+from stages.accumulate.held import warn_of_held
 
 if TYPE_CHECKING:
     from pipeline.machine.stage import Context
@@ -74,9 +74,20 @@ def test_a_mean_of_rings_with_shared_errors_is_less_sure() -> None:
 def test_findings_get_a_warning_where_rings_are_correlated(held: float) -> None:
     told: list[str] = []
     context = SimpleNamespace(report=lambda *_: None, warn=told.append)
-    warn_of_held(HeldOver(held ** np.arange(17.0)), cast("Context", context))
+    warn_of_held(HeldOver(held ** np.arange(17.0)), True, cast("Context", context))
     assert [w for w in told if "45 % of the line's finest structure" in w] == told
     assert len(told) == (held > 0.3)
+
+
+@pytest.mark.parametrize("predicted", [True, False])
+def test_the_codec_is_not_the_cause_where_it_codes_each_picture_alone(predicted: bool) -> None:
+    """Rings of pictures stored as single JPEGs shared 24 and 33 %: "the codec repeats light"."""
+    told: list[str] = []
+    context = SimpleNamespace(report=lambda *_: None, warn=told.append)
+    warn_of_held(HeldOver(0.33 ** np.arange(17.0)), predicted, cast("Context", context))
+    assert ("the codec, or a noise filter, repeats" in told[0]) == predicted
+    assert ("the codec, which keeps each picture apart" in told[0]) != predicted
+    assert "same places of the image" in told[0]
 
 
 def columns_with(held: float, sigma_mm: float) -> RingColumns:

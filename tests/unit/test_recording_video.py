@@ -34,6 +34,19 @@ def _made(folder: Path, name: str) -> VideoSource:
     return open_video(folder / f"v.{ext}")
 
 
+@pytest.mark.parametrize("name", ENCODINGS)
+def test_only_lossy_codecs_that_predict_pictures_may_repeat_light(tmp_path: Path, name: str) -> None:
+    assert _made(tmp_path, name).index.predicted == name.startswith(("H.264", "HEVC"))
+
+
+@pytest.mark.parametrize("group", ["1", "4"])
+def test_a_recording_states_whether_its_pictures_are_predicted(tmp_path: Path, group: str) -> None:
+    """H.264 that codes each picture alone repeats nothing."""
+    folder = write_folder(tmp_path / "r", "v.mkv")
+    write_video(folder / "v.mkv", "libx264", "yuv420p", {"g": group})
+    assert open_recording(folder).predicted == (group != "1")
+
+
 def _decoded(path: Path) -> list[av.VideoFrame]:
     with av.open(str(path)) as container:
         return list(container.decode(video=0))
