@@ -9,6 +9,7 @@ import numpy as np
 
 from pipeline.adjustment.robust import root_mean_square as rms
 from pipeline.arrays import Byte, Float
+from pipeline.physics.effect import FixedTo
 from pipeline.recording.base import Recording
 from stages.diagnose.channels import Seen
 from stages.diagnose.correct import ENCODER_EFFECTS, Correction
@@ -16,7 +17,7 @@ from stages.diagnose.effects.base import EffectModel, Shape
 from stages.diagnose.effects.courses import of_own_clock
 from stages.diagnose.field.run import FieldRun
 from stages.diagnose.gauge.examine import Examined
-from stages.diagnose.gauge.run import Term
+from stages.diagnose.gauge.run import Term, pattern_of
 from stages.diagnose.residual import (
     RingResidual,
     azimuths_rad,
@@ -30,6 +31,7 @@ from stages.diagnose.travel.model import TravelFit
 # A frame is shown only if it has this share of the bins of the fullest ring: chosen, so that the picture
 # shows the pattern all round.
 _MOST_OF_BINS = 0.8
+_OF_GAUGE = (FixedTo.PIPE, FixedTo.GRAVITY)
 
 Linear = tuple[tuple[EffectModel, Shape, Float], ...]
 
@@ -139,9 +141,13 @@ def _in_field(
 
 
 def _beyond_probe(terms: Sequence[Term], correction: Correction | None) -> Linear:
-    """Return the effects found that a probe file cannot express."""
+    """Return the effects found that a probe file cannot express, and that the inspection shares.
+
+    What keeps its azimuth in the gauge has another in the inspection, whose frame P has another roll.
+    """
     beyond = correction.inexpressible if correction is not None else ()
-    return tuple((t.model, t.shape, t.amplitude) for t in terms if t.model.name in beyond)
+    shared = [t for t in terms if t.model.name in beyond and pattern_of(t)[0] not in _OF_GAUGE]
+    return tuple((t.model, t.shape, t.amplitude) for t in shared)
 
 
 @dataclass(frozen=True)

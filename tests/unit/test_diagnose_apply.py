@@ -8,7 +8,11 @@ import pytest
 
 from pipeline.api.diagnosis.apply import GeometryChange, consequence, geometry_change
 from pipeline.recording.base import Encoder, FrameTable, PipeFacts, Recording
+from stages.diagnose.compared import _beyond_probe
 from stages.diagnose.correct import Correction, encoder_effects, with_true_readings
+from stages.diagnose.effects.library import LIBRARY
+from stages.diagnose.effects.nameless import VOCABULARY
+from stages.diagnose.gauge.run import Term
 from stages.diagnose.residual import AZIMUTHS, RingResidual, azimuths_rad, wall_distances_mm
 from stages.diagnose.result import EffectFound, Value
 from tests.unit.wall_points import plain_probe
@@ -141,3 +145,15 @@ def test_what_a_probe_file_cannot_express_is_told_without_internal_names():
     found = "laser_tilt, step", "generic_line_1_2_hangs", "generic_line_0_3", "sheet_waviness 2, ramp"
     told = Correction(plain_probe(), (), found).beyond_probe
     assert told == "laser_tilt, step and a pattern without a known cause and sheet_waviness 2, ramp"
+
+
+def test_what_keeps_its_azimuth_in_the_pipe_of_a_gauge_run_is_not_subtracted_in_the_inspection():
+    """P has another roll in each recording: what hung at 90° in the gauge run may hang at −40° there."""
+    patterns = {m.name: m for m, _ in VOCABULARY}
+    models = (
+        LIBRARY["tube_wedge"],
+        *(patterns[n] for n in ("generic_line_1_2_hangs", "generic_wall_2_0", "generic_line_1_2")),
+    )
+    terms = [Term(m, (), np.ones(len(m.amplitudes))) for m in models]
+    linear = _beyond_probe(terms, Correction(plain_probe(), (), tuple(m.name for m in models)))
+    assert [m.name for m, *_ in linear] == ["tube_wedge", "generic_line_1_2"]
