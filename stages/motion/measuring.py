@@ -121,10 +121,11 @@ def _warn_of_repetition(texture: TrackedTexture, context: Context) -> None:
         return
     context.warn(
         f"the texture of the wall repeats along the pipe, and there is no encoder: in {texture.ambiguous} of "
-        f"{lit} lit frames another step, longer or shorter by one period, fits the pictures as well. The "
-        "nearest step was taken; distances may be wrong by one period for each of these frames, which their "
-        "σ does not include. What to do: record with an encoder, or let the probe move by less than half a "
-        "period between two lit frames"
+        f"{lit} lit frames another step, longer or shorter by one period, fits the pictures as well, or the "
+        "picture before was lost. Distances are right only if the probe moved by less than half a period "
+        "between lit frames; otherwise each of these frames may be wrong by one period, which the σ of "
+        "distances does not include. What to do: record with an encoder, or compare the distance with a "
+        "known one"
     )
 
 

@@ -43,12 +43,12 @@ def picture(at_mm: float, pattern: float, spots: Float) -> Image:
     return softened(np.clip(np.round(image), 0, 255).astype(np.uint8))
 
 
-def followed(pattern: float, spots: Float) -> TrackedTexture:
-    """Return four pictures followed by a predictor that knows nothing but the last pose."""
+def followed(pattern: float, spots: Float, step_mm: float = STEP_MM, frames: int = 4) -> TrackedTexture:
+    """Return pictures followed by a predictor that knows nothing but the last pose."""
     tracker, T_pc = TextureTracker(PROBE, GRID, PARAMETERS, Hidden()), np.eye(4)
     with ThreadPoolExecutor(1) as aside:
-        for frame in range(4):
-            T_pc = tracker.follow(frame, picture(frame * STEP_MM, pattern, spots), T_pc, aside)
+        for frame in range(frames):
+            T_pc = tracker.follow(frame, picture(frame * step_mm, pattern, spots), T_pc, aside)
     return tracker.result()
 
 
@@ -61,6 +61,13 @@ def test_marks_that_do_not_repeat_decide_between_steps(contrast: float) -> None:
 
 def test_where_nothing_else_is_on_the_wall_the_step_is_ambiguous() -> None:
     assert followed(0.3, marks(0.0)).ambiguous == 3
+
+
+def test_steps_behind_lost_pictures_of_a_wall_that_repeats_are_ambiguous() -> None:
+    """Every other picture was lost, each step between found ones was a period short, and nothing was told."""
+    found = followed(0.3, marks(0.0), 6.0, 8)
+    assert found.poses.lost[2::2].all()
+    assert found.ambiguous >= 3
 
 
 def test_a_wall_that_does_not_repeat_is_not_ambiguous() -> None:

@@ -120,9 +120,10 @@ class EncoderScale:
         context.warn(
             f"by the wall's texture the encoder's scale differs by {100 * self.uneven:.2f} % (1 σ) "
             f"between stretches of the run, more than the {100 * self.stated_sigma:.2f} % by which it may "
-            "be wrong as a whole: the wheel creeps, or the clocks of encoder and pictures differ. σ of "
-            "distances includes it. What to do: clean the wheel and press it to the wall, compare the clocks "
-            "of encoder.csv and frames.csv, compare the distance with a known one"
+            "be wrong as a whole: the wheel creeps, follows the outer or inner wall of a bend, or its clock "
+            "is not that of the pictures. σ of distances includes it. What to do: clean the wheel and press "
+            "it to the wall, compare the clocks of encoder.csv and frames.csv, compare the distance with a "
+            "known one"
         )
 
     def _warn_of_doubt(self, context: Context) -> None:

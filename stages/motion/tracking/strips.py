@@ -125,6 +125,12 @@ class Strip:
         low = g[m + 1, n].astype(np.float64) * (1 - b) + g[m + 1, n + 1] * b
         return np.asarray(top * (1 - a) + low * a)
 
+    def px_per_sample(self, at: Float) -> Float:
+        """Return image px (N,) per strip sample at strip positions (N, 2), rms of both directions."""
+        du = self.pixel(at[:, 0] + 1, at[:, 1]) - self.pixel(at[:, 0], at[:, 1])
+        dv = self.pixel(at[:, 0], at[:, 1] + 1) - self.pixel(at[:, 0], at[:, 1])
+        return np.asarray(np.sqrt((np.sum(du * du, 1) + np.sum(dv * dv, 1)) / 2))
+
 
 @dataclass(frozen=True)
 class Hidden:

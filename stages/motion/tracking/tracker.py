@@ -16,7 +16,7 @@ from pipeline.machine.scratch import Scratch
 from stages.motion.encoder import PosePredictor
 from stages.motion.parameters import MotionParameters
 from stages.motion.tracking.landmarks import LandmarkMap, ObservationStore, TrackedPoses, Tracks
-from stages.motion.tracking.overlap import displacement, repeats, rival_of
+from stages.motion.tracking.overlap import Rival, displacement, repeats, rival_of
 from stages.motion.tracking.patches import best_of_cells, cornerness, cut, whole_patches
 from stages.motion.tracking.strips import Hidden, Strip, StripGrid, unroll
 
@@ -179,6 +179,8 @@ class TextureTracker:
             other = unroll(image, self._probe, T_moved, self._grid, self._hidden.at(frame))
             found_there = self._matched(other, frame)
             if found_there.agreeing > _FEWEST_AGREEING:
+                if self._repeating and found.agreeing < _FEWEST_AGREEING:
+                    self._rival(other, found_there)
                 return T_moved, other, found_there
         return T_pc, strip, found
 
@@ -186,16 +188,25 @@ class TextureTracker:
         """Return the displacement (2,) of the strip as a whole; None if what was found is beyond doubt."""
         if self._last is None:
             return None
+        if len(self._poses) % _LOOKED_EVERY == 1:
+            self._repeating = repeats(self._last, self._map.half)
         if found.agreeing < _FEWEST_AGREEING:
             return self._last_drift + displacement(self._last, strip)
-        apart = self._map.half
-        if len(self._poses) % _LOOKED_EVERY == 1:
-            self._repeating = repeats(self._last, apart)
         if not self._repeating and found.agreeing > _SURELY_AGREEING:
             return None
-        rival = rival_of(found.drift[0] - self._last_drift[0], self._last, strip, apart)
-        self._ambiguous += rival.fits_as_well
+        rival = self._rival(strip, found)
         return np.array([rival.shift + self._last_drift[0], found.drift[1]]) if rival.fits_better else None
+
+    def _rival(self, strip: Strip, found: _Matched) -> Rival:
+        """Return the step that fits best beside the one found; count it if nothing decides between the two.
+
+        Behind a picture that was lost the last strip does not, since where it has the wall is not known.
+        """
+        assert self._last is not None
+        rival = rival_of(found.drift[0] - self._last_drift[0], self._last, strip, self._map.half)
+        behind_lost = len(self._poses) > 1 and self._poses[-1][2]
+        self._ambiguous += rival.fits_as_well or (self._repeating and behind_lost)
+        return rival
 
     def _matched(self, strip: Strip, frame: int) -> _Matched:
         """Match every landmark that should be in the strip."""
@@ -236,7 +247,7 @@ class TextureTracker:
             m.retired[index] = True
             return
         at = found.at[good]
-        sigma = np.maximum(found.sigma[good], _LEAST_SIGMA) * _px_per_sample(strip, at)
+        sigma = np.maximum(found.sigma[good], _LEAST_SIGMA) * strip.px_per_sample(at)
         start = np.stack([m.row, m.column], -1)[index]
         self._store.add(m.number[index], frame, strip.pixel(at[:, 0], at[:, 1]), sigma, start)
         m.offset[index] += found.offset[good] - found.drift
@@ -290,10 +301,3 @@ class TextureTracker:
         out = step @ T_pc
         out[2, 3] = T_pc[2, 3] - drift[0] * self._grid.step_mm
         return np.asarray(out)
-
-
-def _px_per_sample(strip: Strip, at: Float) -> Float:
-    """Return image px (N,) per strip sample at strip positions (N, 2), rms of both directions."""
-    du = strip.pixel(at[:, 0] + 1, at[:, 1]) - strip.pixel(at[:, 0], at[:, 1])
-    dv = strip.pixel(at[:, 0], at[:, 1] + 1) - strip.pixel(at[:, 0], at[:, 1])
-    return np.asarray(np.sqrt((np.sum(du * du, 1) + np.sum(dv * dv, 1)) / 2))
