@@ -13,6 +13,7 @@ from pipeline.arrays import Float
 from pipeline.physics.catalogue import EFFECTS
 from pipeline.physics.effect import CourseKind
 from stages.diagnose.effects.base import EffectModel, Shape
+from stages.diagnose.effects.nameless import Nameless
 from stages.diagnose.inference import DEGREES, UNKNOWN
 from stages.diagnose.result import Confirmation, Value
 
@@ -162,9 +163,8 @@ def turn_deg(model: EffectModel, shape: Shape, amplitude: Float) -> float:
     """Return the angle after which a direction means the same again: a swing has two, m waves have m."""
     if model.kind is CourseKind.SINUSOID:
         return 180.0
-    known = EFFECTS.get(model.law)
-    harmonic = known.harmonic if known is not None else None
-    return 360.0 / max(model.quantities(shape, amplitude).get("order", harmonic or 1), 1)
+    known = model if isinstance(model, Nameless) else EFFECTS[model.law]
+    return 360.0 / max(model.quantities(shape, amplitude).get("order", known.harmonic or 1), 1)
 
 
 def drawn(

@@ -11,6 +11,7 @@ import pytest
 
 from stages.diagnose.agreement import chance_of_name, drawn, sized, turn_deg
 from stages.diagnose.effects.library import LIBRARY
+from stages.diagnose.effects.nameless import GENERIC
 from tests.diagnosed import AGREES, DIFFERS
 
 
@@ -51,11 +52,12 @@ def test_another_recording_confirms_a_name_beside_the_halves_of_the_first() -> N
         ("sheet_waviness", (3.0,), [-1e-3, 1e-6], 120.0),
         ("sheet_waviness", (2.0,), [-1e-3, 1e-6], 180.0),
         ("laser_tilt", (), [-6e-3, 1e-6], 360.0),
+        ("generic_line_2_1", (), [-0.05, 1e-6], 180.0),
     ],
 )
 def test_a_direction_at_the_edge_of_its_range_is_as_well_known_as_any(name, shape, amplitude, turn) -> None:
     """A sheet rocking toward 88.0° was told to rock toward -90.6 ± 110.8°, which is 89.4 ± 1.4°."""
-    model = LIBRARY[name]
+    model = (LIBRARY | {m.name: m for m in GENERIC})[name]
     middle = np.array(amplitude)
     assert turn_deg(model, shape, middle) == turn
     covariance = (0.01 * np.linalg.norm(middle)) ** 2 * np.eye(len(middle))
