@@ -229,7 +229,7 @@ def compared_with(
     placed, beside = beside_sectors((*on_window, *of_wall, *glints), (*over_time, *slow), scene.ring, samples)
     placed, of_side = beside_dark_side(placed, over_time, samples, scene)
     of_whole = (*photometry.pixels, *whole, *clipped(rings, state.line_clipped, comparison.clipped_share))
-    found: tuple[Mismatch, ...] = (*over_time, *placed, *dark_spots(samples), *of_whole)
+    found: tuple[Mismatch, ...] = (*over_time, *placed, *dark_spots(samples, clear), *of_whole)
     fall, unnamed_map = left_over(None if samples is None else samples.seen_through(state.gain_map))
     comparison.after[Region.WALL] -= fall
     _report(comparison, found, context)
@@ -284,7 +284,7 @@ PHOTOMETRY = Stage(
 )
 TWIN = Stage(
     "twin",
-    "68",
+    "69",
     TwinParameters,
     compare_with_twin,
     "recorded frames beside the same frames, re-rendered from what the run has measured",

@@ -6,6 +6,8 @@ laser that is shaded now and then, follows none of them. Both are located withou
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import cv2
 import numpy as np
 
@@ -23,10 +25,15 @@ block and of the line. A sound recording of another renderer had one block of 24
 of squares from which other blocks predict a spot, and of the frames from which a sector is dim. Chosen."""
 
 
-def dark_spots(samples: BlockSamples | None) -> tuple[Mismatch, ...]:
-    """Return spots of lit wall that are dark in several frames and are fixed neither to image nor to wall."""
+def dark_spots(samples: BlockSamples | None, found: Sequence[Mismatch] = ()) -> tuple[Mismatch, ...]:
+    """Return spots of lit wall that are dark in several frames and are fixed neither to image nor to wall.
+
+    Blocks at places of the image where something else was ``found`` do not count: texture that a drop
+    displaces leaves dark fragments, each frame others.
+    """
     if samples is None:
         return ()
+    samples = samples.clear_of(found)
     dark = (samples.strength < -_SIGMA) & (samples.change < -_LEAST_DARK)
     use = np.zeros(len(dark), bool)
     for k in np.unique(samples.frame[dark]):

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from pipeline.artefacts.twin import Mismatch, NamedFigure
 from pipeline.instrument.probe import Lighting
 from stages.twin.at_times import dark_spots
 from stages.twin.causes import causes
@@ -39,6 +40,26 @@ def test_a_dark_spot_that_crawls_is_told_and_one_that_stays_is_not():
     assert dark_spots(_samples(lambda f, r, c, a: _at(a, c, 16, 16))) == ()
     assert dark_spots(_samples(lambda f, r, c, a: np.zeros(len(f)))) == ()
     assert dark_spots(None) == ()
+
+
+def test_dark_fragments_of_texture_in_a_drop_are_no_spot_that_moves():
+    """Beside a drop that was found, a spot was told that moves: each frame has dark fragments elsewhere."""
+    drop = Mismatch("droplet", "intensity", "image", _disc(130.0, 100.0, 24.0), (), 0.0, 2.0, 1.0, "It is.")
+    turn = 2.4 * np.arange(FRAMES)
+
+    def in_drop(f, r, c, a):
+        return _at(r, c, 12 + 2 * np.sin(turn)[f], 16 + 2 * np.cos(turn)[f])
+
+    assert len(dark_spots(_samples(in_drop))) == 1
+    assert dark_spots(_samples(in_drop), (drop,)) == ()
+    crawls = _samples(lambda f, r, c, a: in_drop(f, r, c, a) + _at(r, c, 20, 4 + 2.5 * f))
+    (spot,) = dark_spots(crawls, (drop,))
+    assert "In 10 of 10 lit frames" in spot.statement
+
+
+def _disc(*value):
+    names = ("u_px", "v_px", "radius_px")
+    return tuple(NamedFigure(n, v, 1.0, "px") for n, v in zip(names, value, strict=True))
 
 
 @pytest.mark.parametrize(("frames", "told"), [((2, 5, 6, 11), 1), ((5,), 0), (range(14), 0)])
