@@ -73,7 +73,7 @@ def causes(
     """Return causes of changes over time and along the line, from the cells of each light's frames.
 
     Second are withdrawn ones: a side that darkens, but not at once. ``samples`` tell from which frames the
-    wall's photo was made.
+    wall's photo was made, and whether a step is alike all over the picture.
     """
     found: list[Mismatch] = []
     slow: list[Mismatch] = []
@@ -95,7 +95,7 @@ def causes(
         found += dim_at_times(cells, base, ring) if light == "laser" else ()
         if unsure is not None and unsure[0].probability <= FALSE_ALARM:
             slow.append(slow_side(unsure[0], _lost(unsure[0]), cells, ring))
-    return (*steps_named(steps, lit, line, ring), *found), tuple(slow)
+    return (*steps_named(steps, lit, line, ring, samples), *found), tuple(slow)
 
 
 def _chosen(

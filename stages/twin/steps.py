@@ -10,6 +10,7 @@ from pipeline.arrays import Bool, Float, Int
 from pipeline.artefacts.twin import Mismatch, NamedFigure
 from stages.twin.cells import SECTORS, Cells, Fitted, Law, best_column
 from stages.twin.laws import sectors_and_drift, steps_of
+from stages.twin.reference import BlockSamples
 from stages.twin.scene import Ring
 
 FEWEST_FRAMES, _BESIDE = 6, 3
@@ -26,7 +27,14 @@ be usable for it to count. Chosen."""
 _HALVES = (np.arange(SECTORS) - np.arange(0, SECTORS, _SIDES_APART)[:, None]) % SECTORS < SECTORS // 2
 """(H, S) sectors in each half of the picture."""
 OWN_STEP = {"LEDs": "lamp_step", "laser": "laser_step"}
+_FEWEST_BLOCKS, _PARTS = 40, (0.25, 0.75)
+"""Least blocks that two frames must have in common; quantiles of their distance from the picture's middle up
+to which they are its middle, and from which they are its border. Chosen."""
 _OR_WALL = "Or other wall begins there, for example a liner or another material."
+_OF_BORDER = (
+    "Relative to its middle, lit wall at the border of the picture becomes {}: no change of the exposure or "
+    "of all lamps does that. Vignetting by the lens or its hood, or haze on the window, would."
+)
 
 
 def at_once(step: Fitted, cells: Cells) -> float:
@@ -104,6 +112,42 @@ def _again(step: Fitted, cells: Cells, base: Float) -> tuple[float, float]:
     return best_column(cells, base, law, np.ones(len(cells.frame), bool))[1:]
 
 
+def toward_border(samples: BlockSamples) -> Float:
+    """Return by how much more (F − 1,) brightness changes at the border than in the middle of the picture.
+
+    Each is for lit wall of two neighbouring frames, as a logarithm; NaN where they share few places.
+    """
+    image, out = samples.orders["image"], np.full(len(samples.number) - 1, np.nan)
+    for k in range(len(out)):
+        before, after = (np.flatnonzero(samples.frame == f) for f in (k, k + 1))
+        both, one, two = np.intersect1d(image[before], image[after], return_indices=True)
+        if len(both) < _FEWEST_BLOCKS:
+            continue
+        away = samples.away[after[two]]
+        change = samples.log_change[after[two]] - samples.log_change[before[one]]
+        inner, outer = np.quantile(away, _PARTS)
+        out[k] = np.median(change[away >= outer]) - np.median(change[away <= inner])
+    return out
+
+
+def _at_border(step: Fitted, between: Int, samples: BlockSamples | None) -> float:
+    """Return by how much more the lit wall steps at the picture's border than in its middle; 0 if it may not.
+
+    A lamp, a laser or an exposure dims middle and border alike; vignetting, for example, does not. The σ is
+    the scatter of other neighbouring frames.
+    """
+    if samples is None or len(samples.number) < FEWEST_FRAMES:
+        return 0.0
+    each = toward_border(samples)
+    here = (samples.number[1:] > between[0]) & (samples.number[:-1] < between[1]) & np.isfinite(each)
+    others = each[~here & np.isfinite(each)]
+    if not here.any() or not len(others):
+        return 0.0
+    most = float(each[here][np.abs(each[here]).argmax()])
+    least = max(_SURE * float(np.sqrt(np.mean(others**2))), LEAST_SHARE * abs(step.size))
+    return most if abs(most) > least else 0.0
+
+
 def first_frame(frame: Int, first: int) -> NamedFigure:
     """Return the frame from which something changed, between two compared ones of those (F,)."""
     gap = float(frame[first] - frame[first - 1])
@@ -111,11 +155,13 @@ def first_frame(frame: Int, first: int) -> NamedFigure:
 
 
 def steps_named(
-    steps: dict[str, tuple[Fitted, Cells, list[str]]], lit: Cells | None, line: Cells | None, ring: Ring
-) -> list[Mismatch]:
+    steps: dict[str, tuple[Fitted, Cells, list[str]]], lit: Cells | None, line: Cells | None, ring: Ring,
+    samples: BlockSamples | None = None,
+) -> list[Mismatch]:  # fmt: skip
     """Return steps of brightness: of the exposure where both lights step alike, else of one light.
 
     Beside each are names of other causes that fit about as well: a step of both lights is none of them.
+    A step has no name where the lit wall of ``samples`` steps otherwise at the border of the picture.
     """
     found = []
     for light, (best, cells, rivals) in steps.items():
@@ -137,17 +183,24 @@ def steps_named(
             None: f"frames lit by the {light} are",
         }[same]
         way = "brighter" if best.size > 0 else "darker"
-        said = f"From frame {at.value:.0f} on, {what} {100 * abs(size.value):.0f} % {way}."
+        said = at_all = f"From frame {at.value:.0f} on, {what} {100 * abs(size.value):.0f} % {way}."
         if _may_be_wall(best, cells, light):
             name, said = f"{name} or other_wall", f"{said} {_OR_WALL}"
         if rivals and not same:
             name, said = " or ".join([name, *rivals]), f"{said} {told_apart(rivals)}"
+        more = _at_border(best, cells.frame[first - 1 : first + 1], samples)
+        if more:
+            name, said = "", f"{at_all} {_OF_BORDER.format(_percent(more))}"
         found.append(Mismatch(
             name, "line" if light == "laser" and not same else "intensity", "time", (at,), (size,),
             best.probability, best.chi2_before, best.chi2_after,
             said, ring.whole(cells.frame[first]),
         ))  # fmt: skip
     return found
+
+
+def _percent(change: float) -> str:
+    return f"{100 * abs(np.expm1(change)):.0f} % {'brighter' if change > 0 else 'darker'}"
 
 
 def told_apart(rivals: list[str]) -> str:
