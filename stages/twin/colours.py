@@ -16,6 +16,7 @@ import numpy as np
 from pipeline.arrays import Byte, Float, Int
 from pipeline.artefacts.twin import Look, Mismatch, NamedFigure
 from stages.twin.cells import sigmas
+from stages.twin.reflectance import LUMA_BGR
 from stages.twin.render import Region, Renderer
 from stages.twin.scene import Scene
 from stages.twin.state import PhotometricState
@@ -24,13 +25,14 @@ Coloured = Iterable[tuple[int, Byte | None]]
 _FEW = 8
 """Most lit frames whose colours are compared: decoding colour takes three times as long."""
 _EVERY_PX, _BRIGHT, _CLIPPED = 8, 8.0, 250
-"""Spacing of the pixels that are compared; grey levels above black from which each of their colours is, since
+"""Spacing of the pixels that are compared; grey levels above black that each colour must have by its twin, as
 an error of the black level changes darker ones; grey level from which a colour is clipped. Chosen."""
 _LEAST, _SURE, _FEWEST, _FEWEST_PIXELS = 0.1, 3.0, 4, 200
 """Least change of a colour's logarithm within a view that is reported, its σ from frame to frame, fewest
 frames and pixels. Chosen: sound recordings of another renderer leave up to .04."""
-_WIDE = 0.9
-"""Share of the pixels of a view over which the change within it is stated."""
+_WIDE, _PARTS = 0.9, 8
+"""Share of the pixels of a view over which the change within it is stated; parts of equally many pixels, of
+which each colour is summed: the logarithm of a single dark pixel's colour is biased by noise."""
 
 
 def few_lit(frames: Sequence[int]) -> Int:
@@ -71,19 +73,25 @@ def _slopes(scene: Scene, renderer: Renderer, number: int, image: Byte) -> Float
     some = (slice(None, None, _EVERY_PX),) * 2
     # Under both lights the line is left out.
     twin, black = renderer.frame(number, renderer.state.shows_wall[-1]), _black(renderer.state)
-    seen = image[some].astype(float) - black
-    use = (twin.region[some] == Region.WALL) & (seen.min(-1) > _BRIGHT) & (image[some].max(-1) < _CLIPPED)
-    distance = twin.distance_mm[some][use]
-    photo = scene.reflectance.coloured(distance, twin.azimuth_rad[some][use]).astype(float) - black
-    known = np.isfinite(photo).all(0) & (photo.min(0) > _BRIGHT)
+    use = (twin.region[some] == Region.WALL) & (image[some].max(-1) < _CLIPPED)
+    away, azimuth, grey = (a[some][use] for a in (twin.distance_mm, twin.azimuth_rad, twin.level))
+    photo = scene.reflectance.coloured(away, azimuth).astype(float) - black
+    with np.errstate(divide="ignore", invalid="ignore"):
+        predicted = photo * (grey / (LUMA_BGR @ photo))
+    # Chosen by prediction: noise would choose the brighter ones of the dark pixels.
+    known = predicted.min(0) > _BRIGHT
     if known.sum() < _FEWEST_PIXELS:
         return None
-    ratio = np.log(seen[use][known].T / photo[:, known])
-    away = distance[known].astype(float)
+    return _growth(away[known].astype(float), (image[some][use][known] - black).T, predicted[:, known])
+
+
+def _growth(away: Float, seen: Float, predicted: Float) -> Float:
+    """Return the growth (2,) of ln(blue / green) and ln(red / green) with N distances, of seen (3, N)."""
+    parts = np.array_split(np.argsort(away), _PARTS)
+    each = [np.maximum(seen[:, k].sum(1), 1.0) / predicted[:, k].sum(1) for k in parts]
+    ratio, lean = np.log(each).T, np.array([away[k].mean() for k in parts]) - away.mean()
     wide = float(np.diff(np.quantile(away, [(1 - _WIDE) / 2, (1 + _WIDE) / 2]))[0])
-    lean = away - away.mean()
-    each = (ratio[[0, 2]] - ratio[1]) @ lean / max(float(lean @ lean), 1e-9)
-    return np.asarray(wide * each)
+    return np.asarray(wide * (ratio[[0, 2]] - ratio[1]) @ lean / max(float(lean @ lean), 1e-9))
 
 
 def _black(state: PhotometricState) -> float:

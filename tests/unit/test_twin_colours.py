@@ -19,17 +19,18 @@ RING = Ring((120.0, 80.0), 50.0, 50.0, SHEET_MM)
 AHEAD_MM = np.linspace(5, 60, SHAPE[1]) + np.zeros(SHAPE)
 
 
-def _found(monkeypatch, blue, wall=lambda mm: np.zeros_like(mm), black=0.0, ahead=1.0, line=0.0):
+def _found(monkeypatch, blue, wall=lambda mm: np.zeros_like(mm), black=0.0, ahead=1.0, line=0.0, noise=2.0):
     """Return what is told where blue is exp(``blue``) of the way, mm, on wall whose blue is exp(``wall``).
 
     ``black`` is the black level; light falls to ``ahead`` at the end of the view; ``line`` is what the laser
-    adds to red of its line.
+    adds to red of its line; ``noise`` is 1 σ in grey levels.
     """
     random, at_line = np.random.default_rng(1), np.abs(AHEAD_MM - 50) < 2
     lights = (Illumination.LED, Illumination.BOTH) if line else (Illumination.LED,)
     # Without a frame of the laser alone, the photo's black level is that of the frames.
-    noise, of_photo = SimpleNamespace(black=SimpleNamespace(value=black)), np.nan if line else black
-    state = SimpleNamespace(outside=None, noise=noise, photo_black=of_photo, shows_wall=lights)
+    camera, of_photo = SimpleNamespace(black=SimpleNamespace(value=black)), np.nan if line else black
+    fall = ahead ** ((AHEAD_MM - SHEET_MM) / (60 - SHEET_MM))
+    state = SimpleNamespace(outside=None, noise=camera, photo_black=of_photo, shows_wall=lights)
 
     class Drawn:
         def __init__(self, scene, state):
@@ -37,7 +38,7 @@ def _found(monkeypatch, blue, wall=lambda mm: np.zeros_like(mm), black=0.0, ahea
 
         def frame(self, number, light):
             place = (number * STEP_MM + AHEAD_MM).astype(np.float32)
-            even = np.full(SHAPE, 80.0, np.float32)
+            even = (80 * fall).astype(np.float32)
             region = np.full(SHAPE, Region.WALL, np.uint8)
             region[at_line if light == Illumination.BOTH else at_line & False] = Region.UNSEEN
             return TwinFrame(even, even, region, place, 0 * place)
@@ -49,9 +50,9 @@ def _found(monkeypatch, blue, wall=lambda mm: np.zeros_like(mm), black=0.0, ahea
     def picture(number):
         way = number * STEP_MM
         level = 80 * np.stack([np.exp(blue(way) + wall(way + AHEAD_MM)), *np.ones((2, *SHAPE))], -1)
-        level = black + level * ahead ** ((AHEAD_MM - SHEET_MM) / (60 - SHEET_MM))[..., None]
+        level = black + level * fall[..., None]
         level[at_line, 2] += line
-        return np.clip(np.round(level + 2 * random.standard_normal(level.shape)), 0, 255).astype(np.uint8)
+        return np.clip(np.round(level + noise * random.standard_normal(level.shape)), 0, 255).astype(np.uint8)
 
     monkeypatch.setattr(colours, "Renderer", Drawn)
     monkeypatch.setattr(colours, "replace", lambda scene, **changes: scene)
@@ -79,6 +80,12 @@ def test_a_black_level_on_coloured_wall_that_is_darker_ahead_is_no_change_of_col
     brown, still = (lambda mm: 0 * mm - 1.0), (lambda mm: 0 * mm)
     assert _found(monkeypatch, still, brown, black=12.0, ahead=0.4) == ()
     assert len(_found(monkeypatch, lambda mm: 0.7 * mm / LENGTH_MM, brown, black=12.0, ahead=0.4)) == 1
+
+
+def test_noise_of_dark_colours_is_no_change_of_colour(monkeypatch):
+    """The brighter half of the dark pixels was taken for wall with more blue."""
+    brown, still = (lambda mm: 0 * mm - 1.6), (lambda mm: 0 * mm)
+    assert _found(monkeypatch, still, brown, ahead=0.3, noise=6.0) == ()
 
 
 def test_the_laser_under_both_lights_is_no_change_of_colour(monkeypatch):
