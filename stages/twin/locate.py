@@ -95,7 +95,8 @@ def places_in_image(
     spread = np.maximum(spread, _error_of_median(np.stack(ratios), known))
     bound = np.maximum(float(norm.isf(FALSE_ALARM / (2 * known.sum()))) * spread, least)
     gain = np.ones_like(change)
-    found = _joined(np.abs(change) > bound)
+    # The photo was made through dirt, too: beside dark dirt it is too dark, which is another place.
+    found = [*_joined(change < -bound), *_joined(change > bound)]
     for inside in found:
         grown = cv2.dilate(inside.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
         gain[grown & known] = 1 + change[grown & known]

@@ -34,6 +34,20 @@ def test_dirt_is_found_at_its_place():
     assert np.median(whole) == 1
 
 
+def test_dirt_that_the_photo_holds_too_is_found_at_its_own_place():
+    """Dark dirt and wall beside it, which is brighter than its photo, were one place, 28 px off the dirt."""
+    bright = sum(_spot(u, 30, 0.2) for u in (32, 33, 34))
+    places, _ = places_in_image([r + bright for r in _ratios(np.random.default_rng(3), (40, 30, 0.3))])
+    assert [p.change < 0 for p in places] == [True, False]
+    middle = (np.array([40, 30]) + 0.5) * BLOCK_PX - 0.5
+    assert np.hypot(places[0].u_px - middle[0], places[0].v_px - middle[1]) < BLOCK_PX
+
+
+def _spot(column, row, size):
+    v, u = np.mgrid[0:75, 0:100]
+    return (size * np.exp(-0.5 * ((u - column) ** 2 + (v - row) ** 2) / 2.0**2)).astype(np.float32)
+
+
 def test_wall_that_differs_from_frame_to_frame_is_not_dirt():
     random, ratios = np.random.default_rng(6), _ratios(np.random.default_rng(3))
     assert len(ratios) < 20
