@@ -7,7 +7,7 @@ every delay; of several strengths of the walk the most likely is taken.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg import solve_triangular
@@ -18,6 +18,7 @@ from pipeline.geometry.axis import distance_along
 from pipeline.machine.stage import Context
 from stages.motion.bundle_adjustment.equations import Measurements
 from stages.motion.bundle_adjustment.solver import Estimate
+from stages.motion.bundle_adjustment.unknowns import ENCODER_SCALE
 from stages.motion.encoder import EncoderReadings
 
 _LONGEST_S = 1.0
@@ -88,6 +89,7 @@ def delay_of_encoder(estimate: Estimate, measured: Measurements) -> EncoderDelay
     """Return the delay of the encoder relative to the motion in the pictures; None without evidence.
 
     Where texture is weak, the estimate follows a late encoder. So one linear step without it is made first.
+    What is wrong with that motion then looks like a delay as well: all equations must confirm it.
     """
     if measured.encoder is None or measured.tracks.poses.much_lost:
         return None
@@ -96,7 +98,32 @@ def delay_of_encoder(estimate: Estimate, measured: Measurements) -> EncoderDelay
     except np.linalg.LinAlgError:
         return None
     state = estimate.state.step(step.frames, step.border, step.landmarks)
-    return find_delay(measured.time_s, distance_along(state.axis, state.T_pc), measured.encoder)
+    found = find_delay(measured.time_s, distance_along(state.axis, state.T_pc), measured.encoder)
+    if found is None or not found.matters:
+        return found
+    frame_s = float(np.median(np.diff(measured.time_s)))
+    whole = replace(found, delay_s=frame_s * round(found.delay_s / frame_s))
+    corrected = whole.corrected(measured.encoder, measured.time_s)
+    return replace(found, better=min(found.better, _gained(estimate, measured.encoder, corrected)))
+
+
+def _gained(estimate: Estimate, encoder: EncoderReadings, corrected: EncoderReadings) -> float:
+    """Return by how much less all linear equations contradict each other with the corrected readings."""
+    equations, scale = estimate.adjusted.equations, estimate.state.globals[ENCODER_SCALE]
+    if equations.readings is None:
+        return np.inf
+    costs = []
+    for distance_mm in (encoder.distance_mm, corrected.distance_mm):
+        rows = list(equations.rows)
+        row = rows[equations.readings]
+        rows[equations.readings] = replace(
+            row,
+            residual=row.residual - scale * (distance_mm - encoder.distance_mm),
+            sigma=np.where(corrected.known, row.sigma, np.inf),
+        )
+        with_readings = replace(equations, rows=tuple(rows))
+        costs.append(with_readings.cost - with_readings.decrease(with_readings.step(0.0)))
+    return float(costs[0] - costs[1])
 
 
 def find_delay(time_s: Float, distance_mm: Float, encoder: EncoderReadings) -> EncoderDelay | None:
