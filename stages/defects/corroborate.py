@@ -19,6 +19,7 @@ from pipeline.arrays import Bool, Float, Int
 from pipeline.artefacts.measured import PointCloud, RingSamples, RingValidity, WallTexture
 from stages.defects.behind_drop import shows_drop
 from stages.defects.depth import Depth
+from stages.defects.marred import without_glints
 from stages.defects.neighbours import frames_at_peak
 from stages.defects.parallax import LitPictures
 from stages.defects.relief import Relief
@@ -54,7 +55,7 @@ class Evidence:
     Attributes
     ----------
     rings : int
-        Number of independent rings that show it; rings to which a codec gave the same light count as one.
+        Number of independent rings that show it and no glint; rings with the same light count as one.
     photo : bool, optional
         Whether the photo shows it; None where the photo cannot decide.
     score : float
@@ -163,9 +164,8 @@ def evidence_for(
     size = min(n * c for n, c in zip(region.mask.shape, relief.cell_mm, strict=True))
     shifted = abs(depth.depth_mm) > size
     # A pit inside a wide patch covers less than a fifth of any ring's samples: its peak is examined, too.
-    showing = np.union1d(
-        frames_behind(region, depth.depth_mm, surface), frames_at_peak(depth, region, surface)
-    )
+    frames = frames_behind(region, depth.depth_mm, surface), frames_at_peak(depth, region, surface)
+    showing = without_glints(np.union1d(*frames), region, surface, seen_by.rings)
     pictures = seen_by.pictures
     evidence = Evidence(
         seen_by.held.independent(len(showing)),

@@ -11,7 +11,9 @@ glints.
 The probability compares the expected numbers of real and of false findings of the same kind: of the same
 height against noise, and in as many rings against chance (local false discovery rate: B. Efron, Large-Scale
 Inference, 2010, ch. 5). The photo, taken under other light, raises it where it differs at that place, and
-lowers it a little where it does not. Independently of that, a depth within its own σ may be zero.
+lowers it a little where it does not. In pictures full of streaks and noise the photo differs at many places:
+how often it does at findings that one ring alone shows tells what that is worth. Independently of that, a
+depth within its own σ may be zero.
 """
 
 from __future__ import annotations
@@ -36,6 +38,9 @@ _SURE = 0.05
 # By chance, the photo stands out at a place once in 41 times for darker and once for brighter. It stands out
 # at 6 of the 11 defects of open-1, 2 and 3: deposits and dents often have the wall's own colour.
 _PHOTO_BY_CHANCE, _PHOTO_OF_REAL = 2 / 41, 6 / 11
+# The recording's own share counts against that chance as so many findings against five. Chosen: with two or
+# three others the chance hardly changes.
+_AS_USUAL = 5
 # A tenth of all places counts as bright, and so does a tenth of the defects, by chance. Besides the bright
 # ones that the dark ones imply, half a bright real finding is allowed for.
 _BRIGHT_BY_CHANCE, _UNTOLD = 0.1, 0.5
@@ -61,6 +66,8 @@ class Credibility:
         Probability that a neighbouring ring happens to show a glint of the same sign at a finding's place.
     bright, dark : int
         Among the certain findings with less than six rings: number with a bright line, and number of others.
+    photo_alone : Counter
+        What the photo says of the findings that one ring alone (or none) shows, certain or not.
     """
 
     tail: NoiseTail
@@ -68,11 +75,12 @@ class Credibility:
     overlap_chance: float
     bright: int
     dark: int
+    photo_alone: Counter[bool | None]
 
     def chance_against_clutter(self, evidence: Evidence) -> float:
         """Return the probability that a finding is neither noise nor a glint."""
         wrong = self._noise(evidence) + self._clutter(evidence)
-        return 1 / (1 + wrong * _odds_by_photo(evidence.photo) + self._glints(evidence))
+        return 1 / (1 + wrong * self._odds_by_photo(evidence) + self._glints(evidence))
 
     def chance_overlaps(self, rings: int) -> float:
         """Return the expected number of places where ``rings`` neighbouring rings show glints by chance."""
@@ -96,6 +104,24 @@ class Credibility:
         few = evidence.bright and evidence.rings < MANY_RINGS
         return max(self.bright - real, 0.0) / real if few else 0.0
 
+    def _odds_by_photo(self, evidence: Evidence) -> float:
+        """Return the likelihood of what the photo shows, without a defect over with one."""
+        if evidence.photo is None:
+            return 1.0
+        by_chance = self._photo_by_chance(evidence)
+        if evidence.photo:
+            return by_chance / _PHOTO_OF_REAL
+        return (1 - by_chance) / (1 - _PHOTO_OF_REAL)
+
+    def _photo_by_chance(self, evidence: Evidence) -> float:
+        """Return how often the photo stands out where there is no defect, from other single-ring findings."""
+        others = self.photo_alone.copy()
+        others[evidence.photo] -= evidence.rings < LEAST_RINGS
+        false, seen = self._alone / max(self.sure[1], 1), others[True] + others[False]
+        stands_out = max(others[True] - (1 - false) * seen * _PHOTO_OF_REAL, 0.0)
+        chance = (_AS_USUAL * _PHOTO_BY_CHANCE + stands_out) / (_AS_USUAL + false * seen)
+        return float(np.clip(chance, _PHOTO_BY_CHANCE, _PHOTO_OF_REAL))
+
     @property
     def _alone(self) -> float:
         """Number of single-ring findings, less as many real ones as two rings show."""
@@ -110,15 +136,6 @@ class Credibility:
     def _real(self) -> float:
         """Number of real findings to expect: the certain ones, plus one."""
         return 1.0 + sum(self.sure.values())
-
-
-def _odds_by_photo(stands_out: bool | None) -> float:
-    """Return the likelihood of what the photo shows, without a defect over with one."""
-    if stands_out is None:
-        return 1.0
-    if stands_out:
-        return _PHOTO_BY_CHANCE / _PHOTO_OF_REAL
-    return (1 - _PHOTO_BY_CHANCE) / (1 - _PHOTO_OF_REAL)
 
 
 def chance_of_depth(defect: Defect, min_depth_mm: float) -> float:
@@ -143,4 +160,5 @@ def credibility_of(
     # same sign.
     overlap = 2 * float(np.mean(alone)) / (2 * np.pi) / 2 if alone else 0.0
     overlap_chance = min(overlap * len(alone) / max(rings, 1), 1.0)
-    return Credibility(tail, sure, overlap_chance, bright[True], bright[False])
+    photo_alone = Counter(e.photo for e in found if e.rings < LEAST_RINGS)
+    return Credibility(tail, sure, overlap_chance, bright[True], bright[False], photo_alone)
