@@ -5,8 +5,11 @@ the line passes the finding then show the wall displaced there, and those taken 
 not. Displaced texture agrees better with these after a shift. Noise gains by the best of many shifts, too,
 and a wrong depth, pose or lens displaces texture at any time or all around. So the gain is compared with that
 of the other pictures at the same place, and with that of the same pictures at other places around the pipe:
-it counts only where it is larger than both. On a plain wall only the defect may have texture: no other place
-can then show that the pose was wrong, and nothing is told.
+it counts only where it is larger than both. A reflection on glossy wall moves with the camera at any time:
+the pictures taken before do not agree with those taken after either. What these gain by a shift counts like
+another's gain, and if they agree too little nothing is told.
+On a plain wall only the defect may have texture: no other place can then show that the pose was wrong, and
+nothing is told.
 """
 
 from __future__ import annotations
@@ -34,7 +37,8 @@ _HALF_MM, _PIXEL_MM, _SHIFT_PX, _LINE_MM, _BROAD_PX = 4.0, 0.25, 6, 1.5, 8.0
 _PASSING, _OTHERS, _LEAST_OTHERS, _READ, _FARTHEST_MM, _TURNS = 6, 8, 4, 12, 15.0, 8
 # The gain must be larger by this factor, and .01 at least. Of other places the upper quartile counts: more of
 # them may lie under drops. Debt: data/debts.md. A plain wall is not seen to be displaced: places count whose
-# pictures agree, after the best shift, at least half as well as those of the finding (chosen).
+# pictures agree, after the best shift, at least half as well as those of the finding; and so must pictures
+# taken before and after agree without a shift (chosen).
 _LARGER, _LEAST_GAIN, _UPPER, _TEXTURED = 2.0, 0.01, 0.75, 0.5
 
 
@@ -122,9 +126,11 @@ def _window(relief: Relief, line_mm: float, column: Float) -> tuple[Float, Float
 def _gains(
     pictures: LitPictures, lit: _Pictures, k: int, others: Int, window: tuple[Float, Float, Float, Float]
 ) -> tuple[float, float, float] | None:
-    """Return the gain of picture ``k`` by a shift, the median gain of others, and how well ``k`` then agrees.
+    """Return the gain of picture ``k`` by a shift, the usual gain of others, and how well ``k`` then agrees.
 
-    None is returned if too few pictures show the window.
+    The usual gain is the median of the others, or the gain of those before and after against each other if
+    it is larger. None is returned if too few pictures show the window, or if these two agree less than half
+    as well as ``k`` does after its shift.
 
     The wall is taken with the measured relief or without it, whichever lets the others agree better.
     """
@@ -136,15 +142,21 @@ def _gains(
         xyz_p = from_pipe(pictures.motion.axis, s, psi, radius + more)
         own, *its = (_texture(pictures, xyz_p, lit.image[i], lit.T_cp[i]) for i in (k, *others))
         known = np.array([t for t in its if t is not None])
+        after = (lit.line_mm[others] > lit.line_mm[k])[[t is not None for t in its]]
         if own is not None and len(known) >= _LEAST_OTHERS:
-            seen.append((float(known.mean(0).std() / known.std()), own, known))
+            seen.append((float(known.mean(0).std() / known.std()), own, known, after))
     if not seen:
         return None
-    _, own, known = max(seen, key=lambda each: each[0])
+    _, own, known, after = max(seen, key=lambda each: each[0])
     used = np.abs(s - lit.line_mm[k]) > _LINE_MM * lit.both[k]
     total = known.sum(0)
     gain, agrees = _gain(own, total, used)
-    return gain, float(np.median([_gain(t, total - t, used)[0] for t in known])), agrees
+    usual = float(np.median([_gain(t, total - t, used)[0] for t in known]))
+    one_sided = after.all() or not after.any()
+    moves, best = (0.0, agrees) if one_sided else _gain(known[after].sum(0), known[~after].sum(0), used)
+    if best - moves < _TEXTURED * agrees:
+        return None
+    return gain, max(usual, moves), agrees
 
 
 def _texture(pictures: LitPictures, xyz_p: Float, image: Byte, T_cp: Float) -> Float32 | None:
