@@ -158,7 +158,7 @@ class Defects:
     false_alarm_rate : float
         Expected number of false ones among them: the sum of 1 − probability.
     smallest_depth_mm : float
-        Depth from which a defect of 3 mm × 3 mm is found in nine of ten cases.
+        Depth from which a defect of 3 mm × 3 mm that two rings cross is found in nine of ten cases.
     unconfirmed : tuple of Defect
         Findings that one ring alone shows, or that are more likely false than real: to be checked, not
         counted.
