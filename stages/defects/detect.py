@@ -238,7 +238,16 @@ def usual_sigma_mm(relief: Relief) -> Float:
     # Where noise is larger behind a part of the window, pieces at its border count as noisy.
     size = 2 * round(_PIECE_MM / 2 / relief.cell_mm[0]) + 1, 3
     bound = maximum_filter(np.nan_to_num(median), size, mode=("nearest", "wrap"))
-    return np.concatenate([np.minimum(p, bound[:, [k]]) for k, p in enumerate(pieces)], 1)
+    around = np.repeat(bound, [piece.shape[1] for piece in pieces], axis=1)
+    return np.minimum(relief.sigma_mm, np.maximum(around, _lasting_sigma_mm(relief)))
+
+
+def _lasting_sigma_mm(relief: Relief) -> Float:
+    """Return the median σ (S, A) along the pipe: behind a spot of the window it stays large, in a pit not."""
+    rows = len(relief.sigma_mm)
+    pieces = np.array_split(relief.sigma_mm, max(1, round(rows * relief.cell_mm[0] / _PIECE_MM)))
+    median = np.stack([row_median(piece.T) for piece in pieces])
+    return np.repeat(np.nan_to_num(median), [len(piece) for piece in pieces], axis=0)
 
 
 def _fitted(relief: WallRelief, kernels: list[Float], overlap: int) -> Iterator[tuple[Filter, Float]]:
