@@ -284,7 +284,7 @@ PHOTOMETRY = Stage(
 )
 TWIN = Stage(
     "twin",
-    "69",
+    "70",
     TwinParameters,
     compare_with_twin,
     "recorded frames beside the same frames, re-rendered from what the run has measured",

@@ -31,16 +31,20 @@ def glow(stray: Sequence[Float], frame: Int, ring: Ring) -> Suspected | None:
     bright = np.flatnonzero(np.nan_to_num(wall) > LEAST_LEVEL)
     if len(bright) < _FEWEST_FRAMES:
         return None
-    level, nan = wall[bright], float("nan")
-    first, last = (int(frame[bright[k]]) for k in (0, -1))
+    # All frames between the first and the last bright one count: the bright ones alone are too bright.
+    span = bright[0] + np.flatnonzero(np.isfinite(wall[bright[0] : bright[-1] + 1]))
+    level, nan = wall[span], float("nan")
+    if level.mean() <= LEAST_LEVEL:
+        return None
+    first, last = int(frame[span[0]]), int(frame[span[-1]])
     sd = float(level.std(ddof=1) / np.sqrt(len(level)))
     place = tuple(NamedFigure(n, float(f), 0.0) for n, f in (("frame_from", first), ("frame_to", last)))
     said = (
-        f"In {len(bright)} of {len(frame)} laser frames that were examined, between frames {first} and "
-        f"{last}, the wall away from the line has {level.mean():.1f} grey levels in the mean: LEDs that are "
-        "not quite off, other light, light of the line from wall to wall, or what a codec retains of the "
-        "frame before."
+        f"In {len(bright)} of {len(frame)} laser frames that were examined there is light on the wall away "
+        f"from the line; from frame {first} to {last} the mean is {level.mean():.1f} grey levels: LEDs "
+        "that are not quite off, other light, light of the line from wall to wall, or what a codec retains "
+        "of the frame before."
     )
     size = (NamedFigure("level", float(level.mean()), sd, "grey levels"),)
     found = Mismatch("", "intensity", "time", place, size, nan, nan, nan, said, ring.whole(first))
-    return Suspected(found, None, frame[bright], level[:, None])
+    return Suspected(found, None, frame[span], level[:, None])

@@ -272,6 +272,17 @@ def test_light_that_comes_during_the_run_is_told_with_its_frames():
     assert found([0.0, 9.0, 9.0, np.nan]) is None
 
 
+@pytest.mark.parametrize(("mean", "fewest", "most"), [(0.8, 0, 30), (2.0, 200, 200)])
+def test_the_mean_of_light_includes_the_frames_that_show_less(mean, fewest, most):
+    """Only frames above 1 grey level counted: 2 ± 0.8 was too bright, and 0.8 ± 0.8 was always reported."""
+    drawn = mean + 0.8 * np.random.default_rng(7).standard_normal((200, 40))
+    frame = np.arange(40)
+    found = [glow([np.array([[0, 1, 0, 0, w]] * 3) for w in wall], frame, RING) for wall in drawn]
+    size = [f.mismatch.parameters[0] for f in found if f is not None]
+    assert fewest <= len(size) <= most
+    assert sum(abs(s.value - mean) < 1.96 * s.sd for s in size) >= 0.92 * fewest
+
+
 def test_frames_that_see_black_are_evidence_of_light_for_those_that_do_not():
     """One frame without black invalidated the evidence of all others, for ambient light or against it."""
     mean, bright = np.full(8, 4.0), np.array([0.1, -0.1, 0, 0.1, -0.1, 0.1, 0, np.nan])
