@@ -22,7 +22,8 @@ from pipeline.instrument.camera.formats import read_camera
 from pipeline.instrument.probe import Probe
 from stages.diagnose.effects.base import EffectModel, Shape
 from stages.diagnose.effects.library import LIBRARY, columns
-from stages.diagnose.effects.nameless import GENERIC, Moves
+from stages.diagnose.effects.nameless import Moves
+from stages.diagnose.effects.vocabulary import GENERIC
 from stages.diagnose.result import classes_of
 from tests.benchmarks.pipeblaser_rings import BINS, Fitted, Rings, fitted, probe_of, rings_of
 from tests.shared_data import shared

@@ -13,8 +13,9 @@ from pipeline.simulator.scene import read_scene
 from stages.diagnose.effects.base import Shape, Travel
 from stages.diagnose.effects.courses import Coursed
 from stages.diagnose.effects.library import LIBRARY
-from stages.diagnose.effects.nameless import GENERIC, STEADY
+from stages.diagnose.effects.nameless import STEADY
 from stages.diagnose.effects.pose import MotionBlur
+from stages.diagnose.effects.vocabulary import GENERIC
 from stages.diagnose.gauge.answer import effects_found, formula, verdict_of
 from stages.diagnose.gauge.examine import Examined, examine
 from stages.diagnose.gauge.fit import evidence, fit

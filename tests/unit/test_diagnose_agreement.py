@@ -11,7 +11,7 @@ import pytest
 
 from stages.diagnose.agreement import chance_of_name, drawn, sized, turn_deg
 from stages.diagnose.effects.library import LIBRARY
-from stages.diagnose.effects.nameless import GENERIC
+from stages.diagnose.effects.vocabulary import GENERIC
 from tests.diagnosed import AGREES, DIFFERS
 
 

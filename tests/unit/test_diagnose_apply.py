@@ -11,7 +11,7 @@ from pipeline.recording.base import Encoder, FrameTable, PipeFacts, Recording
 from stages.diagnose.compared import _beyond_probe
 from stages.diagnose.correct import Correction, encoder_effects, with_true_readings
 from stages.diagnose.effects.library import LIBRARY
-from stages.diagnose.effects.nameless import VOCABULARY
+from stages.diagnose.effects.vocabulary import VOCABULARY
 from stages.diagnose.gauge.run import Term
 from stages.diagnose.residual import AZIMUTHS, RingResidual, azimuths_rad, wall_distances_mm
 from stages.diagnose.result import EffectFound, Value

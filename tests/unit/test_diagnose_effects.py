@@ -22,7 +22,8 @@ from stages.diagnose.effects.library import (
     texture_shift_px,
     without,
 )
-from stages.diagnose.effects.nameless import GENERIC, STEADY, VOCABULARY, GenericTerm, Moves, PatternInCourse
+from stages.diagnose.effects.nameless import STEADY, GenericTerm, Moves, PatternInCourse
+from stages.diagnose.effects.vocabulary import GENERIC, VOCABULARY
 from tests.unit.wall_points import Bore, plain_probe, ring_points, texture_points
 
 # What an effect on positions or readings must not change.
@@ -314,3 +315,17 @@ def test_generic_terms_move_either_the_line_or_the_whole_image():
         size = np.full(len(term.amplitudes), 0.1)
         assert ring_shift_px(term, points, (0.0,), size).any() or term.moves is Moves.AROUND
         assert bool(texture_shift_px(term, wall, (0.0,), size).any()) == (term.moves is not Moves.LINE)
+
+
+@pytest.mark.parametrize(
+    ("moves", "exponent", "formula"),
+    [
+        (Moves.LINE, 0, "δr = a cos 2(ψ − ψ₀)"),
+        (Moves.LINE, 1, "δr = a (r/50)^1 cos 2(ψ − ψ₀)"),
+        (Moves.OUTWARD, 0, "image outward: a cos 2(ψ − ψ₀)"),
+        (Moves.OUTWARD, 3, "image outward: a θ^3 cos 2(ψ − ψ₀)"),
+    ],
+)
+def test_a_formula_has_no_power_of_nought(moves: Moves, exponent: int, formula: str) -> None:
+    (term,) = (g for g in GENERIC if (g.moves, g.harmonic, g.exponent) == (moves, 2, exponent))
+    assert term.formula(STEADY) == formula

@@ -9,7 +9,7 @@ from scipy import stats
 from pipeline.adjustment.rows import Rows
 from stages.diagnose.effects.courses import with_courses
 from stages.diagnose.effects.library import LIBRARY
-from stages.diagnose.effects.nameless import VOCABULARY
+from stages.diagnose.effects.vocabulary import VOCABULARY
 from stages.diagnose.gauge.elimination import (
     Equations,
     OwnUnknowns,

@@ -13,7 +13,8 @@ from stages.diagnose.effects.base import EffectModel, Shape
 from stages.diagnose.effects.courses import Coursed
 from stages.diagnose.effects.free_profile import FREE_PROFILES
 from stages.diagnose.effects.library import LIBRARY
-from stages.diagnose.effects.nameless import GENERIC, STEADY, PatternInCourse
+from stages.diagnose.effects.nameless import STEADY, PatternInCourse
+from stages.diagnose.effects.vocabulary import GENERIC
 from stages.diagnose.gauge.run import Term
 from stages.diagnose.gauge.sets import Member, Sets, believed, cause_of, members_of
 from stages.diagnose.inference import INSTRUMENT, PRIOR_PLAUSIBLE, Column, Evidence, Stated

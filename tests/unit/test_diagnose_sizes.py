@@ -10,7 +10,7 @@ import pytest
 from pipeline.adjustment.normal_equations import Marginal
 from stages.diagnose.effects.base import ImagePoints
 from stages.diagnose.effects.library import LIBRARY
-from stages.diagnose.effects.nameless import SWINGS
+from stages.diagnose.effects.vocabulary import SWINGS
 from stages.diagnose.gauge import fit as fitting
 from stages.diagnose.gauge.altered_laws import OtherGrowth, other_course
 from stages.diagnose.gauge.confirm import Sized, partial_of, quantities

@@ -16,9 +16,10 @@ from pipeline.recording.base import Illumination
 from stages.motion import MotionParameters, adjust_at_once, estimate_motion, measure_run
 from stages.motion.bundle_adjustment import residuals
 from stages.motion.estimate import require_along_pipe
+from stages.motion.tracking.matched import Matched
 from stages.motion.tracking.patches import cut
 from stages.motion.tracking.strips import Hidden, Strip, StripGrid
-from stages.motion.tracking.tracker import TextureTracker, _Matched
+from stages.motion.tracking.tracker import TextureTracker
 from stages.premises.stays import find_static_places
 from tests.drawn_run import RADIUS, DrawnRun, drawn_run, small_probe, without_encoder
 from tests.quiet import quiet_context
@@ -269,7 +270,7 @@ def test_matches_that_do_not_agree_are_replaced() -> None:
     tracker._map.add(np.stack([np.full(40, 40.0), np.arange(40) * 10.0], -1), 0, patches)
     away = 4 * np.random.default_rng(1).standard_normal((40, 2))
     at = np.stack([np.full(40, 40.0), np.arange(40) * 10.0], -1)
-    found = _Matched(np.arange(40), np.ones(40, bool), at, away, np.full(40, 0.1))
+    found = Matched(np.arange(40), np.ones(40, bool), at, away, np.full(40, 0.1))
     seen = Strip(
         0, strip, np.ones_like(strip, bool), np.zeros((21, 101, 2), np.float32), np.ones(80, np.float32)
     )

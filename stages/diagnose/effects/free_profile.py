@@ -11,7 +11,8 @@ from pipeline.physics.catalogue import effect
 from pipeline.physics.effect import CourseKind, FixedTo
 from stages.diagnose.effects.base import Amplitude, EffectModel, ImagePoints, Shape, Share, SumOfLaws
 from stages.diagnose.effects.courses import Drifting
-from stages.diagnose.effects.nameless import GENERIC, STEADY, GenericTerm, Moves, Nameless, PatternInCourse
+from stages.diagnose.effects.nameless import STEADY, GenericTerm, Moves, Nameless, PatternInCourse
+from stages.diagnose.effects.vocabulary import GENERIC
 
 
 @dataclass(frozen=True)

@@ -14,15 +14,11 @@ from stages.diagnose.effects.courses import IN_TIME, InCourse, in_words
 from stages.diagnose.effects.kinds import cosine, frequencies
 
 _REFERENCE_MM = 50.0
-_HARMONICS = (0, 1, 2, 3, 4)
-_EXPONENTS = (0, 1, 2, 3)
 STEADY: Shape = ()
 # Where a probe rolls so little that a pattern fixed to it shares more than this of one fixed to gravity, only
 # the former is tested. At an SNR of 8, which is detected, the rest decides at exp(8² (1 − .95²) / 2) = 23:1.
 _ROLLS_LITTLE = 0.95
 _HANGS = " (always toward this azimuth of the pipe while the probe rolls, like what hangs by its weight)"
-# Reference values for the units of a pattern's size; any would do.
-_REFERENCE_S, _REFERENCE_MM_S = 10.0, 20.0
 
 
 class Nameless(EffectModel):
@@ -138,9 +134,9 @@ class GenericTerm(Nameless):
         wave = f" cos {self.harmonic}({azimuth})" if self.harmonic else ""
         if self.moves is Moves.WALL:
             return f"wall: a cos {self.harmonic}(ψ_P − ψ₀){' s/50' * self.exponent}"
-        if self.moves is Moves.LINE:
-            return f"δr = a (r/50)^{self.exponent}{wave}"
-        return f"image {self.moves}: a θ^{self.exponent}{wave}"
+        base = "(r/50)" if self.moves is Moves.LINE else "θ"
+        size = f"a {base}^{self.exponent}{wave}" if self.exponent else f"a{wave}"
+        return f"δr = {size}" if self.moves is Moves.LINE else f"image {self.moves}: {size}"
 
     def goes_with(self, shape: Shape) -> tuple[FixedTo, str, int | None]:
         """Return what it displaces."""
@@ -265,41 +261,3 @@ class FractionTerm(Nameless):
     def formula(self, shape: Shape) -> str:
         """Return the pattern as a formula."""
         return "line: a cos(2πρ − φ₀), ρ its image radius in px"
-
-
-def _term(moves: Moves, harmonic: int, exponent: int, hangs: bool = False) -> GenericTerm:
-    in_mm = moves in (Moves.LINE, Moves.WALL)
-    amplitudes = two_parts("mm", 0.05) if in_mm else two_parts("px", 0.2)
-    kept = amplitudes if harmonic else amplitudes[:1]
-    name = f"generic_{moves}_{harmonic}_{exponent}{'_hangs' if hangs else ''}"
-    return GenericTerm(name, moves, harmonic, exponent, kept, hangs)
-
-
-GENERIC: tuple[GenericTerm, ...] = tuple(
-    _term(moves, harmonic, exponent)
-    for moves in (Moves.LINE, Moves.OUTWARD, Moves.AROUND)
-    for harmonic in _HARMONICS
-    for exponent in _EXPONENTS
-)
-
-
-def _vocabulary() -> tuple[tuple[Nameless, Shape], ...]:
-    with_time, with_speed = (CourseKind.RAMP, (_REFERENCE_S,)), (CourseKind.SPEED, (_REFERENCE_MM_S,))
-    courses = {Moves.LINE: (with_time, with_speed), Moves.OUTWARD: (with_time,)}
-    out: list[tuple[Nameless, Shape]] = []
-    for term in GENERIC:
-        out.append((term, STEADY))
-        out += [(PatternInCourse(term, kind), shape) for kind, shape in courses.get(term.moves, ())]
-    out += [(_term(Moves.WALL, m, power), STEADY) for m in (1, 2, 3, 4) for power in (0, 1)]
-    # A sheet that shifts or tilts by its weight.
-    out += [(_term(Moves.LINE, 1, power, hangs=True), STEADY) for power in (1, 2)]
-    return (*out, (RowTerm(), STEADY), (FractionTerm(), STEADY))
-
-
-# The patterns that empirical formulas are built from, in (r, ψ, t, s, speed, row).
-VOCABULARY: tuple[tuple[Nameless, Shape], ...] = _vocabulary()
-# A sheet that moves along the axis, or rocks.
-SWINGS: tuple[PatternInCourse, ...] = tuple(
-    PatternInCourse(_term(Moves.LINE, harmonic, exponent), CourseKind.SINUSOID)
-    for harmonic, exponent in ((0, 1), (1, 2))
-)

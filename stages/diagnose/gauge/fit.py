@@ -14,7 +14,7 @@ from pipeline.arrays import Float, Int
 from pipeline.geometry.rigid import from_parts, rotation_from_vector
 from stages.calibrate.gauge.state import ENCODER, OFFSET_SIGMA_MM, Unknowns
 from stages.diagnose.effects.base import EffectModel, Shape
-from stages.diagnose.effects.nameless import VOCABULARY
+from stages.diagnose.effects.vocabulary import VOCABULARY
 from stages.diagnose.gauge.elimination import ENCODER as ENCODER_ROW
 from stages.diagnose.gauge.elimination import (
     Equations,

@@ -13,7 +13,8 @@ from scipy import stats
 
 from pipeline.arrays import Int
 from stages.diagnose.effects.base import EffectModel, Shape
-from stages.diagnose.effects.nameless import SWINGS, VOCABULARY, Nameless
+from stages.diagnose.effects.nameless import Nameless
+from stages.diagnose.effects.vocabulary import SWINGS, VOCABULARY
 from stages.diagnose.gauge.fit import Fit, evidence, fit
 from stages.diagnose.gauge.linearise import asking, linearise
 from stages.diagnose.gauge.run import GaugeRun, Term

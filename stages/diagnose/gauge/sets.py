@@ -21,7 +21,8 @@ from pipeline.physics.effect import CourseKind
 from stages.diagnose.effects.base import EffectModel, Shape
 from stages.diagnose.effects.courses import SEARCHED, Coursed
 from stages.diagnose.effects.free_profile import FREE_PROFILES, patterns_in_course, patterns_of_kind
-from stages.diagnose.effects.nameless import STEADY, VOCABULARY, Nameless, PatternInCourse
+from stages.diagnose.effects.nameless import STEADY, Nameless, PatternInCourse
+from stages.diagnose.effects.vocabulary import VOCABULARY
 from stages.diagnose.gauge.fit import Fit
 from stages.diagnose.gauge.run import GaugeRun, Term, pattern_of
 from stages.diagnose.gauge.scan import Scored, span

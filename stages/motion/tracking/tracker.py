@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
@@ -16,20 +15,14 @@ from pipeline.machine.scratch import Scratch
 from stages.motion.encoder import PosePredictor
 from stages.motion.parameters import MotionParameters
 from stages.motion.tracking.landmarks import LandmarkMap, ObservationStore, TrackedPoses, Tracks
+from stages.motion.tracking.matched import FEWEST_AGREEING, Matched
 from stages.motion.tracking.overlap import Rival, displacement, repeats, rival_of
 from stages.motion.tracking.patches import best_of_cells, cornerness, cut, whole_patches
 from stages.motion.tracking.strips import Hidden, Strip, StripGrid, unroll
 
-_FEWEST = 12
-"""Fewest landmarks whose median gives a frame's displacement. Not measured."""
-_FEWEST_AGREEING = 0.25
-"""Share of the landmarks in view that must move like their neighbour. On noise without texture up to 0.12 do
-by chance (`test_no_roll_is_found_on_a_plain_wall`), in HEVC at crf 32 0.3 to 0.6, else nearly all."""
 _SURELY_AGREEING = 0.5
 """Share from which the motion is not compared with that of whole strips, unless the wall repeats: on a drawn
 pattern with other marks of half its contrast, patches matched one period too far agreed to 0.4 at most."""
-_AGREEING_PX = 1.5
-"""Difference, strip samples, up to which neighbours move together: five times ``landmark_sigma_px``."""
 _LARGEST_SIGMA = 3.0
 """Matches whose σ is larger than so many times ``landmark_sigma_px`` are rejected. Not measured."""
 _LEAST_SIGMA = 0.02
@@ -88,38 +81,6 @@ def track_texture(
         return tracker.result()
 
 
-@dataclass(frozen=True)
-class _Matched:
-    """Landmarks (N,) looked for: which were found (N,), strip position, offset (N, 2) and 1 σ (N,)."""
-
-    landmark: Int
-    good: Bool
-    at: Float
-    offset: Float
-    sigma: Float
-
-    @cached_property
-    def agreeing(self) -> float:
-        """Return the share of landmarks in view that were found and moved like the next one around the pipe.
-
-        Noise is matched too, wherever it fits best by chance, but then no two landmarks move alike.
-        """
-        in_view = int(np.isfinite(self.at[:, 0]).sum())
-        around = np.argsort(self.at[self.good, 1], kind="stable")
-        apart = np.abs(np.diff(self.offset[self.good][around], axis=0)).max(1, initial=0.0)
-        return float(np.sum(apart < _AGREEING_PX)) / max(in_view, 1)
-
-    @cached_property
-    def lost(self) -> bool:
-        """Whether too few were found, or too few of them move alike, to tell how the camera moved."""
-        return bool(self.good.sum() < _FEWEST or self.agreeing < _FEWEST_AGREEING)
-
-    @cached_property
-    def drift(self) -> Float:
-        """Common displacement (2,), rows and columns; 0 where they are lost."""
-        return np.zeros(2) if self.lost else np.median(self.offset[self.good], 0)
-
-
 class TextureTracker:
     """Tracks the wall's texture; distance and roll follow from it, the rest of the pose from the rings.
 
@@ -164,7 +125,7 @@ class TextureTracker:
         lost = np.array([p[2] for p in self._poses], bool)
         return TrackedTexture(self._store, self._grid, TrackedPoses(frames, T_pc, lost), self._ambiguous)
 
-    def _located(self, frame: int, image: Image, T_pc: Float) -> tuple[Float, Strip, _Matched]:
+    def _located(self, frame: int, image: Image, T_pc: Float) -> tuple[Float, Strip, Matched]:
         """Return the pose from which landmarks were found, the strip and the matches there.
 
         Where few are found at the predicted pose, or another step fits much better, the last strip as a whole
@@ -178,26 +139,26 @@ class TextureTracker:
             T_moved = self._shifted(T_pc, moved)
             other = unroll(image, self._probe, T_moved, self._grid, self._hidden.at(frame))
             found_there = self._matched(other, frame)
-            if found_there.agreeing > _FEWEST_AGREEING:
-                if self._repeating and found.agreeing < _FEWEST_AGREEING:
+            if found_there.agreeing > FEWEST_AGREEING:
+                if self._repeating and found.agreeing < FEWEST_AGREEING:
                     self._rival(other, found_there)
                 return T_moved, other, found_there
         return T_pc, strip, found
 
-    def _moved(self, strip: Strip, found: _Matched) -> Float | None:
+    def _moved(self, strip: Strip, found: Matched) -> Float | None:
         """Return the displacement (2,) of the strip as a whole; None if what was found is beyond doubt."""
         if self._last is None:
             return None
         if len(self._poses) % _LOOKED_EVERY == 1:
             self._repeating = repeats(self._last, self._map.half)
-        if found.agreeing < _FEWEST_AGREEING:
+        if found.agreeing < FEWEST_AGREEING:
             return self._last_drift + displacement(self._last, strip)
         if not self._repeating and found.agreeing > _SURELY_AGREEING:
             return None
         rival = self._rival(strip, found)
         return np.array([rival.shift + self._last_drift[0], found.drift[1]]) if rival.fits_better else None
 
-    def _rival(self, strip: Strip, found: _Matched) -> Rival:
+    def _rival(self, strip: Strip, found: Matched) -> Rival:
         """Return the step that fits best beside the one found; count it if nothing decides between the two.
 
         Behind a picture that was lost the last strip does not, since where it has the wall is not known.
@@ -208,7 +169,7 @@ class TextureTracker:
         self._ambiguous += rival.fits_as_well or (self._repeating and behind_lost)
         return rival
 
-    def _matched(self, strip: Strip, frame: int) -> _Matched:
+    def _matched(self, strip: Strip, frame: int) -> Matched:
         """Match every landmark that should be in the strip."""
         m = self._map
         guess = np.stack([m.row - strip.first_row, m.column], -1) + m.offset
@@ -219,7 +180,7 @@ class TextureTracker:
         at = guess[near] + found.offset + np.array([strip.first_row, 0])
         good = (found.correlation > self._parameters.min_correlation) & np.isfinite(at).all(1)
         good &= found.sigma < _LARGEST_SIGMA * self._parameters.landmark_sigma_px
-        return _Matched(near, good, at, found.offset, found.sigma)
+        return Matched(near, good, at, found.offset, found.sigma)
 
     def _in_view(self, strip: Strip, guess: Float) -> Bool:
         """Return whether patches at strip positions (L, 2) are seen whole, even if these err a little.
@@ -234,7 +195,7 @@ class TextureTracker:
         inside = (row >= 0) & (row < len(whole))
         return np.asarray(inside & whole[np.where(inside, row, 0), np.mod(column, whole.shape[1])])
 
-    def _record(self, found: _Matched, strip: Strip, frame: int) -> None:
+    def _record(self, found: Matched, strip: Strip, frame: int) -> None:
         """Store the pixels of matched landmarks, and where they are beside their common displacement."""
         m, good = self._map, found.good
         index = found.landmark[good]
@@ -252,7 +213,7 @@ class TextureTracker:
         self._store.add(m.number[index], frame, strip.pixel(at[:, 0], at[:, 1]), sigma, start)
         m.offset[index] += found.offset[good] - found.drift
 
-    def _renew(self, found: _Matched, strip: Strip, frame: int) -> None:
+    def _renew(self, found: Matched, strip: Strip, frame: int) -> None:
         """Record what was found, start landmarks in free cells, and put those no longer seen away."""
         self._record(found, strip, frame)
         self._start_landmarks(strip, frame, found.drift)
