@@ -216,7 +216,7 @@ def _texture_of_run(
 
 TEXTURE = Stage(
     "texture",
-    "12",
+    "13",
     TextureParameters,
     _texture_of_run,
     "lit frames to the wall's photo as a flat picture, evenly lit, as bright as recorded",

@@ -20,10 +20,8 @@ from stages.texture.project import project_tile
 from stages.texture.surface import WallSurface
 from stages.texture.views import LitViews, TileViews
 
-_LEFT = np.sqrt(0.5**2 - 1 / 12)
-"""1 σ, grey levels, of noise that with the rounding of the photo to 8 bits (1 / √12) is half a grey level,
-which is not visible. For noise as small as the rounding alone, open-1-field would need 23 views instead of
-16, a third of the stage's time, for 0.1 dB of 44.6."""
+_ROUNDED = 1 / np.sqrt(12)
+"""1 σ, grey levels, of the photo's rounding to 8 bits: noise below it is not visible."""
 _FEWEST = 16
 """Number of views blended even without noise, so that a glint or a drop in some of them is distinguished from
 the wall. In open-1-field 16 instead of 48 views cost 0.1 dB of 44.7, 24 cost 0.04 dB."""
@@ -107,10 +105,10 @@ def _evenly_lit(luma: Image, uv: Float32, inverse_brightness: Float32) -> Float3
 
 
 def views_against(noise: float, most: int) -> int:
-    """Return the number of views whose mean has so little noise (1 σ, grey levels) that it is not visible.
+    """Return the number of views whose mean has no more noise (1 σ, grey levels) than rounding.
 
     It is ``most`` at most, and ``most`` if the noise is unknown.
     """
     if not np.isfinite(noise):
         return most
-    return min(max(int(np.ceil((noise / _LEFT) ** 2)), _FEWEST), most)
+    return min(max(int(np.ceil((noise / _ROUNDED) ** 2)), _FEWEST), most)

@@ -118,9 +118,8 @@ def test_tiles_have_similar_numbers_of_views_and_share_them(most: int) -> None:
     assert all(14 <= len(t.views) <= 15 for t in alike)
 
 
-def test_views_average_noise_down_until_it_is_not_visible() -> None:
-    assert views_against(2.0, 48) == 24
-    assert views_against(1.4, 48) == 16
+def test_views_average_noise_down_to_that_of_rounding() -> None:
+    assert views_against(1.4, 48) == 24
     assert views_against(0.0, 48) == 16
     assert views_against(9.0, 48) == views_against(float("nan"), 48) == 48
     assert views_against(1.4, 10) == 10
