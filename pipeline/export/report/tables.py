@@ -155,12 +155,13 @@ def _found(summary: RunSummary) -> Card:
     ]
     if defects.unconfirmed:
         lines.append(
-            f"{len(defects.unconfirmed)} more places were seen in one ring or in the photo alone, or are "
-            "more likely false than real: they are listed as unconfirmed and not counted"
+            "seen in one ring or in the photo alone, or more likely false than real: "
+            f"{len(defects.unconfirmed)} more, listed as unconfirmed and not counted"
         )
     if not defects.items:
         return Card("What was found", "no defect", tuple(lines))
-    return Card("What was found", f"{len(defects.items)} findings", (_counted(defects.items), *lines))
+    found = "1 finding" if len(defects.items) == 1 else f"{len(defects.items)} findings"
+    return Card("What was found", found, (_counted(defects.items), *lines))
 
 
 def _seen_distances(wall: Wall) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
