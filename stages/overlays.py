@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from typing import Literal
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
@@ -23,13 +22,6 @@ from pipeline.recording.base import Recording
 
 # Colour of what was not measured: middle grey, which no colour map has.
 _NOT_MEASURED_BGR = (128, 128, 128)
-# Maps of 11 colours by C. Brewer and M. Harrower (colorbrewer2.org): RGB, at equal distances.
-_ANCHORS = {
-    "RdBu_r": "053061 2166ac 4393c3 92c5de d1e5f0 f7f7f7 fddbc7 f4a582 d6604d b2182b 67001f",
-    "PuOr_r": "2d004b 542788 8073ac b2abd2 d8daeb f7f7f7 fee0b6 fdb863 e08214 b35806 7f3b08",
-    "BrBG": "543005 8c510a bf812d dfc27d f6e8c3 f5f5f5 c7eae5 80cdc1 35978f 01665e 003c30",
-}
-_TABLES = {"cividis": cv2.COLORMAP_CIVIDIS, "viridis": cv2.COLORMAP_VIRIDIS}
 # A sound pipe has two harmonics beside its mean radius: it lies off centre, and it is oval.
 _HARMONICS = 2
 # 95 % efficiency for normal errors (P. Huber, "Robust statistics", 1981).
@@ -154,20 +146,17 @@ def _overlay(
 
 
 def _palette(colours: str) -> Byte:
-    share = np.linspace(0, 1, 255)
-    if colours in _TABLES:
-        place = np.minimum(256 * share, 255).astype(np.uint8)
-        bgr = cv2.applyColorMap(place[:, None], _TABLES[colours])[:, 0]
-    else:
-        anchors = np.array([list(bytes.fromhex(a)) for a in _ANCHORS[colours].split()], float)
-        at = np.linspace(0, 1, len(anchors))
-        bgr = np.stack([np.rint(np.interp(share, at, anchors[:, c])) for c in (2, 1, 0)], -1)
-    return np.vstack([np.array([_NOT_MEASURED_BGR], np.uint8), bgr.astype(np.uint8)])
+    # matplotlib is slow to import, so it is imported only when it is needed.
+    from matplotlib import colormaps
+
+    rgb = colormaps[colours](np.linspace(0, 1, 255))[:, :3]
+    bgr = np.rint(255 * rgb[:, ::-1]).astype(np.uint8)
+    return np.vstack([np.array([_NOT_MEASURED_BGR], np.uint8), bgr])
 
 
 OVERLAYS = Stage(
     "overlays",
-    "2",
+    "3",
     OverlayParameters,
     draw_overlays,
     "wall -> deviation, uncertainty, misalignment as colours",

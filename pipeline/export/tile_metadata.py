@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.arrays import Bool, Float, Int
+from pipeline.arrays import Float, Int
 from pipeline.artefacts.findings import Defect
 from pipeline.artefacts.measured import RadiusMap
 from pipeline.export.glb import GlbBuilder
@@ -96,27 +96,14 @@ def near(defects: Sequence[Defect], from_mm: float, to_mm: float) -> list[Defect
 
 def defect_at(defects: Sequence[Defect], distance_mm: Float, azimuth_rad: Float) -> Int:
     """Return the index (N,) of the defect whose outline contains each place; their number if none does."""
+    # matplotlib is slow to import, so it is imported only when it is needed.
+    from matplotlib.path import Path as Outline
+
     out = np.full(len(distance_mm), len(defects))
     for number, defect in enumerate(defects):
+        outline = Outline(defect.outline)
         for turn in (-2 * np.pi, 0.0, 2 * np.pi):
-            out[_inside(defect.outline, distance_mm, azimuth_rad + turn)] = number
-    return out
-
-
-def _inside(outline: Float, x: Float, y: Float) -> Bool:
-    """Return which places (N,) a closed outline (M, 2) contains.
-
-    A ray from such a place crosses it an odd number of times.
-    """
-    low, high = outline.min(0), outline.max(0)
-    out: Bool = (x >= low[0]) & (x <= high[0]) & (y >= low[1]) & (y <= high[1])
-    some = np.flatnonzero(out)
-    odd = np.zeros(len(some), bool)
-    for (x0, y0), (x1, y1) in zip(outline, np.roll(outline, -1, 0), strict=True):
-        if y0 != y1:
-            crosses = (y0 > y[some]) != (y1 > y[some])
-            odd ^= crosses & (x[some] < x0 + (y[some] - y0) / (y1 - y0) * (x1 - x0))
-    out[some] = odd
+            out[outline.contains_points(np.stack([distance_mm, azimuth_rad + turn], -1))] = number
     return out
 
 
