@@ -24,9 +24,8 @@ _BESIDE, _FEWEST = 3, 2
 _LEAST, _SURE = 0.22, 6.0
 """Least change of the noise's logarithm, and its least size in spreads of the other steps between frames.
 Chosen: sound recordings of two renderers change by .05 between frames, crf 34 after 16 by .5 and 2.2."""
-_NOISE, _OF_MEDIAN = "noise", 1.483
-"""Name of the figure by which a change of the coding is known; 1 σ of normal numbers over the median of their
-sizes."""
+_NOISE = "noise"
+"""Name of the figure by which a change of the coding is known."""
 
 
 @dataclass
@@ -47,7 +46,7 @@ class FineNoise:
         rest = (above[upper] - twin.level[upper]) - (above[lower] - twin.level[lower])
         twice = (rest[:, 1:] - rest[:, :-1])[use] / np.sqrt(4 * twin.variance[upper][:, 1:][use])
         self.frame.append(frame)
-        self.log_noise.append(float(np.log(max(_OF_MEDIAN * float(np.median(np.abs(twice))), 1e-3))))
+        self.log_noise.append(float(np.log(max(robust_spread(twice), 1e-3))))
 
     def step(self, ring: Ring) -> tuple[Mismatch, ...]:
         """Return the change of fine noise from one frame to the next, if there is one beside its scatter."""
