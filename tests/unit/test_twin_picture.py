@@ -8,7 +8,6 @@ import pytest
 
 from stages.twin.cells import chance_of
 from stages.twin.gate import _borne_out, judged
-from stages.twin.glow import glow
 from stages.twin.lamp_light import Figure
 from stages.twin.line_light import _plain_line
 from stages.twin.name import focus_of, response_of
@@ -257,30 +256,6 @@ def test_a_pattern_is_not_light_because_the_pictures_flicker():
 
 def test_without_a_place_that_sees_no_wall_uniform_light_is_not_reported():
     assert _stray_names(lambda pale: 22 * pale, SimpleNamespace(**{**vars(SCENE), "outside": None})) == []
-
-
-def test_light_that_comes_during_the_run_is_told_with_its_frames():
-    """Lamps that stay on from the middle of the run on were a laser that gains 167 %, and nothing else."""
-
-    def found(wall):
-        return glow([np.array([[0, 1, 0, 0, w]] * 3) for w in wall], np.arange(0, 8 * len(wall), 8), RING)
-
-    light = found([0.1, 0.0, -0.1, 16.0, 17.0, 16.5]).mismatch
-    assert [p.value for p in light.place] == [24, 40]
-    assert light.parameters[0].value == pytest.approx(16.5)
-    assert (light.name, found([0.6] * 6), found([np.nan] * 6)) == ("", None, None)
-    assert found([0.0, 9.0, 9.0, np.nan]) is None
-
-
-@pytest.mark.parametrize(("mean", "fewest", "most"), [(0.8, 0, 30), (2.0, 200, 200)])
-def test_the_mean_of_light_includes_the_frames_that_show_less(mean, fewest, most):
-    """Only frames above 1 grey level counted: 2 ± 0.8 was too bright, and 0.8 ± 0.8 was always reported."""
-    drawn = mean + 0.8 * np.random.default_rng(7).standard_normal((200, 40))
-    frame = np.arange(40)
-    found = [glow([np.array([[0, 1, 0, 0, w]] * 3) for w in wall], frame, RING) for wall in drawn]
-    size = [f.mismatch.parameters[0] for f in found if f is not None]
-    assert fewest <= len(size) <= most
-    assert sum(abs(s.value - mean) < 1.96 * s.sd for s in size) >= 0.92 * fewest
 
 
 def test_frames_that_see_black_are_evidence_of_light_for_those_that_do_not():
