@@ -1,4 +1,4 @@
-"""Inputs of a diagnosis: a gauge run of another probe is left out, and the user is warned."""
+"""Inputs of a diagnosis: a gauge run of another probe is left out, and the same pictures are no gauge run."""
 
 from __future__ import annotations
 
@@ -6,7 +6,10 @@ import re
 import shutil
 from pathlib import Path
 
+import pytest
+
 from pipeline.api.diagnosis.inputs import open_inputs
+from pipeline.errors import InputError
 from tests.shared_data import PROJECT_ROOT
 
 SAMPLE = PROJECT_ROOT / "data" / "sample"
@@ -31,7 +34,22 @@ def test_a_gauge_run_of_another_probe_is_left_out_with_a_warning(tmp_path: Path)
     assert "baseline_mm 99 against" in said
 
 
-def test_a_gauge_run_of_the_same_probe_is_kept_without_a_message() -> None:
-    inputs = open_inputs(SAMPLE, SAMPLE, None)
+def test_a_gauge_run_of_the_same_probe_is_kept_without_a_message(tmp_path: Path) -> None:
+    other = Path(shutil.copytree(SAMPLE, tmp_path / "gauge"))
+    # Another video: its header names another program.
+    video = (other / "frames.mkv").read_bytes()
+    assert b"Lavf" in video
+    (other / "frames.mkv").write_bytes(video.replace(b"Lavf", b"Lavg"))
+    inputs = open_inputs(SAMPLE, other, None)
     assert inputs.gauge is not None
     assert inputs.record()["reader_warnings"] == []
+
+
+def test_the_inspection_is_refused_as_its_own_gauge_run(tmp_path: Path) -> None:
+    """It was diagnosed, and each effect that it showed was confirmed by itself."""
+    other = Path(shutil.copytree(SAMPLE, tmp_path / "gauge"))
+    text = (other / "recording.yaml").read_text()
+    (other / "recording.yaml").write_text(text.replace("inspection", "gauge"))
+    for gauge in (SAMPLE, other):
+        with pytest.raises(InputError, match=r"frames.mkv: has the same pictures as the inspection"):
+            open_inputs(SAMPLE, gauge, None)

@@ -57,7 +57,7 @@ def open_inputs(field: Path | None, gauge: Path | None, probe: Path | None) -> D
     Raises
     ------
     InputError
-        When there is no recording, or a recording or the probe cannot be used.
+        When there is no recording, both have the same pictures, or a recording or the probe cannot be used.
     """
     if field is None and gauge is None:
         raise InputError("diagnose", "has no recording", hint="state FIELD, or --gauge GAUGE, or both")
@@ -68,7 +68,25 @@ def open_inputs(field: Path | None, gauge: Path | None, probe: Path | None) -> D
         recordings[1] = None
     for recording in (r for r in recordings if r is not None):
         check_probe_fits(recording, stated)
+    _refuse_same_pictures(*recordings)
     return DiagnosisInputs(recordings[0], recordings[1], stated, file, foreign)
+
+
+def _refuse_same_pictures(field: Recording | None, gauge: Recording | None) -> None:
+    """Raise `InputError` when both recordings have the same pictures, whatever their other files say.
+
+    Two recordings confirm each other: the same pictures given twice would confirm themselves.
+    """
+    if field is None or gauge is None:
+        return
+    # The largest file of a recording holds pictures.
+    pictures = max(gauge.files, key=lambda file: file.stamp.bytes)
+    if any(file.sha256 == pictures.sha256 for file in field.files):
+        raise InputError(
+            gauge.path, f"has the same pictures as the inspection {field.path}", place=pictures.path.name,
+            expected="a second recording: the same probe's run through a gauge",
+            hint="state another recording; a gauge run alone is diagnosed with --gauge, without FIELD",
+        )  # fmt: skip
 
 
 def _probe_file(recordings: Sequence[Recording | None], probe: Path | None) -> Path:
