@@ -5,18 +5,16 @@ The effect of the instrument's uncertainty on the radius is common to all rings:
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from pydantic import Field
 
-from pipeline.arrays import Float
 from pipeline.artefacts.findings import clock_of_azimuth
-from pipeline.artefacts.measured import RingPoints, RingSamples, RingValidity, Trajectory, Wall
+from pipeline.artefacts.measured import RingPoints, RingSamples, Trajectory, Wall
 from pipeline.artefacts.moved_back import kept_by_roll
 from pipeline.artefacts.wall_map import FixedPlace, FixedToProbe
 from pipeline.errors import UnusableError
-from pipeline.geometry.axis import roll_at
 from pipeline.instrument.probe import Probe
 from pipeline.machine.stage import Context, Parameters, Stage
 from pipeline.pages import notation
@@ -28,78 +26,9 @@ from stages.accumulate.held import held_in, warn_of_held
 from stages.accumulate.rival import rival_on
 from stages.accumulate.shared_errors import shared_on_wall, warn_of_left_out
 from stages.accumulate.stretch import cut_stretches, empty_wall, fill, map_of
-from stages.accumulate.survey import RingsOnWall, RingSurvey, in_steady_pictures, nearest, survey_of
+from stages.accumulate.survey import RingsOnWall, RingSurvey, in_steady_pictures, survey_of
+from stages.accumulate.systematic import CalibrationSpread, Systematic, calibration_spread
 from stages.accumulate.unmeasured import warn_of_unmeasured
-
-# Azimuths, 5° apart: the instrument's errors are harmonics up to the fourth, and linear between nodes.
-_AZIMUTHS = 72
-# Rings for which the instrument's share is computed: at least so many, in long runs every 500th.
-_RINGS, _EVERY = 24, 500
-
-
-@dataclass(frozen=True)
-class CalibrationSpread:
-    """1 σ of the radius from the probe's covariance at some distances (K,), around the circle (K, 72)."""
-
-    distance_mm: Float
-    sigma_mm: Float
-
-    def on(self, grid: MapGrid) -> Float:
-        """Return the 1 σ (S, A): rows take the nearest distance, columns are interpolated."""
-        rows = self.sigma_mm[nearest(self.distance_mm, grid.distance_mm)]
-        wide = np.concatenate([rows, rows[:, :1]], 1)
-        fine = (grid.azimuth_rad + np.pi) / (2 * np.pi / _AZIMUTHS)
-        left = np.minimum(fine.astype(int), _AZIMUTHS - 1)
-        part = fine - left
-        return np.asarray(wide[:, left] * (1 - part) + wide[:, left + 1] * part)
-
-
-def calibration_spread(
-    probe: Probe, rings: RingSamples, trajectory: Trajectory, survey: RingSurvey
-) -> CalibrationSpread:
-    """Return the 1 σ of the radius from the instrument's uncertainty, computed for some rings.
-
-    The first harmonic of each change is removed, because the pipe's axis follows the rings' centres.
-    """
-    azimuth = np.linspace(-np.pi, np.pi, _AZIMUTHS, endpoint=False)
-    # Rings seen over less than 0.3 of the circle hardly determine the first harmonic to be removed (chosen).
-    usable = np.flatnonzero(survey.seen > min(0.3, 0.99 * survey.seen.max()))
-    count = min(len(usable), max(_RINGS, len(usable) // _EVERY))
-    some = usable[np.unique(np.linspace(0, len(usable) - 1, count).astype(int))]
-    index = np.searchsorted(trajectory.frame, rings.frame[some])
-    roll = roll_at(trajectory.axis, survey.middle_mm[some], trajectory.T_pc[index])
-    knock = trajectory.knock
-    after = probe if knock is None else probe.after(knock)
-    first = np.inf if knock is None else knock.frame
-    probes = [probe if rings.frame[k] < first else after for k in some]
-    profiles = [_around(p, rings, k, azimuth, t) for p, k, t in zip(probes, some, roll, strict=True)]
-    drift = np.full(len(some), trajectory.radius_doubt * trajectory.radius_mm)
-    if trajectory.image_scale_sigma is not None:
-        by_scale = [_by_scale(probe, rings, k) for k in some]
-        drift = np.hypot(drift, np.array(by_scale) * trajectory.image_scale_sigma[index])
-    return CalibrationSpread(survey.middle_mm[some], np.hypot(np.stack(profiles), drift[:, None]))
-
-
-def _by_scale(probe: Probe, rings: RingSamples, row: int) -> float:
-    """Return the change of a ring's radius, mm, per relative change of the picture's scale."""
-    outward = np.stack([np.cos(rings.azimuth_rad), np.sin(rings.azimuth_rad)], -1)
-    radius_px = float(np.median(rings.radius_px[row][rings.valid[row]]))
-    by_pixel = probe.triangulate_jacobian(rings.centre_px + radius_px * outward)[0][:, :2]
-    return radius_px * float(np.mean(np.einsum("ai,aij,aj->a", outward, by_pixel, outward)))
-
-
-def _around(probe: Probe, rings: RingSamples, row: int, azimuth_p: Float, roll: float) -> Float:
-    """Return the 1 σ of the radius at azimuths of P (72,) for one ring."""
-    azimuth_c = (azimuth_p - roll + np.pi) % (2 * np.pi) - np.pi
-    valid = rings.validity[row] == RingValidity.VALID
-    radius_px = float(np.median(rings.radius_px[row][valid]))
-    outward = np.stack([np.cos(azimuth_c), np.sin(azimuth_c)], -1)
-    by_parameters = probe.triangulate_jacobian(rings.centre_px + radius_px * outward)[1]
-    change = np.einsum("ai,aip->ap", outward, by_parameters[:, :2])
-    first = np.stack([np.cos(azimuth_c), np.sin(azimuth_c)], -1)
-    change = change - first @ (first.T @ change) * (2 / len(azimuth_p))
-    return np.asarray(np.sqrt(np.einsum("ap,pq,aq->a", change, probe.covariance, change)))
-
 
 __all__ = ["ACCUMULATE", "AccumulateParameters", "accumulate_wall"]
 
@@ -155,36 +84,38 @@ def accumulate_wall(
         hint = "the report lists the rejected samples of the stage rings by reason; see the earlier warnings"
         raise UnusableError("accumulate", "no valid ring sample", hint=hint)
     grid = map_grid(survey, parameters.distance_step_mm, parameters.azimuth_samples)
-    spread = calibration_spread(found, rings, trajectory, survey)
-    shared = shared_on_wall(on_wall, grid, parameters.largest_gap_mm, context.scratch)
-    rival = rival_on(grid, on_wall, survey)
-    fixed = fixed_to_probe(survey, rings.frame, trajectory.radius_mm, grid, context.scratch)
+    systematic = _systematic(found, on_wall, survey, grid, parameters.largest_gap_mm, context)
     held = held_in(rings, survey, trajectory.radius_mm)
-    wall = empty_wall(grid, survey, trajectory.axis, fixed, context.scratch)
-    displaced = displaced_on(grid, trajectory, rings.frame, survey)
-    radius_map = replace(wall.radius_map, displaced_mm=displaced)
+    wall = empty_wall(grid, survey, trajectory.axis, systematic.fixed, context.scratch)
+    radius_map = replace(wall.radius_map, displaced_mm=systematic.displaced_mm)
     wall = replace(wall, held=held, radius_map=radius_map)
     smoothing_mm, gap_mm = parameters.smoothing_mm, parameters.largest_gap_mm
     stretches = cut_stretches(grid, survey, smoothing_mm, gap_mm)
     for done, stretch in enumerate(stretches, 1):
-        rows = slice(stretch.from_row, stretch.to_row)
-        local = displaced[rows, None]
-        if fixed is not None:
-            # What stays at a place of the image is a part of what displaces the picture.
-            local = np.maximum(local, fixed.departure_mm[rows])
-        systematic = np.hypot(spread.on(grid.rows(rows.start, rows.stop)), local)
-        for more in (None if rival is None else rival[:, None], shared):
-            if more is not None:
-                systematic = np.hypot(systematic, more[rows])
-        part = map_of(stretch, on_wall, survey, grid, systematic, smoothing_mm, gap_mm, held)
+        sigma = systematic.on(grid, slice(stretch.from_row, stretch.to_row))
+        part = map_of(stretch, on_wall, survey, grid, sigma, smoothing_mm, gap_mm, held)
         fill(wall, stretch, part, on_wall, survey)
         context.progress(done, len(stretches))
     _judge_radii(wall, trajectory, context)
-    _report(context, wall, spread)
+    _report(context, wall, systematic.instrument)
     warn_of_displaced(trajectory, wall, context)
-    _warn_of_fixed(fixed, context)
+    _warn_of_fixed(systematic.fixed, context)
     warn_of_unmeasured(wall.radius_map, trajectory.radius_mm, gap_mm, survey.middle_mm, context)
     return wall
+
+
+def _systematic(
+    probe: Probe, on_wall: RingsOnWall, survey: RingSurvey, grid: MapGrid, gap_mm: float, context: Context
+) -> Systematic:
+    """Return all systematic parts of the radius's σ."""
+    rings, trajectory, scratch = on_wall.rings, on_wall.trajectory, context.scratch
+    return Systematic(
+        calibration_spread(probe, rings, trajectory, survey),
+        displaced_on(grid, trajectory, rings.frame, survey),
+        fixed_to_probe(survey, rings.frame, trajectory.radius_mm, grid, scratch),
+        rival_on(grid, on_wall, survey),
+        shared_on_wall(on_wall, grid, gap_mm, scratch),
+    )
 
 
 def _warn_of_fixed(fixed: FixedToProbe | None, context: Context) -> None:

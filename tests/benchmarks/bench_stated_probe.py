@@ -26,8 +26,8 @@ import numpy as np
 from pipeline.geometry.axis import distance_along
 from pipeline.instrument.probe import Probe
 from pipeline.instrument.probe_file import read_probe
-from stages.accumulate import calibration_spread
 from stages.accumulate.survey import RingsOnWall, survey_of
+from stages.accumulate.systematic import calibration_spread
 from stages.motion.measuring import measure_run
 from stages.motion.parameters import MotionParameters
 from stages.motion.rings import looking_at_wall
