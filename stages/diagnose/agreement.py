@@ -58,13 +58,10 @@ class Agreement:
     ratio : float
         Likelihood of the second measurement if the cause of the first one made both, over its likelihood if
         it had a similar size but, including its sign, nothing to do with the first.
-    elsewhere : bool
-        Whether the second measurement is of another recording, with pictures of its own.
     """
 
     confirmation: Confirmation
     ratio: float
-    elsewhere: bool = False
 
 
 def agreement(
@@ -131,15 +128,14 @@ def chance_of_name(
     O. Berger, "Calibration of p values for testing precise null hypotheses", Am. Stat., 2001). Each
     undistinguished rival, and each other doubt about the name, has the same weight as the name. An unknown
     cause loses weight by the likelihood ratio of the best second measurement, or gains by that of one that
-    disagrees: measurements from one recording share its pictures and count once, those of another recording
-    count beside them. An unknown cause also gains weight if the residual beside the named cause is not noise
-    (``fits_p``, the chance that noise makes it), and by its likelihood with a course of its own, relative to
-    the name (``other_courses``).
+    disagrees. Only the best counts, in whatever recording: an unknown cause that passes one comparison
+    because it stays the same passes the next one too, also in another recording of that probe. It also gains
+    weight if the residual beside the named cause is not noise (``fits_p``, the chance that noise makes it),
+    and by its likelihood with a course of its own, relative to the name (``other_courses``).
     """
     nothing = _at_most(p_value)
     failed = [a.ratio for a in agreements if not a.confirmation.agrees]
-    here, there = (max((a.ratio for a in agreements if a.elsewhere is e), default=1.0) for e in (False, True))
-    ratio = min(failed) if failed else here * there
+    ratio = min(failed) if failed else max((a.ratio for a in agreements), default=1.0)
     unknown = UNKNOWN * (1 / (ratio * _at_most(fits_p)) + other_courses)
     return float(1 / (1 + nothing + doubts + unknown))
 

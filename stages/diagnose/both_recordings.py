@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import replace
 
 import numpy as np
 
@@ -24,7 +23,7 @@ def agreements(
             continue
         found = agreement(_part(where, name, value, of), _part(elsewhere, name, others[name], of))
         if found is not None:
-            yield replace(found, elsewhere=True)
+            yield found
 
 
 def _part(where: str, name: str, value: Value, of: str) -> Part:

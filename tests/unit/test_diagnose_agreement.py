@@ -36,13 +36,12 @@ def test_size_and_direction_each_have_the_right_sigma(direction_deg: float) -> N
     assert set(told) == {"tilt_deg", "direction_deg"}
 
 
-def test_another_recording_confirms_a_name_beside_the_halves_of_the_first() -> None:
-    """A delay of .0247 s (true .025) had .9886: its inspection counted for nothing beside its gauge run."""
-    there = replace(AGREES, ratio=7.7, elsewhere=True)
+def test_of_several_confirmations_only_the_best_counts_also_in_another_recording() -> None:
+    """A cause that stays passes the halves of one recording and another one: both odds were multiplied."""
+    there = replace(AGREES, ratio=7.7)
     alone, both = (chance_of_name(1e-70, 0, of, fits_p=0.054) for of in ([AGREES], [AGREES, AGREES, there]))
-    assert alone == pytest.approx(chance_of_name(1e-70, 0, [AGREES, AGREES], fits_p=0.054))
-    assert (1 / both - 1) * 7.7 == pytest.approx(1 / alone - 1)
-    assert chance_of_name(1e-70, 0, [AGREES, replace(DIFFERS, elsewhere=True)]) < 0.1
+    assert both == alone < chance_of_name(1e-70, 0, [AGREES, replace(there, ratio=2 * AGREES.ratio)], 0.054)
+    assert chance_of_name(1e-70, 0, [AGREES, DIFFERS]) < 0.1
 
 
 @pytest.mark.parametrize(
