@@ -13,10 +13,11 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import fields, is_dataclass
 from enum import Enum
+from functools import cache
 from importlib import import_module
 from itertools import combinations
-from types import MappingProxyType
-from typing import Any, NamedTuple, TypeAlias
+from types import MappingProxyType, NoneType, UnionType
+from typing import Any, NamedTuple, TypeAlias, Union, get_args, get_origin, get_type_hints
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +29,7 @@ OWN_PACKAGES = ("pipeline", "stages")
 # Modules of classes in stored results, and where they are today.
 _MOVED = {"pipeline.recording.checked_frames": "pipeline.recording.checks"}
 Array = NDArray[Any]
+_UNIONS = (Union, UnionType)
 NOT_STORED: Mapping[str, bool] = MappingProxyType({"stored": False})
 """``metadata`` of a dataclass' field that belongs to the computation, not to its result."""
 
@@ -160,8 +162,30 @@ def _decode(tree: Json, array: Callable[[str], Array], packages: set[str]) -> An
         case {"class": str(name), "fields": dict(content)}:
             kind = _class_named(name, packages)
             known = {f.name for f in fields(kind)}  # an older result may hold more
-            return kind(**{k: _decode(v, array, packages) for k, v in content.items() if k in known})
+            values = {k: _decode(v, array, packages) for k, v in content.items() if k in known}
+            _refuse_other_kinds(kind, values)
+            return kind(**values)
     raise CodecError(f"neither a value nor an array: {sorted(tree)}")
+
+
+def _refuse_other_kinds(kind: type, values: Mapping[str, Any]) -> None:
+    """Refuse an array where a class has none, and a number where it has an array: an older result."""
+    arrays = _arrays_of(kind)
+    for name, value in values.items():
+        holds_array = isinstance(value, np.ndarray)
+        if value is not None and arrays[name] not in (None, holds_array):
+            raise CodecError(f"{name} is {'an' if holds_array else 'no'} array")
+
+
+@cache
+def _arrays_of(kind: type) -> dict[str, bool | None]:
+    """Return for each field of a class whether it is an array; None where it may be an array or not."""
+    found: dict[str, bool | None] = {}
+    for name, hint in get_type_hints(kind).items():
+        parts = [p for p in (get_args(hint) if get_origin(hint) in _UNIONS else (hint,)) if p is not NoneType]
+        each = {get_origin(p) is np.ndarray for p in parts if p is not Any}
+        found[name] = each.pop() if len(each) == 1 and Any not in parts else None
+    return found
 
 
 def _class_named(name: str, packages: set[str]) -> Any:

@@ -199,6 +199,16 @@ def test_a_result_with_fields_that_its_class_has_lost_is_read_without_them(tmp_p
     assert digest(found) == digest(tree())
 
 
+@pytest.mark.parametrize("change", [{"size": np.zeros(3)}, {"array": 0.0}])
+def test_a_number_in_place_of_an_array_or_the_reverse_is_no_result(
+    tmp_path: Path, change: dict[str, Any]
+) -> None:
+    store, other = Store(tmp_path), replace(Leaf("a", 1.0, np.zeros(3)), **change)
+    store.write(other, PROVENANCE)
+    assert store.look("grow", KEY, Leaf) is None
+    assert store.read("grow", KEY, Leaf) is None
+
+
 @pytest.mark.parametrize("limit", [0, 100, 5000])
 def test_a_full_disk_is_reported_and_leaves_nothing_that_looks_complete(tmp_path: Path, limit: int) -> None:
     store = Store(tmp_path)

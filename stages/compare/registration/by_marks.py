@@ -23,6 +23,9 @@ _LEAST_STATIONS = 2
 _HALF_RADII, _ROOM_RADII = 0.2, 0.06
 _SAMPLES_PER_CELL = 2
 _LEAST_CORRELATION = 0.8
+_LONGER = (
+    "compare runs that have a longer stretch of wall in common: 2 diameters and more, with texture or relief"
+)
 _AZIMUTHS = 360
 
 
@@ -95,13 +98,14 @@ def _chance(matches: Matches) -> float:
 def _refuse_strangers(matches: Matches, chance: float, limits: RegisterParameters) -> None:
     good, count = int(matches.agree.sum()), len(matches.agree)
     stations = len(np.unique(matches.at_mm[matches.agree]))
-    if stations < _LEAST_STATIONS or good < limits.least_share * count or chance > limits.largest_chance:
+    alike = good >= limits.least_share * count
+    if stations < _LEAST_STATIONS or not alike or chance > limits.largest_chance:
         raise UnusableError(
             "compare",
             f"the runs do not show the same wall, or too little of it: {good} of {count} pieces of wall "
             f"agree, which happens by chance with a probability of {min(chance, 1.0):.2g}",
             limit=f"{limits.least_share:.0%} of the pieces, chance below {limits.largest_chance:g}",
-            hint="compare two runs of one pipe, recorded in the same direction",
+            hint=_LONGER if alike else "compare two runs of one pipe, recorded in the same direction",
         )
 
 
