@@ -61,7 +61,9 @@ class Patch:
 
     @property
     def coverage(self) -> tuple[float, float]:
-        """Seen share of the defect, in the later run and in the earlier."""
+        """Seen share of the defect, in the later run and in the earlier; NaN where it lies beyond both."""
+        if not self.inside.any():
+            return float("nan"), float("nan")
         return float(self.seen_now[self.inside].mean()), float(self.seen_before[self.inside].mean())
 
     @property

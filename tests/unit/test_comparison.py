@@ -13,7 +13,7 @@ from pipeline.artefacts.comparison import FAMILY_ERROR, Fate
 from pipeline.errors import UnusableError
 from stages.compare import changes, holm, put_together
 from stages.compare.paired import PairedWalls
-from stages.compare.patch import Cutter, outline_mask
+from stages.compare.patch import Cutter, Patch, outline_mask
 from stages.compare.registration.by_marks import register
 from tests.two_walls import (
     COLUMNS,
@@ -190,3 +190,10 @@ def test_where_the_later_run_did_not_measure_a_finding_its_coverage_is_zero():
     assert cutter.patch([outline], np.random.default_rng(0)).coverage[0] == 0
     nowhere = replace(pair, now=replace(wall, radius_mm=np.full_like(wall.radius_mm, np.nan)))
     assert (outline_mask([outline], nowhere) == cutter.defective).all()
+
+
+def test_a_defect_beyond_the_common_wall_has_no_coverage_and_raises_no_warning():
+    none, height = np.zeros((3, 4), bool), np.zeros((3, 4))
+    patch = Patch(height, height, none, none, none, (0.5, 0.4), np.zeros((0, 3, 4)), 0)
+    assert np.isnan(patch.coverage).all()
+    assert not patch.is_seen_in_both
