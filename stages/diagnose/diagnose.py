@@ -6,15 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Annotated
 
-import numpy as np
-
-from pipeline.arrays import Float
 from pipeline.artefacts.measured import RingSamples
 from pipeline.instrument.probe import Probe
 from pipeline.machine.stage import Context, Of, Stage
 from pipeline.recording.base import Recording
 from pipeline.recording.checks import CheckedFrames
-from stages.diagnose.agreement import Agreement, Part, agreement
 from stages.diagnose.channels import (
     FIDUCIALS,
     FIELD_EVIDENCE,
@@ -32,17 +28,14 @@ from stages.diagnose.effects.library import without as library_without
 from stages.diagnose.field.answer import borne_out, encoder_share, field_confirmations, with_field
 from stages.diagnose.field.evidence import travel_of_run
 from stages.diagnose.field.run import FieldRun
-from stages.diagnose.gauge.answer import verdict_of
-from stages.diagnose.profile.finding import Finding
-from stages.diagnose.result import Diagnosis, FitQuality, Verdict
+from stages.diagnose.result import Diagnosis, FitQuality
+from stages.diagnose.second_line import compared_with_rings, sheet_by_rings
 from stages.diagnose.travel.evidence import TravelEvidence
 from stages.premises import PREMISES
 from stages.rings import RINGS
 from stages.triangulate import TRIANGULATE
 
 _STEPS = 2
-_NAME = "ghost_ring"
-_SHEET = ("tilt_x", "tilt_y", "cone_rad")
 
 
 @dataclass(frozen=True)
@@ -186,59 +179,3 @@ def diagnosis_stages(with_field: bool, with_gauge: bool) -> tuple[Stage, ...]:
     of_gauge = tuple(s.for_role("gauge") for s in _OF_GAUGE if with_gauge)
     of_both = (CORRECTED_MOTION.for_role("field"),) if with_field and with_gauge else ()
     return (*of_field, *of_gauge, *of_both, DIAGNOSIS)
-
-
-def sheet_by_rings(gauge: Seen | None, correction: Correction | None, probe: Probe) -> Part | None:
-    """Return tilt along x and y and cone of the sheet, deg, true minus stated, from a gauge run's rings.
-
-    None where they leave open what displaced them.
-    """
-    if gauge is None or gauge.geometry is None or correction is None:
-        return None
-    if verdict_of(gauge.geometry) not in (Verdict.CONSISTENT, Verdict.NAMED):
-        return None
-    at = [probe.parameter_names.index(name) for name in _SHEET]
-    moved = np.degrees(correction.probe.parameters[at] - probe.parameters[at])
-    covariance = np.degrees(np.degrees(correction.probe.covariance[np.ix_(at, at)]))
-    return Part("rings of the gauge", _words(moved), moved, covariance)
-
-
-def against_rings(found: Finding, sheet: Part) -> Agreement | None:
-    """Return whether the sheet implied by the place of a second line agrees with that of the rings.
-
-    None where either determines the sheet too poorly.
-    """
-    value = np.array([size.value for size in found.confirms])
-    covariance = np.diag([size.sigma**2 for size in found.confirms])
-    return agreement(sheet, Part("place of the second line", _words(value), value, covariance))
-
-
-def compared_with_rings(seen: Seen, sheet: Part) -> Seen:
-    """Return a recording's evidence with its second line confirmed by the rings, or withdrawn.
-
-    A faint line whose place implies a sheet that the rings exclude is not light bounced across the bore.
-    Compression, the lens and the wall leave such light, too.
-    """
-    if seen.profile is None:
-        return seen
-    second = next((f for f in seen.profile.found if f.effect == _NAME and f.confirms), None)
-    match = against_rings(second, sheet) if second is not None else None
-    if second is None or match is None:
-        return seen
-    if match.confirmation.agrees:
-        kept = replace(second, agreements=(*second.agreements, match))
-        return replace(seen, profile=seen.profile.with_finding(kept))
-    withdrawn = replace(second, p_value=1.0, confirms=(), agreements=())
-    words = (
-        f"The line's profile of {seen.name} shows faint light beside the line. It is not light "
-        f"bounced across the bore: its place would require {match.confirmation.measured.partition(': ')[2]}, "
-        f"and the rings say {match.confirmation.prediction.partition(': ')[2]}."
-    )
-    return replace(
-        seen, profile=seen.profile.with_finding(withdrawn), shortcomings=(*seen.shortcomings, words)
-    )
-
-
-def _words(sheet: Float) -> str:
-    tilt, direction = np.hypot(sheet[0], sheet[1]), np.degrees(np.arctan2(sheet[1], sheet[0]))
-    return f"a tilt of {tilt:.3f}° toward {direction:.0f}° and a cone of {sheet[2]:+.3f}°"
