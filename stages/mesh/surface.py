@@ -53,12 +53,16 @@ def weld(pieces: Sequence[Surface]) -> Surface:
 
 
 def vertex_normals(surface: Surface) -> Float:
-    """Return unit normals (V, 3) of the vertices, toward the inside of the pipe (by open3d)."""
-    o3d = open3d()
-    mesh = o3d.geometry.TriangleMesh(
-        o3d.utility.Vector3dVector(surface.vertex_p), o3d.utility.Vector3iVector(surface.face)
-    )
-    return np.asarray(mesh.compute_vertex_normals().vertex_normals)
+    """Return unit normals (V, 3) of the vertices, toward the inside of the pipe: by the triangles' areas.
+
+    To import open3d for these alone would take ten times as long.
+    """
+    a, b, c = surface.vertex_p[surface.face.T]
+    twice_the_area = np.cross(b - a, c - a)
+    corner, count = surface.face.ravel(), len(surface.vertex_p)
+    total = np.stack([np.bincount(corner, np.repeat(n, 3), count) for n in twice_the_area.T], -1)
+    length = np.linalg.norm(total, axis=1, keepdims=True)
+    return np.asarray(total / np.maximum(length, np.finfo(float).tiny))
 
 
 def with_normals(pieces: Iterable[Surface]) -> Iterator[tuple[Surface, Float]]:

@@ -274,6 +274,22 @@ def test_a_wall_without_measurements_is_refused() -> None:
         )
 
 
+def test_normals_are_those_of_open3d() -> None:
+    o3d = open3d()
+    piece = grid(small_wall(noise_mm=0.05, hole=HOLE), 1)[0]
+    corner = piece.vertex_p[piece.face[0]]
+    flat = dataclasses.replace(
+        piece,
+        vertex_p=np.concatenate([piece.vertex_p, corner[[0, 0, 0]]]),
+        face=np.concatenate([piece.face, len(piece.vertex_p) + np.arange(3, dtype=np.int32)[None]]),
+    )
+    mesh = o3d.geometry.TriangleMesh(
+        o3d.utility.Vector3dVector(flat.vertex_p), o3d.utility.Vector3iVector(flat.face)
+    )
+    wanted = np.asarray(mesh.compute_vertex_normals().vertex_normals)
+    np.testing.assert_allclose(vertex_normals(flat), wanted, atol=1e-12)
+
+
 def test_normals_are_continuous_from_piece_to_piece() -> None:
     pieces = grid(small_wall(noise_mm=0.05, hole=HOLE), 3)
     whole = weld(pieces)
