@@ -10,6 +10,7 @@ from scipy.ndimage import gaussian_filter, map_coordinates
 
 from pipeline.arrays import Float, Image
 from stages.motion import MotionParameters
+from stages.motion.tracking.overlap import Overlap, StoredStrip, along
 from stages.motion.tracking.strips import Hidden, StripGrid, softened
 from stages.motion.tracking.tracker import TextureTracker, TrackedTexture
 from tests.unit.drawn_pipe import RADIUS, led_light, small_probe, wall_hits
@@ -74,3 +75,16 @@ def test_a_wall_that_does_not_repeat_is_not_ambiguous() -> None:
     found = followed(0.0, marks(0.2))
     np.testing.assert_allclose(found.poses.T_pc[:, 2, 3], STEP_MM * np.arange(4), atol=0.5)
     assert not found.ambiguous
+
+
+@pytest.mark.parametrize("most_turned", [0, 9])
+def test_few_turns_correlate_as_they_do_among_all(most_turned: int) -> None:
+    drawn = gaussian_filter(np.random.default_rng(5).standard_normal((64, 240)), 2, mode="wrap")
+    later = np.roll(drawn, (6, -4), (0, 1))
+    drawn[:20, 30:90] = np.nan
+    strips = [StoredStrip(first, x.astype(np.float32)) for first, x in ((40, drawn), (48, later))]
+    shift, height = along(*strips, most_turned)
+    whole = Overlap.of(*strips)
+    few, order = np.abs(whole.column[0]) <= most_turned, np.argsort(whole.row[:, 0], kind="stable")
+    np.testing.assert_array_equal(shift, whole.row[order, 0])
+    np.testing.assert_allclose(height, whole.height[np.ix_(order, few)].max(1), atol=1e-5)

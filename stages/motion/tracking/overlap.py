@@ -11,11 +11,14 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from scipy.fft import irfft2, rfft2
+from numpy.typing import NDArray
+from scipy.fft import irfft, irfft2, rfft, rfft2
 from scipy.ndimage import maximum_filter1d
 
 from pipeline.arrays import Bool, Float, Float32, Int
 from stages.motion.tracking.strips import Strip
+
+Spectrum = NDArray[np.complex64]
 
 MOST_RIVAL = 0.75
 """Correlation, as a share of the best, from which another shift makes the best one doubtful. With it, all of
@@ -69,18 +72,31 @@ class Overlap:
     @staticmethod
     def of(earlier: StoredStrip, later: StoredStrip) -> Overlap:
         """Correlate two strips at all shifts by two samples."""
-        height = _correlation(earlier, later)
-        rows, columns = height.shape
-        lag = later.first_row - earlier.first_row
-        row = lag + 2 * ((np.arange(rows) + rows // 2) % rows - rows // 2)[:, None]
-        column = 2 * ((np.arange(columns) + columns // 2) % columns - columns // 2)[None]
-        return Overlap(height, row, column)
+        a, b = _Halved.of(earlier), _Halved.of(later)
+        size = (2 * len(a.value), a.value.shape[1])
+        first, second = ([rfft2(x, size) for x in half.parts] for half in (a, b))
+        height = _normalised(
+            [irfft2(np.conj(f) * s, size) for f, s in _factors(first, second)], a.least_common(b)
+        )
+        row = later.first_row - earlier.first_row + _shifts(len(height))
+        return Overlap(height, row[:, None], _shifts(size[1])[None])
 
-    def along(self, most_turned: int) -> tuple[Float, Float]:
-        """Return all shifts along the pipe (H,), and the best correlation there at a turn up to so many."""
-        turned = np.abs(self.column[0]) <= most_turned
-        order = np.argsort(self.row[:, 0], kind="stable")
-        return self.row[order, 0].astype(float), self.height[np.ix_(order, turned)].max(1).astype(float)
+
+def along(earlier: StoredStrip, later: StoredStrip, most_turned: int) -> tuple[Float, Float]:
+    """Return all shifts along the pipe (H,), and the best correlation there at a turn up to so many.
+
+    Only these few turns are computed: a tenth of the arithmetic of `Overlap.of`.
+    """
+    a, b = _Halved.of(earlier), _Halved.of(later)
+    turns, size = most_turned // 2, 2 * len(a.value)
+    first = second = [rfft(x.T, size) for x in a.parts]
+    if later is not earlier:
+        second = [rfft(x.T, size) for x in b.parts]
+    products = [_summed_around(f, s, turns) for f, s in _factors(first, second)]
+    height = _normalised([irfft(p, size) for p in products], a.least_common(b)).max(0)
+    row = later.first_row - earlier.first_row + _shifts(size)
+    order = np.argsort(row, kind="stable")
+    return row[order].astype(float), height[order].astype(float)
 
 
 @dataclass(frozen=True)
@@ -104,12 +120,12 @@ class Rival:
 def repeats(strip: Strip, apart: int) -> bool:
     """Return whether a strip resembles itself farther along the pipe than ``apart``, strip samples."""
     stored = StoredStrip.of(strip)
-    return _rival(Overlap.of(stored, stored), 0.0, apart).share > _REPEATS
+    return _rival(*along(stored, stored, apart), 0.0, apart).share > _REPEATS
 
 
 def rival_of(found: float, before: Strip, now: Strip, apart: int) -> Rival:
     """Return the best shift of two strips that is farther than ``apart`` from the one that was found."""
-    return _rival(Overlap.of(StoredStrip.of(before), StoredStrip.of(now)), found, apart)
+    return _rival(*along(StoredStrip.of(before), StoredStrip.of(now), apart), found, apart)
 
 
 def displacement(before: Strip, now: Strip) -> Float:
@@ -127,8 +143,7 @@ def displacement(before: Strip, now: Strip) -> Float:
     return np.array([2 * dy, 2 * dx]) if response > _LEAST_RESPONSE else np.zeros(2)
 
 
-def _rival(overlap: Overlap, found: float, apart: int) -> Rival:
-    shift, height = overlap.along(apart)
+def _rival(shift: Float, height: Float, found: float, apart: int) -> Rival:
     here = height[np.abs(shift - found) <= 2 * _NEAR].max(initial=1e-9)
     crest = height >= maximum_filter1d(height, 2 * _NEAR + 1)
     elsewhere = np.where(crest & (np.abs(shift - found) > apart), height, 0.0)
@@ -136,29 +151,56 @@ def _rival(overlap: Overlap, found: float, apart: int) -> Rival:
     return Rival(float(shift[best]), float(elsewhere[best] / here))
 
 
-def _correlation(earlier: StoredStrip, later: StoredStrip) -> Float32:
-    """Return the normalised correlation (H, W/2) at all shifts by two samples; 0 where little overlaps."""
-    (a, seen_a), (b, seen_b) = (_halved(p) for p in (earlier, later))
-    size = (2 * a.shape[0], a.shape[1])
-    fa, fa2, fm = (np.conj(rfft2(x, size)) for x in (a, a * a, seen_a))
-    gb, gb2, gm = (rfft2(x, size) for x in (b, b * b, seen_b))
-    product, power_a, power_b, common = (
-        irfft2(x, size) for x in (fa * gb, fa2 * gm, fm * gb2, fm * gm)
-    )  # fmt: skip
-    enough = common > _LEAST_OVERLAP * min(float(seen_a.sum()), float(seen_b.sum()))
-    scale = np.sqrt(np.maximum(power_a * power_b, 1e-12))
-    return np.asarray(np.where(enough, product / scale, 0.0), np.float32)
-
-
-def _halved(strip: StoredStrip) -> tuple[Float32, Float32]:
-    """Return contrast and usability at half resolution, without structures that run all along the pipe.
+@dataclass(frozen=True)
+class _Halved:
+    """A strip's contrast and usability (H/2, W/2), without structures that run all along the pipe.
 
     A seam or a streak has no information on distance and would fit everywhere.
     """
-    seen = strip.usable
-    value = np.where(seen, np.clip(np.nan_to_num(strip.contrast), -1, 1), 0).astype(np.float32)
-    value -= (value.sum(0) / np.maximum(seen.sum(0), 1)).astype(np.float32)
-    size = (value.shape[1] // 2, value.shape[0] // 2)
-    parts = (np.where(seen, value, 0).astype(np.float32), seen.astype(np.float32))
-    a, b = (cv2.resize(x, size, interpolation=cv2.INTER_AREA) for x in parts)
-    return np.asarray(a, np.float32), np.asarray(b, np.float32)
+
+    value: Float32
+    seen: Float32
+
+    @staticmethod
+    def of(strip: StoredStrip) -> _Halved:
+        seen = strip.usable
+        value = np.where(seen, np.clip(np.nan_to_num(strip.contrast), -1, 1), 0).astype(np.float32)
+        value -= (value.sum(0) / np.maximum(seen.sum(0), 1)).astype(np.float32)
+        size = (value.shape[1] // 2, value.shape[0] // 2)
+        parts = (np.where(seen, value, 0).astype(np.float32), seen.astype(np.float32))
+        a, b = (cv2.resize(x, size, interpolation=cv2.INTER_AREA) for x in parts)
+        return _Halved(np.asarray(a, np.float32), np.asarray(b, np.float32))
+
+    @property
+    def parts(self) -> tuple[Float32, Float32, Float32]:
+        """Return contrast, its square, and usability."""
+        return self.value, self.value * self.value, self.seen
+
+    def least_common(self, other: _Halved) -> float:
+        """Return how many usable samples two strips must have in common to be compared."""
+        return _LEAST_OVERLAP * min(float(self.seen.sum()), float(other.seen.sum()))
+
+
+def _factors(first: list[Spectrum], second: list[Spectrum]) -> list[tuple[Spectrum, Spectrum]]:
+    """Return the spectra whose products are those of the contrasts, the powers and the common samples."""
+    (a, a2, seen_a), (b, b2, seen_b) = first, second
+    return [(a, b), (a2, seen_b), (seen_a, b2), (seen_a, seen_b)]
+
+
+def _summed_around(first: Spectrum, second: Spectrum, turns: int) -> Spectrum:
+    """Return cross-spectra along the pipe (2 turns + 1, F) of columns (W, F), the second ones turned."""
+    wide = np.concatenate([second[len(second) - turns :], second, second[:turns]])
+    back = np.conj(first)
+    return np.stack([(back * wide[k : k + len(back)]).sum(0) for k in range(2 * turns + 1)])
+
+
+def _normalised(products: list[Float32], least: float) -> Float32:
+    """Return the correlation by products, powers and the number of common samples; 0 below the ``least``."""
+    product, power_a, power_b, common = products
+    scale = np.sqrt(np.maximum(power_a * power_b, 1e-12))
+    return np.asarray(np.where(common > least, product / scale, 0.0), np.float32)
+
+
+def _shifts(count: int) -> Int:
+    """Return the shifts (count,) of halved strips in the order of a Fourier transform, strip samples."""
+    return np.asarray(2 * ((np.arange(count) + count // 2) % count - count // 2))
