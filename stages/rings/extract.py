@@ -9,7 +9,7 @@ from itertools import chain, islice
 import numpy as np
 from pydantic import Field
 
-from pipeline.arrays import Byte, Float, Float32, Image, Int
+from pipeline.arrays import Byte, Image, Int
 from pipeline.artefacts.measured import RingSamples, RingValidity
 from pipeline.errors import UnusableError
 from pipeline.geometry.image_places import ImagePlaces
@@ -21,9 +21,9 @@ from stages.rings.behind_dirt import set_right
 from stages.rings.expectation import warn_of_rings
 from stages.rings.glints import SAYING_RINGS
 from stages.rings.lattice import lattices_of, take_out, warn_of_lattices
-from stages.rings.noise import QUANTISATION_VARIANCE, SURELY_UNCLIPPED, clip_level_of, noise_response
+from stages.rings.mixture import across_line, channel_of, excess_weights, first_weights, line_weights, mix
+from stages.rings.noise import SURELY_UNCLIPPED, clip_level_of, noise_response
 from stages.rings.seam import seam_of, warn_of_seam
-from stages.rings.search import BAND_WIDTHS
 from stages.rings.sectors import Sectors, sectors_of
 from stages.rings.trace import LOST, RingTrace, trace_ring
 from stages.rings.validity import contradicted
@@ -33,11 +33,6 @@ Images = Iterator[tuple[int, Image | None]]
 Found = tuple[int, RingTrace | None]
 _LEARNING_FRAMES = 4
 _AT_ONCE = 512
-_BLUE_GREEN_NM, _GREEN_RED_NM = 490.0, 580.0
-_LINE_WIDTHS, _WALL_WIDTHS = 0.7, 4.0
-# The wall's colours are taken from every fourth pixel beside the line: of open-3's 46000 in a frame this
-# moves the line by .003 of its σ.
-_WALL_EVERY = 4
 # Clipped pixels are searched up to so many line widths on either side of the line. If the line lies within
 # half a width of their middle, both of its flanks were fitted.
 _CLIP_WIDTHS, _CLIP_STEP, _ASIDE_WIDTHS = 3.0, 0.5, 0.5
@@ -134,7 +129,7 @@ def _laser_traces(images: Images, recording: Recording, sectors: Sectors) -> Ite
 
 def _lit_traces(images: Images, probe: Probe, sectors: Sectors) -> Iterator[Found]:
     """Trace frames in which the wall is lit too, in the mixture of channels that shows the line best."""
-    weights, channel = excess_weights(probe.laser.wavelength_nm), _channel(probe.laser.wavelength_nm)
+    weights, channel = excess_weights(probe.laser.wavelength_nm), channel_of(probe.laser.wavelength_nm)
     trace = None
     for frame, bgr in images:
         if bgr is None:
@@ -146,13 +141,13 @@ def _lit_traces(images: Images, probe: Probe, sectors: Sectors) -> Iterator[Foun
             trace = trace_ring(image, sectors, np.inf, before)
         if before is None or trace is None or trace.coverage < before.coverage - LOST:
             # Colours may have changed, so that weights learned from the pictures before hide the line.
-            own = _first_weights(bgr, sectors, probe)
+            own = first_weights(bgr, sectors, probe)
             alone = trace_ring(mix(bgr, own), sectors, np.inf)
             if trace is None or (alone is not None and alone.coverage > trace.coverage):
                 weights, image, trace = own, mix(bgr, own), alone
         yield frame, None if trace is None else _without_dips(trace, bgr, sectors, channel)
         if trace is not None:
-            weights = discriminant_weights(bgr, sectors, trace, weights)
+            weights = line_weights(bgr, sectors, trace, weights)
             trace = replace(trace, response=noise_response(image, sectors, trace.fit, trace.response))
 
 
@@ -165,13 +160,8 @@ def _without_dips(trace: RingTrace, bgr: Byte, sectors: Sectors, channel: int) -
     that the clipped pixels can cause.
     """
     across = np.arange(-_CLIP_WIDTHS, _CLIP_WIDTHS + _CLIP_STEP / 2, _CLIP_STEP)
-    radius = np.nan_to_num(trace.fit.radius_px)[:, None] + across * trace.width_px
-    psi, size = sectors.azimuth_rad[:, None], np.array(sectors.image_size) - 1
-    u, v = (
-        np.clip(np.rint(c + radius * f(psi)), 0, most).astype(int)
-        for c, f, most in zip(sectors.centre_px, (np.cos, np.sin), size, strict=True)
-    )
-    clips = bgr[v, u, channel] > SURELY_UNCLIPPED * np.iinfo(bgr.dtype).max
+    colours = across_line(bgr, sectors, np.nan_to_num(trace.fit.radius_px), across * trace.width_px)
+    clips = colours[..., channel] > SURELY_UNCLIPPED * np.iinfo(bgr.dtype).max
     count = clips.sum(1)
     aside = np.abs(clips @ across) / np.maximum(count, 1)
     line = np.exp(-(across**2) / 2)
@@ -180,13 +170,6 @@ def _without_dips(trace: RingTrace, bgr: Byte, sectors: Sectors, channel: int) -
     lost &= trace.validity == RingValidity.VALID
     fit = trace.fit._replace(sigma_px=np.hypot(trace.fit.sigma_px, pull * trace.width_px))
     return replace(trace, fit=fit, validity=np.where(lost, RingValidity.SATURATED, trace.validity))
-
-
-def _first_weights(bgr: Byte, sectors: Sectors, probe: Probe) -> Float:
-    """Return weights learned from an image in which the ring is found by the laser's colour alone."""
-    weights = excess_weights(probe.laser.wavelength_nm)
-    trace = trace_ring(mix(bgr, weights), sectors, np.inf)
-    return weights if trace is None else discriminant_weights(bgr, sectors, trace, weights)
 
 
 def _first_trace(
@@ -256,37 +239,3 @@ def _report(context: Context, samples: RingSamples, wander: float) -> None:
             else f"ring samples rejected: {reason.name.lower()}"
         )
         context.report(name, int((samples.validity == reason).sum()), "samples")
-
-
-def excess_weights(wavelength_nm: float) -> Float:
-    """Return (3,) B, G, R weights: the channel nearest to the laser's wavelength minus half of the others."""
-    weights = np.full(3, -0.5)
-    weights[_channel(wavelength_nm)] = 1.0
-    return weights
-
-
-def _channel(wavelength_nm: float) -> int:
-    """Return the channel, of blue, green and red, nearest to a wavelength."""
-    return 0 if wavelength_nm < _BLUE_GREEN_NM else 1 if wavelength_nm < _GREEN_RED_NM else 2
-
-
-def mix(bgr: Byte, weights: Float) -> Float32:
-    """Return the (H, W) mixture of an image (H, W, 3)."""
-    return np.asarray(bgr @ weights.astype(np.float32), np.float32)
-
-
-def discriminant_weights(bgr: Byte, sectors: Sectors, trace: RingTrace, otherwise: Float) -> Float:
-    """Return (3,) Fisher discriminant weights between line and wall beside it.
-
-    The wall's colour covariance holds both its reflectance and the sensor's noise, so the mixture has the
-    best ratio of line height to everything else. It is scaled so that the line keeps its height in the
-    strongest channel; ``otherwise`` is returned if line and wall do not differ in colour.
-    """
-    radius, width = trace.radius_everywhere(), trace.width_px
-    beside = sectors.pixels_near(radius, _WALL_WIDTHS * width, BAND_WIDTHS * width)[::_WALL_EVERY]
-    line = bgr.reshape(-1, 3)[sectors.pixels_near(radius, 0, _LINE_WIDTHS * width)].astype(float)
-    wall = bgr.reshape(-1, 3)[beside].astype(float)
-    rise = line.mean(0) - wall.mean(0)
-    weights = np.linalg.solve(np.cov(wall.T) + np.eye(3) * QUANTISATION_VARIANCE, rise)
-    gain = float(weights @ rise / rise.max())
-    return weights / gain if gain > 0 else otherwise

@@ -25,7 +25,7 @@ from scipy.optimize import nnls
 
 from pipeline.arrays import Bool, Float, Float32, Int
 from pipeline.artefacts.measured import RingValidity
-from stages.rings.extract import excess_weights, mix
+from stages.rings.mixture import excess_weights, mix
 from stages.rings.sectors import cut_sectors
 from stages.rings.trace import trace_ring
 from stages.twin.line_blocks import BlockLight, LineBlocks, light_of

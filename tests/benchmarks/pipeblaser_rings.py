@@ -17,7 +17,7 @@ from pipeline.instrument.camera import Camera
 from pipeline.instrument.laser import LaserSheet
 from pipeline.instrument.probe import Probe
 from stages.diagnose.effects.base import ImagePoints
-from stages.rings.extract import excess_weights, mix
+from stages.rings.mixture import excess_weights, mix
 from stages.rings.sectors import cut_sectors
 from stages.rings.trace import trace_ring
 

@@ -11,7 +11,8 @@ from pipeline.artefacts.measured import RingValidity
 from pipeline.instrument.camera.fisheye import KannalaBrandt
 from pipeline.instrument.probe_file import read_probe
 from pipeline.recording import open_recording
-from stages.rings.extract import RingParameters, excess_weights, extract_rings, mix
+from stages.rings.extract import RingParameters, extract_rings
+from stages.rings.mixture import excess_weights, mix
 from stages.rings.sectors import cut_sectors
 from stages.rings.trace import trace_ring
 from tests.quiet import quiet_context

@@ -20,7 +20,7 @@ from stages.calibrate.boards.pictures import read_picture
 from stages.calibrate.boards.start import pose
 from stages.calibrate.laser.line import LaserPlaneParameters, measure_line, patch_around
 from stages.calibrate.laser.plane import BoardErrors, fit_plane_robustly
-from stages.rings.extract import excess_weights, mix
+from stages.rings.mixture import excess_weights, mix
 
 __all__ = ["LASER_PLANE", "LaserCalibration"]
 
