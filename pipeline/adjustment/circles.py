@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
+
 import numpy as np
 
 from pipeline.adjustment.robust import robust_spreads, row_median
@@ -43,63 +45,81 @@ def circles_through(xy: Float32) -> tuple[Float, Float]:
     return centre, radius
 
 
+@dataclass(frozen=True)
+class _Rings:
+    """Coordinates of the samples (F, A) of rings, their squared distance from the origin, and which count."""
+
+    x: Float
+    y: Float
+    square: Float
+    near: Bool
+
+    @staticmethod
+    def of(xy: Float, near: Bool) -> _Rings:
+        x, y = xy[..., 0], xy[..., 1]
+        return _Rings(x, y, x * x + y * y, near)
+
+    def every(self, step: int) -> _Rings:
+        """Return every so many samples."""
+        some = slice(None, None, step)
+        return _Rings(self.x[:, some], self.y[:, some], self.square[:, some], self.near[:, some])
+
+    def fitted(self, weight: Float) -> Float:
+        """Return Kåsa's terms (F, 3) of circles through samples of some weight (F, A)."""
+        terms = (self.x, self.y, np.ones_like(weight))
+        weighted = [weight * t for t in terms]
+        normal = [[np.einsum("fa,fa->f", w, t) for t in terms] for w in weighted]
+        right = [np.einsum("fa,fa->f", w, self.square) for w in weighted]
+        return np.linalg.solve(np.moveaxis(np.array(normal), -1, 0), np.array(right).T[..., None])[..., 0]
+
+    def off(self, found: Float) -> Float:
+        """Return the algebraic distance (F, A), mm², of samples from their circles; NaN where none counts."""
+        a, b, c = found.T[..., None]
+        return np.where(self.near, self.square - (a * self.x + b * self.y + c), np.nan)
+
+
 def _circles(xy: Float) -> tuple[Float, Float]:
     seen = np.asarray(np.isfinite(xy).all(-1))
     usable = seen.mean(1) > LEAST_COVERED
     out = np.full((len(xy), 3), np.nan)
     if usable.any():
-        distance = np.where(seen, np.linalg.norm(xy, axis=-1), np.nan)[usable]
+        distance = np.where(seen, np.hypot(xy[..., 0], xy[..., 1]), np.nan)[usable]
         near = distance < _FARTHEST_SAMPLE * row_median(distance)[:, None]
-        out[usable] = _robust_circles(np.where(seen[..., None], xy, 0.0)[usable], near)
+        out[usable] = _robust_circles(_Rings.of(np.where(seen[..., None], xy, 0.0)[usable], near))
     centre = out[:, :2] / 2
     return centre, np.sqrt(out[:, 2] + np.sum(centre**2, 1))
 
 
-def _robust_circles(xy: Float, near: Bool) -> Float:
-    """Return Kåsa's three terms (F, 3) of circles through the ``near`` samples (F, A) of rings (F, A, 2)."""
-    every = max(near.shape[1] // _ENOUGH, 1)
-    found, most = _start(xy[:, ::every], near[:, ::every])
-    error = _off(xy, found, near)
-    near = np.abs(error) < most[:, None]
-    error = np.where(near, error, np.nan)
+def _robust_circles(rings: _Rings) -> Float:
+    """Return Kåsa's three terms (F, 3) of circles through rings."""
+    found, most = _start(rings.every(max(rings.near.shape[1] // _ENOUGH, 1)))
+    error = rings.off(found)
+    rings = replace(rings, near=np.abs(error) < most[:, None])
+    error = np.where(rings.near, error, np.nan)
     for _ in range(_ROUNDS - 1):
         scale = np.maximum(robust_spreads(error, axis=1), 1e-6)[:, None]
-        found = _fitted(xy, near / (1 + (np.nan_to_num(error) / (_OUTLYING * scale)) ** 2))
-        error = _off(xy, found, near)
+        found = rings.fitted(rings.near / (1 + (np.nan_to_num(error) / (_OUTLYING * scale)) ** 2))
+        error = rings.off(found)
     return found
 
 
-def _start(xy: Float, near: Bool) -> tuple[Float, Float]:
+def _start(rings: _Rings) -> tuple[Float, Float]:
     """Return circles through all samples, or through an arc if its circle clearly fits more samples.
 
     Also return the largest deviation, mm², of samples that are used: the many mirrored ones share another
     circle.
     """
-    found, azimuths = _fitted(xy, near), near.shape[1]
-    most = np.full(len(xy), np.inf)
-    least = _CLEARLY * row_median(np.abs(_off(xy, found, near)))
+    near, azimuths = rings.near, rings.near.shape[1]
+    found, most = rings.fitted(near.astype(float)), np.full(len(near), np.inf)
+    least = _CLEARLY * row_median(np.abs(rings.off(found)))
     for first in range(0, azimuths, max(azimuths // _ARCS, 1)):
         arc = np.zeros(azimuths, bool)
         arc[np.arange(first, first + azimuths // _ARC) % azimuths] = True
         enough = (near & arc).sum(1) > max(azimuths // _ARC / 2, _FEWEST)
-        other = _fitted(xy, np.where(enough[:, None], near & arc, near))
-        off = _off(xy, other, near)
+        other = rings.fitted(np.where(enough[:, None], near & arc, near).astype(float))
+        off = rings.off(other)
         size = row_median(np.abs(off))
         better = enough & (size < least)
         found[better], least[better] = other[better], size[better]
         most[better] = _AMONG * robust_spreads(off[better][:, arc], axis=1)
     return found, most
-
-
-def _fitted(xy: Float, weight: Float | Bool) -> Float:
-    """Return Kåsa's terms (F, 3) of weighted circles."""
-    design = np.concatenate([xy, np.ones_like(xy[..., :1])], -1)
-    weighted = np.swapaxes(design * weight[..., None], 1, 2)
-    right = weighted @ np.sum(xy * xy, -1)[..., None]
-    return np.asarray(np.linalg.solve(weighted @ design, right)[..., 0])
-
-
-def _off(xy: Float, found: Float, near: Bool) -> Float:
-    """Return the algebraic distance (F, A), mm², of ``near`` samples from their circles; NaN for others."""
-    on_circle = np.einsum("fai,fi->fa", xy, found[:, :2]) + found[:, 2:]
-    return np.where(near, np.sum(xy * xy, -1) - on_circle, np.nan)
