@@ -148,6 +148,7 @@ def twin_document(found: Twin, tried: DiagnosisTried, of: TwinOf) -> dict[str, A
         "chi2_wall_camera_noise_alone": json_number(found.chi2_camera),
         "stray_light_in_dark": found.stray,
         "seen": found.seen,
+        "compared_of_seen": found.compared,
         "chi2_by_brightness": _figures(found.by_level),
         "cannot_tell": [*tried.cannot_tell, *found.cannot_tell],
     }

@@ -148,6 +148,9 @@ class Twin:
         Share of dark pixels that are brighter than noise explains.
     seen : float
         Share of the view's pixels whose wall is known, in lit frames.
+    compared : float
+        Share of the pixels of known wall in lit frames that are compared: neither at the edge of the view
+        nor too dark.
     cannot_tell : tuple of str
         What the recording does not tell.
     views : tuple of TwinView
@@ -171,6 +174,7 @@ class Twin:
     chi2_camera: float
     stray: float
     seen: float
+    compared: float
     cannot_tell: tuple[str, ...]
     views: tuple[TwinView, ...]
     maps: tuple[TwinMap, ...] = ()

@@ -17,15 +17,10 @@ from pipeline.instrument.probe import Probe
 from pipeline.machine.stage import Context, Parameters, Stage
 from pipeline.recording.base import Illumination, Recording
 from pipeline.recording.checks import CheckedFrames
-from stages.twin.at_times import dark_spots
 from stages.twin.blocks import blocks_of
-from stages.twin.colours import beside_colour, few_lit
 from stages.twin.compare import Comparison
-from stages.twin.dark_side import beside_dark_side
-from stages.twin.fine_noise import beside_coding
-from stages.twin.fixed_line import on_line
+from stages.twin.findings import Compared
 from stages.twin.fixed_pattern import pattern_figures
-from stages.twin.glints import window_and_glints
 from stages.twin.lamp_power import lamp_power
 from stages.twin.locate import (
     LEAST_CONTRAST,
@@ -35,14 +30,11 @@ from stages.twin.locate import (
     places_displaced,
     places_in_image,
 )
-from stages.twin.name import cannot_tell, clipped, left_over, noise_figures, state_figures
-from stages.twin.on_wall import ring_step_mm, unnamed
-from stages.twin.over_time import changes_over_time
+from stages.twin.name import cannot_tell, left_over, noise_figures, state_figures
 from stages.twin.photo_course import hidden_failures
 from stages.twin.pixels import defective_pixels
 from stages.twin.render import Region
 from stages.twin.scene import Scene, scene_of
-from stages.twin.seen_in_photo import beside_sectors, separated_from_photo
 from stages.twin.state import (
     PhotometricState,
     black_of_photo,
@@ -52,7 +44,6 @@ from stages.twin.state import (
     sample_frames,
 )
 from stages.twin.sums import MOST_STRAY, Sums
-from stages.twin.window import separated_from_blur
 from stages.twin.worst import maps_of, worst_places
 
 _EVERY, _COLOURED, _CLIPPED_FRAMES = 10, 3, 8
@@ -195,54 +186,53 @@ def compared_with(
 
     See `compare_with_twin`.
     """
-    compared, _ = _split(frames, scene.trajectory, parameters.compared)
     if frames.withheld is None:
         context.warn(_NONE_WITHHELD)
-    light = dict(zip(frames.frame.tolist(), frames.illumination.tolist(), strict=True))
-    laser = [n for n in compared.tolist() if light[n] == Illumination.LASER]
+    chosen, _ = _split(frames, scene.trajectory, parameters.compared)
+    light = dict(zip(frames.frame.tolist(), map(Illumination, frames.illumination.tolist()), strict=True))
+    light = {n: light[n] for n in chosen.tolist()}
+    state, sums = photometry.state, _summed(scene, recording, light, photometry, context)
+    samples, lit = sums.blocks.samples(), [n for n, kind in light.items() if kind in state.shows_wall]
+    compared = Compared(scene, state, recording, rings, lit, sums, samples, photometry.pixels, fixed)
+    return _twin(compared, frames.withheld is not None, context)
+
+
+def _summed(
+    scene: Scene, recording: Recording, light: dict[int, Illumination], photometry: Photometry,
+    context: Context,
+) -> Sums:  # fmt: skip
+    """Return the sums over frames, of which ``light`` gives the light by frame number."""
+    laser = np.array([n for n, kind in light.items() if kind == Illumination.LASER], np.int64)
     step = max(len(laser) // _CLIPPED_FRAMES, 1) if photometry.state.line_clipped else len(laser) + 1
-    colour = recording.read(np.array(laser[step - 1 :: step], np.int64), "bgr")
+    clips = clipped_pixels(recording.read(laser[step - 1 :: step], "bgr"))
     places = (*photometry.places, *photometry.blurred)
-    sums = Sums(
-        scene, photometry.state, places, clipped_pixels(colour), laser[:: -(-len(laser) // MOST_STRAY) or 1]
-    )
-    for done, (frame, image) in enumerate(recording.read(compared, "grey")):
-        context.progress(done, len(compared))
+    sums = Sums(scene, photometry.state, places, clips, _spread(laser, MOST_STRAY).tolist())
+    for done, (frame, image) in enumerate(recording.read(np.array([*light], np.int64), "grey")):
+        context.progress(done, len(light))
         if image is not None:
-            sums.add(frame, Illumination(light[frame]), image)
-    comparison = sums.comparison
-    if not comparison.views:
+            sums.add(frame, light[frame], image)
+    if not sums.comparison.views:
         raise UnusableError("twin", "no frame could be decoded", hint="copy the video again")
-    state, samples = photometry.state, sums.blocks.samples()
-    few = few_lit([n for n in compared.tolist() if light[n] in state.shows_wall])
-    over_time, slow = changes_over_time(sums, samples, scene, state, recording.read(few, "bgr"))
-    whole, withdrawn = sums.named(samples, recording, any("led_dead" in m.name for m in over_time))
-    whole, of_colour = beside_colour(whole, over_time)
-    on_window, of_photo = separated_from_photo(sums.on_window(samples), scene.ring)
-    on_window, unsure = separated_from_blur(on_window, whole)
-    of_line, coded = beside_coding(on_line(fixed, rings, scene.ring, on_window), over_time)
-    on_window = (*on_window, *of_line)
-    on_window, glints = window_and_glints(on_window, sums.glints(whole, on_window))
-    apart_mm, clear = ring_step_mm(rings, scene.trajectory), (*on_window, *glints, *of_photo)
-    line_rad = float(np.arctan2(scene.ring.radius_mm, scene.ring.ahead_mm))
-    of_wall = unnamed(samples and samples.clear_of(clear), scene.surface, apart_mm, line_rad)
-    placed, beside = beside_sectors((*on_window, *of_wall, *glints), (*over_time, *slow), scene.ring, samples)
-    placed, of_side = beside_dark_side(placed, over_time, samples, scene)
-    of_whole = (*photometry.pixels, *whole, *clipped(rings, state.line_clipped, comparison.clipped_share))
-    found: tuple[Mismatch, ...] = (*over_time, *placed, *dark_spots(samples, clear), *of_whole)
+    return sums
+
+
+def _twin(compared: Compared, withheld: bool, context: Context) -> Twin:
+    """Return what is found in compared frames, and the figures about them."""
+    state, samples, comparison = compared.state, compared.samples, compared.sums.comparison
+    found, withdrawn = compared.findings()
     fall, unnamed_map = left_over(None if samples is None else samples.seen_through(state.gain_map))
     comparison.after[Region.WALL] -= fall
     _report(comparison, found, context)
+    power = () if comparison.wall_is_clipped else lamp_power(samples)
     return Twin(
-        np.array([v.frame for v in comparison.views]), frames.withheld is not None,
+        np.array([v.frame for v in comparison.views]), withheld,
         (*noise_figures(state.noise), *pattern_figures(state.pattern)),
-        (*state_figures(state), *(() if comparison.wall_is_clipped else lamp_power(samples)), *unnamed_map),
+        (*state_figures(state), *power, *unnamed_map),
         comparison.regions(), found, comparison.psnr_db(False), comparison.psnr_db(True),
         comparison.chi2_camera, comparison.stray_share,
-        comparison.seen / max(comparison.view, 1.0),
-        (*cannot_tell(state, comparison.silent), *hidden_failures(samples, scene.ring)),
-        tuple(comparison.views), maps_of(samples), comparison.levels(), worst_places(samples),
-        (*withdrawn, *of_colour, *slow, *coded, *unsure, *of_photo, *beside, *of_side),
+        comparison.seen / max(comparison.view, 1.0), comparison.compared_share,
+        (*cannot_tell(state, comparison.silent), *hidden_failures(samples, compared.scene.ring)),
+        tuple(comparison.views), maps_of(samples), comparison.levels(), worst_places(samples), withdrawn,
     )  # fmt: skip
 
 
@@ -262,9 +252,13 @@ def _split(frames: CheckedFrames, trajectory: Trajectory, most: int) -> tuple[In
         measured = posed
     else:
         chosen, measured = frames.withheld, posed & ~frames.withheld
-    compared = frames.frame[chosen & posed]
-    few = np.unique(np.linspace(0, len(compared) - 1, min(most, len(compared))).round().astype(int))
-    return compared[few], measured
+    return _spread(frames.frame[chosen & posed], most), measured
+
+
+def _spread(frame: Int, most: int) -> Int:
+    """Return up to ``most`` of some frames (F,), spread evenly over them."""
+    few = np.linspace(0, len(frame) - 1, min(most, len(frame))).round().astype(int)
+    return np.asarray(frame[np.unique(few)])
 
 
 def _report(comparison: Comparison, found: tuple[Mismatch, ...], context: Context) -> None:
@@ -284,7 +278,7 @@ PHOTOMETRY = Stage(
 )
 TWIN = Stage(
     "twin",
-    "70",
+    "71",
     TwinParameters,
     compare_with_twin,
     "recorded frames beside the same frames, re-rendered from what the run has measured",

@@ -18,6 +18,7 @@ from pipeline.arrays import Float
 from pipeline.artefacts.twin import Mismatch, NamedFigure
 from pipeline.instrument.probe import Lighting
 from stages.twin.at_times import dim_at_times
+from stages.twin.banding import banding_of_line
 from stages.twin.cells import (
     SECTORS,
     Cells,
@@ -92,7 +93,8 @@ def causes(
             else:
                 found.append(_mismatch(best, rivals, cells, ring))
         found += _flicker_or_else(cells, base, unsure, light, ring)
-        found += dim_at_times(cells, base, ring) if light == "laser" else ()
+        if light == "laser":
+            found += (*dim_at_times(cells, base, ring), *banding_of_line(cells, ring))
         if unsure is not None and unsure[0].probability <= FALSE_ALARM:
             slow.append(slow_side(unsure[0], _lost(unsure[0]), cells, ring))
     return (*steps_named(steps, lit, line, ring, samples), *found), tuple(slow)
@@ -113,7 +115,7 @@ def _chosen(
         if not tries:
             break
         tries.sort(key=lambda f: -f.fall.sum())
-        best = _by_other_sectors(_simplest(tries), cells, base)
+        best = _by_other_sectors(_simplest(_at_once_first(tries, cells)), cells, base)
         if size_of(best) <= _LEAST[best.law.name]:
             break
         rivals = _rivals(best, tries, light)
@@ -157,6 +159,17 @@ def _simplest(tries: Sequence[Fitted]) -> Fitted:
     named = next((o for o in tries if o.law.name != "lamp_sector"), tries[0])
     by_chance = named.probability > FALSE_ALARM >= tries[0].probability
     return tries[0] if by_chance or sigmas(tries[0].fall - named.fall) >= _SURE else named
+
+
+def _at_once_first(tries: Sequence[Fitted], cells: Cells) -> Sequence[Fitted]:
+    """Return laws, best first, without those that should act at once and do not: they remain rivals.
+
+    If they fit clearly better than the others, all are kept: what fits less well is none either.
+    """
+    possible = [o for o in tries if _at_once(o, cells)]
+    if not possible or sigmas(tries[0].fall - possible[0].fall) >= _SURE:
+        return tries
+    return possible
 
 
 def _at_once(found: Fitted, cells: Cells) -> bool:

@@ -22,12 +22,6 @@ CLIPPED_WALL = 0.01
 """Share of pixels of lit wall above which clipping is reported."""
 _SILENT = 0.92
 """Share of pixels at one grey level from which on noise is below that of rounding, 1/√12: erf(√1.5)."""
-_LEAST_TEXTURE = 4.0
-"""Variance of fine texture, grey levels squared, above which its contrast is measurable in 576 noisy
-pixels."""
-_LEAST_SLOPES = 0.2
-"""Geometric mean of a block's squared slopes in two directions, as a share of their sum, from which on its
-displacement is known both ways: 0.5 where both are alike, 0 along a stripe. Chosen."""
 _DARK, _WALL, _CORE, _AT_BLACK = int(Region.DARK), int(Region.WALL), int(Region.LINE_CORE), 0.5
 """Region numbers for the compiled sums; a pixel within half a grey level of black is at black."""
 _COUNTED = (Region.LINE_CORE, Region.LINE_FLANK, Region.WALL)
@@ -52,7 +46,10 @@ class Comparison:
     still : float
         Dark pixels that are at black to the grey level.
     seen, view : float
-        Pixels whose wall is known, and all pixels within the view, in lit frames.
+        Pixels whose wall is known, and all pixels within the view, in lit frames; wall too dark to be
+        compared counts in neither.
+    dim, border : float
+        Pixels of such dark wall, and pixels at the edge of the view, in lit frames.
     clipped_wall : float
         Pixels of lit wall at the level where grey levels clip.
     views : list of TwinView
@@ -72,6 +69,8 @@ class Comparison:
     still: float = 0.0
     seen: float = 0.0
     view: float = 0.0
+    dim: float = 0.0
+    border: float = 0.0
     clipped_wall: float = 0.0
     views: list[TwinView] = field(default_factory=list)
     by_level: Float = field(default_factory=lambda: np.zeros((2, len(_LEVELS))))
@@ -102,6 +101,7 @@ class Comparison:
             self.by_level += by_level
             self.seen += float(size.sum() - size[Region.UNSEEN] - size[Region.DARK])
             self.view += float(size.sum() - size[Region.DARK])
+            self.dim, self.border = self.dim + sums[3, 2], self.border + float(size[Region.EDGE])
         counted = [int(r) for r in _COUNTED]
         chi2 = after_sum[counted].sum() / max(size[counted].sum(), 1.0)
         self.views.append(_view(frame, light, chi2, above_black, after, z, noise.black.value))
@@ -144,6 +144,11 @@ class Comparison:
         return self.clipped_wall / max(self.lit, 1.0)
 
     @property
+    def compared_share(self) -> float:
+        """Share of the pixels of lit frames that show known wall, dark or not, that is compared."""
+        return (self.seen - self.border) / max(self.seen + self.dim, 1.0)
+
+    @property
     def wall_is_clipped(self) -> bool:
         """Whether so much lit wall clips that it is reported."""
         return self.clipped_share > CLIPPED_WALL
@@ -174,7 +179,7 @@ def _pair(twin: TwinFrame) -> tuple[Float32, Float32]:
 def _differences(  # type: ignore[no-untyped-def]
     region, above, level, variance, level_after, variance_after, noise, white, levels, stray
 ):
-    """Return z (H, W) after; per region, pixels and χ² before and after; counts of stray and still pixels.
+    """Return z (H, W) after; per region, pixels and χ² before and after; counts of stray, still and dim ones.
 
     Then, of lit wall: squared differences, those over the camera's noise alone, variances and clipped pixels;
     last, pixels and squares of z by brightness (2, L).
@@ -193,6 +198,7 @@ def _differences(  # type: ignore[no-untyped-def]
             if r == _DARK:
                 sums[3, 0] += one > stray
                 sums[3, 1] += abs(value) < _AT_BLACK
+                sums[3, 2] += level[i, j] > 0
             elif r == _WALL:
                 bright = max(twin, 0.0)
                 square = (value - twin) ** 2
@@ -259,38 +265,3 @@ def block_ratios(above_black: Float32, twin: TwinFrame, white_above_black: float
     with np.errstate(divide="ignore", invalid="ignore"):
         # 0.99: a whole block, up to rounding.
         return np.where(of_blocks(use) > 0.99, above / below, np.float32(np.nan)).astype(np.float32)
-
-
-def block_textures(
-    above_black: Float32, twin: TwinFrame, white_above_black: float
-) -> tuple[Float32, Float32]:
-    """Return the contrast of each block's fine texture over that of its twin, and the texture's displacement.
-
-    The displacement (2, rows, columns), px to the right and down from the twin's, solves recorded − twin =
-    −∇twin · displacement by least squares over three by three blocks (B. Lucas, T. Kanade, 1981). Both are
-    NaN without lit wall and texture around.
-    """
-    use = (twin.region == Region.WALL) & (above_black < white_above_black)
-
-    def about(values: Float32 | Bool) -> Float32:
-        return np.asarray(cv2.blur(of_blocks(values), (3, 3)), np.float32)
-
-    seen, made = (
-        np.where(use, a - cv2.GaussianBlur(a, (0, 0), BLOCK_PX), np.float32(0))
-        for a in (above_black, np.asarray(twin.level))
-    )
-    right, down = (
-        np.asarray(cv2.Sobel(made, cv2.CV_32F, *way, ksize=1, scale=0.5), np.float32)
-        for way in ((1, 0), (0, 1))
-    )
-    cross, own = about(seen * made), about(made**2)
-    rr, rd, dd = about(right**2), about(right * down), about(down**2)
-    to_right, to_down = (-about(slope * (seen - made)) for slope in (right, down))
-    whole = rr * dd - rd**2
-    # At the border of the view light and texture end: blocks within two of it are not measured.
-    inside = cv2.erode((about(use) > 0.99).astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
-    known = inside & (own > _LEAST_TEXTURE)
-    nan, contrast = np.float32(np.nan), cross / np.maximum(own, _LEAST_TEXTURE)
-    place = np.stack([dd * to_right - rd * to_down, rr * to_down - rd * to_right]) / np.maximum(whole, 1e-6)
-    sloped = known & (whole > (_LEAST_SLOPES * (rr + dd)) ** 2)
-    return np.where(known, contrast, nan), np.where(sloped, place, nan).astype(np.float32)

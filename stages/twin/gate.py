@@ -51,6 +51,8 @@ class Suspected:
         Maps the mean (K,) of the measured sizes to the numbers that the law takes.
     measured : callable, optional
         Measures the size in a frame rendered again; the mean over frames is then reported.
+    unnamed : bool
+        Whether it is reported without its name, and not withdrawn, if other frames do not confirm the law.
     """
 
     mismatch: Mismatch
@@ -59,6 +61,7 @@ class Suspected:
     sizes: Float
     size_of: Callable[[Float], Float] = np.asarray
     measured: Callable[[Shown, Float], float] | None = None
+    unnamed: bool = False
 
     def from_other_half(self, frame: int) -> Float:
         """Return the law's numbers from the half of the frames that does not contain this one."""
@@ -97,6 +100,8 @@ def _judged(one: Suspected, again: Again) -> tuple[Mismatch, bool]:
     chi2 = [float(squares[seen].sum()) / total for squares in (before, after)]
     found = replace(one.mismatch, chi2_before=chi2[0], chi2_after=chi2[1])
     if len(fall) < _FEWEST or sigma < _SURE or chance > FALSE_ALARM:
+        if one.unnamed:
+            return replace(one.mismatch, name=""), True
         return _withdrawn(found, fall, sigma), False
     found = found if not sizes else replace(found, parameters=_with_size(found, sizes))
     return replace(found, probability=float(np.nanmax([chance, found.probability]))), True

@@ -18,16 +18,17 @@ from pipeline.arrays import Bool, Float, Int
 from pipeline.artefacts.measured import RingSamples, Trajectory
 from pipeline.artefacts.twin import Mismatch, NamedFigure
 from stages.texture.surface import WallSurface
-from stages.twin.cells import centred, sigmas
+from stages.twin.banding import banding
+from stages.twin.cells import centred
 from stages.twin.locate import FALSE_ALARM
 from stages.twin.reference import FEWEST_FRAMES, SHOWN_PX, WALL_COLUMNS, BlockSamples, map_of
 from stages.twin.scene import SHADING_MM
 
 _SURE, _FEWEST_CELLS = 3.0, 2
 """σ, from frame to frame, by which other frames must confirm a region; and its fewest touching cells."""
-_LEAST_ON_WALL, _LEAST_OF_ROWS = 0.05, 0.01
-"""Smallest reported relative changes, on the wall and of rows: at steps of the wall the photo itself errs by
-a few per cent."""
+_LEAST_ON_WALL = 0.05
+"""Smallest reported relative change on the wall: at steps of the wall the photo itself errs by a few per
+cent."""
 _LEAST_SHINE, _LEAST_LEAN = 0.25, 0.03
 """Smallest relative brightening over one radius of the line that counts as gloss, and smallest spread of the
 places, in radii of the line, over which it is measured. Chosen."""
@@ -48,7 +49,7 @@ def unnamed(
     """
     if samples is None:
         return ()
-    return (*_regions_of_wall(samples, surface, ring_step_mm, line_rad), *_banding(samples))
+    return (*_regions_of_wall(samples, surface, ring_step_mm, line_rad), *banding(samples))
 
 
 def ring_step_mm(rings: RingSamples, trajectory: Trajectory) -> float:
@@ -241,27 +242,3 @@ def _on_wall(
 def _middle_angle(angle_rad: Float) -> float:
     """Return the mean direction of angles."""
     return float(np.arctan2(np.sin(angle_rad).mean(), np.cos(angle_rad).mean()))
-
-
-def _banding(samples: BlockSamples) -> tuple[Mismatch, ...]:
-    """Return bands along rows that change from frame to frame."""
-    everywhere = np.ones(len(samples.change), bool)
-    if samples.frame.max() + 1 < FEWEST_FRAMES or samples.fixed_to(everywhere) != "rows":
-        return ()
-    frames = np.unique(samples.frame)
-    each = samples.common_in_rows()[frames]
-    size = float(np.sqrt(max(each.mean(), 0.0)))
-    chance = float(t.sf(sigmas(samples.explained("rows", everywhere)[frames]), len(frames) - 1))
-    if size < _LEAST_OF_ROWS:
-        return ()
-    sd = float(each.std(ddof=1)) / np.sqrt(len(frames)) / (2 * size)
-    nan = float("nan")
-    return (
-        Mismatch(
-            "banding", "intensity", "rows", (), (NamedFigure("change", size, sd, "relative"),), chance,
-            nan, nan,
-            f"Rows of single frames are brighter or darker by {100 * size:.1f} % (1 σ): banding, as by lamps "
-            "that flicker within the exposure of a rolling shutter.",
-            samples.look(everywhere, 2 * SHOWN_PX),
-        ),
-    )  # fmt: skip

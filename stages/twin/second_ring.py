@@ -8,7 +8,7 @@ a distance from the line that differs from direction to direction where the prob
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.ndimage import grey_opening, uniform_filter1d
@@ -32,6 +32,8 @@ _WIDEST, _SMOOTH, _ALIKE, _OF_HEIGHT, _OF_NOISE = 65, 3, 2, 0.2, 8.0
 smoothed, bins by which the quadrants of one ring may differ, and share of a band's height from which a bin
 counts; all chosen. σ of one bin by which light must stand out: noise alone spans 5.5 σ from its lowest to its
 highest of two hundred bins, and 8 σ in 3 of 10 000 quadrants."""
+_OF_QUADRANT = float(np.sinc(1 / _QUADRANTS))
+"""Share of a cosine around the picture that its means over quadrants keep."""
 
 
 def ring_profile(ring: Ring, above: Float32, twin: TwinFrame, use: Bool) -> Float | None:
@@ -84,20 +86,31 @@ def second_ring(ring: Ring, profiles: Sequence[Float], frame: Int) -> Suspected 
     chance = min(1.0, _RATIOS * chance_of(best.each))
     if chance > FALSE_ALARM or best.each.mean() < LEAST_SECOND:
         return None
-    if np.ptp(best.peak[best.seen]) <= _ALIKE:
-        return _ring(ring, best, ratio, chance, frame)
-    ghost = _told(ring, best, np.exp(ratio[best.peak[best.seen]]), chance, frame)
-    return Suspected(replace(ghost, name=""), None, frame, best.each[:, None])
+    return _suspected(ring, best, ratio, chance, frame)
 
 
-def _ring(ring: Ring, band: _Band, ratio: Float, chance: float, frame: Int) -> Suspected:
-    """Return a second line at one ratio of radii all round."""
-    near = np.abs(np.arange(_RATIOS) - int(np.median(band.peak[band.seen]))) <= _BESIDE_PEAK
-    heights = np.where(near, band.more.mean(0), 0)
-    at = float(np.exp((ratio * heights).sum() / max(heights.sum(), 1e-9)))
-    sizes = np.stack([band.each, np.full(len(band.each), at)], 1)
-    found = _told(ring, band, np.array([at]), chance, frame)
-    return Suspected(found, second_line, frame, sizes, measured=share_of_second)
+def _suspected(ring: Ring, band: _Band, ratio: Float, chance: float, frame: Int) -> Suspected:
+    """Return a second line whose radius varies once around the picture at most."""
+    around = np.array([_middle(band.more[q], ratio, int(band.peak[q])) for q in np.flatnonzero(band.seen)])
+    phi = (np.flatnonzero(band.seen) + 0.5) * 2 * np.pi / _QUADRANTS - np.pi
+    basis = np.stack([np.ones(len(phi)), *(f(phi) / _OF_QUADRANT for f in (np.cos, np.sin))], 1)
+    if np.ptp(around) <= _ALIKE * 2 * _REACH / _RATIOS:
+        basis = basis[:, :1]
+    place = np.zeros(3)
+    place[: basis.shape[1]] = np.linalg.lstsq(basis, around, rcond=None)[0]
+    sizes = np.column_stack([band.each, np.tile(place, (len(band.each), 1))])
+    at = np.exp(around if place[1:].any() else place[:1])
+    # A mirror image moves on the wall from frame to frame: it need not stay at one place beside the line.
+    return Suspected(
+        _told(ring, band, at, chance, frame), second_line, frame, sizes,
+        measured=share_of_second, unnamed=bool(place[1:].any()),
+    )  # fmt: skip
+
+
+def _middle(more: Float, ratio: Float, peak: int) -> float:
+    """Return the mean of a quadrant's ``ratio`` (R,) about its peak, weighted by how much stands out (R,)."""
+    near = np.where(np.abs(np.arange(_RATIOS) - peak) <= _BESIDE_PEAK, more, 0)
+    return float((ratio * near).sum() / near.sum())
 
 
 def _told(ring: Ring, band: _Band, at: Float, chance: float, frame: Int) -> Mismatch:

@@ -210,9 +210,9 @@ def leaked(free: Bool) -> tuple[Float32, Float32]:
 
 
 def second_line(shown: Shown, size: Float) -> Pair:
-    """Return a frame with the line repeated; ``size`` is its share and its radius over the line's."""
+    """Return a frame with the line repeated; ``size`` is its share and its place, as for `ratio_around`."""
     level = shown.twin.level
-    copy = _copied(shown, float(size[1]))
+    copy = _copied(shown, size[1:])
     use = shown.free & (copy > _ON_RING * copy.max()) & (shown.twin.region == Region.DARK)
     return Pair(level, level + np.float32(size[0]) * copy, use)
 
@@ -222,7 +222,7 @@ def share_of_second(shown: Shown, size: Float) -> float:
 
     Recorded frame and twin are fitted with the same profile, each free to be slightly displaced.
     """
-    copy, line = _copied(shown, float(size[1])), shown.twin.level
+    copy, line = _copied(shown, size[1:]), shown.twin.level
     dark = shown.free & (shown.twin.region == Region.DARK) & (copy > _ON_RING * copy.max())
     own = shown.free & (shown.twin.region == Region.LINE_CORE)
     sizes = [_size_at_place(shown, basis, use) for basis, use in ((copy, dark), (line, own))]
@@ -238,14 +238,24 @@ def _size_at_place(shown: Shown, basis: Float32, use: Bool) -> float:
     return float(np.linalg.lstsq(columns.T, shown.above[use] * weight, rcond=None)[0][0])
 
 
-def _copied(shown: Shown, ratio: float) -> Float32:
-    """Return the line's light (H, W) as a ring of ``ratio`` times its radius."""
+def _copied(shown: Shown, place: Float) -> Float32:
+    """Return the line's light (H, W) as a ring at a ``place`` (3,), as for `ratio_around`."""
     (u, v), shape = shown.scene.ring.centre_px, shown.twin.level.shape
-    back = 1 / ratio
-    move = np.array([[back, 0, u * (1 - back)], [0, back, v * (1 - back)]])
+    row, column = np.mgrid[: shape[0], : shape[1]].astype(np.float32)
+    back = np.float32(1) / ratio_around(place, shown.scene.polar[1])
+    at_u, at_v = (np.float32(c) + back * (x - np.float32(c)) for c, x in ((u, column), (v, row)))
     line = np.where(on_line(shown.twin), shown.twin.level, np.float32(0))
-    copy = cv2.warpAffine(line, move, shape[::-1], flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP)
-    return np.asarray(copy, np.float32)
+    return np.asarray(cv2.remap(line, at_u, at_v, cv2.INTER_LINEAR), np.float32)
+
+
+def ratio_around(place: Float, phi_rad: Float32) -> Float32:
+    """Return the radius of a second ring over the line's at image azimuths.
+
+    ``place`` (3,) is the mean of the ratio's logarithm, and what varies with the cosine and the sine: a ghost
+    of a window that is askew is displaced, and so is a mirror image in a probe that is.
+    """
+    mean, cosine, sine = place.astype(np.float32)
+    return np.asarray(np.exp(mean + cosine * np.cos(phi_rad) + sine * np.sin(phi_rad)), np.float32)
 
 
 def lamp_pattern(shown: Shown, size: Float) -> Pair:

@@ -8,6 +8,7 @@ import pytest
 
 from pipeline.artefacts.measured import RingValidity
 from pipeline.recording.base import Illumination
+from stages.twin import _spread
 from stages.twin.compare import BLOCK_PX, Comparison, block_ratios, exposure_of
 from stages.twin.lamp_light import Figure
 from stages.twin.locate import ImagePlace
@@ -171,6 +172,16 @@ def test_the_edge_is_left_out_and_so_is_the_dark_where_its_noise_is_cut_off():
         assert np.isfinite(fits["dark"].chi2_after) == compared
 
 
+def test_wall_at_the_edge_or_too_dark_is_known_but_not_compared():
+    level = np.full((40, 50), 20.0, np.float32)
+    level[:4], level[36:] = 2.0, 0.0  # dim wall, and pixels outside the view
+    frame, comparison = _frame(level), Comparison()
+    frame.region[:4], frame.region[36:], frame.region[4:8] = Region.DARK, Region.DARK, Region.EDGE
+    frame.region[8:12] = Region.UNSEEN
+    comparison.add(7, Illumination.LED, level, frame, frame, NOISE)
+    assert comparison.compared_share == pytest.approx(24 / 32)
+
+
 def test_light_in_the_dark_is_counted():
     above = np.zeros((40, 50), np.float32)
     above[:4] = 30.0
@@ -272,3 +283,9 @@ def test_clipped_wall_is_recognised_behind_a_codec_and_bright_wall_is_not():
     assert 228 <= black_and_white([coded] * 2)[1] <= 235
     bright = (16 + np.minimum(0.6 * light, 200)).astype(np.float32)
     assert black_and_white([bright + random.standard_normal(light.shape).astype(np.float32)])[1] == np.inf
+
+
+def test_as_many_laser_frames_are_examined_as_there_are_up_to_the_limit():
+    """Of 10 frames, 5 were examined, and a second ring needs 6: every second one was left out for 8."""
+    assert [len(_spread(np.arange(n), 8)) for n in (0, 3, 10, 23)] == [0, 3, 8, 8]
+    assert _spread(np.arange(5, 15), 3).tolist() == [5, 9, 14]

@@ -11,7 +11,8 @@ import pytest
 from scipy.ndimage import map_coordinates
 
 from pipeline.instrument.probe import Lighting
-from stages.twin.causes import _may_be, causes
+from stages.twin import causes as of_time
+from stages.twin.causes import _at_once_first, _may_be, causes
 from stages.twin.cells import SECTORS, Cells, CellsOfFrames, Fitted, Law, sector_azimuth_rad, sectors_of
 from stages.twin.laws import led_share, ramps_of
 from stages.twin.line_light import _plain_line
@@ -326,3 +327,39 @@ def test_a_dim_sector_has_the_right_depth_and_width_though_the_rendered_line_con
     state = SimpleNamespace(line_is_clipped=False, lamp=None, line=line)
     _, cells = Sums.cells(SimpleNamespace(_state=state, lit=CellsOfFrames(), line=taken))
     np.testing.assert_allclose(cells.log_ratio[0], np.log(left.reshape(SECTORS, -1).mean(1)), atol=0.05)
+
+
+def _bands(size):
+    """Return bands along rows (F, S) whose phase differs from frame to frame."""
+    row = np.sin(np.radians(AZIMUTH_DEG))
+    phase = 2.1 * np.arange(FRAMES)[:, None]
+    return np.log1p(size * np.sqrt(2) * np.sin(7 * row + phase))
+
+
+def test_bands_of_laser_frames_are_named_and_at_most_as_strong_as_drawn():
+    """Bands of .11 were missed; a displaced probe and an oval bore are alike on both sides of a row, too."""
+    (found,) = (m for m in _found(line=_bands(0.11)) if m.fixed_to == "rows")
+    (size,) = found.parameters
+    assert found.name == "banding"
+    assert 0.05 < size.value < 0.11 + 2 * size.sd
+    assert found.chi2_after < found.chi2_before
+    random = np.random.default_rng(4)
+    shape = random.standard_normal((FRAMES, 2)) @ np.array([np.sin(np.radians(AZIMUTH_DEG)),
+                                                            np.cos(np.radians(2 * AZIMUTH_DEG))])  # fmt: skip
+    assert [m.name for s in range(6) for m in _found(line=0.1 * shape, seed=s) if m.fixed_to == "rows"] == []
+    turned = np.roll(_bands(0.11), SECTORS // 4, 1)  # along columns
+    assert not any(m.fixed_to == "rows" for m in _found(line=turned))
+
+
+@pytest.mark.parametrize(("better_by", "kept"), [(1.0, ["step"]), (40.0, ["led_dead", "step"])])
+def test_a_side_that_should_darken_at_once_and_does_not_hides_no_step_that_fits_as_well(
+    better_by, kept, monkeypatch
+):
+    """A step of exposure under both lights, 10 %, was missed: an LED fitted by a thousandth better."""
+    fall = 100 + 10 * np.random.default_rng(3).standard_normal(FRAMES)
+    step, led = (
+        Fitted(Law(name, np.zeros((1, 1, 1)), np.zeros((1, 3))), 0, -0.1, 0.001, 1e-9, each, 1.0, 0.9)
+        for name, each in (("step", fall), ("led_dead", fall[::-1] + better_by))
+    )
+    monkeypatch.setattr(of_time, "_at_once", lambda found, cells: found.law.name == "step")
+    assert [f.law.name for f in _at_once_first([led, step], None)] == kept

@@ -19,7 +19,7 @@ def _twin():
     return Twin(
         np.array([4]), True, (NamedFigure("white_dn", float("inf"), 0.0),), (),
         (RegionFit("wall", 0, float("nan"), float("nan")),), (nameless,), 45.0, float("inf"),
-        1.1, 0.0, 0.9, (),
+        1.1, 0.0, 0.9, 0.97, (),
         (TwinView(4, "led", 1.2, picture, picture, picture),),
     )  # fmt: skip
 
@@ -32,6 +32,7 @@ def test_unknown_values_are_null_and_the_page_has_all_frames(tmp_path):
     write_twin(_twin(), tried, of, MadeBy("twin", {}, {}), tmp_path)
     document = json.loads((tmp_path / "twin.json").read_text("utf-8"))
     assert document["noise"]["white_dn"]["value"] is None
+    assert document["compared_of_seen"] == 0.97
     assert document["regions"]["wall"]["chi2_after"] is None
     assert [found["name"] for found in document["found"]] == ["laser_tilt", None]
     assert document["gauge"]["chi2_diagnosed"] == 0.9

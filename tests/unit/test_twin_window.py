@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from pipeline.artefacts.twin import Mismatch, NamedFigure
-from stages.twin.compare import block_textures
+from stages.twin.blocks import block_textures
 from stages.twin.locate import ImagePlace, full_size, places_displaced, without_duplicates
 from stages.twin.render import Region, TwinFrame
 from stages.twin.spot import FittedLaw, _slopes_at, _spot_at

@@ -25,7 +25,7 @@ def twin(tmp_path_factory: pytest.TempPathFactory) -> Path:
     bloom = Mismatch("bloom", "intensity", "image", (), (), 0.5, 1.0, 1.1, "It looks like bloom.")
     found = Twin(
         np.array([4]), True, (NamedFigure("white_dn", 255.0, 0.0),), (), (RegionFit("wall", 9, 1.2, 1.1),),
-        (), 45.0, 50.0, 1.1, 0.0, 0.9, (), (TwinView(4, "led", 1.2, picture, picture, picture),),
+        (), 45.0, 50.0, 1.1, 0.0, 0.9, 0.97, (), (TwinView(4, "led", 1.2, picture, picture, picture),),
         withdrawn=(bloom,),
     )  # fmt: skip
     write_twin(found, DiagnosisTried(), TwinOf("/runs/one"), MadeBy("twin", {}, {}), folder)
