@@ -68,7 +68,7 @@ class Adjusted:
     estimate: SimpleNamespace
     parameters: MotionParameters = field(default_factory=MotionParameters)
 
-    def again(self, start: object) -> Adjusted:
+    def resumed(self) -> Adjusted:
         return self
 
     def with_texture_off(self, times: float) -> Adjusted:

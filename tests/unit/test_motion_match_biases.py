@@ -11,7 +11,12 @@ from pipeline.adjustment.bordered import Factor
 from pipeline.arrays import Float
 from pipeline.geometry.rigid import inverse, transform
 from stages.motion.bundle_adjustment.equations import MATCH_BIASES
-from stages.motion.bundle_adjustment.solver import adjust, estimate_state, scale_between_halves
+from stages.motion.bundle_adjustment.solver import (
+    adjust,
+    estimate_again,
+    estimate_state,
+    scale_between_halves,
+)
 from stages.motion.parameters import MotionParameters
 from stages.motion.tracking.strips import StripGrid
 from stages.motion.windows.first_window import scale_by_lag
@@ -65,6 +70,18 @@ def test_a_shift_of_near_matches_alone_makes_distances_unsure() -> None:
     sigma = np.sqrt(last_frame_covariance(found.factor)[2, 2]) / way
     assert unsure[0] < 2 * sigma
     assert unsure[1] > 3 * unsure[0], unsure
+
+
+def test_an_adjustment_to_a_larger_shared_error_goes_on_from_the_first() -> None:
+    given = scene(FRAMES, 90, encoder=False, seed=1)
+    first = estimate_state(given.truth, given.measured, MotionParameters(alike=1.0))
+    noisier = MotionParameters(alike=1.0, match_bias_px=0.3)
+    found = estimate_again(first, given.measured, noisier)
+    afresh = estimate_state(first.state, given.measured, noisier)
+    sigma = np.sqrt(last_frame_covariance(afresh.factor).diagonal()[:3])
+    apart = found.state.T_pc[-1, :3, 3] - afresh.state.T_pc[-1, :3, 3]
+    assert np.abs(apart / sigma).max() < 0.3
+    assert found.adjusted.trials < afresh.adjusted.trials
 
 
 def test_misplaced_templates_lengthen_the_distance_within_the_stated_sigma() -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from stages.motion.bundle_adjustment.solver import excess_of, lasting_excess
+from stages.motion.bundle_adjustment.match_errors import excess_of, lasting_excess
 
 LANDMARKS, SEEN = 2000, 12
 

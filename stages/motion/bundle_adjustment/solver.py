@@ -58,9 +58,6 @@ influence, and the motion has not changed much. Not measured."""
 _SWING_RAD = np.radians(1)
 """Smallest swing of an end that is not motion: in the few pictures before texture is followed no probe
 rotates as far in a pipe. Not measured."""
-_RAYLEIGH_MEDIAN = float(np.sqrt(2 * np.log(2)))
-"""Median length of an error of two coordinates, of 1 σ each."""
-
 Adjusted = Minimum[State, Equations]
 
 
@@ -100,16 +97,39 @@ def estimate_state(
         measured = replace(measured, smooth_sigma=np.hypot(measured.smooth_sigma, uneven))
         loose = _loosely(start, measured, parameters, watch)
         loose = loose.with_bore_in_place(measured.probe.laser.baseline_mm)
-        known = measured.tracks.poses.known
-        sigma = np.hypot(_smoothness(loose.T_pc, measured.time_s, known), uneven)
-        smooth = adjust(loose, replace(measured, smooth_sigma=sigma), parameters, CLOSELY, watch)
-        for _ in range(_ROUNDS):
-            looser = _looser(sigma, smooth.state.T_pc, measured.time_s, known)
-            if np.all(looser < _MORE * sigma):
-                break
-            sigma = looser
-            smooth = adjust(smooth.state, replace(measured, smooth_sigma=sigma), parameters, CLOSELY, watch)
-        return Estimate(smooth, smooth.equations.factor(), sigma)
+        sigma = np.hypot(_smoothness(loose.T_pc, measured.time_s, measured.tracks.poses.known), uneven)
+        return _smoothly(loose, measured, sigma, parameters, watch)
+
+
+def estimate_again(
+    before: Estimate, measured: Measurements, parameters: MotionParameters, watch: Watch = unwatched
+) -> Estimate:
+    """Adjust again from an estimate, with other parameters or a probe of other σ but of the same motion.
+
+    The smoothness of the motion is known from the estimate: that saves the loose adjustment, and most steps.
+
+    Raises
+    ------
+    UnusableError
+        When the motion is not determined.
+    """
+    with _refusing_undetermined():
+        return _smoothly(before.state, measured, before.smooth_sigma, parameters, watch)
+
+
+def _smoothly(
+    start: State, measured: Measurements, sigma: Float, parameters: MotionParameters, watch: Watch
+) -> Estimate:
+    """Adjust with the smoothness (6,) of the motion, and again while the poses tremble more than that."""
+    known = measured.tracks.poses.known
+    smooth = adjust(start, replace(measured, smooth_sigma=sigma), parameters, CLOSELY, watch)
+    for _ in range(_ROUNDS):
+        looser = _looser(sigma, smooth.state.T_pc, measured.time_s, known)
+        if np.all(looser < _MORE * sigma):
+            break
+        sigma = looser
+        smooth = adjust(smooth.state, replace(measured, smooth_sigma=sigma), parameters, CLOSELY, watch)
+    return Estimate(smooth, smooth.equations.factor(), sigma)
 
 
 def _loosely(start: State, measured: Measurements, parameters: MotionParameters, watch: Watch) -> State:
@@ -176,22 +196,6 @@ def scale_between_halves(
             way = _way_mm(adjust(start, alone, parameters, CLOSELY, watch).state)
         apart.append(way / max(whole, _SHORTEST_MM) - 1)
     return float(np.abs(apart).max())
-
-
-def excess_of(in_sigma: Float) -> float:
-    """Return the size of errors (M, 2), in σ, relative to the expected size."""
-    size = np.linalg.norm(in_sigma, axis=1)
-    return float(np.median(size)) / _RAYLEIGH_MEDIAN if size.size else 0.0
-
-
-def lasting_excess(in_sigma: Float, landmark: Int) -> float:
-    """Return the part of the errors (M, 2), in σ, that a landmark's neighbouring observations share.
-
-    Noise is independent in every picture: the difference of two of them contains all of it, and it hardly
-    affects distance. An error that lasts moves the poses.
-    """
-    step = np.diff(in_sigma, axis=0)[np.diff(landmark) == 0] / np.sqrt(2)
-    return float(np.sqrt(max(excess_of(in_sigma) ** 2 - excess_of(step) ** 2, 0.0)))
 
 
 def _way_mm(state: State) -> float:

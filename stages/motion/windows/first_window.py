@@ -13,10 +13,11 @@ from stages.motion.bundle_adjustment.encoder_delay import EncoderDelay, delay_of
 from stages.motion.bundle_adjustment.encoder_scale import EncoderScale, noise_of_encoder, scale_of_encoder
 from stages.motion.bundle_adjustment.equations import Measurements
 from stages.motion.bundle_adjustment.laser_knock import KnockTest
+from stages.motion.bundle_adjustment.match_errors import lasting_excess
 from stages.motion.bundle_adjustment.solver import (
     Estimate,
+    estimate_again,
     estimate_state,
-    lasting_excess,
     scale_between_halves,
 )
 from stages.motion.bundle_adjustment.unknowns import State
@@ -136,7 +137,13 @@ class _Adjusted:
         """Return it adjusted again, with common and own errors of the matches multiplied by ``times``."""
         given = self.parameters
         wider = {"match_bias_px": times * given.match_bias_px, "alike": times**2 * given.alike}
-        return replace(self, parameters=given.model_copy(update=wider)).again(self.estimate.state)
+        return replace(self, parameters=given.model_copy(update=wider)).resumed()
+
+    def resumed(self) -> _Adjusted:
+        """Return it adjusted again from its estimate, as the same motion."""
+        return replace(
+            self, estimate=estimate_again(self.estimate, self.measured, self.parameters, self.watch)
+        )
 
     def again(self, start: State) -> _Adjusted:
         """Return it adjusted again, starting at a state."""
@@ -172,7 +179,7 @@ def _with_shared_error(first: _Adjusted) -> tuple[_Adjusted, float]:
         return first, 0.0
     lasts = first.lasting_px > first.parameters.match_bias_px
     first = replace(first, parameters=noisy)
-    first = _without_far_texture(first) if lasts else first.again(first.estimate.state)
+    first = _without_far_texture(first) if lasts else first.resumed()
     lag_px = _LAG * first.lasting_px
     halves = scale_between_halves(first.estimate, first.measured, noisy, first.watch)
     return first, float(
@@ -185,7 +192,7 @@ def _without_far_texture(first: _Adjusted) -> _Adjusted:
     tracks, state = first.measured.tracks, first.estimate.state
     beside = tracks.polar_angle(first.run.probe.camera) >= _FARTHEST_RAD
     if beside.mean() < 0.5:
-        return first.again(state)
+        return first.resumed()
     run = replace(first.run, farthest_rad=_FARTHEST_RAD)
     first = replace(first, run=run, measured=run.measured(first.window, first.parameters))
     return first.again(replace(state, xyz_p=state.xyz_p[tracks.some(beside)[1]]))
@@ -227,7 +234,7 @@ def with_scale(first: _Adjusted, unsure: float) -> tuple[_Adjusted, EncoderScale
     if scale.contradicted:
         probe = replace(first.run.probe, encoder_scale_sigma=abs(scale.scale - 1))
         run, measured = replace(first.run, probe=probe), replace(first.measured, probe=probe)
-        first = replace(first, run=run, measured=measured).again(first.estimate.state)
+        first = replace(first, run=run, measured=measured).resumed()
     return first, scale, float(np.hypot(unsure, scale.doubt))
 
 

@@ -13,13 +13,12 @@ from pipeline.adjustment.levenberg_marquardt import Watch
 from pipeline.arrays import Float
 from stages.motion.bundle_adjustment.equations import Measurements
 from stages.motion.bundle_adjustment.laser_knock import KnockTest
+from stages.motion.bundle_adjustment.match_errors import excess_of, lasting_excess
 from stages.motion.bundle_adjustment.shared_difference import WallTwice
 from stages.motion.bundle_adjustment.solver import (
     Estimate,
     estimate_state,
     estimate_with_shared,
-    excess_of,
-    lasting_excess,
 )
 from stages.motion.bundle_adjustment.unknowns import State
 from stages.motion.bundle_adjustment.wall_twice import wall_twice
