@@ -76,6 +76,8 @@ class Runner:
         self._display, self._logger, self._wish, self._workers = display, logger, wish, workers
         self._lent, self._at_once = lent, at_once
         self._keys = plan.keys() | {Results: plan.key(), MadeBy: made_by.key if made_by is not None else ""}
+        known = (e for e in exporters if all(k in self._keys for k in e.inputs().values()))
+        self._export_keys = {e: e.key(self._keys) for e in known}
         self._outcomes = {
             s.stage.label: StageOutcome(s.stage.label, s.stage.version, s.key) for s in plan.steps
         }
@@ -245,15 +247,14 @@ class Runner:
             self._writer.check()
         finally:
             self._at = self._writer.failed or self._at
-        for exporter in self._exporters:
-            kinds = exporter.inputs().values()
-            if all(k in self._artefacts for k in kinds):
-                self._writer.offer(exporter, exporter.key(self._keys), self._artefacts)
+        for exporter, key in self._export_keys.items():
+            if all(k in self._artefacts for k in exporter.inputs().values()):
+                self._writer.offer(exporter, key, self._artefacts)
 
     def _withdraw_stale(self) -> None:
         for exporter in self._exporters:
-            known = all(k in self._keys for k in exporter.inputs().values())
-            if not known or published_key(exporter, self._folder) != exporter.key(self._keys):
+            key = self._export_keys.get(exporter)
+            if key is None or published_key(exporter, self._folder) != key:
                 withdraw(exporter, self._folder)
 
     def _publish_results(self, selection: Selection) -> None:
