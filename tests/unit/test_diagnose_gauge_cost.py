@@ -1,4 +1,4 @@
-"""Hypotheses about a gauge run are ranked by their fit in the image, independent of the lens."""
+"""Equations of a gauge run: a fit counts in the image, whatever the lens; so does the place in a pixel."""
 
 from dataclasses import replace
 
@@ -7,9 +7,10 @@ import pytest
 
 from pipeline.arrays import Float
 from stages.calibrate.gauge.state import Unknowns
+from stages.diagnose.effects.library import LIBRARY, ring_shift_px
 from stages.diagnose.gauge.elimination import RING
-from stages.diagnose.gauge.linearise import linearise
-from stages.diagnose.gauge.run import GaugeRun
+from stages.diagnose.gauge.linearise import asking, linearise
+from stages.diagnose.gauge.run import GaugeRun, Term
 from stages.diagnose.gauge.search import prepare, weighed
 from tests.gauge_runs import made_run, measured_run
 
@@ -60,3 +61,19 @@ def test_points_outside_the_view_have_no_weight_and_do_not_sharpen_the_rest(
         measured, rings=alone, width_px=measured.width_px[~away], ring_weight=np.ones((~away).sum())
     )
     assert kept[~away] == pytest.approx(weighed(few, linearise(few, start, ())).ring_weight, rel=1e-6)
+
+
+def test_the_place_within_a_pixel_is_that_of_the_line_as_found_effects_displace_it(
+    run: tuple[GaugeRun, Unknowns],
+) -> None:
+    """It was that of the undisplaced line: beside two waves of the sheet, .051 px came out as .008."""
+    measured, start = run
+    wavy = Term(LIBRARY["sheet_waviness"], (3.0,), np.array([2.0, 0.0]))
+    at = linearise(measured, start, [wavy])
+    waves = ring_shift_px(wavy.model, at.rings, *wavy.at(wavy.amplitude))
+    assert np.ptp(waves) > 0.5
+    rho = np.linalg.norm(at.rings.uv - start.stated.camera.centre_px, axis=1) + waves
+    locked = np.sinc(measured.rings.across_px) * np.sin(2 * np.pi * rho)
+    told = asking(measured, start, at, [(LIBRARY["pixel_locking"], ())])
+    seen = (told.kind == RING) & (told.weight > 0)
+    assert -told.by_global[seen, -1] == pytest.approx(locked[seen[told.kind == RING]], abs=0.01)

@@ -61,6 +61,8 @@ class ImagePoints:
         Range of the image radius over the samples that a point averages.
     albedo_slope_per_mm : (M,), optional
         ∂ ln A / ∂s of the wall's albedo along the pipe; without it the albedo displaces no line.
+    shifted_px : (M,), optional
+        By how much the effects that are included shift the line outward.
     """
 
     probe: Probe
@@ -79,11 +81,13 @@ class ImagePoints:
     albedo_slope_per_mm: Float | None = None
     per_px_c: Float | None = None
     across_px: Float | None = None
+    shifted_px: Float | None = None
 
     @cached_property
     def fraction(self) -> Float:
         """(M, 2) cosine and sine of 2πρ of the image radius ρ, px, averaged over each point's samples."""
         rho = np.linalg.norm(self.uv - self.probe.camera.centre_px, axis=1)
+        rho += self.shifted_px if self.shifted_px is not None else 0.0
         left = np.sinc(self.across_px) if self.across_px is not None else np.ones(len(rho))
         return np.asarray(left[:, None] * np.stack([np.cos(2 * np.pi * rho), np.sin(2 * np.pi * rho)], -1))
 

@@ -54,8 +54,9 @@ def linearise(run: GaugeRun, state: Unknowns, terms: Sequence[Term]) -> Linearis
     ring_at = ring_points(state, _on_bore(run, state), run.time_s, moving, run.width_px)
     # The camera's distance and speed along the gauge, from which the encoder's readings are predicted.
     travel = Travel(run.time_s, state.T_pc[:, 2, 3], moving.speed_mm_s)
-    each = (ring_shift_px(t.model, ring_at, *t.at(t.amplitude)) for t in terms)
-    shift = sum(each, np.zeros(len(run.rings.uv)))
+    if terms:
+        ring_at = replace(ring_at, shifted_px=_ring_shift(ring_at, terms) - _light_shift(ring_at, terms))
+    shift = _ring_shift(ring_at, terms)
     rings = replace(run.rings, uv=run.rings.uv - shift[:, None] * run.rings.outward)
     residual = ring_residual(state, rings, rings.uv)
     parts = [_edge_part(run, state, edges, edge_at, terms)]
@@ -67,6 +68,18 @@ def linearise(run: GaugeRun, state: Unknowns, terms: Sequence[Term]) -> Linearis
     smooth = smooth_motion_rows(state.T_pc, run.time_s, run.motion_sigma, 0)
     motion = replace(smooth, by_frame=np.ascontiguousarray(smooth.by_frame[..., :POSE]))
     return Linearised(Equations(**joined, edges=state.layout.marker), motion, ring_at, edge_at, travel)
+
+
+def _ring_shift(points: ImagePoints, terms: Sequence[Term]) -> Float:
+    """Return the outward shift (M,), px, of the line by all terms."""
+    each = (ring_shift_px(t.model, points, *t.at(t.amplitude)) for t in terms)
+    return np.asarray(sum(each, np.zeros(len(points.uv))))
+
+
+def _light_shift(points: ImagePoints, terms: Sequence[Term]) -> Float:
+    """Return the part of it by light, which depends on the place where the line would lie without it."""
+    each = (t.model.line_shift_px(points, *t.at(t.amplitude)) for t in terms)
+    return np.asarray(sum(each, np.zeros(len(points.uv))))
 
 
 def beside(run: GaugeRun, state: Unknowns, at: Linearised, model: EffectModel, shape: Shape) -> Linearised:
