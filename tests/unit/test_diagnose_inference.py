@@ -21,9 +21,18 @@ from stages.diagnose.gauge.elimination import (
 from stages.diagnose.gauge.formula import joint_p
 from stages.diagnose.gauge.run import Term
 from stages.diagnose.gauge.score_spread import score_inflation
-from stages.diagnose.gauge.sets import NAMELESS
 from stages.diagnose.gauge.unknown_laws import known_alike, odds_in
-from stages.diagnose.inference import INSTRUMENT, Column, Evidence, Stated, estimate, places_of, score, total
+from stages.diagnose.inference import (
+    INSTRUMENT,
+    UNKNOWN,
+    Column,
+    Evidence,
+    Stated,
+    estimate,
+    places_of,
+    score,
+    total,
+)
 
 FRAMES, GLOBALS = 9, 5
 TILT, CONE = LIBRARY["laser_tilt"], LIBRARY["laser_cone"]
@@ -209,7 +218,7 @@ def test_a_residual_is_recognised_as_noise_or_not(hidden, low, high):
 
 @pytest.mark.parametrize(
     ("noise", "growing", "low", "high"),
-    [(0.01, 0.0, 0.0, NAMELESS / 20), (10.0, 0.0, NAMELESS / 2, NAMELESS), (0.1, 0.5, 1.0, np.inf)],
+    [(0.01, 0.0, 0.0, UNKNOWN / 20), (10.0, 0.0, UNKNOWN / 2, UNKNOWN), (0.1, 0.5, 1.0, np.inf)],
 )
 def test_a_name_is_less_sure_if_its_growth_with_the_radius_is_unsure_or_another(noise, growing, low, high):
     """A cone of size 1 that grows rightly, one too faint to show its growth, and one that grows otherwise."""
@@ -230,14 +239,18 @@ def test_each_known_law_of_a_kind_makes_an_unknown_one_of_that_kind_more_likely(
     every = with_courses({n: LIBRARY[n] for n in names})
     alike = {n: known_alike(LIBRARY[n], every) for n in (*names[1:], "focal_scale")}
     drifting = {"focal_drift": 7 / 6, "baseline_drift": 7 / 6}
-    static = {"focal_scale": 2, "dome_axial": 2, "baseline": 1, "pixel_locking": 1}
+    static = {"focal_scale": 2, "dome_axial": 2, "baseline": 1, "pixel_locking": 0}
     assert alike == pytest.approx(drifting | static)
     assert known_alike(every["focal_scale, ramp"], every) == pytest.approx(7)
 
 
 @pytest.mark.parametrize(
     ("power", "pattern", "noise", "low", "high"),
-    [(1, "same", 1.0, 0.1, np.inf), (6, "same", 0.01, 0.0, 0.01), (1, "another", 1.0, 0.0, 0.05)],
+    [
+        (1, "same", 1.0, 5 * UNKNOWN, np.inf),
+        (6, "same", 0.01, 0.0, UNKNOWN / 2),
+        (1, "another", 1.0, 0.0, UNKNOWN),
+    ],
 )
 def test_two_names_that_one_unknown_law_can_replace_are_unsure(power, pattern, noise, low, high):
     """A cone and a baseline.

@@ -29,8 +29,8 @@ from stages.diagnose.gauge.fit import evidence
 from stages.diagnose.gauge.hypotheses import Judged
 from stages.diagnose.gauge.run import GaugeRun, Term, behaviour, pattern_of
 from stages.diagnose.gauge.scan import span
-from stages.diagnose.gauge.sets import NAMELESS, prior_deviance, prior_sigma
-from stages.diagnose.inference import INSTRUMENT, Evidence, Stated, estimate, places_of
+from stages.diagnose.gauge.sets import prior_deviance, prior_sigma
+from stages.diagnose.inference import INSTRUMENT, UNKNOWN, Evidence, Stated, estimate, places_of
 
 # 1 σ, in equal parts, of the difference between an unknown law and the named one, relative to the latter, in
 # each power of the radius; as large as the library's own laws differ. Over the rings of a gauge with bores of
@@ -83,9 +83,10 @@ def odds_of_unknown_laws(
 
     An unknown law is similar to one of the effects and takes its place, or that of several with its harmonic
     and behaviour in time, including patterns without a cause; or it is the sum of several that have one
-    direction. Two effects, of which one has no direction, have no such sum. Unknown laws of a kind (a
-    harmonic, of the sheet or of the picture) are as frequent as those of the library, of which a name is one.
-    An unknown course may take the place of several effects with one harmonic, whatever their behaviour in
+    direction. Two effects, of which one has no direction, have no such sum. For each law of the library of a
+    kind (a harmonic, of the sheet or of the picture), including the named one, there are `UNKNOWN` others.
+    With the odds of a pattern, which stands for any law, left-out focal lengths were named a dome at .993. An
+    unknown course may take the place of several effects with one harmonic, whatever their behaviour in
     time. χ² is divided by ``believed``.
     """
     laws = {model.law for model in library.values()}
@@ -135,7 +136,7 @@ def odds_of_steady(
         return 0.0
     kept = [steady if t is drift else t for t in terms]
     gain = _surprise(about, terms, "", 0.0, stated) + before(terms) - before(kept)
-    return NAMELESS * float(np.exp((gain - _surprise(about, kept, "", 0.0, stated)) / 2))
+    return UNKNOWN * float(np.exp((gain - _surprise(about, kept, "", 0.0, stated)) / 2))
 
 
 def odds_of_unseen_course(term: Term, duration_s: float) -> float:
@@ -148,11 +149,11 @@ def known_alike(model: EffectModel, library: Mapping[str, EffectModel]) -> float
     """Return the number of laws of the library that are of a model's kind, including its own.
 
     Each counts by its prior probability relative to the model's, once for all its courses of that behaviour.
-    A law without a harmonic is recognised by what it depends on, whatever its growth: it is the only one of
-    its kind.
+    A law without a harmonic is recognised by what it depends on, whatever its growth: with another one, it
+    has the same name, and none is of its kind.
     """
     if _kind(model)[0] is None:
-        return 1.0
+        return 0.0
     like_it = sorted((_share(other), other.law) for other in library.values() if _kind(other) == _kind(model))
     return sum({law: share for share, law in like_it}.values()) / _share(model)
 
@@ -191,7 +192,7 @@ def odds_in(
                 left.append(_surprise(_aligned(about, terms, group, k), terms, "", 0.0, stated))
             gain = alone + before(terms) - before(kept)
             each += [np.exp((gain - one) / 2) for one in left]
-        odds[grown] += NAMELESS * float(np.mean(each)) if each else 0.0
+        odds[grown] += UNKNOWN * float(np.mean(each)) if each else 0.0
     return tuple(map(float, odds))
 
 
