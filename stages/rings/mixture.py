@@ -1,4 +1,4 @@
-"""The mixture of a picture's channels in which the line's place is known best where the wall is lit, too."""
+"""Mixtures of a picture's channels in which the line is found, and placed, where the wall is lit, too."""
 
 from __future__ import annotations
 
@@ -6,16 +6,19 @@ import numpy as np
 
 from pipeline.arrays import Byte, Float, Float32
 from pipeline.artefacts.measured import RingValidity
-from pipeline.instrument.probe import Probe
 from stages.rings.noise import QUANTISATION_VARIANCE, SURELY_UNCLIPPED
+from stages.rings.search import BAND_WIDTHS
 from stages.rings.sectors import Sectors
-from stages.rings.trace import RingTrace, trace_ring
+from stages.rings.trace import RingTrace
 
 _BLUE_GREEN_NM, _GREEN_RED_NM = 490.0, 580.0
-# Samples across the line, in its widths: bell and straight background are told apart by both flanks.
-_ACROSS = np.arange(-3.0, 3.1, 0.5)
-_BESIDE = np.array([-7.0, -5.5, -4.0, 4.0, 5.5, 7.0])  # the same on the wall beside the line
-_MOST = 0.5
+_LINE_WIDTHS, _WALL_WIDTHS = 0.7, 4.0
+# The wall's colours are taken from every fourth pixel beside the line: of open-3's 46000 in a frame this
+# moves the line by .003 of its σ.
+_WALL_EVERY = 4
+# Samples across the line, in its widths: bell and straight background are told apart by both flanks. They
+# are used where most of the ring does not clip.
+_ACROSS, _MOST = np.arange(-3.0, 3.1, 0.5), 0.5
 # Waves of the ring's smooth course: with 4 or 20 the samples of open-3 scatter by .186 and .193 px for .184
 # as it is, and by .155 and .173 for .157 at half size and crf 30.
 _WAVES = 8
@@ -38,41 +41,48 @@ def mix(bgr: Byte, weights: Float) -> Float32:
     return np.asarray(bgr @ weights.astype(np.float32), np.float32)
 
 
-def first_weights(bgr: Byte, sectors: Sectors, probe: Probe) -> Float:
-    """Return weights learned from an image in which the ring is found by the laser's colour alone."""
-    weights = excess_weights(probe.laser.wavelength_nm)
-    trace = trace_ring(mix(bgr, weights), sectors, np.inf)
-    return weights if trace is None else line_weights(bgr, sectors, trace, weights)
+def wall_weights(bgr: Byte, sectors: Sectors, trace: RingTrace, otherwise: Float) -> Float:
+    """Return (3,) weights of the mixture in which the line stands out best from the wall beside it.
+
+    Fisher's discriminant of line and wall; ``otherwise`` if they do not differ in colour. The ring is found
+    in this mixture, because bright bands of wall do not show in it.
+    """
+    radius, width = trace.radius_everywhere(), trace.width_px
+    beside = sectors.pixels_near(radius, _WALL_WIDTHS * width, BAND_WIDTHS * width)[::_WALL_EVERY]
+    line = bgr.reshape(-1, 3)[sectors.pixels_near(radius, 0, _LINE_WIDTHS * width)].astype(float)
+    wall = bgr.reshape(-1, 3)[beside].astype(float)
+    weights = _discriminant(np.cov(wall.T), line.mean(0) - wall.mean(0))
+    return otherwise if weights is None else weights
 
 
-def line_weights(bgr: Byte, sectors: Sectors, trace: RingTrace, otherwise: Float) -> Float:
-    """Return (3,) weights of the mixture in which a line is displaced least; ``otherwise`` if none shows it.
+def line_weights(bgr: Byte, sectors: Sectors, trace: RingTrace) -> Float | None:
+    """Return (3,) weights of the mixture in which the line is displaced least; None if it clips.
 
     A line of mean height h (3,) appears displaced by w·d / w·h where the channels lean by d (3,) at its
-    place, and w ∝ cov(d)⁻¹ h makes the variance of that smallest (Fisher's discriminant). Texture, noise and
-    colours that a codec stores coarsely all lean at the line itself; beside it, the last do not show. The
-    channels lean together, by d ∝ h, where the line leaves the smooth course about which they are sampled:
-    that does not change w. They must not be sampled about the traced line: with its own weights, w·d is zero
-    there. A clipped line does not lean; where most of it clips, the wall's colours beside it stand for d.
-    Weights are scaled so that the line keeps its height in the strongest channel.
+    place, and w ∝ cov(d)⁻¹ h makes the variance of that smallest. Colours that a codec stores coarsely lean
+    at the line, but beside it they are quiet. The channels lean together, by d ∝ h, where the line leaves
+    the smooth course about which they are sampled: that does not change w. They must not be sampled about the
+    traced line: in the mixture in which it was traced, it leans nowhere.
     """
     traced, width = trace.radius_everywhere(), trace.width_px
     course = _smooth(traced)
     near = (trace.validity == RingValidity.VALID) & (np.abs(traced - course) < width)
-    colours = across_line(bgr, sectors, course, _ACROSS * width)[near]
-    if not len(colours):
-        return otherwise
-    height, lean = np.einsum("km,amc->kac", _BELL_AND_LEAN, colours)
-    unclipped = (colours <= SURELY_UNCLIPPED * np.iinfo(bgr.dtype).max).all((1, 2))
-    noise = float(_BELL_AND_LEAN[1] @ _BELL_AND_LEAN[1]) * QUANTISATION_VARIANCE * np.eye(3)
-    if unclipped.mean() > _MOST:
-        noise += lean[unclipped].T @ lean[unclipped] / unclipped.sum()
-    else:
-        noise += np.cov(across_line(bgr, sectors, traced, _BESIDE * width)[near].reshape(-1, 3).T)
-    rise = height.mean(0)
-    weights = np.linalg.solve(noise, rise)
+    colours = across_line(bgr, sectors, course, _ACROSS * width)
+    near &= (colours <= SURELY_UNCLIPPED * np.iinfo(bgr.dtype).max).all((1, 2))
+    if near.mean() < _MOST:
+        return None
+    height, lean = np.einsum("km,amc->kac", _BELL_AND_LEAN, colours[near])
+    return _discriminant(lean.T @ lean / len(lean), height.mean(0))
+
+
+def _discriminant(noise: Float, rise: Float) -> Float | None:
+    """Return weights for a ``rise`` (3,) in noise of covariance (3, 3); None if none of them shows it.
+
+    They are scaled so that the line keeps its height in the strongest channel.
+    """
+    weights = np.linalg.solve(noise + QUANTISATION_VARIANCE * np.eye(3), rise)
     gain = float(weights @ rise / rise.max())
-    return weights / gain if gain > 0 else otherwise
+    return np.asarray(weights / gain, float) if gain > 0 else None
 
 
 def _smooth(radius_px: Float) -> Float:

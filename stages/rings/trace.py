@@ -34,6 +34,8 @@ LOST = 0.1
 # Sectors of the running median, as for outliers (`stages.rings.validity`): five or more that leave it are
 # wall.
 _EXPECTED_SECTORS = 9
+# As far as bell and background are told apart; and pixels from which the level without light is taken.
+_NEAR_WIDTHS, _BLACK_EVERY = 3.0, 8
 
 
 @dataclass(frozen=True)
@@ -126,6 +128,28 @@ def discover_ring(image: Image, sectors: Sectors, clip_level: float) -> RingTrac
         radius = _bridged(np.where(found, radius, fit.radius_px))
         choice, fit = _fitted_about(radius, band, image, sectors, width, response)
     return _judged(fit, choice, sectors, width, response)
+
+
+def fitted_in(image: Image, trace: RingTrace, sectors: Sectors) -> RingTrace | None:
+    """Return a ring fitted in another mixture ``image`` (H, W) of its picture; None if it is wider there.
+
+    What is not the line broadens it: light of the wall, and colours that a codec stores coarsely. It is
+    searched so near to the traced ring that the wall's bright bands, wider than the line, form no peak.
+    """
+    width, traced = trace.width_px, trace.radius_everywhere()
+    low, high = traced - _NEAR_WIDTHS * width, traced + _NEAR_WIDTHS * width
+    response = trace.response._replace(black=float(np.median(image[::_BLACK_EVERY, ::_BLACK_EVERY])))
+    peaks = search_band(image, sectors, low, high, width, response.dark_noise)
+    choice = choose_line(peaks, traced, width)
+    for _ in range(2):
+        fit = fit_line(image, sectors, choice.radius_px, width, response)
+        if not np.isfinite(fit.width_px).any():
+            return None
+        response = noise_response(image, sectors, fit, response)
+    anew = _judged(fit, choice, sectors, float(np.nanmedian(fit.width_px)), response)
+    lost = trace.validity != RingValidity.VALID
+    anew = replace(anew, validity=np.where(lost, trace.validity, anew.validity))
+    return anew if anew.width_px < trace.width_px and anew.coverage > trace.coverage - LOST else None
 
 
 def _fitted_about(

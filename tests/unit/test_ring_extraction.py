@@ -135,22 +135,22 @@ def test_the_line_is_found_on_a_lit_textured_wall():
 
 
 def coarsely_coloured(picture):
-    """Return a picture whose colours are stored once per 8 × 8 pixels and in steps of 4, as codecs do."""
+    """Return a picture whose colours are stored once per 8 × 8 pixels, as by a codec."""
     luma, *colours = cv2.split(cv2.cvtColor(picture, cv2.COLOR_BGR2YCrCb))
     small = (cv2.resize(c, None, fx=1 / 8, fy=1 / 8, interpolation=cv2.INTER_AREA) for c in colours)
-    stored = (cv2.resize(np.rint(c / 4.0).astype(np.uint8) * 4, luma.shape[::-1]) for c in small)
+    stored = (cv2.resize(c, luma.shape[::-1]) for c in small)
     return cv2.cvtColor(cv2.merge([luma, *stored]), cv2.COLOR_YCrCb2BGR)
 
 
 def test_coarsely_stored_colours_do_not_displace_the_line():
-    """The mixture in which the wall beside the line was quietest had RMS errors of .7 px at the line."""
+    """The mixture in which the wall beside the line was quietest had RMS errors of .9 px at the line."""
     ring, random = off_centre(165.0, 8.0), np.random.default_rng(2)
     texture = cv2.GaussianBlur(random.uniform(0.3, 1.7, SIZE[::-1]), (0, 0), 3.0)
     images = {i: coarsely_coloured(lit_image(ring, i, texture)) for i in range(3)}
     samples = extracted(images, ["both"] * 3)
     error = np.where(samples.valid, samples.radius_px - ring(samples.azimuth_rad), np.nan)
     assert samples.valid.mean() > 0.97
-    assert np.sqrt(np.nanmean(error**2)) < 0.3
+    assert np.sqrt(np.nanmean(error**2)) < 0.25
 
 
 def white_wall(ring, seed, texture):
