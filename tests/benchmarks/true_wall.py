@@ -16,7 +16,7 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-from scipy.ndimage import map_coordinates
+from scipy.ndimage import map_coordinates, median_filter
 
 from pipeline.adjustment.robust import robust_spread
 from pipeline.arrays import Float
@@ -26,6 +26,8 @@ _NEAR_MM = 2.0
 # A finding is real where the true wall departs by half of the smallest depth that is reported, and by a share
 # of the finding's own depth.
 _LEAST_MM, _LEAST_SHARE = 0.1, 0.3
+# An oval is the median over 120 mm of the pipe: twice as long as two of the longest defects.
+_OVAL_MM = 120.0
 
 
 @dataclass(frozen=True)
@@ -69,22 +71,26 @@ class Errors:
 
 
 def true_wall(folder: Path) -> TrueWall:
-    """Read a true wall; its relief is what departs from its oval and from its usual radius.
-
-    The oval is fitted in every row robustly against defects.
-    """
+    """Read a true wall; its relief is what departs from its oval and from its usual radius."""
     with np.load(folder / "truth_wall.npz") as file:
         distance, azimuth, radius = (
             file[n].astype(float) for n in ("distance_mm", "azimuth_rad", "radius_mm")
         )
-    basis = np.stack([f(k * azimuth) for k in range(3) for f in (np.cos, np.sin)], -1)[:, [0, 2, 3, 4, 5]]
-    own = radius @ np.linalg.pinv(basis).T
-    relief = radius - own @ basis.T
-    for _ in range(8):
-        own = np.where(np.abs(relief) < 0.1, radius, radius - relief) @ np.linalg.pinv(basis).T
-        relief = radius - own @ basis.T
-    relief += own[:, :1] - np.median(own[:, 0])
-    return TrueWall(distance, azimuth, radius, cv2.blur(relief, (5, 5)))
+    return TrueWall(distance, azimuth, radius, relief_of(radius, distance, azimuth))
+
+
+def relief_of(radius: Float, distance_mm: Float, azimuth_rad: Float) -> Float:
+    """Return by how much a true radius (S, A), mm, departs from its oval and from its usual mean.
+
+    The oval is the median along the pipe of those fitted to single rows. Fitted to each row by itself, it
+    took .29 mm off a dent of 1.61 mm that is a tenth of the circumference wide.
+    """
+    basis = np.stack([f(k * azimuth_rad) for k in (1, 2) for f in (np.cos, np.sin)], -1)
+    rows = 2 * round(_OVAL_MM / 2 / (distance_mm[1] - distance_mm[0])) + 1
+    mean = radius.mean(1, keepdims=True)
+    oval = median_filter((radius - mean) @ np.linalg.pinv(basis).T, (rows, 1), mode="nearest") @ basis.T
+    own = np.median(radius - oval, axis=1)
+    return np.asarray(cv2.blur(radius - oval - np.median(own), (5, 5)))
 
 
 def errors(run: Path, wall: TrueWall, placed: Mapping[str, float]) -> Errors:
