@@ -43,7 +43,7 @@ class CloudAlong:
 
     def ring_spacing_mm(self) -> float:
         """Return the median distance of neighbouring rings, mm; if the probe mostly stood, where it moved."""
-        _, middle = self._rings()
+        _, middle = self.rings()
         gone, apart = np.abs(np.diff(middle)), np.diff(np.sort(middle))
         moves = _MOVES * usual_way(gone)
         if 2 * np.sum(gone <= moves) > len(gone) and (apart > moves).any():
@@ -55,14 +55,14 @@ class CloudAlong:
 
         It is 0 for frames without a ring, and for the first ring after missing ones.
         """
-        frame, middle = self._rings()
+        frame, middle = self.rings()
         ways = np.zeros(int(frame.max(initial=-1)) + 1)
         apart = np.diff(frame)
         follows = apart <= np.median(apart) if len(apart) else apart > 0
         ways[frame[1:][follows]] = np.abs(np.diff(middle))[follows]
         return ways
 
-    def _rings(self) -> tuple[Int, Float]:
+    def rings(self) -> tuple[Int, Float]:
         """Return the frames (R,) that show a ring, and the distance of each ring's middle along the pipe."""
         frames = int(self.cloud.frame.max(initial=-1)) + 1
         count, total = np.zeros(frames), np.zeros(frames)

@@ -6,6 +6,7 @@ clockwise looking forward: azimuth = 30° · clock − 90°.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -148,6 +149,40 @@ class Defect:
 
 
 @dataclass(frozen=True)
+class Detectable:
+    """What the search finds on a stretch of the pipe: nine of ten round defects of a size and depth, or more.
+
+    Attributes
+    ----------
+    from_mm, to_mm : float
+        The stretch, along the pipe.
+    ring_spacing_mm : float
+        Median distance of neighbouring rings.
+    size_mm, depth_mm : float
+        The smallest diameter that enough rings cross, and the depth from which it is found; infinite where
+        not even large defects are found.
+    photo_size_mm : float
+        The smallest diameter that one ring crosses: from there on what the photo shows, too, is found.
+    measured, photo : float
+        Shares of the wall that rings measured, and that the photo shows.
+    """
+
+    from_mm: float
+    to_mm: float
+    ring_spacing_mm: float
+    size_mm: float
+    depth_mm: float
+    photo_size_mm: float
+    measured: float
+    photo: float
+
+
+def usual_limit(limits: Sequence[Detectable]) -> Detectable:
+    """Return the limit of detection of the longest stretch."""
+    return max(limits, key=lambda d: d.to_mm - d.from_mm)
+
+
+@dataclass(frozen=True)
 class Defects:
     """All defects in order of distance, and the sensitivity of the search.
 
@@ -157,8 +192,8 @@ class Defects:
         Defects that two rings show, or one ring and the photo.
     false_alarm_rate : float
         Expected number of false ones among them: the sum of 1 − probability.
-    smallest_depth_mm : float
-        Depth from which a defect of 3 mm × 3 mm that two rings cross is found in nine of ten cases.
+    detectable : tuple of Detectable
+        The limits of detection, stretch by stretch in order of distance.
     unconfirmed : tuple of Defect
         Findings that one ring alone shows, or that are more likely false than real: to be checked, not
         counted.
@@ -166,8 +201,13 @@ class Defects:
 
     items: tuple[Defect, ...]
     false_alarm_rate: float
-    smallest_depth_mm: float
+    detectable: tuple[Detectable, ...] = ()
     unconfirmed: tuple[Defect, ...] = ()
+
+    def limit_at(self, distance_mm: float) -> Detectable | None:
+        """Return the limit of detection at a distance; at the ends that of the nearest stretch."""
+        off = [max(d.from_mm - distance_mm, distance_mm - d.to_mm) for d in self.detectable]
+        return self.detectable[off.index(min(off))] if off else None
 
     @property
     def deepest(self) -> Defect | None:

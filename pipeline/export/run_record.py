@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from pipeline.arrays import Float
-from pipeline.artefacts.findings import Defects
+from pipeline.artefacts.findings import Defects, usual_limit
 from pipeline.artefacts.measured import RingSamples, Trajectory, Wall
 from pipeline.artefacts.wall_map import WallMap
 from pipeline.errors import InputError
@@ -174,6 +174,10 @@ def mean_diameter(radius: WallMap) -> tuple[float, float]:
 
 def _of_defects(defects: Defects) -> Iterator[Number]:
     yield Number("defects", len(defects.items))
+    if defects.detectable:
+        usual = usual_limit(defects.detectable)
+        yield Number("nine of ten defects are found from a diameter of", round(usual.size_mm, 1), "mm")
+        yield Number("and from a depth of", round(usual.depth_mm, 2), "mm")
     if defects.deepest is not None:
         yield Number("deepest defect", round(abs(defects.deepest.depth_mm), 3), "mm")
 

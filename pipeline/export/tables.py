@@ -38,9 +38,13 @@ def write_sections(sections: Sections, folder: Path) -> None:
 
 
 def write_defects(defects: Defects, folder: Path) -> None:
-    """Write ``defects`` and ``unconfirmed``, each as .csv and .json: lists in order of distance."""
+    """Write ``defects`` and ``unconfirmed``, each as .csv and .json: lists in order of distance.
+
+    Every finding states the limit of detection at its place; ``detectable.csv`` has those of the whole pipe.
+    """
+    _write_detectable(defects, folder)
     for name, items in (("defects", defects.items), ("unconfirmed", defects.unconfirmed)):
-        records = [_record(d) for d in items]
+        records = [_record(d) | _limit(defects, d.peak_distance_mm) for d in items]
         (folder / f"{name}.json").write_text(
             json.dumps(records, indent=1, allow_nan=False, ensure_ascii=False) + "\n", encoding="utf-8"
         )
@@ -48,6 +52,32 @@ def write_defects(defects: Defects, folder: Path) -> None:
             writer = csv.writer(file, lineterminator="\n")
             writer.writerow(_TABLE)
             writer.writerows([_cell(column, record[column]) for column in _TABLE] for record in records)
+
+
+_LIMIT = (
+    "from_mm", "to_mm", "ring_spacing_mm", "size_mm", "depth_mm", "photo_size_mm", "measured_percent",
+    "photo_percent",
+)  # fmt: skip
+
+
+def _write_detectable(defects: Defects, folder: Path) -> None:
+    """Write ``detectable.csv``: a row for each stretch; cells are empty where nothing is found reliably."""
+    with (folder / "detectable.csv").open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(_LIMIT)
+        for d in defects.detectable:
+            numbers = (d.from_mm, d.to_mm, d.ring_spacing_mm, d.size_mm, d.depth_mm, d.photo_size_mm)
+            writer.writerow([_number(v) for v in (*numbers, 100 * d.measured, 100 * d.photo)])
+
+
+def _limit(defects: Defects, distance_mm: float) -> dict[str, object]:
+    """Return the size and the depth, mm, from which nine of ten defects are found there; null where none."""
+    limit = defects.limit_at(distance_mm)
+    known = {} if limit is None else {"size": limit.size_mm, "depth": limit.depth_mm}
+    return {
+        f"detectable_{name}_mm": round(known[name], 4) if math.isfinite(known.get(name, math.nan)) else None
+        for name in ("size", "depth")
+    }
 
 
 def _number(value: float) -> str:

@@ -14,6 +14,7 @@
 6. Give a probability to each kind of defect by named features, and write codes and a description
    (`describe`).
 7. List dark lines that only the photo shows, as cracks are, among the unconfirmed findings (`dark_lines`).
+8. State, stretch by stretch, from which size and depth on defects are found (`limits`).
 
 A long wall is processed in overlapping stretches along the pipe; the result does not depend on where they are
 cut.
@@ -25,7 +26,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
-from scipy.special import ndtri
 
 from pipeline.arrays import Float, Float32
 from pipeline.artefacts.cloud_along import cloud_along
@@ -44,9 +44,10 @@ from stages.defects.corroborate import Evidence, Witnesses, evidence_for
 from stages.defects.dark_lines import dark_lines, lies_beside
 from stages.defects.depth import Depth
 from stages.defects.describe import Scene, describe, describe_line
-from stages.defects.detect import Detection, detect
+from stages.defects.detect import detect
 from stages.defects.grow import footprint, grown
 from stages.defects.judge import Found, credibility_on, judged
+from stages.defects.limits import detectable
 from stages.defects.measure import Measured, Measurer
 from stages.defects.noise_tail import noise_tail
 from stages.defects.parallax import LitPictures
@@ -54,10 +55,12 @@ from stages.defects.parameters import DefectParameters
 from stages.defects.relief import smooth_shape_removed
 from stages.defects.report import (
     report_found,
+    report_limits,
     report_unconfirmed,
     warn_of_drops,
-    warn_of_missed,
+    warn_of_shallow,
     warn_of_short_ones,
+    warn_of_sparse,
 )
 from stages.defects.segment import Region, regions_of
 from stages.defects.smear import flattened
@@ -118,10 +121,12 @@ def find_defects(
     warn_of_drops(sum(f.evidence.moved_over for f in found), context)
     rejected = len(regions) - len(found)
     context.report("rejected: shallower than the smallest depth or between rings", rejected, "detections")
-    smallest_mm = _smallest_depth(seeds, parameters)
-    warn_of_missed(smallest_mm, parameters.min_depth_mm, context)
+    limits = detectable(measured, seeds, credibility, texture, wall.held, parameters)
+    report_limits(limits, context)
+    warn_of_shallow(limits, parameters.min_depth_mm, context)
+    warn_of_sparse(limits, parameters.min_size_mm, wall.held, context)
     warn_of_short_ones(wall.held, measured.spacing_mm, context)
-    return Defects(items, expected, smallest_mm, alone)
+    return Defects(items, expected, limits, alone)
 
 
 def _numbered(found: Sequence[Defect], first: int) -> tuple[Defect, ...]:
@@ -216,13 +221,6 @@ def _refuse_unseen(wall: Wall) -> None:
         )
 
 
-def _smallest_depth(detection: Detection, parameters: DefectParameters) -> float:
-    """Return the depth, mm, at which 9 of 10 defects of 3 mm × 3 mm pass threshold and smallest depth."""
-    chance = float(ndtri(0.9))
-    found = (detection.threshold + chance) * detection.small_sigma_mm
-    return max(found, parameters.min_depth_mm + chance * detection.small_sigma_mm)
-
-
 def _defects_of_run(
     recording: Recording,
     frames: CheckedFrames,
@@ -241,5 +239,5 @@ def _defects_of_run(
 
 
 DEFECTS = Stage(
-    "defects", "62", DefectParameters, _defects_of_run, "defects as instances with depth, clock and kind"
+    "defects", "63", DefectParameters, _defects_of_run, "defects as instances with depth, clock and kind"
 )

@@ -29,8 +29,8 @@ from stages.defects.surface import Surface, cells_of, of_usual_sigma
 LEAST_RINGS = 2
 # A ring shows a defect if a fifth of its samples there deviate by a quarter of the depth, as they do beside
 # the deepest place of a bell, and by two σ of the wall's own unevenness.
-_TOP_SHARE, _DEPTH_SHARE, _NOISE_SIGMAS = 0.2, 0.25, 2.0
-_LEAST_SAMPLES = 3
+_TOP_SHARE, DEPTH_SHARE, NOISE_SIGMAS = 0.2, 0.25, 2.0
+LEAST_SAMPLES = 3
 # Bright means brighter than nine of ten places of the ring.
 _BRIGHT = 0.9
 # Half of the asked rings must be bright there. A codec repeats a glint in one or two pictures before and
@@ -262,10 +262,10 @@ def frames_behind(region: Region, depth_mm: float, surface: Surface) -> Int:
     i, j, inside = cells_of(points, relief, region)
     inside &= of_usual_sigma(points)
     deviation = points.radius_mm[inside] - relief.shape_at(i[inside], j[inside])
-    limit = max(_DEPTH_SHARE * abs(depth_mm), _NOISE_SIGMAS * relief.typical.sigma_mm)
+    limit = max(DEPTH_SHARE * abs(depth_mm), NOISE_SIGMAS * relief.typical.sigma_mm)
     frame, ring, count = np.unique(points.frame[inside], return_inverse=True, return_counts=True)
     showing = np.bincount(ring, np.sign(depth_mm) * deviation > limit, len(frame))
-    return np.asarray(frame[showing >= np.maximum(_TOP_SHARE * count, _LEAST_SAMPLES)])
+    return np.asarray(frame[showing >= np.maximum(_TOP_SHARE * count, LEAST_SAMPLES)])
 
 
 def photo_stands_out(texture: WallTexture, relief: Relief, region: Region) -> bool | None:

@@ -20,14 +20,15 @@ from pipeline.system.parallel import in_threads
 from stages.defects.along import stretches, widened
 from stages.defects.relief import Relief, WallRelief
 
-_ROUND_MM = (0.7, 1.4, 2.8, 5.6, 11.2)
+ROUND_MM = (0.7, 1.4, 2.8, 5.6, 11.2)
+# Quantiles that describe scores on a wall, taken from every seventh cell to save time.
+_QUANTILES, _EVERY = (np.arange(20) + 0.5) / 20, 7
 _LONG_MM = ((4.0, 0.6), (8.0, 0.8))
 _DIRECTIONS = 8
 _THREADS = 2
 _PIECE_MM = 16.0
 """Length around the pipe, mm, of pieces of a row whose median σ bounds that of their cells: twice the width
 of defects that only few rings cross; on wider ones, rings lie on a smooth wall (chosen)."""
-_SMALL = 1  # index of the template for a bump of 3 mm × 3 mm: round, 1.4 mm
 
 
 @dataclass(frozen=True)
@@ -114,12 +115,16 @@ class Filter:
         Where the power (sum of weight times squared kernel) is less, too little was seen: the score is 0.
     height_sigma_mm : float
         Typical 1 σ of the height that it measures.
+    noise, gain : (Q,)
+        Quantiles of the score on this wall, in σ, and of how much more than usual a defect adds to it.
     """
 
     kernel: Float
     scale: float
     least_power: float
     height_sigma_mm: float
+    noise: Float
+    gain: Float
 
     def standardised(self, wall: Weighed) -> Float:
         """Return the response (S, A) in σ."""
@@ -140,8 +145,6 @@ class Detection:
         Cells that some template finds above the threshold, into the wall and inward.
     threshold : float
         In σ.
-    small_sigma_mm : float
-        Typical 1 σ of the height of a bump of 3 mm × 3 mm.
     score : (S, A)
         Largest absolute response of all templates, σ.
     filters : tuple of Filter
@@ -150,16 +153,24 @@ class Detection:
     into: Bool
     inward: Bool
     threshold: float
-    small_sigma_mm: float
     score: Float32
     filters: tuple[Filter, ...]
+
+    def height_sigma_mm(self, width_mm: float) -> float:
+        """Return 1 σ of the height that the best filter measures of a round bump, 1 σ ``width_mm`` wide.
+
+        A Gaussian template of width t measures 2 w² / (w² + t²) of the height of a bump of width w.
+        """
+        shares = (2 * width_mm**2 / (width_mm**2 + t**2) for t in ROUND_MM)
+        sigmas = (f.height_sigma_mm for f in self.filters[: len(ROUND_MM)])
+        return min(sigma / share for share, sigma in zip(shares, sigmas, strict=True))
 
 
 def templates() -> tuple[Template, ...]:
     """Return round bumps of several sizes and elongated ones in several directions."""
     turns = [np.pi * k / _DIRECTIONS for k in range(_DIRECTIONS)]
     return (
-        *(Template(m, m) for m in _ROUND_MM),
+        *(Template(m, m) for m in ROUND_MM),
         *(Template(long, short, t) for long, short in _LONG_MM for t in turns),
     )
 
@@ -190,7 +201,7 @@ def detect(relief: WallRelief, false_alarms: float, scratch: Scratch, progress: 
             for score in scores(filters, near):
                 note(part.own, score[part.inner])
         progress(done, 2 * len(parts))
-    return Detection(into, inward, threshold, filters[_SMALL].height_sigma_mm, best, tuple(filters))
+    return Detection(into, inward, threshold, best, tuple(filters))
 
 
 def scores(filters: Sequence[Filter], wall: Weighed) -> Iterator[Float]:
@@ -267,7 +278,10 @@ def _fitted(relief: WallRelief, kernels: list[Float], overlap: int) -> Iterator[
         enough = power > least
         size = np.abs(response[enough])
         scale = max(robust_spread(size), float(np.quantile(size, 0.9)) / 1.645, 1e-9)
-        used = Filter(kernel, scale, least, scale / float(np.sqrt(np.median(power[enough]))))
+        usual = float(np.median(power[enough]))
+        noise = np.quantile(np.outer([-1, 1], response[enough][::_EVERY] / scale), _QUANTILES)
+        gain = np.quantile(np.sqrt(power[enough][::_EVERY] / usual), _QUANTILES)
+        used = Filter(kernel, scale, least, scale / float(np.sqrt(usual)), noise, gain)
         return used, used.score(response, power)
 
     return in_threads(fitted, kernels, _THREADS)

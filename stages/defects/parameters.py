@@ -13,6 +13,9 @@ class DefectParameters(Parameters):
     min_depth_mm: float = Field(
         0.2, ge=0.01, le=10.0, description="smallest depth or height worth reporting, mm"
     )
+    min_size_mm: float = Field(
+        5.0, ge=1.0, le=50.0, description="diameter from which defects shall be found by rings alone, mm"
+    )
     false_alarms: float = Field(
         0.05, ge=1e-6, le=1.0, description="expected number of false detections by noise in a recording"
     )

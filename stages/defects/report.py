@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
+
 from pipeline.adjustment.shared_light import HeldOver
+from pipeline.artefacts.findings import Detectable, usual_limit
 from pipeline.machine.stage import Context
 from stages.defects.corroborate import LEAST_RINGS
+from stages.defects.limits import rings_needed, widest_spacing_mm
 
 # So few unconfirmed findings need no warning, since they are quickly looked at. A warning is due where one
 # defect in four is expected to be false.
@@ -15,8 +20,10 @@ _SPLASHES = 2
 # good recordings the two are close.
 _DEEPER = 2.0
 # A warning is due where defects must be longer than 3 mm, the size for which the depth above holds, to be
-# seen by two independent rings; up to 40 rings are tried. Chosen.
-_SHORT_MM, _MOST_RINGS = 3.0, 40
+# seen by two independent rings. Chosen.
+_SHORT_MM = 3.0
+# Number of stretches that a warning names (chosen).
+_NAMED = 4
 
 
 def report_found(defects: int, expected_false: float, context: Context) -> None:
@@ -60,22 +67,65 @@ def warn_of_drops(contradicted: int, context: Context) -> None:
         )
 
 
-def warn_of_missed(smallest_mm: float, asked_mm: float, context: Context) -> None:
+def report_limits(limits: Sequence[Detectable], context: Context) -> None:
+    """Report from which size and depth on nine of ten defects are found on most of the pipe."""
+    if limits:
+        usual = usual_limit(limits)
+        context.report("nine of ten defects are found from a diameter of", usual.size_mm, "mm")
+        context.report("and from a depth of", usual.depth_mm, "mm")
+
+
+def warn_of_shallow(limits: Sequence[Detectable], asked_mm: float, context: Context) -> None:
     """Warn where defects are found reliably only if much deeper than the wanted smallest depth, mm."""
-    context.report("depth from which nine of ten defects of 3 mm × 3 mm are found", smallest_mm, "mm")
-    if smallest_mm > _DEEPER * asked_mm:
-        context.warn(
-            f"defects of 3 mm × 3 mm must be {smallest_mm:.2g} mm deep for nine of ten to be found, but "
-            f"{asked_mm:.2g} mm are wanted: the laser line is too unsteady here. Shallower ones may be "
-            "missed, and so are all where the wall was not measured. What to do: record with less "
-            "compression, a sharper picture, a dry window and a camera that is firmly mounted"
-        )
+    known = [d for d in limits if math.isfinite(d.depth_mm)]
+    shallow = [d for d in known if d.depth_mm > _DEEPER * asked_mm]
+    if not shallow:
+        return
+    one = usual_limit(shallow)
+    context.warn(
+        f"defects of {one.size_mm:.2g} mm × {one.size_mm:.2g} mm must be {one.depth_mm:.2g} mm deep for nine "
+        f"of ten to be found{_where(shallow, limits)}, but {asked_mm:.2g} mm are wanted: the laser line is "
+        "too unsteady there. Shallower ones may be missed, and so are all where the wall was not measured. "
+        "What to do: record with less compression, a sharper picture, a dry window and a camera that is "
+        "firmly mounted"
+    )
+
+
+def warn_of_sparse(limits: Sequence[Detectable], wanted_mm: float, held: HeldOver, context: Context) -> None:
+    """Warn where rings lie too far apart for enough of them to cross defects of the wanted diameter, mm."""
+    widest, needed_rings = widest_spacing_mm(wanted_mm, LEAST_RINGS), rings_needed(held)
+    sparse = [d for d in limits if d.size_mm > wanted_mm and d.ring_spacing_mm > widest]
+    if not sparse:
+        return
+    worst = max(sparse, key=lambda d: d.ring_spacing_mm)
+    apart = worst.ring_spacing_mm
+    needed = (
+        f"not even large defects are found reliably{_where(sparse, limits)}"
+        if any(math.isinf(d.depth_mm) for d in sparse)
+        else f"only defects from {max(d.size_mm for d in sparse):.2g} mm × as much are found reliably"
+        f"{_where(sparse, limits)}"
+    )
+    context.warn(
+        f"{needed}: rings lie up to {apart:.2g} mm apart there, and {needed_rings} must cross a defect. "
+        "Smaller ones are missed or unconfirmed, however deep, unless one ring crosses them and the photo "
+        f"shows them. What to do: for defects of {wanted_mm:.2g} mm, pull the probe at most "
+        f"{widest / apart:.2g} times as fast (rings {widest:.2g} mm apart), light the laser in more of the "
+        "pictures, or record at a higher frame rate"
+    )
+
+
+def _where(some: Sequence[Detectable], limits: Sequence[Detectable]) -> str:
+    """Return the places of some stretches, in words; nothing where these are all."""
+    if len(some) == len(limits):
+        return ""
+    places = [f"{d.from_mm:.0f}–{d.to_mm:.0f} mm" for d in some]
+    more = f" and {len(places) - _NAMED} more" if len(places) > _NAMED else ""
+    return f" at {', '.join(places[:_NAMED])}{more}"
 
 
 def warn_of_short_ones(held: HeldOver, ring_spacing_mm: float, context: Context) -> None:
     """Warn where rings share so much light that a short defect is not seen by two independent ones."""
-    enough = (n for n in range(LEAST_RINGS, _MOST_RINGS) if held.independent(n) >= LEAST_RINGS)
-    rings = next(enough, _MOST_RINGS)
+    rings = rings_needed(held)
     length_mm = rings * ring_spacing_mm
     if length_mm > _SHORT_MM and rings > LEAST_RINGS:
         context.warn(

@@ -212,7 +212,7 @@ def _exports(made: Made, folder: Path) -> None:
 
 def _tileset(recording: Recording, made: Made, folder: Path) -> None:
     folder.mkdir(exist_ok=True)
-    wall, photo, defects = made(Wall), made(WallTexture), made(Defects, Defects((), 0.0, 0.0))
+    wall, photo, defects = made(Wall), made(WallTexture), made(Defects, Defects((), 0.0))
     write_tileset(recording, made(TexturedMesh), wall, photo, made(Overlays), defects, folder)
 
 

@@ -1,7 +1,7 @@
 """Whether findings and their depths are true: defects are inserted into the rings of finished runs.
 
 usage: python -m tests.benchmarks.bench_painted_findings RUN=RECORDING ... [--draws N] [--keep FOLDER]
-[--say-sure] [--shift-truth MM]
+[--say-sure] [--shift-truth MM] [--limit SIZE DEPTH]
 
 The background are the real rings of a run, with all flaws of its pictures; it was not made by the program
 under test. Defects of drawn kind, size and depth are inserted into the rings where the run places each sample
@@ -13,6 +13,10 @@ Printed are: how often a finding of stated confidence is real, with the expected
 how many depths lie in their 95 % interval; how many defects are missed. ``--say-sure`` states 1 for every
 finding, and ``--shift-truth`` moves the inserted defects by so much after the search: then the tables must
 get bad.
+
+With ``--limit 1 1`` only slim round defects are inserted that have the smallest diameter and depth of which
+the run says, for that stretch of the pipe, that nine of ten are found; other numbers multiply diameter and
+depth, and with .5 most must be missed.
 """
 
 from __future__ import annotations
@@ -32,8 +36,10 @@ from pipeline.machine.stage import Context
 from stages.defects import DefectParameters, find_defects
 from tests.benchmarks.bench_findings import Counted, table
 from tests.benchmarks.painted_rings import (
+    AT_LIMIT,
     Background,
     Painted,
+    at_limit,
     background,
     drawn,
     painted_rings,
@@ -69,7 +75,7 @@ def searched(bg: Background, rings: RingSamples, context: Context) -> Defects:
     return find_defects(bg.recording, wall, bg.photo, DefectParameters(), context, rings)
 
 
-def cases(bg: Background, draws: int, seed: int) -> Iterator[Case]:
+def cases(bg: Background, draws: int, seed: int, limit: tuple[float, float] | None = None) -> Iterator[Case]:
     """Yield every background with every set of rings and every draw."""
     for n in range(draws):
         part = list(_EVERY)[n % 3]
@@ -83,7 +89,11 @@ def cases(bg: Background, draws: int, seed: int) -> Iterator[Case]:
         plain = walled(some, some.rings, context).radius_map
         rows = plain.distance_mm[np.isfinite(plain.radius_mm).mean(1) > 0.5]
         radius = float(np.nanmedian(plain.radius_mm))
-        defects = drawn(some, radius, (rows[0] + 4, rows[-1] - 4), np.random.default_rng([seed, n]))
+        span, random = (rows[0] + 4, rows[-1] - 4), np.random.default_rng([seed, n])
+        kind = None
+        if limit is not None:
+            kind = at_limit(searched(some, some.rings, context), *limit)
+        defects = drawn(some, radius, span, random, kind)
         found = searched(some, painted_rings(some, defects), context)
         yield Case(
             f"{bg.name}/{part}/{n}", defects, found, bg.own, bg.true, radius, float(np.ptp(rows)), told
@@ -139,9 +149,13 @@ def counted(case: Case) -> tuple[list[Counted], list[Float], int, int]:
         out.append(Counted(case.name, confirmed, stated, real, depth, sigma))
         if real and confirmed:
             depths.append(np.array([abs(found.depth_mm), extreme, found.depth_sigma_mm]))
-    asked = [d for d in case.painted if abs(d.depth_mm) >= _ASKED_MM and min(d.length_mm, d.width_mm) >= 3]
+    asked = [d for d in case.painted if d.kind == AT_LIMIT or _is_asked(d)]
     missed = [d for d in asked if not any(_covers(case, f, d) for f in case.found.items)]
     return out, depths, len(asked), len(missed)
+
+
+def _is_asked(d: Painted) -> bool:
+    return abs(d.depth_mm) >= _ASKED_MM and min(d.length_mm, d.width_mm) >= 3
 
 
 def _covers(case: Case, found: Defect, d: Painted) -> bool:
@@ -165,6 +179,7 @@ def main() -> None:
     parser.add_argument("--keep", type=Path)
     parser.add_argument("--say-sure", action="store_true")
     parser.add_argument("--shift-truth", type=float, default=0.0)
+    parser.add_argument("--limit", type=float, nargs=2)
     given = parser.parse_args()
     every: list[Case] = []
     for number, pair in enumerate(given.runs):
@@ -173,7 +188,7 @@ def main() -> None:
         if kept and kept.is_file():
             some = pickle.loads(kept.read_bytes())
         else:
-            some = list(cases(background(run, truth), given.draws, number))
+            some = list(cases(background(run, truth), given.draws, number, given.limit))
             if kept:
                 kept.parent.mkdir(parents=True, exist_ok=True)
                 kept.write_bytes(pickle.dumps(some))

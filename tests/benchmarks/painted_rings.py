@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 
 import numpy as np
 
 from pipeline.arrays import Float
+from pipeline.artefacts.findings import Defects
 from pipeline.artefacts.measured import RingPoints, RingSamples, Trajectory, Wall, WallTexture
 from pipeline.instrument.probe import Probe
 from pipeline.machine.stage import Context
@@ -22,6 +23,8 @@ from tests.benchmarks.true_wall import TrueWall, true_wall
 from tests.quiet import quiet_context
 
 _KINDS = ("pit", "corrosion", "gouge", "groove", "deposit", "ridge", "dent")
+# A slim round defect at the limit of detection, into the wall or inward.
+AT_LIMIT = "at the limit"
 _INWARD = ("deposit", "ridge", "dent")
 _DEPTH_MM, _SIZE_MM = (0.12, 3.0), (1.5, 22.0)
 # Free wall between two inserted defects, and from the recording's own: as far as a finding may extend.
@@ -52,7 +55,7 @@ class Painted:
         c, d = np.cos(self.turn_rad), np.sin(self.turn_rad)
         x, y = (c * s + d * q) / (self.length_mm / 2), (c * q - d * s) / (self.width_mm / 2)
         rho2 = x * x + y * y
-        if self.kind == "dent":
+        if self.kind in ("dent", AT_LIMIT):
             form = np.exp(-((1.5**2) * rho2))
         elif self.kind in ("deposit", "corrosion"):
             bumps = 1 + 0.15 * np.sin(5 * x + self.distance_mm) * np.cos(4 * y + self.azimuth_rad)
@@ -123,17 +126,40 @@ def _own_defects(truth, shift: float, turn: float) -> Float:  # type: ignore[no-
     return np.array(rows).reshape(-1, 4)
 
 
+Drawing = Callable[[tuple[float, float], np.random.Generator], "Painted | None"]
+
+
 def drawn(
-    bg: Background, radius: float, span: tuple[float, float], random: np.random.Generator
+    bg: Background,
+    radius: float,
+    span: tuple[float, float],
+    random: np.random.Generator,
+    kind: Drawing | None = None,
 ) -> list[Painted]:
     """Draw defects that are clear of each other and of the recording's own."""
     out: list[Painted] = []
     for _ in range(300):
-        new = _one(span, random)
+        new = (kind or _one)(span, random)
+        if new is None:
+            continue
         taken = [*bg.own, *((p.distance_mm, p.azimuth_rad, *(2 * [p.reach_mm])) for p in out)]
         if all(_clear(new, *place, radius) for place in taken) and len(out) < _MOST:
             out.append(new)
     return out
+
+
+def at_limit(found: Defects, by_size: float, by_depth: float) -> Drawing:
+    """Return a drawing of defects at the limit of detection, None where there is none; both multiplied."""
+
+    def one(span: tuple[float, float], random: np.random.Generator) -> Painted | None:
+        s, psi, sign = random.uniform(*span), random.uniform(-np.pi, np.pi), random.choice([-1.0, 1.0])
+        limit = found.limit_at(s)
+        if limit is None or not limit.from_mm < s < limit.to_mm or not np.isfinite(limit.depth_mm):
+            return None
+        size = by_size * limit.size_mm
+        return Painted(AT_LIMIT, s, psi, size, size, sign * by_depth * limit.depth_mm, 0.0)
+
+    return one
 
 
 def _one(span: tuple[float, float], random: np.random.Generator) -> Painted:

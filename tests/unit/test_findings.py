@@ -22,14 +22,14 @@ PIT = Defect(
 )
 def test_the_deepest_finding_is_one_with_a_known_depth(depth_mm: float, sigma_mm: float, is_it: bool) -> None:
     other = replace(PIT, id=2, depth_mm=depth_mm, depth_sigma_mm=sigma_mm)
-    deepest = Defects((PIT, other), 0.05, 0.3).deepest
+    deepest = Defects((PIT, other), 0.05).deepest
     assert deepest is not None
     assert deepest.id == (2 if is_it else 1)
 
 
 def test_no_finding_is_deepest_where_no_depth_is_known() -> None:
-    assert Defects((replace(PIT, depth_sigma_mm=1.0),), 0.05, 0.3).deepest is None
-    assert Defects((), 0.05, 0.3).deepest is None
+    assert Defects((replace(PIT, depth_sigma_mm=1.0),), 0.05).deepest is None
+    assert Defects((), 0.05).deepest is None
 
 
 def test_clock_runs_clockwise_from_the_top() -> None:

@@ -55,7 +55,7 @@ def written(wall: Wall, mesh: TexturedMesh, tmp_path_factory: pytest.TempPathFac
 
 def write(wall: Wall, mesh: TexturedMesh, folder: Path) -> None:
     overlays = overlays_of(wall.radius_map, 2 * RADIUS, OverlayParameters())
-    defects = Defects((pit_defect(),), 0.1, 0.1)
+    defects = Defects((pit_defect(),), 0.1)
     write_tileset(bare_recording(2 * RADIUS), mesh, wall, smooth_photo(), overlays, defects, folder)
 
 

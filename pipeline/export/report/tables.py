@@ -148,8 +148,7 @@ def _found(summary: RunSummary) -> Card:
     if defects is None:
         return Card("What was found", "not searched", ())
     lines = [
-        f"nine of ten defects of 3 mm × 3 mm are found if they are {defects.smallest_depth_mm:.2f} mm deep "
-        "and two rings cross them; where rings are farther apart, fewer are found",
+        *notation.limits(defects.detectable),
         f"{defects.false_alarm_rate:.2g} false findings are expected in such a recording, from the wall's "
         "texture and from glints that two rings show at the same place",
     ]
