@@ -26,6 +26,8 @@ _QUANTILES, _EVERY = (np.arange(20) + 0.5) / 20, 7
 _LONG_MM = ((4.0, 0.6), (8.0, 0.8))
 _DIRECTIONS = 8
 _THREADS = 2
+# The filters search where at least this part of a template was seen: a little less than at the pipe's ends.
+_LEAST_SEEN = 0.4
 _PIECE_MM = 16.0
 """Length around the pipe, mm, of pieces of a row whose median σ bounds that of their cells: twice the width
 of defects that only few rings cross; on wider ones, rings lie on a smooth wall (chosen)."""
@@ -79,8 +81,13 @@ class Weighed:
         """The Fourier transform of ``weight``, padded with zeros beyond the ends of the pipe."""
         return self._spectrum(self.weight)
 
-    def filtered(self, spectrum: Complex64, kernel: Float) -> Float:
-        """Return the correlation (S, A) with a kernel: periodic in azimuth, zero beyond the pipe's ends.
+    @cached_property
+    def seen_spectrum(self) -> Complex64:
+        """The Fourier transform of ``seen``, padded with zeros beyond the ends of the pipe."""
+        return self._spectrum(self.seen.astype(float))
+
+    def filtered(self, kernel: Float, *spectra: Complex64) -> list[Float]:
+        """Return the correlations (S, A) with a kernel: periodic in azimuth, zero beyond the pipe's ends.
 
         Templates are symmetric about their centre, so that correlation equals convolution.
         """
@@ -89,8 +96,9 @@ class Weighed:
         i, j = (np.arange(n) - n // 2 for n in kernel.shape)
         # A template longer than the circumference is wrapped round it.
         np.add.at(padded, np.ix_(i % rows, j % columns), kernel.astype(np.float32))
-        found = irfft2(spectrum * rfft2(padded), (rows, columns))
-        return np.asarray(found[: len(self.seen)], float)
+        of_kernel = rfft2(padded)
+        found = (irfft2(spectrum * of_kernel, (rows, columns)) for spectrum in spectra)
+        return [np.asarray(f[: len(self.seen)], float) for f in found]
 
     @property
     def _shape(self) -> tuple[int, int]:
@@ -111,8 +119,6 @@ class Filter:
     kernel : (odd, odd)
     scale : float
         1 σ of its response to this wall's noise and roughness; it would be 1 for white noise.
-    least_power : float
-        Where the power (sum of weight times squared kernel) is less, too little was seen: the score is 0.
     height_sigma_mm : float
         Typical 1 σ of the height that it measures.
     noise, gain : (Q,)
@@ -121,7 +127,6 @@ class Filter:
 
     kernel: Float
     scale: float
-    least_power: float
     height_sigma_mm: float
     noise: Float
     gain: Float
@@ -130,9 +135,9 @@ class Filter:
         """Return the response (S, A) in σ."""
         return self.score(*_response(wall, self.kernel))
 
-    def score(self, response: Float, power: Float) -> Float:
-        """Return a response (S, A) in σ; 0 where too little of the wall was seen."""
-        return np.where(power > self.least_power, response / self.scale, 0.0)
+    def score(self, response: Float, _: Float, enough: Bool) -> Float:
+        """Return a response (S, A) in σ; 0 where not ``enough`` (S, A) of the wall was seen."""
+        return np.where(enough, response / self.scale, 0.0)
 
 
 @dataclass(frozen=True)
@@ -269,25 +274,28 @@ def _fitted(relief: WallRelief, kernels: list[Float], overlap: int) -> Iterator[
     """
     parts = [widened(rows, relief.shape[0], overlap) for rows in relief.sampled]
     walls = [weighed(relief.rows(part.wide), overlap) for part in parts]
-    seen = np.concatenate([w.seen[part.inner] for w, part in zip(walls, parts, strict=True)])
 
     def fitted(kernel: Float) -> tuple[Filter, Float]:
         found = [[f[part.inner] for f in _response(w, kernel)] for w, part in zip(walls, parts, strict=True)]
-        response, power = (np.concatenate(f) for f in zip(*found, strict=True))
-        least = 0.4 * float(np.median(power[seen]))
-        enough = power > least
+        response, power, enough = (np.concatenate(f) for f in zip(*found, strict=True))
         size = np.abs(response[enough])
         scale = max(robust_spread(size), float(np.quantile(size, 0.9)) / 1.645, 1e-9)
         usual = float(np.median(power[enough]))
         noise = np.quantile(np.outer([-1, 1], response[enough][::_EVERY] / scale), _QUANTILES)
         gain = np.quantile(np.sqrt(power[enough][::_EVERY] / usual), _QUANTILES)
-        used = Filter(kernel, scale, least, scale / float(np.sqrt(usual)), noise, gain)
-        return used, used.score(response, power)
+        used = Filter(kernel, scale, scale / float(np.sqrt(usual)), noise, gain)
+        return used, used.score(response, power, enough)
 
     return in_threads(fitted, kernels, _THREADS)
 
 
-def _response(wall: Weighed, kernel: Float) -> tuple[Float, Float]:
-    """Return the response (S, A), of unit variance in white noise, and its power: how much was seen."""
-    power = wall.filtered(wall.weight_spectrum, kernel**2)
-    return wall.filtered(wall.signal_spectrum, kernel) / np.sqrt(np.maximum(power, 1e-30)), power
+def _response(wall: Weighed, kernel: Float) -> tuple[Float, Float, Bool]:
+    """Return the response (S, A), of unit variance in white noise, its power, and where enough was seen.
+
+    What was seen counts by area, not by its weight: where noise is larger, as in a dent of glossy steel, only
+    what stands out of that noise is found, but it is searched.
+    """
+    power, seen = wall.filtered(kernel**2, wall.weight_spectrum, wall.seen_spectrum)
+    (response,) = wall.filtered(kernel, wall.signal_spectrum)
+    enough = seen > _LEAST_SEEN * np.sum(kernel**2)
+    return response / np.sqrt(np.maximum(power, 1e-30)), power, enough

@@ -49,6 +49,9 @@ _MOST_RINGS = 40
 _HIGHEST = 3.0
 # Deeper defects are not asked for: in pipes of the sizes that a probe passes, they are holes.
 _DEEPEST_MM = 30.0
+# What is deeper than so much of its diameter is a hole, and no ring shows its bottom; larger defects than the
+# largest template's are not examined (both chosen).
+_STEEP, _LARGEST_MM = 0.4, 48.0
 # 1 σ of the kernel by which the map is interpolated along the pipe: in ring spacings, and at least, mm; as
 # the stage accumulate has it unless told otherwise.
 _KERNEL_RINGS, _KERNEL_MM = 0.4, 0.3
@@ -168,8 +171,8 @@ def _photo_share(photo: WallTexture, at_mm: Float) -> Float:
 def _limit(along: _Along, rows: slice, search: _Search) -> Detectable:
     """Return the limit of detection on some rows."""
     from_mm, to_mm = float(along.at_mm[rows][0]), float(along.at_mm[rows][-1])
-    with_photo, size = (_size(way) for way in along.ways_mm[rows].T)
-    depth = _depth(along, rows, size, search) if math.isfinite(size) else math.inf
+    with_photo, crossed = (_size(way) for way in along.ways_mm[rows].T)
+    size, depth = _size_and_depth(along, rows, crossed, search)
     gap = np.searchsorted(along.ring_mm, along.at_mm[rows], "right").clip(1, len(along.ring_mm) - 1)
     spacing = float(np.median(along.ring_mm[gap] - along.ring_mm[gap - 1]))
     shares = (float(share[rows].mean()) for share in (along.measured, along.photo))
@@ -180,6 +183,19 @@ def _size(way_mm: Float) -> float:
     """Return the smallest diameter, mm, at which rings that far off (n,) show nearly all defects."""
     way = float(np.quantile(way_mm, _CROSSED, method="higher"))
     return max(LEAST_SIZE_MM, math.ceil(way / REACH * 2) / 2) if math.isfinite(way) else math.inf
+
+
+def _size_and_depth(along: _Along, rows: slice, size_mm: float, search: _Search) -> tuple[float, float]:
+    """Return the smallest diameter from ``size_mm`` on, mm, and depth of defects that are found; else inf.
+
+    In noise, small defects would have to be deeper than wide: then larger ones are tried.
+    """
+    while size_mm <= _LARGEST_MM:
+        depth = _depth(along, rows, size_mm, search)
+        if depth <= _STEEP * size_mm:
+            return size_mm, depth
+        size_mm = math.ceil(2.4 * size_mm) / 2
+    return math.inf, math.inf
 
 
 def _depth(along: _Along, rows: slice, size_mm: float, search: _Search) -> float:
@@ -200,8 +216,8 @@ def _depth(along: _Along, rows: slice, size_mm: float, search: _Search) -> float
     def found(depth_mm: float) -> float:
         high = (depth_mm * adds + used.noise > search.score).mean((1, 2))
         deep = ndtr((depth_mm * height - search.least_mm) / one_sigma)
-        clear = depth_mm * shown - np.maximum(DEPTH_SHARE * depth_mm, NOISE_SIGMAS * search.sigma_mm)
-        return float(np.mean(high * deep * ndtr(clear / unevenness)))
+        clear = ndtr((depth_mm * shown - NOISE_SIGMAS * search.sigma_mm) / unevenness)
+        return float(np.mean(high * deep * clear * (shown >= DEPTH_SHARE)))
 
     if found(_DEEPEST_MM) < _FOUND:
         return math.inf
