@@ -75,19 +75,30 @@ def beside_dark_side(
 ) -> tuple[tuple[Mismatch, ...], tuple[Mismatch, ...]]:
     """Return the findings that remain beside a side that is dark in the photo; and it, and those withdrawn.
 
-    Unnamed places of the image on that side are withdrawn. A side that darkens during the run, which is among
-    what changes ``over_time``, is in the photo as well, and is not told twice.
+    Unnamed places of the image on that side are withdrawn, unless they differ by more than the side does. A
+    side that darkens during the run, which is among what changes ``over_time``, is in the photo as well, and
+    is not told twice.
     """
     sides = () if any(map(dimmed, over_time)) else dark_side(samples, scene)
     places = [m for m in found if not m.name and m.fixed_to == "image" and m.channel != "line"]
-    turned = [side.place[0].value for side in sides]
-    left = [m for m in places if any(looks_at(m, at, SIDE_DEG, scene.ring) for at in turned)]
+    left = [
+        m
+        for m in places
+        if any(looks_at(m, s.place[0].value, SIDE_DEG, scene.ring) and not _exceeds(m, s) for s in sides)
+    ]
     said = (
         "{} But the photo is darker on that side, too. If lights cause this, frames differ from it at "
         "both edges of the side."
     )
     withdrawn = tuple(replace(m, statement=said.format(m.statement)) for m in left)
     return tuple(m for m in found if m not in left), (*sides, *withdrawn)
+
+
+def _exceeds(place: Mismatch, side: Mismatch) -> bool:
+    """Return whether a place surely differs by more than wall that leaves a dark side for the light."""
+    most = 1 / (1 - side.parameters[0].value) - 1
+    sizes = [p for p in place.parameters if p.name in ("change", "share")]
+    return any(abs(p.value) - _SURE * p.sd > most for p in sizes)
 
 
 def _brighter_side(samples: BlockSamples, scene: Scene) -> tuple[complex, float]:

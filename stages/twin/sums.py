@@ -28,6 +28,7 @@ from stages.twin.render import Renderer
 from stages.twin.scene import Scene
 from stages.twin.state import PhotometricState
 from stages.twin.switched import STRAY_NAMES, Shown
+from stages.twin.unexplained import unexplained
 from stages.twin.window import WindowPlace
 
 MOST_STRAY = 8
@@ -100,7 +101,10 @@ class Sums:
     def on_window(self, samples: BlockSamples | None) -> tuple[Mismatch, ...]:
         """Return what is on the window or the lens; places that other frames do not confirm are left out."""
         fixed_to = in_image(samples, tuple(w.place for w in self.window))
-        judged = [w.judged(to) for w, to in zip(self.window, fixed_to, strict=True)]
+        judged = [
+            w.judged(to) or (unexplained(w.place, samples) if to == "image" else None)
+            for w, to in zip(self.window, fixed_to, strict=True)
+        ]
         return without_duplicates([m for m in judged if m is not None])
 
     def glints(self, whole: Sequence[Mismatch], on_window: Sequence[Mismatch] = ()) -> tuple[Mismatch, ...]:

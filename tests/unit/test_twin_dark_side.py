@@ -1,5 +1,6 @@
 """A photo that is darker on one side all along: lights or wall cannot be told, and nothing else is."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -95,3 +96,11 @@ def test_a_side_that_darkens_during_the_run_is_not_stated_twice():
     at = (NamedFigure("frame_from", 51.0, 2.0), NamedFigure("azimuth_deg", 0.0, 7.0))
     side = Mismatch("", "intensity", "time", at, (), 0.0, 2.0, 1.0, "Darker.")
     assert beside_dark_side((_place(0),), (side,), _samples(_dark(0.9)), SCENE) == ((_place(0),), ())
+
+
+@pytest.mark.parametrize(("change", "kept"), [(0.3, False), (2.7, True)])
+def test_a_place_that_differs_by_more_than_the_dark_side_remains(change, kept):
+    """Behind a housing that took .9 of the light, frames differ by 270 % from the photo: withdrawn."""
+    place = replace(_place(20), parameters=(NamedFigure("change", change, 0.05),))
+    found, _ = beside_dark_side((place,), (), _samples(_dark(0.5)), SCENE)
+    assert found == (place,) * kept

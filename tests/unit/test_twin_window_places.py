@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 
 from stages.twin.compare import BLOCK_PX
-from stages.twin.locate import full_size, places_in_image
+from stages.twin.locate import ImagePlace, full_size, places_in_image
+from stages.twin.reference import BlockSamples, in_image
+from stages.twin.unexplained import unexplained
 from stages.twin.window import _fall_of_drop
 
 
@@ -88,3 +90,28 @@ def test_a_ring_that_no_lamp_of_the_twin_lights_is_not_dirt():
     ratios = [r + bounced.astype(np.float32) for r in _ratios(random, (80, 30, 0.4))]
     (place,), _ = places_in_image(ratios)
     assert place.u_px == pytest.approx(80.5 * BLOCK_PX, abs=BLOCK_PX)
+
+
+def _blocks(change, frames=10):
+    """Blocks of frames whose wall moves by two rows a frame, with a change by row, column and wall."""
+    random = np.random.default_rng(6)
+    frame, row, column = (a.ravel() for a in np.mgrid[0:frames, 0:40, 0:60])
+    along = row + 2 * frame
+    value = 0.01 * random.standard_normal(len(frame)) + change(row, column, along)
+    return BlockSamples(
+        value, 4 + 0 * value, 32 + 0 * value, frame, row, column, along, column, 100.0, 2.5,
+        np.arange(frames), row / 40, 0 * value,
+    )  # fmt: skip
+
+
+def test_a_place_that_no_effect_on_the_window_explains_is_reported_without_a_name():
+    """Shade behind which the photo was a tenth was corrected (chi-square 47 to 7) and not mentioned."""
+    place = ImagePlace(20.5 * BLOCK_PX, 20.5 * BLOCK_PX, 24.0, 1.4, 0.01, 0.0)
+    uneven = _blocks(lambda r, c, s: np.where(np.hypot(r - 20, c - 20) < 4, np.where(c > 20, 3.0, -0.5), 0))
+    found = unexplained(place, uneven)
+    assert (found.name, found.fixed_to) == ("", "image")
+    assert found.parameters[0].value == pytest.approx(np.sqrt((9 + 0.25) / 2), abs=0.4)
+    assert unexplained(place, _blocks(lambda r, c, s: 0 * r)) is None
+    assert unexplained(place, None) is None
+    by_wall = _blocks(lambda r, c, s: 0.3 * (np.abs(s - 22) < 2))
+    assert in_image(by_wall, (place,)) != ("image",)
