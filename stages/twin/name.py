@@ -245,7 +245,8 @@ def state_figures(state: PhotometricState) -> tuple[NamedFigure, ...]:
 def cannot_tell(state: PhotometricState, silent: bool = False) -> tuple[str, ...]:
     """Return sentences on what such recordings cannot decide; ``silent``: dark pixels show no noise."""
     said = [
-        "Vignetting cannot be separated from the LEDs' lobe: both act by the polar angle alone.",
+        "Vignetting cannot be separated from the LEDs' lobe: both act by the polar angle alone. If it "
+        "changes slowly, the photo of the wall changes with it, and frames fit nearly as well.",
         "A power response cannot be separated from the wall's contrast, since the photo has it, too. Gamma "
         "is estimated from the noise, which a video codec changes: it does not prove a nonlinear response.",
         "Lamps that are uneven in all frames, other than by one dim LED, can be distinguished from wall that "

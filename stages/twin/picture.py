@@ -142,12 +142,14 @@ class WholePictures:
             self.frame["ghost"].append(frame)
 
     def add_clipped(self, frame: int, above: Float32, twin: TwinFrame, free: Bool) -> None:
-        """Add any frame: what leaks from clipped pixels along columns, and along rows for comparison."""
+        """Add any frame: what leaks from clipped pixels along columns, and along rows for comparison.
+
+        Not on the line: errors of its profile beside clipped pixels are larger than what leaks.
+        """
         if (~free).sum() < _CLIPPED:
             return
         spread = leaked(free)
-        known = (twin.region != Region.UNSEEN) & (twin.region != Region.EDGE)
-        near = free & known & (spread[0] + spread[1] > _NEAR)
+        near = free & np.isin(twin.region, (Region.DARK, Region.WALL)) & (spread[0] + spread[1] > _NEAR)
         columns = np.stack([*(s[near] for s in spread), twin.level[near]]).astype(float)
         rest = (above - twin.level)[near].astype(float)
         own = columns @ columns.T + 1e-6 * np.eye(3)

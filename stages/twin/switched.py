@@ -194,7 +194,8 @@ def bloom(shown: Shown, size: Float) -> Pair:
     ``size`` is what leaks along columns and along rows, grey levels.
     """
     along, across = leaked(shown.free)
-    use = shown.free & ~np.isin(shown.twin.region, (Region.UNSEEN, Region.EDGE)) & (along + across > _NEAR)
+    beside = np.isin(shown.twin.region, (Region.DARK, Region.WALL))
+    use = shown.free & beside & (along + across > _NEAR)
     level, even = shown.twin.level, np.float32(size.mean())
     with_it = level + np.float32(size[0]) * along + np.float32(size[1]) * across
     return Pair(level + even * (along + across), with_it, use)

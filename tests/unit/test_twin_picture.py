@@ -15,7 +15,7 @@ from stages.twin.picture import WholePictures, _brings_light
 from stages.twin.reference import BlocksOfFrames
 from stages.twin.render import Region, TwinFrame
 from stages.twin.scene import Ring
-from stages.twin.switched import STRAY_NAMES, Shown
+from stages.twin.switched import STRAY_NAMES, Shown, leaked
 
 SHAPE, FRAMES, WHITE = (240, 320), 8, 200.0
 V, U = np.mgrid[0 : SHAPE[0], 0 : SHAPE[1]].astype(np.float32)
@@ -188,6 +188,20 @@ def test_a_photo_with_internal_displacements_is_not_a_response():
 
 def test_bloom_is_found_along_columns_only():
     assert _named(_bloomed) == ["bloom"]
+
+
+@pytest.mark.parametrize("leak", [0.0, 40.0])
+def test_bloom_of_a_clipped_line_is_measured_beside_it_and_not_on_its_profile(leak):
+    """A line wider on some sides than its twin hid bloom of 11 %: the leak was measured on the line, too."""
+    random, whole = np.random.default_rng(7), WholePictures(SCENE)
+    for frame in range(8):
+        twin = _line()
+        wider = 60 * np.cos(2 * PHI + frame) * np.exp(-0.5 * ((abs(AWAY - 70) - 4) / 1.5) ** 2)
+        full = twin.level > 140
+        seen = twin.level + wider + leak * leaked(~full)[0]
+        seen = np.where(full, WHITE + 50, np.minimum(_noisy(seen, random), WHITE - 1)).astype(np.float32)
+        whole.add_clipped(frame, seen, twin, ~full)
+    assert (whole._bloom() is not None) == (leak > 0)
 
 
 def test_stray_light_is_named_by_what_it_falls_on():
