@@ -22,11 +22,22 @@ _FEWEST, _FEWEST_BLOCKS, _FEWEST_SECTORS = 3, 4, 2
 _SIGMA, _LEAST_DARK, _LEAST_DIM, _MOSTLY = 8.0, 0.15, 0.25, 0.5
 """Fewest frames; fewest joined blocks and sectors. Times the usual scatter, and least loss of light, of a
 block and of the line. A sound recording of another renderer had one block of 24,000 beyond 8, of .05. Share
-of squares from which other blocks predict a spot, and of the frames from which a sector is dim. Chosen."""
+of squares from which other blocks predict a spot, of blocks that lie on the same wall in several frames, and
+of the frames from which a sector is dim. Chosen."""
+
+
+_MOVES = (
+    "each time at another place of picture and wall: something moves on the window or in front of the wall."
+)
+_SHINES = (
+    "mostly where other frames show it on the same wall, but not in all that see this wall: wall that shines "
+    "at some angles, as wet or polished wall does, beside a photo that was made where it shone, or something "
+    "that moves slowly."
+)
 
 
 def dark_spots(samples: BlockSamples | None, found: Sequence[Mismatch] = ()) -> tuple[Mismatch, ...]:
-    """Return spots of lit wall that are dark in several frames and are fixed neither to image nor to wall.
+    """Return spots of lit wall that are dark in several frames and stay neither in the image nor on the wall.
 
     Blocks at places of the image where something else was ``found`` do not count: texture that a drop
     displaces leaves dark fragments, each frame others.
@@ -45,14 +56,20 @@ def dark_spots(samples: BlockSamples | None, found: Sequence[Mismatch] = ()) -> 
     size = NamedFigure("darker", float(np.median(lost)), float(lost.std() / np.sqrt(len(lost))), "share")
     first, last = (float(samples.number[frames[k]]) for k in (0, -1))
     place = (NamedFigure("frame_from", first, 0.0), NamedFigure("frame_to", last, 0.0))
-    nan = float("nan")
+    again, nan = _recurs(samples, use), float("nan")
     said = (
         f"In {len(frames)} of {count} lit frames, a spot is up to {100 * lost.max():.0f} % darker than "
-        "re-rendered, each time at another place of picture and wall: something moves on the window or in "
-        "front of the wall."
+        f"re-rendered, {_SHINES if again else _MOVES}"
     )
-    look = samples.look(use, SHOWN_PX)
-    return (Mismatch("", "intensity", "time", place, (size,), nan, nan, nan, said, look),)
+    look, fixed_to = samples.look(use, SHOWN_PX), "image or wall" if again else "time"
+    return (Mismatch("", "intensity", fixed_to, place, (size,), nan, nan, nan, said, look),)
+
+
+def _recurs(samples: BlockSamples, use: Bool) -> bool:
+    """Return whether most of the blocks (N,) lie on wall that is among them in other frames as well."""
+    cell = samples.orders["wall"][use]
+    once = np.unique(np.stack([cell, samples.frame[use]]), axis=1)[0]
+    return bool(np.mean(np.bincount(once)[cell] > 1) > _MOSTLY)
 
 
 def _stays(samples: BlockSamples, use: Bool) -> bool:

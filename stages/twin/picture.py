@@ -249,8 +249,8 @@ class WholePictures:
         figure = NamedFigure("leak", size, float(more.std()) / np.sqrt(len(more)), "of full scale")
         found = self._mismatch(
             "bloom", "image", figure, chance, "bloom",
-            f"Above and below clipped pixels the picture is {100 * size:.0f} % of full scale brighter than "
-            "beside them: charge leaks along columns.",
+            f"Above and below a clipped pixel, at least {100 * size:.0f} % of full scale is added to the "
+            "picture in all, and less beside it: charge leaks along columns.",
         )  # fmt: skip
         return Suspected(found, bloom, self.frames_of("bloom"), 255.0 * leak)
 

@@ -42,6 +42,18 @@ def test_a_dark_spot_that_crawls_is_told_and_one_that_stays_is_not():
     assert dark_spots(None) == ()
 
 
+def test_wall_that_is_dark_at_some_angles_is_not_told_as_something_that_moves():
+    """Wet wall, darker than its photo but where it shines, was told as a spot on the window that moves."""
+
+    def wet(f, r, c, a):
+        on_wall = (np.abs(a - 20) < 2.5) & (np.abs(c - 16) < 5)
+        return on_wall * np.where(np.abs(r - 12) < 4, 0.8, -0.3)
+
+    (spot,) = dark_spots(_samples(wet))
+    assert (spot.name, spot.fixed_to) == ("", "image or wall")
+    assert "wet or polished" in spot.statement
+
+
 def test_dark_fragments_of_texture_in_a_drop_are_no_spot_that_moves():
     """Beside a drop that was found, a spot was told that moves: each frame has dark fragments elsewhere."""
     drop = Mismatch("droplet", "intensity", "image", _disc(130.0, 100.0, 24.0), (), 0.0, 2.0, 1.0, "It is.")
