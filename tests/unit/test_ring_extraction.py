@@ -153,6 +153,29 @@ def test_coarsely_stored_colours_do_not_displace_the_line():
     assert np.sqrt(np.nanmean(error**2)) < 0.25
 
 
+def beside_a_bright_band(ring, seed, texture):
+    """Return a faint, wide green line with a brighter, wider band of lit wall 15 px outside of it."""
+    random = np.random.default_rng(seed)
+    band = ring_light(SIZE, CENTRE, lambda psi: ring(psi) + 15.0, 10.0, 120.0)
+    wall = (texture * (30.0 + band))[..., None] * np.array([0.8, 0.9, 1.1])
+    line = ring_light(SIZE, CENTRE, ring, 4.0, 40.0)
+    light = wall + line[..., None] * np.array([0.35, 1.0, 0.1])
+    noisy = light + random.normal(size=light.shape) * np.sqrt(1 + 0.1 * np.maximum(light, 0))
+    return np.clip(np.rint(noisy), 0, 255).astype(np.uint8)
+
+
+def test_a_bright_band_of_wall_does_not_displace_the_line():
+    """In the mixture of the smallest scatter alone, the line was found .18 px too far inside."""
+    ring, random = off_centre(165.0, 8.0), np.random.default_rng(2)
+    texture = 1 + 1.8 * cv2.GaussianBlur(random.normal(size=SIZE[::-1]), (0, 0), 4.0)
+    images = {i: beside_a_bright_band(ring, i, texture) for i in range(3)}
+    samples = extracted(images, ["both"] * 3)
+    error = np.where(samples.valid, samples.radius_px - ring(samples.azimuth_rad), np.nan)
+    assert samples.valid.mean() > 0.97
+    assert abs(np.nanmean(error)) < 0.05
+    assert np.mean(np.abs(error / samples.sigma_px)[samples.valid] < 1.96) > 0.93
+
+
 def white_wall(ring, seed, texture):
     """Return the same line, much brighter, on a grey wall; it appears in all channels, as bright lines do."""
     random = np.random.default_rng(seed)
