@@ -27,22 +27,22 @@ def cuts(pictures: Pictures, shown: Int, left_out: Bool, time_s: Float) -> Int:
     ----------
     shown, left_out, time_s : (F,)
         `Light` of each picture, whether it is left out, and its time. A gap in the times is no cut: there
-        pictures are known to be missing, and the encoder shows how far the probe went.
+        pictures are known to be missing, and the encoder shows how far the probe went. Yet it is a step that
+        others are compared with: of a hand-pulled probe, stamped with varying times, only the short ones had
+        no gap, and the longest of these was told as a cut.
     """
     place = np.flatnonzero((pictures.partner >= 0) & (shown == Light.WALL) & ~left_out)
-    if len(place) < _FEWEST:
-        return np.empty(0, np.int64)
     before = pictures.partner[place]
-    most_s = (place - before + 0.5) * np.median(np.diff(time_s))
-    same = (shown[before] == Light.WALL) & (time_s[place] - time_s[before] < most_s)
-    place = place[same & np.isfinite(pictures.change[place])]
-    if len(place) < _FEWEST:
+    lit = (shown[before] == Light.WALL) & np.isfinite(pictures.change[place])
+    place, before = place[lit], before[lit]
+    same = time_s[place] - time_s[before] < (place - before + 0.5) * np.median(np.diff(time_s))
+    if same.sum() < _FEWEST:
         return np.empty(0, np.int64)
     change, step = pictures.change[place], pictures.step[place]
-    usual = np.nanmedian(step) if np.any(np.isfinite(step)) else np.nan
+    usual = np.nanmedian(step[same]) if np.any(np.isfinite(step[same])) else np.nan
     continues = np.abs(step - usual) < _CONTINUES * np.abs(usual)
     beside = maximum_filter(change, footprint=_BESIDE, mode="nearest")
-    return np.asarray(place[(change > _CHANGES * beside) & ~continues])
+    return np.asarray(place[same & (change > _CHANGES * beside) & ~continues])
 
 
 def warn_of_cuts(place: Int, pictures: Pictures, frame: Int, context: Context) -> None:

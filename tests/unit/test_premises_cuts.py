@@ -55,6 +55,17 @@ def test_known_missing_pictures_are_not_a_cut() -> None:
     assert found(change, steps, np.where(NUMBERS >= CUT, NUMBERS + 28, NUMBERS) / 30) == []
 
 
+def test_a_long_step_beside_others_with_gaps_in_their_times_is_not_a_cut() -> None:
+    """Hand-pulled, with varying frame times, a run was cut, and σ of its 28 mm was 40 mm."""
+    change, steps = steady()
+    far = np.isin(NUMBERS, [CUT - 6, CUT, CUT + 4])
+    time_s = NUMBERS / 30 + 0.04 * (np.searchsorted([CUT - 6, CUT + 4], NUMBERS, "right"))
+    assert found(np.where(far, 13.0, change), np.where(far, 0.2, steps), time_s) == []
+    assert found(np.where(far, 13.0, change), np.where(far, 0.2, steps), NUMBERS / 30) == []
+    alone = NUMBERS == CUT
+    assert found(np.where(alone, 13.0, change), np.where(alone, 0.2, steps), time_s) == [CUT]
+
+
 def test_a_probe_that_stood_and_moves_on_is_not_a_cut() -> None:
     change, steps = steady()
     still = NUMBERS < CUT
