@@ -278,7 +278,7 @@ PHOTOMETRY = Stage(
 )
 TWIN = Stage(
     "twin",
-    "73",
+    "74",
     TwinParameters,
     compare_with_twin,
     "recorded frames beside the same frames, re-rendered from what the run has measured",

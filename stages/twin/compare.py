@@ -22,7 +22,8 @@ CLIPPED_WALL = 0.01
 """Share of pixels of lit wall above which clipping is reported."""
 _SILENT = 0.92
 """Share of pixels at one grey level from which on noise is below that of rounding, 1/√12: erf(√1.5)."""
-_DARK, _WALL, _CORE, _AT_BLACK = int(Region.DARK), int(Region.WALL), int(Region.LINE_CORE), 0.5
+_DARK, _WALL, _CORE, _EDGE = (int(r) for r in (Region.DARK, Region.WALL, Region.LINE_CORE, Region.EDGE))
+_AT_BLACK = 0.5
 """Region numbers for the compiled sums; a pixel within half a grey level of black is at black."""
 _COUNTED = (Region.LINE_CORE, Region.LINE_FLANK, Region.WALL)
 
@@ -84,7 +85,7 @@ class Comparison:
             before.region, above_black, *_pair(before), *_pair(after), np.array(noise.polynomial),
             np.float32(noise.full_scale), np.array(_LEVELS, np.float32), _STRAY,
         )  # fmt: skip
-        size, before_sum, after_sum = sums[:3]
+        (size, before_sum, after_sum), counted = sums[:3], [int(r) for r in _COUNTED]
         self.pixels += size
         self.before += before_sum
         self.after += after_sum
@@ -99,10 +100,9 @@ class Comparison:
                 )
             )
             self.by_level += by_level
-            self.seen += float(size.sum() - size[Region.UNSEEN] - size[Region.DARK])
-            self.view += float(size.sum() - size[Region.DARK])
-            self.dim, self.border = self.dim + sums[3, 2], self.border + float(size[Region.EDGE])
-        counted = [int(r) for r in _COUNTED]
+            known = float(size[counted].sum()) + sums[3, 3]
+            self.seen, self.view = self.seen + known, self.view + known + float(size[Region.UNSEEN])
+            self.dim, self.border = self.dim + sums[3, 2], self.border + sums[3, 3]
         chi2 = after_sum[counted].sum() / max(size[counted].sum(), 1.0)
         self.views.append(_view(frame, light, chi2, above_black, after, z, noise.black.value))
 
@@ -179,10 +179,11 @@ def _pair(twin: TwinFrame) -> tuple[Float32, Float32]:
 def _differences(  # type: ignore[no-untyped-def]
     region, above, level, variance, level_after, variance_after, noise, white, levels, stray
 ):
-    """Return z (H, W) after; per region, pixels and χ² before and after; counts of stray, still and dim ones.
+    """Return z (H, W) after, and per region pixels and χ² before and after.
 
-    Then, of lit wall: squared differences, those over the camera's noise alone, variances and clipped pixels;
-    last, pixels and squares of z by brightness (2, L).
+    The last row counts stray, still and dim dark pixels, and those of the edge within the view. Then, of lit
+    wall: squared differences, those over the camera's noise alone, variances and clipped pixels; last, pixels
+    and squares of z by brightness (2, L).
     """
     z, sums = np.empty_like(above), np.zeros((4, 6))
     of_wall, by_level = np.zeros(4), np.zeros((2, len(levels)))
@@ -195,7 +196,9 @@ def _differences(  # type: ignore[no-untyped-def]
             sums[0, r] += 1
             sums[1, r] += rest * rest / variance[i, j]
             sums[2, r] += one * one
-            if r == _DARK:
+            if r == _EDGE:
+                sums[3, 3] += level[i, j] > 0  # beyond the view, no wall is lit
+            elif r == _DARK:
                 sums[3, 0] += one > stray
                 sums[3, 1] += abs(value) < _AT_BLACK
                 sums[3, 2] += level[i, j] > 0

@@ -177,7 +177,7 @@ def test_wall_at_the_edge_or_too_dark_is_known_but_not_compared():
     level[:4], level[36:] = 2.0, 0.0  # dim wall, and pixels outside the view
     frame, comparison = _frame(level), Comparison()
     frame.region[:4], frame.region[36:], frame.region[4:8] = Region.DARK, Region.DARK, Region.EDGE
-    frame.region[8:12] = Region.UNSEEN
+    frame.region[8:12], frame.region[36:, 25:] = Region.UNSEEN, Region.EDGE  # half of an edge sees no wall
     comparison.add(7, Illumination.LED, level, frame, frame, NOISE)
     assert comparison.compared_share == pytest.approx(24 / 32)
 
