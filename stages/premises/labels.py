@@ -9,14 +9,15 @@ from pipeline.arrays import Int
 from pipeline.errors import UnusableError
 from pipeline.recording.base import FrameTable, Illumination, Recording
 from stages.premises.light import Light, light_seen, look_the_same, pattern_breaks
-from stages.premises.pictures import Pictures
+from stages.premises.pictures import CLOSED, Pictures
 from stages.premises.repeats import repeated, rows_of_repeats
 from stages.premises.rows import Alignment, Lights, aligned
 
 _LASER, _LED, _BOTH = Illumination.LASER.value, Illumination.LED.value, Illumination.BOTH.value
 Labels = NDArray[np.str_]
 # If all pictures look the same, the light that at least this share of the rows states is taken as true, and
-# the other rows count as mistakes. If no light has such a share, the table is refused.
+# the other rows count as mistakes. If no light has such a share, the table is refused. As many of the bright
+# pictures must show the line for the light to be one.
 _MOST_ROWS = 2 / 3
 # Lights that change more often than this from picture to picture are switched on purpose.
 _SWITCHED = 0.1
@@ -50,7 +51,7 @@ def light_of_pictures(frames: FrameTable, pictures: Pictures) -> Int:
         When the table states one light and the pictures show two, or when it states two, neither of them in
         most rows, and all pictures look the same.
     """
-    light, stated = light_seen(pictures), stated_lights(frames.illumination)
+    light, stated = _beside_line(frames, pictures), stated_lights(frames.illumination)
     _refuse_one_light(frames, stated, light)
     line, wall = stated == Light.LINE, stated == Light.WALL
     two = line.any() and wall.any()
@@ -64,6 +65,19 @@ def light_of_pictures(frames: FrameTable, pictures: Pictures) -> Int:
             hint="state in frames.csv which light was on in each frame",
         )
     return np.where(pictures.seen, Light.LINE if line.mean() > 0.5 else Light.WALL, Light.UNKNOWN)
+
+
+def _beside_line(frames: FrameTable, pictures: Pictures) -> Int:
+    """Return the `Light` (F,) that pictures show; unknown if only their brightness changes.
+
+    Where the table states laser and LEDs in all, and bright pictures show the line as dark ones do, they are
+    not of another light: the exposure has changed, or the light flickers.
+    """
+    light = light_seen(pictures)
+    wall = light == Light.WALL
+    alike = wall.any() and np.mean(pictures.closed[wall] > CLOSED) > _MOST_ROWS
+    one = alike and bool(np.all(frames.illumination == _BOTH))
+    return np.full_like(light, Light.UNKNOWN) if one else light
 
 
 def _refuse_one_light(frames: FrameTable, stated: Int, light: Int) -> None:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from pipeline.recording.base import Illumination, Recording
+from stages.premises.labels import light_of_pictures
 from stages.premises.light import Light, light_seen, look_the_same
 from stages.premises.pictures import Pictures, examine_pictures
 from tests.drawn_run import RADIUS, DrawnRun
@@ -46,6 +48,23 @@ def test_two_lights_are_seen_where_the_lit_pictures_become_ever_darker(lit_share
     closed, partner = np.where(LIT, 0.6, 0.9), np.arange(COUNT) - 2
     seen = Pictures(brightness, closed, line, np.zeros(1), nothing, partner, nothing, nothing)
     np.testing.assert_array_equal(light_seen(seen), np.where(LIT, Light.WALL, Light.LINE))
+
+
+@pytest.mark.parametrize(("label", "closed", "one"), [("both", 0.9, True), ("both", 0.1, False)])
+@pytest.mark.parametrize("period", [2, 3, COUNT])
+def test_a_step_or_flicker_of_both_lights_is_no_second_light(
+    label: str, closed: float, one: bool, period: int
+) -> None:
+    """An exposure 15 % longer from half on was taken for a laser switched off: half was left out."""
+    bright = np.arange(COUNT) % period >= period / 2
+    line, nothing = np.ones((COUNT, 1), np.float32), np.full(COUNT, np.nan)
+    seen = Pictures(
+        8.5 + 0.7 * bright + 0.001 * np.random.default_rng(2).standard_normal(COUNT),
+        np.where(bright, closed, 0.9), line, np.zeros(1), nothing, np.arange(COUNT) - 1, nothing, nothing,
+    )  # fmt: skip
+    table = SimpleNamespace(frame=np.arange(COUNT), illumination=np.full(COUNT, label))
+    light = light_of_pictures(table, seen)  # type: ignore[arg-type]
+    assert np.all(light == Light.UNKNOWN) == one
 
 
 def test_one_light_that_changes_at_random_is_not_two() -> None:
