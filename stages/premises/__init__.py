@@ -218,6 +218,6 @@ def _report(pictures: Pictures, radius_mm: float, changes: Changes, context: Con
 
 
 PREMISES = Stage(
-    "premises", "40", PremisesParameters, check_premises,
+    "premises", "41", PremisesParameters, check_premises,
     "stated lights, times, encoder and diameter compared with the pictures and corrected",
 )  # fmt: skip
