@@ -7,7 +7,7 @@ wall, probe and noise: what is found there is a false alarm. With ``--as-shipped
 scenes' light and gloss: they clip and shine, which may be reported, as ``saturation`` and as a mismatch
 without a name; any other name is false. Their answers are stored under names of their own. A case that has
 its answer in OUT is not done again. Finally every case is also scored by the answer to another effect: those
-counts must be bad. With a single effect there is no such answer.
+counts must be bad. With a single effect there is no such answer. Nulls are scored by the answers to effects.
 """
 
 from __future__ import annotations
@@ -181,6 +181,7 @@ def main(given: argparse.Namespace) -> None:
     """Print the result of every case, and the counts."""
     cases: list[tuple[Case, dict[str, Any], tuple[float, float]]] = []
     nulls: list[bool] = []
+    true = ("", "saturation") if given.as_shipped else ()
     for name, case, told in answers(given):
         put = "" if case is None else " ".join(f"{n:.3g}" for n in case.numbers)
         print(f"{name} {put}: {told['frames']} frames, {told['seconds']:.0f} s {told.get('refused', '')}")
@@ -188,7 +189,6 @@ def main(given: argparse.Namespace) -> None:
             size = "".join(f" {p['name']} {p['value']:.3g} ± {p['sd']:.2g}" for p in m["parameters"][:1])
             print(f"  [{m['name']}; {m['fixed_to']};{size}] {m['statement']}", flush=True)
         if case is None:
-            true = ("", "saturation") if given.as_shipped else ()
             nulls.append(any(m["name"] not in true for m in told["found"]))
             continue
         cases.append((case, told, spot_of(case, given)))
@@ -201,6 +201,8 @@ def main(given: argparse.Namespace) -> None:
     print(f"{len(cases)} cases: {_counts(right)}")
     print(f"{len(exchanged(cases))} cases scored by the answer to another effect: {_counts(spoilt)}")
     print(f"alarms in {sum(nulls)} of {len(nulls)} nulls")
+    alarms = sum(any(m["name"] not in true for m in told["found"]) for _, told, _ in cases)
+    print(f"alarms in {alarms} of {len(cases)} nulls, scored by the answers to effects")
 
 
 Answered = tuple[Case, dict[str, Any], tuple[float, float]]
