@@ -267,13 +267,14 @@ def _regress(first, i, j, deviation, sure, cell_s, cell_a, along, around, least,
                     after = after or s >= 0.0
         if count < least or not (before and after):
             continue
+        # One by one: assigned as rows of numbers, they took more than half of the time to compile this.
         right[0], right[1], right[2], right[3], right[4], right[5] = d00, d10, d01, d20, d11, d02
-        normal[0] = (m00, m10, m01, m20, m11, m02)
-        normal[1, 1:] = (m20, m11, m30, m21, m12)
-        normal[2, 2:] = (m02, m21, m12, m03)
-        normal[3, 3:] = (m40, m31, m22)
-        normal[4, 4:] = (m22, m13)
-        normal[5, 5] = m04
+        normal[0, 0], normal[0, 1], normal[0, 2] = m00, m10, m01
+        normal[0, 3], normal[0, 4], normal[0, 5] = m20, m11, m02
+        normal[1, 1], normal[1, 2], normal[1, 3], normal[1, 4], normal[1, 5] = m20, m11, m30, m21, m12
+        normal[2, 2], normal[2, 3], normal[2, 4], normal[2, 5] = m02, m21, m12, m03
+        normal[3, 3], normal[3, 4], normal[3, 5] = m40, m31, m22
+        normal[4, 4], normal[4, 5], normal[5, 5] = m22, m13, m04
         weight = normal[0, 0]
         for a in range(6):
             normal[a, a] += 1e-4 * weight
