@@ -239,5 +239,5 @@ def _defects_of_run(
 
 
 DEFECTS = Stage(
-    "defects", "64", DefectParameters, _defects_of_run, "defects as instances with depth, clock and kind"
+    "defects", "65", DefectParameters, _defects_of_run, "defects as instances with depth, clock and kind"
 )

@@ -5,20 +5,18 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
-from scipy.fft import irfft2, next_fast_len, rfft2
-from scipy.ndimage import maximum_filter
 from scipy.optimize import brentq
 
-from pipeline.adjustment.robust import robust_spread, row_median
-from pipeline.arrays import Bool, Complex64, Float, Float32
+from pipeline.adjustment.robust import robust_spread
+from pipeline.arrays import Bool, Float, Float32
 from pipeline.machine.scratch import Scratch
 from pipeline.machine.stage import Progress
 from pipeline.system.parallel import in_threads
 from stages.defects.along import stretches, widened
-from stages.defects.relief import Relief, WallRelief
+from stages.defects.relief import WallRelief
+from stages.defects.weight import Weighed, weighed
 
 # 1 σ of round templates, for defects 3 to 48 mm wide: an octave apart, the next one loses at most 6 % of the
 # signal over noise, 1 − 2 w t / (w² + t²) at t = √2 w.
@@ -28,11 +26,9 @@ _QUANTILES, _EVERY = (np.arange(20) + 0.5) / 20, 7
 _LONG_MM = ((4.0, 0.6), (8.0, 0.8))
 _DIRECTIONS = 8
 _THREADS = 2
-# The filters search where at least this part of a template was seen: a little less than at the pipe's ends.
+# The filters search where they see at least this part of what they usually see: a little less than at the
+# pipe's ends.
 _LEAST_SEEN = 0.4
-_PIECE_MM = 16.0
-"""Length around the pipe, mm, of pieces of a row whose median σ bounds that of their cells: twice the width
-of defects that only few rings cross; on wider ones, rings lie on a smooth wall (chosen)."""
 
 
 @dataclass(frozen=True)
@@ -55,64 +51,6 @@ class Template:
 
 
 @dataclass(frozen=True)
-class Weighed:
-    """A relief prepared for the filters.
-
-    Attributes
-    ----------
-    signal, weight : (S, A)
-        Relief over its variance, mm⁻¹, and one over its variance, mm⁻²; 0 where nothing was measured.
-    seen : (S, A) bool
-        Where the wall was measured.
-    reach : int
-        Largest half length of a template, rows.
-    """
-
-    signal: Float
-    weight: Float
-    seen: Bool
-    reach: int
-
-    @cached_property
-    def signal_spectrum(self) -> Complex64:
-        """The Fourier transform of ``signal``, padded with zeros beyond the ends of the pipe."""
-        return self._spectrum(self.signal)
-
-    @cached_property
-    def weight_spectrum(self) -> Complex64:
-        """The Fourier transform of ``weight``, padded with zeros beyond the ends of the pipe."""
-        return self._spectrum(self.weight)
-
-    @cached_property
-    def seen_spectrum(self) -> Complex64:
-        """The Fourier transform of ``seen``, padded with zeros beyond the ends of the pipe."""
-        return self._spectrum(self.seen.astype(float))
-
-    def filtered(self, kernel: Float, *spectra: Complex64) -> list[Float]:
-        """Return the correlations (S, A) with a kernel: periodic in azimuth, zero beyond the pipe's ends.
-
-        Templates are symmetric about their centre, so that correlation equals convolution.
-        """
-        rows, columns = self._shape
-        padded = np.zeros((rows, columns), np.float32)
-        i, j = (np.arange(n) - n // 2 for n in kernel.shape)
-        # A template longer than the circumference is wrapped round it.
-        np.add.at(padded, np.ix_(i % rows, j % columns), kernel.astype(np.float32))
-        of_kernel = rfft2(padded)
-        found = (irfft2(spectrum * of_kernel, (rows, columns)) for spectrum in spectra)
-        return [np.asarray(f[: len(self.seen)], float) for f in found]
-
-    @property
-    def _shape(self) -> tuple[int, int]:
-        return next_fast_len(len(self.seen) + self.reach, real=True), self.seen.shape[1]
-
-    def _spectrum(self, image: Float) -> Complex64:
-        padded = np.zeros(self._shape, np.float32)
-        padded[: len(image)] = image
-        return np.asarray(rfft2(padded), np.complex64)
-
-
-@dataclass(frozen=True)
 class Filter:
     """A template scaled to a wall's noise.
 
@@ -121,6 +59,8 @@ class Filter:
     kernel : (odd, odd)
     scale : float
         1 σ of its response to this wall's noise and roughness; it would be 1 for white noise.
+    least_seen : float
+        Where less was seen (the sum of squared kernel), the score is 0.
     height_sigma_mm : float
         Typical 1 σ of the height that it measures.
     noise, gain : (Q,)
@@ -129,17 +69,19 @@ class Filter:
 
     kernel: Float
     scale: float
+    least_seen: float
     height_sigma_mm: float
     noise: Float
     gain: Float
 
     def standardised(self, wall: Weighed) -> Float:
         """Return the response (S, A) in σ."""
-        return self.score(*_response(wall, self.kernel))
+        response, _, seen = _response(wall, self.kernel)
+        return self.score(response, seen)
 
-    def score(self, response: Float, _: Float, enough: Bool) -> Float:
-        """Return a response (S, A) in σ; 0 where not ``enough`` (S, A) of the wall was seen."""
-        return np.where(enough, response / self.scale, 0.0)
+    def score(self, response: Float, seen: Float) -> Float:
+        """Return a response (S, A) in σ; 0 where too little of the wall was ``seen`` (S, A)."""
+        return np.where(seen > self.least_seen, response / self.scale, 0.0)
 
 
 @dataclass(frozen=True)
@@ -238,36 +180,6 @@ def _threshold(area_mm2: float, bank: tuple[Template, ...], false_alarms: float)
     return float(brentq(excess, 1.0, 40.0)) if excess(1.0) > 0 else 1.0
 
 
-def weighed(relief: Relief, reach: int) -> Weighed:
-    """Return the relief as the filters need it; ``reach`` is the largest half length of a template, rows."""
-    weight = np.where(relief.seen, 1 / usual_sigma_mm(relief) ** 2, 0.0)
-    return Weighed(weight * np.nan_to_num(relief.local_mm), weight, relief.seen, reach)
-
-
-def usual_sigma_mm(relief: Relief) -> Float:
-    """Return 1 σ (S, A) of the relief, in each row at most the largest median of the pieces beside a cell.
-
-    Rings that cross a narrow defect do not lie on one smooth wall, so that σ is larger there. Weighed with
-    it, a defect would hide itself from the search.
-    """
-    count = max(1, round(2 * np.pi * relief.radius_mm / _PIECE_MM))
-    pieces = np.array_split(relief.sigma_mm, count, axis=1)
-    median = np.stack([row_median(piece) for piece in pieces], -1)
-    # Where noise is larger behind a part of the window, pieces at its border count as noisy.
-    size = 2 * round(_PIECE_MM / 2 / relief.cell_mm[0]) + 1, 3
-    bound = maximum_filter(np.nan_to_num(median), size, mode=("nearest", "wrap"))
-    around = np.repeat(bound, [piece.shape[1] for piece in pieces], axis=1)
-    return np.minimum(relief.sigma_mm, np.maximum(around, _lasting_sigma_mm(relief)))
-
-
-def _lasting_sigma_mm(relief: Relief) -> Float:
-    """Return the median σ (S, A) along the pipe: behind a spot of the window it stays large, in a pit not."""
-    rows = len(relief.sigma_mm)
-    pieces = np.array_split(relief.sigma_mm, max(1, round(rows * relief.cell_mm[0] / _PIECE_MM)))
-    median = np.stack([row_median(piece.T) for piece in pieces])
-    return np.repeat(np.nan_to_num(median), [len(piece) for piece in pieces], axis=0)
-
-
 def _fitted(relief: WallRelief, kernels: list[Float], overlap: int) -> Iterator[tuple[Filter, Float]]:
     """Yield the filters for this wall, each with its response to the sampled rows, σ.
 
@@ -276,28 +188,30 @@ def _fitted(relief: WallRelief, kernels: list[Float], overlap: int) -> Iterator[
     """
     parts = [widened(rows, relief.shape[0], overlap) for rows in relief.sampled]
     walls = [weighed(relief.rows(part.wide), overlap) for part in parts]
+    measured = np.concatenate([w.seen[part.inner] for w, part in zip(walls, parts, strict=True)])
 
     def fitted(kernel: Float) -> tuple[Filter, Float]:
         found = [[f[part.inner] for f in _response(w, kernel)] for w, part in zip(walls, parts, strict=True)]
-        response, power, enough = (np.concatenate(f) for f in zip(*found, strict=True))
+        response, power, seen = (np.concatenate(f) for f in zip(*found, strict=True))
+        least = _LEAST_SEEN * float(np.median(seen[measured]))
+        enough = seen > least
         size = np.abs(response[enough])
         scale = max(robust_spread(size), float(np.quantile(size, 0.9)) / 1.645, 1e-9)
         usual = float(np.median(power[enough]))
         noise = np.quantile(np.outer([-1, 1], response[enough][::_EVERY] / scale), _QUANTILES)
         gain = np.quantile(np.sqrt(power[enough][::_EVERY] / usual), _QUANTILES)
-        used = Filter(kernel, scale, scale / float(np.sqrt(usual)), noise, gain)
-        return used, used.score(response, power, enough)
+        used = Filter(kernel, scale, least, scale / float(np.sqrt(usual)), noise, gain)
+        return used, used.score(response, seen)
 
     return in_threads(fitted, kernels, _THREADS)
 
 
-def _response(wall: Weighed, kernel: Float) -> tuple[Float, Float, Bool]:
-    """Return the response (S, A), of unit variance in white noise, its power, and where enough was seen.
+def _response(wall: Weighed, kernel: Float) -> tuple[Float, Float, Float]:
+    """Return the response (S, A), of unit variance in white noise, its power, and how much was seen.
 
     What was seen counts by area, not by its weight: where noise is larger, as in a dent of glossy steel, only
     what stands out of that noise is found, but it is searched.
     """
     power, seen = wall.filtered(kernel**2, wall.weight_spectrum, wall.seen_spectrum)
     (response,) = wall.filtered(kernel, wall.signal_spectrum)
-    enough = seen > _LEAST_SEEN * np.sum(kernel**2)
-    return response / np.sqrt(np.maximum(power, 1e-30)), power, enough
+    return response / np.sqrt(np.maximum(power, 1e-30)), power, seen

@@ -118,8 +118,13 @@ def detectable(
     held: HeldOver,
     parameters: DefectParameters,
 ) -> tuple[Detectable, ...]:
-    """Return the limits of detection between the first and the last ring, in order of distance."""
+    """Return the limits of detection between the first and the last ring, in order of distance.
+
+    There are none where all rings lie at one place.
+    """
     along = _along(wall, photo, rings_needed(held))
+    if along is None:
+        return ()
     count = max(1, round(len(along.at_mm) * wall.relief.cell_mm[0] / _PIECE_MM))
     cuts = np.linspace(0, len(along.at_mm), count + 1).astype(int)
     score = _score_that_counts(credibility, detection.threshold)
@@ -138,14 +143,16 @@ def _score_that_counts(credibility: Credibility, threshold: float) -> float:
     return score
 
 
-def _along(wall: MeasuredWall, photo: WallTexture, needed: int) -> _Along:
-    """Return what the limit depends on, for the rows between the first and the last ring."""
+def _along(wall: MeasuredWall, photo: WallTexture, needed: int) -> _Along | None:
+    """Return what the limit depends on, for the rows between the first and the last ring, if any."""
     s, ring_mm = wall.relief.radius_map.distance_mm, np.sort(wall.cloud.rings()[1])
     measured, sigma = np.zeros(len(s)), np.zeros(len(s))
     for part in stretches(len(s)):
         rows = wall.relief.rows(part.own)
         measured[part.own], sigma[part.own] = rows.seen.mean(1), row_median(rows.sigma_mm)
     within = slice(*np.searchsorted(s, ring_mm[[0, -1]]))
+    if within.start == within.stop:
+        return None
     # So far from its middle, a ring still has enough samples side by side on a defect.
     around = LEAST_SAMPLES / 2 * _pitch_mm(wall, float(measured[within].mean()), len(ring_mm))
     ways = np.hypot(KDTree(ring_mm[:, None]).query(s[within, None], k=[1, needed])[0], around)
@@ -188,9 +195,10 @@ def _size(way_mm: Float) -> float:
 def _size_and_depth(along: _Along, rows: slice, size_mm: float, search: _Search) -> tuple[float, float]:
     """Return the smallest diameter from ``size_mm`` on, mm, and depth of defects that are found; else inf.
 
-    In noise, small defects would have to be deeper than wide: then larger ones are tried.
+    In noise, small defects would have to be deeper than wide: then larger ones are tried. No size is found
+    where less than half of each circle was measured.
     """
-    while size_mm <= _LARGEST_MM:
+    while size_mm <= _LARGEST_MM and (along.measured[rows] >= _MEASURED).any():
         depth = _depth(along, rows, size_mm, search)
         if depth <= _STEEP * size_mm:
             return size_mm, depth

@@ -11,8 +11,9 @@ from scipy.optimize import minimize_scalar
 
 from pipeline.arrays import Bool, Float
 from stages.defects.along import widened
-from stages.defects.detect import Detection, scores, seen_mm2, weighed
+from stages.defects.detect import Detection, scores, seen_mm2
 from stages.defects.relief import WallRelief
+from stages.defects.weight import weighed
 
 # Two peaks closer than 4 cells, 2 mm, the reach of the smaller templates, count as one.
 _BESIDE = 4

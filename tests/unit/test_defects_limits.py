@@ -18,9 +18,9 @@ AZIMUTH = -np.pi + np.arange(360) * np.pi / 180
 RADIUS, SIGMA, LENGTH_MM, STEP_MM = 38.0, 0.03, 62.0, 0.5
 
 
-def wall_with(ring_mm, relief=None, seed=1):
+def wall_with(ring_mm, relief=None, seed=1, length_mm=LENGTH_MM):
     """Return a wall with rings only at some distances, interpolated between them as a map is."""
-    s = np.arange(0.0, LENGTH_MM, STEP_MM)
+    s = np.arange(0.0, length_mm, STEP_MM)
     noise = smooth_noise(np.random.default_rng(seed), (len(ring_mm), len(AZIMUTH)), SIGMA, 1.0)
     shown = RADIUS + noise + (0.0 if relief is None else relief(ring_mm))
     radius = np.stack([np.interp(s, ring_mm, column) for column in shown.T], -1)
@@ -78,6 +78,29 @@ def test_where_rings_are_farther_apart_the_smallest_defect_is_larger_and_a_warni
     (warning,) = [w for w in told if "rings lie up to" in w]
     assert f"at {far.from_mm:.0f}–{far.to_mm:.0f} mm" in warning
     assert f"{widest_spacing_mm(5.0, 2) / 3:.2g} times as fast" in warning
+
+
+@pytest.mark.parametrize("length_mm", [4.0, 8.0])
+def test_wall_shorter_than_the_largest_templates_is_searched(length_mm) -> None:
+    """No place of it saw .4 of the largest template, whose scale was then a quantile of nothing: a crash."""
+    (limit,) = search(wall_with(np.arange(0.0, length_mm, STEP_MM), length_mm=length_mm)).detectable
+    assert 0.2 < limit.depth_mm < 0.5
+
+
+def test_stretch_of_which_rings_measured_less_than_half_has_no_limit() -> None:
+    """Nothing was measured there that the response of a filter could be computed of: a crash."""
+    wall = wall_with(np.arange(0.0, 240.0, 1.0), length_mm=240.0)
+    s, radius = wall.radius_map.distance_mm, wall.radius_map.radius_mm.copy()
+    radius[(s > 60) & (s < 180), 160:] = np.nan
+    told = search(replace(wall, radius_map=replace(wall.radius_map, radius_mm=radius)))
+    assert np.isinf(told.limit_at(120.0).depth_mm)
+    assert np.isfinite(told.limit_at(20.0).depth_mm)
+
+
+def test_rings_at_one_place_have_no_limit() -> None:
+    wall = wall_with(np.arange(0.0, LENGTH_MM, 1.0))
+    cloud = wall_of(np.array([20.0]), AZIMUTH, np.full((1, len(AZIMUTH)), RADIUS), SIGMA).cloud
+    assert search(replace(wall, cloud=cloud)).detectable == ()
 
 
 def test_files_and_sentences_state_the_limit_at_each_place(tmp_path) -> None:
