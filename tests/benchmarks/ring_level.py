@@ -165,11 +165,11 @@ class Eye:
         )
 
     def poses(self, row: Float) -> Float:
-        """Return ``T_pc`` (A, 4, 4) at image rows (A,), linear between those given."""
+        """Return ``T_pc`` (A, 4, 4) at image rows (A,), linear between those given; NaN at NaN."""
         if len(self.row) == 1:
             return np.broadcast_to(self.T_pc, (len(row), 4, 4))
         at = np.clip((row - self.row[0]) / (self.row[1] - self.row[0]), 0, len(self.row) - 1 - 1e-9)
-        low = at.astype(int)
+        low = np.nan_to_num(at).astype(int)
         part = (at - low)[:, None, None]
         return np.asarray((1 - part) * self.T_pc[low] + part * self.T_pc[low + 1])
 
@@ -258,11 +258,14 @@ def _edges(
         )
         seen = np.bincount(predicted.marker[keep], minlength=count) == 4 * parameters.edge_samples
         keep &= seen[predicted.marker]
-        if seen.sum() < 3:
-            continue
         edges = predicted.select(keep)
         at = edges.xyz_p + placed[edges.marker, edges.side][:, None] * edges.outward_p
         uv = seen_at(Eye.at(truth, float(truth.frames.time_s[frame])), at, edges.uv)
+        # A fiducial is measured whole or not at all.
+        hidden = np.isin(edges.marker, edges.marker[np.isnan(uv).any(1)])
+        edges, uv = edges.select(~hidden), uv[~hidden]
+        if len(np.unique(edges.marker)) < 3:
+            continue
         shared = random.normal(0, noise.edge_shared_px, (count, 4))[edges.marker, edges.side]
         error = shared + random.normal(0, noise.edge_px, len(uv))
         out.append(replace(edges, uv=uv + error[:, None] * edges.normal, sigma_px=np.full(len(uv), 0.041)))
@@ -270,7 +273,10 @@ def _edges(
 
 
 def seen_at(eye: Eye, xyz_p: Float, first: Float) -> Float:
-    """Return pixels (M, 2) whose viewing rays pass through wall points (M, 3), by Newton's method."""
+    """Return pixels (M, 2) whose viewing rays pass through wall points (M, 3), by Newton's method.
+
+    NaN for a point beyond the camera's view, such as that of a shifted dome.
+    """
     uv = first.copy()
     for _ in range(_NEWTON):
         miss = _miss(eye, xyz_p, uv)

@@ -6,6 +6,8 @@ import re
 import shutil
 from pathlib import Path
 
+import cv2
+import numpy as np
 import pytest
 
 from pipeline.api.diagnosis.inputs import open_inputs
@@ -53,3 +55,22 @@ def test_the_inspection_is_refused_as_its_own_gauge_run(tmp_path: Path) -> None:
     for gauge in (SAMPLE, other):
         with pytest.raises(InputError, match=r"frames.mkv: has the same pictures as the inspection"):
             open_inputs(SAMPLE, gauge, None)
+
+
+@pytest.mark.parametrize("shorter", ["inspection", "gauge"])
+def test_shared_pictures_are_found_beside_larger_tables_and_in_a_part_of_a_run(
+    shorter: str, tmp_path: Path
+) -> None:
+    """The largest file was a table, or a picture of the longer run that the shorter one lacks."""
+    image = np.random.default_rng(0).integers(0, 255, (1200, 1600), np.uint8)
+    rows = np.arange(1200)[:, None]
+    for name in ("inspection", "gauge"):
+        folder = Path(shutil.copytree(SAMPLE, tmp_path / name, ignore=shutil.ignore_patterns("*.mkv")))
+        text = (folder / "recording.yaml").read_text()
+        (folder / "recording.yaml").write_text(text.replace("frames.mkv", "f%d.png"))
+        for k in range(2 if name == shorter else 4):
+            cv2.imwrite(str(folder / f"f{k}.png"), np.where(rows < 10 * k, image, 0))
+    with (tmp_path / "gauge" / "encoder.csv").open("a") as table:
+        table.write("\n" * 200_000)
+    with pytest.raises(InputError, match="has the same pictures as the inspection"):
+        open_inputs(tmp_path / "inspection", tmp_path / "gauge", None)

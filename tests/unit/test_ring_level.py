@@ -12,6 +12,7 @@ from pipeline.simulator.prior import read_prior
 from stages.calibrate.gauge.geometry import gauge_of
 from stages.diagnose.effects.courses import Coursed, with_courses
 from stages.diagnose.effects.library import LIBRARY, without
+from tests.benchmarks import ring_level
 from tests.benchmarks.bench_diagnosis import of_positions, trial_from
 from tests.benchmarks.ring_level import Eye, Noise, ring_level_run, seen_at, traced_ring
 from tests.benchmarks.ring_level_cases import PRIOR, Mode, drawn, with_a_course
@@ -51,6 +52,25 @@ def test_a_wall_point_is_seen_by_the_ray_through_it():
     seen = seen_at(eye, transform(eye.T_pc[0], xyz_c), uv + 2.0)
     assert np.abs(seen - uv).max() < 1e-6
     assert np.abs(transform(inverse(eye.T_pc[0]), transform(eye.T_pc[0], xyz_c)) - xyz_c).max() < 1e-9
+
+
+@pytest.mark.parametrize("text", ["dome_lateral=2@10", "rolling_shutter=0.02"])
+def test_a_fiducial_beyond_the_cameras_view_is_not_measured(text, monkeypatch):
+    """A row of the image that is no number ended the benchmark; without a rolling shutter it was measured."""
+    scene, file = scene_of(4)
+    ray_through = ring_level.viewing_rays
+
+    def none_above(camera, uv):
+        origin, ray = ray_through(camera, uv)
+        return origin, np.where(uv[:, 1:] < 300, np.nan, ray)
+
+    whole = ring_level_run(scene, file, [parse_switch(text)]).measured.measured.edges
+    monkeypatch.setattr(ring_level, "viewing_rays", none_above)
+    cut = ring_level_run(scene, file, [parse_switch(text)]).measured.measured.edges
+    assert 0 < len(cut.uv) < len(whole.uv)
+    assert np.isfinite(cut.uv).all()
+    of_one = np.unique(np.stack([cut.frame, cut.marker]), axis=1, return_counts=True)[1]
+    assert len(set(of_one)) == 1
 
 
 def test_the_same_seed_gives_the_same_case_and_another_another():

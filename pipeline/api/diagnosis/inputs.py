@@ -11,6 +11,7 @@ import numpy as np
 from pipeline.api.job import probe_record, probe_source, recording_record, recording_source, value_source
 from pipeline.errors import InputError
 from pipeline.files.codec import Json
+from pipeline.files.disk import InputFile
 from pipeline.instrument.probe import Probe
 from pipeline.instrument.probe_file import ProbeSource, read_probe, read_with_source
 from pipeline.machine.plan import Source
@@ -79,14 +80,21 @@ def _refuse_same_pictures(field: Recording | None, gauge: Recording | None) -> N
     """
     if field is None or gauge is None:
         return
-    # The largest file of a recording holds pictures.
-    pictures = max(gauge.files, key=lambda file: file.stamp.bytes)
-    if any(file.sha256 == pictures.sha256 for file in field.files):
+    own, other = _pictures(gauge), _pictures(field)
+    # Small pictures, such as dark ones, may be alike by chance.
+    largest = [max(files, key=lambda file: file.stamp.bytes).sha256 for files in (own, other)]
+    same = [file for file in own if file.sha256 in {f.sha256 for f in other} & set(largest)]
+    if same:
         raise InputError(
-            gauge.path, f"has the same pictures as the inspection {field.path}", place=pictures.path.name,
+            gauge.path, f"has the same pictures as the inspection {field.path}", place=same[0].path.name,
             expected="a second recording: the same probe's run through a gauge",
             hint="state another recording; a gauge run alone is diagnosed with --gauge, without FIELD",
         )  # fmt: skip
+
+
+def _pictures(recording: Recording) -> list[InputFile]:
+    """Return the files of a recording that hold pictures: an IMU's table may be larger than each of them."""
+    return [file for file in recording.files if file.path.suffix not in (".yaml", ".csv")]
 
 
 def _probe_file(recordings: Sequence[Recording | None], probe: Path | None) -> Path:
