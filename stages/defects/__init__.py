@@ -239,5 +239,5 @@ def _defects_of_run(
 
 
 DEFECTS = Stage(
-    "defects", "65", DefectParameters, _defects_of_run, "defects as instances with depth, clock and kind"
+    "defects", "66", DefectParameters, _defects_of_run, "defects as instances with depth, clock and kind"
 )

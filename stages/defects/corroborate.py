@@ -20,7 +20,7 @@ from pipeline.artefacts.measured import PointCloud, RingSamples, RingValidity, W
 from stages.defects.behind_drop import shows_drop
 from stages.defects.depth import Depth
 from stages.defects.marred import without_glints
-from stages.defects.neighbours import frames_at_peak
+from stages.defects.neighbours import frames_at_peak, shown_in_a_row
 from stages.defects.parallax import LitPictures
 from stages.defects.relief import Relief
 from stages.defects.segment import Region
@@ -55,7 +55,7 @@ class Evidence:
     Attributes
     ----------
     rings : int
-        Number of independent rings that show it and no glint; rings with the same light count as one.
+        Number of independent rings in a row that show it, without a glint; those with the same light are one.
     photo : bool, optional
         Whether the photo shows it; None where the photo cannot decide.
     score : float
@@ -168,7 +168,7 @@ def evidence_for(
     showing = without_glints(np.union1d(*frames), region, surface, seen_by.rings)
     pictures = seen_by.pictures
     evidence = Evidence(
-        seen_by.held.independent(len(showing)),
+        seen_by.held.independent(shown_in_a_row(showing, region, surface, seen_by.rings)),
         None if shifted else photo_stands_out(seen_by.texture, relief, region),
         score,
         _is_fixed(region, surface, fixed_mm),

@@ -11,9 +11,12 @@ from __future__ import annotations
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
+from scipy.ndimage import label
 
 from pipeline.arrays import Bool, Float, Int
+from pipeline.artefacts.measured import RingSamples
 from stages.defects.depth import SHARPENING, Depth
+from stages.defects.marred import without_glints
 from stages.defects.segment import Region
 from stages.defects.surface import Surface, cells_of, chosen, of_usual_sigma
 
@@ -41,6 +44,23 @@ def frames_at_peak(depth: Depth, region: Region, surface: Surface) -> Int:
     rings = rings_at_peak(depth, region, sure)
     limit = max(_HALF * abs(depth.depth_mm), _SHOWN_SIGMAS * surface.relief.typical.sigma_mm)
     return rings.frame[rings.peak_mm > limit]
+
+
+def shown_in_a_row(showing: Int, region: Region, surface: Surface, rings: RingSamples | None) -> int:
+    """Return the most rings in a row along the pipe, of all passes, that show a finding: of ``showing`` (n,).
+
+    A defect appears in every ring that crosses it. What appears before and behind a ring that misses it are
+    two things. A ring with a glint there, or with samples of unusual σ, tells neither.
+    """
+    row, _, inside = cells_of(surface.near, surface.relief, region)
+    inside &= of_usual_sigma(surface.near)
+    frame, ring, count = np.unique(surface.near.frame[inside], return_inverse=True, return_counts=True)
+    along = np.argsort(np.bincount(ring, row[inside]) / count, kind="stable")
+    shown = np.isin(frame, showing)
+    missing = frame[~shown & (count >= _LEAST_OF_RING)]
+    tells = shown | np.isin(frame, without_glints(missing, region, surface, rings))
+    runs, _ = label(shown[along][tells[along]])
+    return int(np.bincount(runs[runs > 0]).max(initial=0))
 
 
 @dataclass(frozen=True)
