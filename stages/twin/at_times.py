@@ -22,18 +22,20 @@ _FEWEST, _FEWEST_BLOCKS, _FEWEST_SECTORS = 3, 4, 2
 _SIGMA, _LEAST_DARK, _LEAST_DIM, _MOSTLY = 8.0, 0.15, 0.25, 0.5
 """Fewest frames; fewest joined blocks and sectors. Times the usual scatter, and least loss of light, of a
 block and of the line. A sound recording of another renderer had one block of 24,000 beyond 8, of .05. Share
-of squares from which other blocks predict a spot, of blocks that lie on the same wall in several frames, and
+of squares from which other blocks predict a spot, of blocks that lie at the same place in several frames, and
 of the frames from which a sector is dim. Chosen."""
 
 
-_MOVES = (
-    "each time at another place of picture and wall: something moves on the window or in front of the wall."
-)
-_SHINES = (
-    "mostly where other frames show it on the same wall, but not in all that see this wall: wall that shines "
-    "at some angles, as wet or polished wall does, beside a photo that was made where it shone, or something "
-    "that moves slowly."
-)
+_WHERE = {
+    "wall": "mostly where other frames show it on the same wall, but not in all that see it: wall that "
+    "shines at some angles, as wet or polished wall does, beside a photo that was made where it shone, or "
+    "something that moves slowly.",
+    "image": "mostly at the same place of the picture, but not in all frames: something on the window that "
+    "shows in front of some wall only, or comes and goes.",
+    "": "each time at another place of picture and wall: something moves on the window or in front of the "
+    "wall.",
+}
+"""What is said of spots that recur on the wall, in the image, or nowhere."""
 
 
 def dark_spots(samples: BlockSamples | None, found: Sequence[Mismatch] = ()) -> tuple[Mismatch, ...]:
@@ -59,17 +61,28 @@ def dark_spots(samples: BlockSamples | None, found: Sequence[Mismatch] = ()) -> 
     again, nan = _recurs(samples, use), float("nan")
     said = (
         f"In {len(frames)} of {count} lit frames, a spot is up to {100 * lost.max():.0f} % darker than "
-        f"re-rendered, {_SHINES if again else _MOVES}"
+        f"re-rendered, {_WHERE[again]}"
     )
-    look, fixed_to = samples.look(use, SHOWN_PX), "image or wall" if again else "time"
+    fixed_to = {"wall": "image or wall", "image": "image", "": "time"}[again]
+    look = samples.look(use, SHOWN_PX)
     return (Mismatch("", "intensity", fixed_to, place, (size,), nan, nan, nan, said, look),)
 
 
-def _recurs(samples: BlockSamples, use: Bool) -> bool:
-    """Return whether most of the blocks (N,) lie on wall that is among them in other frames as well."""
-    cell = samples.orders["wall"][use]
-    once = np.unique(np.stack([cell, samples.frame[use]]), axis=1)[0]
-    return bool(np.mean(np.bincount(once)[cell] > 1) > _MOSTLY)
+def _recurs(samples: BlockSamples, use: Bool) -> str:
+    """Return on what most of the blocks (N,) recur: "wall", "image", or neither.
+
+    On wall that is among them in another frame as well; or in the image in most of their frames, since a spot
+    that crawls covers its last place in part.
+    """
+    count = {}
+    for order in ("wall", "image"):
+        cell = samples.orders[order][use]
+        once = np.unique(np.stack([cell, samples.frame[use]]), axis=1)[0]
+        count[order] = np.bincount(once)[cell]
+    if np.mean(count["wall"] > 1) > _MOSTLY:
+        return "wall"
+    frames = len(np.unique(samples.frame[use]))
+    return "image" if np.mean(count["image"] > _MOSTLY * frames) > _MOSTLY else ""
 
 
 def _stays(samples: BlockSamples, use: Bool) -> bool:

@@ -28,10 +28,11 @@ class Disc(NamedTuple):
         return float(np.degrees(np.arctan2(v, u))), float(np.degrees(wide))
 
 
-def disc_of(found: Mismatch) -> Disc | None:
-    """Return the place of a mismatch in the image; None if it has none."""
+def disc_of(found: Mismatch, sigmas: float = 0.0) -> Disc | None:
+    """Return the place of a mismatch in the image, wider by some σ of its radius; None if it has none."""
     at = {p.name: p.value for p in found.place}
-    return Disc(at["u_px"], at["v_px"], at["radius_px"]) if "radius_px" in at else None
+    more = sum(sigmas * p.sd for p in found.place if p.name == "radius_px")
+    return Disc(at["u_px"], at["v_px"], at["radius_px"] + more) if "radius_px" in at else None
 
 
 def meet(one: Mismatch, other: Mismatch, apart_px: float = 0.0) -> bool:

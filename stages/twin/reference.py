@@ -137,10 +137,10 @@ class BlockSamples:
         return replace(self, change=(1 + self.change) / passed - 1, log_level=self.log_level + np.log(passed))
 
     def clear_of(self, found: Sequence[Mismatch]) -> BlockSamples:
-        """Return the blocks outside of what was found at places of the image."""
+        """Return the blocks outside of what was found at places of the image, rims within 1 σ included."""
         keep = np.ones(len(self.change), bool)
         u, v = ((a + 0.5) * BLOCK_PX for a in (self.column, self.row))
-        for place in filter(None, map(disc_of, found)):
+        for place in filter(None, (disc_of(m, sigmas=1.0) for m in found)):
             keep &= np.hypot(u - place.u_px, v - place.v_px) > place.radius_px + 2 * BLOCK_PX
         return self.kept(keep) if keep.any() else self
 

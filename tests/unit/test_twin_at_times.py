@@ -1,5 +1,7 @@
 """What some frames alone show: a dark spot that moves, and a line that is dim at times."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -52,6 +54,24 @@ def test_wall_that_is_dark_at_some_angles_is_not_told_as_something_that_moves():
     (spot,) = dark_spots(_samples(wet))
     assert (spot.name, spot.fixed_to) == ("", "image or wall")
     assert "wet or polished" in spot.statement
+
+
+def test_a_spot_at_one_place_of_some_pictures_is_not_told_as_one_that_moves():
+    """In 3 of 10 frames the same blocks were dark, "each time at another place of picture and wall"."""
+    (spot,) = dark_spots(_samples(lambda f, r, c, a: np.isin(f, (3, 5, 8)) * _at(r, c, 12, 16)))
+    assert (spot.name, spot.fixed_to) == ("", "image")
+    assert "another place" not in spot.statement
+
+
+def test_dark_fragments_in_the_rim_of_a_drop_are_part_of_it():
+    """They lay 67 to 82 px from the middle of a drop whose radius was 50 ± 25 px, and were told beside it."""
+    disc = _disc(130.0, 100.0, 24.0)
+    wide = (*disc[:2], replace(disc[2], sd=12.0))
+    drop, unsure = (
+        Mismatch("droplet", "intensity", "image", place, (), 0.0, 2.0, 1.0, "") for place in (disc, wide)
+    )
+    rim = _samples(lambda f, r, c, a: np.isin(f, (3, 5, 8)) * _at(r, c, 17, 16))
+    assert [len(dark_spots(rim, (m,))) for m in (drop, unsure)] == [1, 0]
 
 
 def test_dark_fragments_of_texture_in_a_drop_are_no_spot_that_moves():
