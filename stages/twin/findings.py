@@ -14,7 +14,7 @@ from stages.twin.at_times import dark_spots
 from stages.twin.colours import beside_colour, few_lit
 from stages.twin.dark_side import beside_dark_side
 from stages.twin.fine_noise import beside_coding
-from stages.twin.fixed_line import on_line
+from stages.twin.fixed_line import beside_absent_light, on_line
 from stages.twin.glints import window_and_glints
 from stages.twin.name import clipped
 from stages.twin.on_wall import ring_step_mm, unnamed
@@ -85,10 +85,12 @@ class Compared:
         ring = self.scene.ring
         on_window, of_photo = separated_from_photo(self.sums.on_window(self.samples), ring)
         on_window, unsure = separated_from_blur(on_window, whole)
-        of_line, coded = beside_coding(on_line(self.fixed, self.rings, ring, on_window), over_time)
+        of_line = on_line(self.fixed, self.rings, ring, on_window)
+        of_line, absent = beside_absent_light(of_line, over_time, ring)
+        of_line, coded = beside_coding(of_line, over_time)
         on_window = (*on_window, *of_line)
         on_window, glints = window_and_glints(on_window, self.sums.glints(whole, on_window))
-        return on_window, glints, of_photo, (*coded, *unsure)
+        return on_window, glints, of_photo, (*absent, *coded, *unsure)
 
     def _on_wall(self, clear: Told) -> Told:
         """Return what is fixed to the wall or to rows, away from what was found at a place of the image."""

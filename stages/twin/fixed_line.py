@@ -8,6 +8,7 @@ itself is not displaced.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -17,9 +18,11 @@ from pipeline.artefacts.twin import Mismatch, NamedFigure
 from pipeline.artefacts.wall_map import FixedPlace, FixedToProbe
 from stages.twin.discs import meet
 from stages.twin.scene import Ring
+from stages.twin.seen_in_photo import dimmed, looks_at
 
-_SEEN = 0.5
-"""Share of rings that must show an azimuth, else the line is not seen there. Chosen."""
+_SEEN, _SURE = 0.5, 3.0
+"""Share of rings that must show an azimuth, else the line is not seen there. σ by which light must differ
+from none. Chosen."""
 
 
 def on_line(
@@ -41,6 +44,30 @@ def on_line(
                 _mismatch(part, samples.azimuth_rad, max(own, key=lambda p: abs(p.departure_mm)), ring)
             )
     return tuple(m for m in made if not any(meet(m, other) for other in others))
+
+
+def beside_absent_light(
+    found: Sequence[Mismatch], sectors: Sequence[Mismatch], ring: Ring
+) -> tuple[tuple[Mismatch, ...], tuple[Mismatch, ...]]:
+    """Return the findings that remain, and displaced lines in sectors that may have lost all of their light.
+
+    What is seen there instead of the line is other light, for example of the line beside it.
+    """
+    dark = [s for s in sectors if s.channel == "line" and any(map(_may_be_all, s.parameters))]
+    reach = [r for r in map(dimmed, dark) if r is not None]
+    of_line = [m for m in found if not m.name and (m.channel, m.fixed_to) == ("line", "image")]
+    left = [m for m in of_line if any(looks_at(m, *r, ring) for r in reach)]
+    said = (
+        "{} But hardly any light of the laser may be left there: other light, as of the line beside it, may "
+        "have been taken for the line."
+    )
+    withdrawn = tuple(replace(m, statement=said.format(m.statement)) for m in left)
+    return tuple(m for m in found if m not in left), withdrawn
+
+
+def _may_be_all(lost: NamedFigure) -> bool:
+    """Return whether a loss may be that of all light: what is left does not surely differ from none."""
+    return lost.name == "lost" and lost.value + _SURE * lost.sd >= 1
 
 
 def _within(place: FixedPlace, azimuth_rad: Float) -> Bool:

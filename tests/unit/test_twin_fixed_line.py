@@ -1,5 +1,7 @@
 """Displacements of the line at one place of the image, found from rings where lit frames show nothing."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -7,7 +9,7 @@ from pipeline.artefacts.measured import RingSamples, RingValidity
 from pipeline.artefacts.twin import Mismatch, NamedFigure
 from pipeline.artefacts.wall_map import FixedPlace, FixedToProbe
 from pipeline.recording.base import Illumination
-from stages.twin.fixed_line import on_line
+from stages.twin.fixed_line import beside_absent_light, on_line
 from stages.twin.glints import Spot, SpotsOfFrames
 from stages.twin.scene import Ring
 from stages.twin.seen_in_photo import beside_sectors
@@ -83,3 +85,17 @@ def test_a_displaced_line_remains_beside_a_sector_that_the_same_drop_dims():
     sector = Mismatch("laser_sector or window_scatter", "line", "line", place, (), 0.0, 2.0, 1.0, "")
     assert len(bent) == 1
     assert beside_sectors(bent, (sector,), _RING) == (bent, ())
+
+
+@pytest.mark.parametrize(("lost", "sd", "stays"), [(0.94, 0.03, False), (0.94, 0.01, True), (0.6, 0.1, True)])
+def test_a_line_of_which_no_light_may_be_left_has_no_place(lost, sd, stays):
+    """In a sector that had lost 94 ± 3 % of its light the line was told as displaced by .165 ± .015 mm."""
+    bent = on_line(_fixed(), _rings(), _RING, ())
+    place = (NamedFigure("azimuth_deg", 91.0, 1.0), NamedFigure("width_deg", 20.0, 2.0))
+    size = (NamedFigure("lost", lost, sd),)
+    other = (0.0, 2.0, 1.0, "")
+    sector = Mismatch("laser_sector or window_scatter", "line", "line", place, size, *other)
+    kept, withdrawn = beside_absent_light(bent, (sector,), _RING)
+    assert (kept == bent, len(withdrawn)) == (stays, not stays)
+    elsewhere = replace(sector, place=(replace(place[0], value=-20.0), place[1]))
+    assert beside_absent_light(bent, (elsewhere,), _RING) == (bent, ())
