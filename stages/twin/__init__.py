@@ -18,6 +18,7 @@ from pipeline.machine.stage import Context, Parameters, Stage
 from pipeline.recording.base import Illumination, Recording
 from pipeline.recording.checks import CheckedFrames
 from stages.twin.blocks import blocks_of
+from stages.twin.cannot_tell import cannot_tell
 from stages.twin.compare import Comparison
 from stages.twin.findings import Compared
 from stages.twin.fixed_pattern import pattern_figures
@@ -30,7 +31,7 @@ from stages.twin.locate import (
     places_displaced,
     places_in_image,
 )
-from stages.twin.name import cannot_tell, left_over, noise_figures, state_figures
+from stages.twin.name import left_over, noise_figures, state_figures
 from stages.twin.photo_course import hidden_failures
 from stages.twin.pixels import defective_pixels
 from stages.twin.render import Region
@@ -278,7 +279,7 @@ PHOTOMETRY = Stage(
 )
 TWIN = Stage(
     "twin",
-    "74",
+    "75",
     TwinParameters,
     compare_with_twin,
     "recorded frames beside the same frames, re-rendered from what the run has measured",

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipeline.arrays import Float, Float32, Int
-from pipeline.artefacts.twin import Mismatch, NamedFigure
+from pipeline.artefacts.twin import Mismatch
 from stages.twin.locate import FALSE_ALARM
 from stages.twin.significance import significance_over_frames
 from stages.twin.switched import Law, Pair, Shown
@@ -51,6 +51,10 @@ class Suspected:
         Maps the mean (K,) of the measured sizes to the numbers that the law takes.
     measured : callable, optional
         Measures the size in a frame rendered again; the mean over frames is then reported.
+    said : callable, optional
+        Returns the sentence about the size so measured.
+    least : float
+        Lower bound of that size. A smaller one shows that the law has not its true shape: it is not reported.
     unnamed : bool
         Whether it is reported without its name, and not withdrawn, if other frames do not confirm the law.
     """
@@ -61,6 +65,8 @@ class Suspected:
     sizes: Float
     size_of: Callable[[Float], Float] = np.asarray
     measured: Callable[[Shown, Float], float] | None = None
+    said: Callable[[float], str] | None = None
+    least: float = -np.inf
     unnamed: bool = False
 
     def from_other_half(self, frame: int) -> Float:
@@ -103,7 +109,8 @@ def _judged(one: Suspected, again: Again) -> tuple[Mismatch, bool]:
         if one.unnamed:
             return replace(one.mismatch, name=""), True
         return _withdrawn(found, fall, sigma), False
-    found = found if not sizes else replace(found, parameters=_with_size(found, sizes))
+    if sizes and np.mean(sizes) >= one.least:
+        found = _with_size(found, sizes, one.said)
     return replace(found, probability=float(np.nanmax([chance, found.probability]))), True
 
 
@@ -144,11 +151,14 @@ def _taken_up(level: Float32, above: Float32, weight: Float32, free_of: str) -> 
     return level
 
 
-def _with_size(found: Mismatch, sizes: list[float]) -> tuple[NamedFigure, ...]:
+def _with_size(found: Mismatch, sizes: list[float], said: Callable[[float], str] | None) -> Mismatch:
+    """Return a mismatch with the mean of the sizes measured in frames rendered again."""
     figure, *others = found.parameters
     sd = float(np.std(sizes, ddof=1) / np.sqrt(len(sizes)))
     mean = float(np.mean(sizes))
-    return (replace(figure, value=mean, sd=float(np.hypot(sd, _OF_PROFILE * mean))), *others)
+    figure = replace(figure, value=mean, sd=float(np.hypot(sd, _OF_PROFILE * mean)))
+    told = found.statement if said is None else said(mean)
+    return replace(found, parameters=(figure, *others), statement=told)
 
 
 _OF_PROFILE = 0.02

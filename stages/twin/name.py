@@ -1,4 +1,4 @@
-"""Findings that are counted or read off the photometric state, and what these frames cannot decide."""
+"""Findings that are counted or read off the photometric state."""
 
 from __future__ import annotations
 
@@ -19,7 +19,6 @@ from stages.twin.noise import CameraNoise
 from stages.twin.picture import FEWEST_FRAMES, LEAST_BLUR_PX, OF_LAW, WholePictures
 from stages.twin.reference import BlockSamples
 from stages.twin.scene import Ring
-from stages.twin.second_ring import LEAST_SECOND
 from stages.twin.state import PhotometricState
 from stages.twin.switched import IN_FOCUS_PX, defocus, response, wide_line
 
@@ -240,55 +239,3 @@ def state_figures(state: PhotometricState) -> tuple[NamedFigure, ...]:
             NamedFigure("speckle", line.speckle.value, line.speckle.sd, "relative"),
         ]
     return tuple(found)
-
-
-def cannot_tell(state: PhotometricState, silent: bool = False) -> tuple[str, ...]:
-    """Return sentences on what such recordings cannot decide; ``silent``: dark pixels show no noise."""
-    said = [
-        "Vignetting cannot be separated from the LEDs' lobe: both act by the polar angle alone. If it "
-        "changes slowly, the photo of the wall changes with it, and frames fit nearly as well.",
-        "A power response cannot be separated from the wall's contrast, since the photo has it, too. Gamma "
-        "is estimated from the noise, which a video codec changes: it does not prove a nonlinear response.",
-        "Lamps that are uneven in all frames, other than by one dim LED, can be distinguished from wall that "
-        "is paler on one side only as far as the probe rolls.",
-        "If all frames move alike during their exposure, their blur is also in the wall's photo: motion blur "
-        "is found only in frames that are more blurred than the others, and from a 1 σ of "
-        f"{LEAST_BLUR_PX} px on: lens and pixels blur as much.",
-        "Frames are compared in grey: a change of colour during the run is told only as far as wall ahead "
-        "and wall near the camera differ by it from their photo.",
-    ]
-    if silent:
-        said.append(
-            "Nearly all dark pixels are at the black level, or clipped there: light fainter than half "
-            "a grey level is rounded away, as is most of the line's light that the wall reflects."
-        )
-    if np.isnan(state.photo_black):
-        said.append(
-            "Whether the wall's photo includes the black level is unknown, since there is no colour frame of "
-            "the laser alone: the photo's contrast says nothing about the response."
-        )
-    elif state.black_in_photo:
-        said.append(
-            f"The black level of {state.photo_black:.0f} grey levels is also in the wall's photo: its "
-            "contrast says nothing about the response."
-        )
-    if state.line_is_clipped:
-        said.append(
-            f"The line is clipped in {100 * state.line_clipped:.0f} % of its middle: whether the laser's "
-            "power changes over time or around the sheet is not visible."
-        )
-    if state.lamp is None:
-        said.append("No lit frame could be used: lamps, vignetting and photon transfer are unknown.")
-    if state.line is None:
-        said.append(
-            "No frame of the laser alone could be used: the line's profile is unknown, and pixels "
-            "near the line are not compared."
-        )
-    else:
-        said += [
-            "The sheet's thickness is the stated one: in one diameter it looks like the lens's blur.",
-            "A second line, or a mirror image of the line on the wall, is told only if darkness lies between "
-            f"it and the line, and from {100 * LEAST_SECOND:.0f} % of the line's brightness on; beside a "
-            "faint line, only if it also stands out from the noise.",
-        ]
-    return tuple(said)

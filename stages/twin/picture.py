@@ -26,7 +26,8 @@ from stages.twin.locate import FALSE_ALARM
 from stages.twin.render import Region, TwinFrame
 from stages.twin.scene import Scene
 from stages.twin.second_ring import ring_profile, second_ring
-from stages.twin.switched import STEP, STRAY_NAMES, TILE, bloom, leaked, motion_blur, stray, stray_lights
+from stages.twin.stray_light import STRAY_NAMES, stray, stray_lights
+from stages.twin.switched import BLOOM_PX, STEP, TILE, bloom, leaked, motion_blur
 
 _SURE, FEWEST_FRAMES = 3.0, 6
 """σ by which effects are distinguished; fewest frames."""
@@ -246,11 +247,11 @@ class WholePictures:
         size, chance = float(more.mean()), chance_of(more)
         if chance > FALSE_ALARM or sigmas(more) < _SURE or size < _LEAST_BLOOM:
             return None
-        figure = NamedFigure("leak", size, float(more.std()) / np.sqrt(len(more)), "of full scale")
         found = self._mismatch(
-            "bloom", "image", figure, chance, "bloom",
-            f"Above and below a clipped pixel, at least {100 * size:.0f} % of full scale is added to the "
-            "picture in all, and less beside it: charge leaks along columns.",
+            "bloom", "image", NamedFigure("leak", size, np.inf, "of full scale"), chance, "bloom",
+            "Above and below clipped pixels the picture is brighter than beside them: charge leaks along "
+            f"columns. If it fades to 1/e over {BLOOM_PX:.0f} px, about {100 * size:.0f} % of full scale "
+            "leaks from each in all; how far it reaches is not measured, and with it the share is uncertain.",
         )  # fmt: skip
         return Suspected(found, bloom, self.frames_of("bloom"), 255.0 * leak)
 

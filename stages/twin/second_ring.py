@@ -9,10 +9,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from scipy.ndimage import grey_opening, uniform_filter1d
 
+from pipeline.adjustment.robust import robust_spread
 from pipeline.arrays import Bool, Float, Float32, Int
 from pipeline.artefacts.twin import Mismatch, NamedFigure
 from stages.twin.cells import chance_of
@@ -103,7 +105,8 @@ def _suspected(ring: Ring, band: _Band, ratio: Float, chance: float, frame: Int)
     # A mirror image moves on the wall from frame to frame: it need not stay at one place beside the line.
     return Suspected(
         _told(ring, band, at, chance, frame), second_line, frame, sizes,
-        measured=share_of_second, unnamed=bool(place[1:].any()),
+        measured=share_of_second, said=partial(_said, at), least=float(band.each.mean()),
+        unnamed=bool(place[1:].any()),
     )  # fmt: skip
 
 
@@ -114,26 +117,34 @@ def _middle(more: Float, ratio: Float, peak: int) -> float:
 
 
 def _told(ring: Ring, band: _Band, at: Float, chance: float, frame: Int) -> Mismatch:
-    """Return what is reported of a second line ``at`` one ratio of radii, or one for each quadrant."""
+    """Return what is reported of a second line ``at`` one ratio of radii, or one for each quadrant.
+
+    Within a quadrant its radius may vary, which lowers its height in the mean: that has no σ.
+    """
     share = float(band.each.mean())
-    figure = NamedFigure("share", share, float(band.each.std()) / np.sqrt(len(band.each)), "of the line")
+    figure = NamedFigure("share", share, np.inf, "of the line")
     radius = NamedFigure(
         "radius", float(at.mean()), max(_REACH / _RATIOS, float(np.ptp(at)) / 2), "of the line's"
     )
-    said = (
-        f"A second ring lies at {at[0]:.2f} radii of the line, {100 * share:.0f} % as bright: "
-        "a ghost of window or lens, or a second sheet."
-    )
-    if len(at) > 1:
-        said = (
-            f"Light {100 * share:.0f} % as bright as the line lies apart from it, at {at.min():.2f} to "
-            f"{at.max():.2f} of its radius around the picture: a mirror image of the line on the wall, or a "
-            "ghost of window or lens."
-        )
+    said = _said(at, share, " in means over quarters of the picture, within which it may be brighter,")
     return Mismatch(
         "second_line", "line", "line", (radius,), (figure,), chance, np.nan, np.nan, said,
         ring.whole(int(frame[0])),
     )  # fmt: skip
+
+
+def _said(at: Float, share: float, but: str = "") -> str:
+    """Return the sentence on a second line ``at`` one ratio of radii, or one for each quadrant."""
+    if len(at) == 1:
+        return (
+            f"A second ring lies at {at[0]:.2f} radii of the line, {100 * share:.0f} % as bright{but}: a "
+            "ghost of window or lens, or a second sheet."
+        )
+    return (
+        f"Light {100 * share:.0f} % as bright as the line{but} lies apart from it, at {at.min():.2f} to "
+        f"{at.max():.2f} of its radius around the picture: a mirror image of the line on the wall, or a "
+        "ghost of window or lens."
+    )
 
 
 @dataclass(frozen=True)
@@ -166,11 +177,22 @@ def _band(stack: Float, mean: Float, use: Bool, line: float) -> _Band | None:
     inside *= (height / np.maximum((inside * more).sum(1), 1e-12))[:, None]
     each = ((stack - (mean - more)) * inside).sum(-1)
     sd = each.std(0) / np.sqrt(len(stack))
-    noise = np.median(stack[..., use].std(0, ddof=1), axis=-1) / np.sqrt(len(stack) * _SMOOTH)
+    noise = _noise(stack[..., use], mean[:, use])
     seen = (height > _SURE * sd) & (height > LEAST_SECOND * line) & (height > _OF_NOISE * noise)
     if seen.sum() < 3:  # a glint is in one quadrant, at most two
         return None
     return _Band(more, peak, seen, each[:, seen].mean(1) / line)
+
+
+def _noise(stack: Float, mean: Float) -> Float:
+    """Return 1 σ (4,) of a bin of mean profiles (4, N), from those of frames (F, 4, N) and from bin to bin.
+
+    The larger one counts: constant offsets of pixels are alike in all frames, and differ from bin to bin.
+    """
+    over_frames = np.median(stack.std(0, ddof=1), axis=-1) / np.sqrt(len(stack) * _SMOOTH)
+    bend = mean[:, : -2 * _SMOOTH] - 2 * mean[:, _SMOOTH:-_SMOOTH] + mean[:, 2 * _SMOOTH :]
+    along = [robust_spread(b) / np.sqrt(6) for b in bend]
+    return np.asarray(np.maximum(over_frames, along))
 
 
 def _standing_out(mean: Float, line_after: bool) -> Float:

@@ -27,7 +27,8 @@ from stages.twin.reference import BlockSamples, BlocksOfFrames, in_image
 from stages.twin.render import Renderer
 from stages.twin.scene import Scene
 from stages.twin.state import PhotometricState
-from stages.twin.switched import STRAY_NAMES, Shown
+from stages.twin.stray_light import STRAY_NAMES
+from stages.twin.switched import Shown
 from stages.twin.unexplained import unexplained
 from stages.twin.window import WindowPlace
 

@@ -29,14 +29,9 @@ IN_FOCUS_PX = 1.2
 at half height has 0.85."""
 _NEAREST_RAD, _THETAS = 0.2, 12
 """Least polar angle at which the share of an LED is computed, and number of angles."""
-_ANGLE_RAD, _MOST_PALE = 0.05, 3.0
-"""Step of polar angle within which the light changes by a few per cent, and the largest ratio of a place to
-the mean at its angle: more is not reflectance but an angle at which hardly any wall is seen."""
 _NODES = ((-1.732051, 1 / 6), (0.0, 2 / 3), (1.732051, 1 / 6))
 """Gauss-Hermite nodes: three displacements whose mean blurs like a Gaussian, exact to the fifth power of its
 width. Two rounds of them make nine."""
-STRAY_NAMES = ("ambient_light", "interreflection", "ambient_light")
-"""Of `stray_lights`."""
 _ON_RING = 0.05
 """Share of a second ring's peak above which pixels belong to it."""
 
@@ -76,7 +71,7 @@ class Shown:
     @property
     def wall(self) -> Bool:
         """(H, W) pixels of lit wall, away from its borders."""
-        return _inner(self.free & (self.twin.region == Region.WALL))
+        return inner(self.free & (self.twin.region == Region.WALL))
 
 
 @dataclass(frozen=True)
@@ -143,49 +138,6 @@ def defocus(shown: Shown, size: Float) -> Pair:
 def response(shown: Shown, size: Float) -> Pair:
     """Return a frame whose wall has the photo's contrast raised to the power ``size``."""
     return Pair(shown.twin.level, shown.again(power=float(size[0])), shown.wall, "scale")
-
-
-def stray(which: int) -> Law:
-    """Return the law of the stray light with this index in `stray_lights`."""
-
-    def law(shown: Shown, size: Float) -> Pair:
-        lit, line = shown.lit(), _dilated(on_line(shown.twin))
-        column = stray_lights(shown.scene, shown.twin, lit)[which]
-        use = _inner(~line & (lit.region == Region.WALL) & shown.free)
-        level = shown.twin.level
-        return Pair(level, level + np.float32(size[which]) * column, use, "offset")
-
-    return law
-
-
-def stray_lights(scene: Scene, twin: TwinFrame, lit: TwinFrame) -> tuple[Float32, Float32, Float32]:
-    """Return light (H, W) on the wall while the LEDs are off, up to factors; see `STRAY_NAMES`.
-
-    First light distributed like the LEDs', then light of the line from wall to wall, then uniform light,
-    which is brighter on paler wall only.
-    """
-    paler = np.minimum(lit.level / _at_angle(scene.polar[0], lit), _MOST_PALE)
-    bounced = np.nan_to_num(_once_bounced(scene, twin, lit)) * paler
-    return lit.level, np.asarray(bounced, np.float32), np.asarray(100 * paler, np.float32)
-
-
-def _once_bounced(scene: Scene, twin: TwinFrame, lit: TwinFrame) -> Float32:
-    """Return the line's light (H, W) after one reflection in a round bore of uniform reflectance."""
-    on = twin.distance_mm[twin.region == Region.LINE_CORE]
-    middle = float(np.nanmedian(on)) if len(on) else np.nan
-    x = np.abs(lit.distance_mm - np.float32(middle)) / np.float32(2 * scene.surface.mean_radius_mm)
-    return np.asarray(100 * (1 - x * (2 * x**2 + 3) / (2 * (x**2 + 1) ** 1.5)), np.float32)
-
-
-def _at_angle(theta_rad: Float32, lit: TwinFrame) -> Float32:
-    """Return the mean level (H, W) of lit wall at the same polar angle: the effect of lamps and lens."""
-    some = (slice(None, None, 4),) * 2
-    wall, theta = lit.region[some] == Region.WALL, np.nan_to_num(theta_rad[some])
-    cell = (theta[wall] / _ANGLE_RAD).astype(int)
-    count = np.bincount(cell, minlength=2)
-    mean = np.bincount(cell, lit.level[some][wall], len(count)) / np.maximum(count, 1)
-    at = np.interp(np.nan_to_num(theta_rad), (np.arange(len(mean)) + 0.5) * _ANGLE_RAD, mean)
-    return np.maximum(at, 1.0).astype(np.float32)
 
 
 def bloom(shown: Shown, size: Float) -> Pair:
@@ -301,9 +253,6 @@ def on_line(twin: TwinFrame) -> Bool:
     return np.asarray((twin.region == Region.LINE_CORE) | (twin.region == Region.LINE_FLANK))
 
 
-def _dilated(use: Bool) -> Bool:
-    return np.asarray(cv2.dilate(use.astype(np.uint8), np.ones((9, 9), np.uint8)) > 0)
-
-
-def _inner(use: Bool) -> Bool:
+def inner(use: Bool) -> Bool:
+    """Return pixels (H, W) whose neighbours within two pixels are all in use."""
     return np.asarray(cv2.erode(use.astype(np.uint8), np.ones((5, 5), np.uint8)) > 0)

@@ -9,10 +9,11 @@ import pytest
 from pipeline.artefacts.measured import RingValidity
 from pipeline.recording.base import Illumination
 from stages.twin import _spread
+from stages.twin.cannot_tell import cannot_tell
 from stages.twin.compare import BLOCK_PX, Comparison, block_ratios, exposure_of
 from stages.twin.lamp_light import Figure
 from stages.twin.locate import ImagePlace
-from stages.twin.name import _not_sharp, cannot_tell, clipped, left_over
+from stages.twin.name import _not_sharp, clipped, left_over
 from stages.twin.noise import CameraNoise, black_and_white
 from stages.twin.on_wall import unnamed
 from stages.twin.rays import wall_seen

@@ -13,7 +13,7 @@ from pipeline.artefacts.twin import Mismatch, NamedFigure
 from stages.twin.blocks import block_textures
 from stages.twin.locate import ImagePlace, full_size, places_displaced, without_duplicates
 from stages.twin.render import Region, TwinFrame
-from stages.twin.spot import FittedLaw, _slopes_at, _spot_at
+from stages.twin.spot import FittedLaw
 from stages.twin.window import WindowPlace, _fall_of_drop, _with_photo, or_on_window, separated_from_blur
 
 
@@ -109,13 +109,6 @@ def test_scatter_of_more_than_all_light_is_not_scatter(share, name, monkeypatch)
     found = place.judged("image")
     assert found.name == name
     assert "takes away" in found.statement
-
-
-def test_wall_that_a_few_neighbouring_frames_see_does_not_prove_a_spot():
-    size = NamedFigure("share", 0.05, 0.01)
-    passing = np.repeat([9.0, 8.0, -1.0, 1.0, 0.5], 3)
-    by_turns = passing.reshape(5, 3).T.ravel()
-    assert FittedLaw(passing, size).chance > 0.01 > FittedLaw(by_turns, size).chance
 
 
 @pytest.mark.parametrize("texture", [1.0, 0.92, 1.06])
@@ -264,15 +257,6 @@ def test_the_size_of_a_spot_is_right_for_any_shape_of_its_rim(flatness):
     away = np.abs(1 - (1 - 0.3) * (1 - in_photo) - share.value)
     assert np.mean(away < 2 * share.sd) > 0.99
     assert np.mean(away < share.sd) == pytest.approx(1 / np.sqrt(3), abs=0.07)  # of a uniform error
-
-
-def test_a_spot_is_fitted_with_its_derivatives():
-    u, v = np.mgrid[3:60:7, 4:50:5].reshape(2, -1)
-    spot = np.array([0.4, 31.0, 24.0, 12.0, 1.7, 0.02])
-    for k, step in enumerate(1e-5 * np.maximum(spot, 1.0)):
-        more, less = (_spot_at(spot + way * step * np.eye(6)[k], u, v) for way in (1, -1))
-        np.testing.assert_allclose(_slopes_at(spot, u, v)[:, k], (more - less) / (2 * step), atol=1e-6)
-    assert np.isfinite(_slopes_at(spot, np.array([31]), np.array([24]))).all()
 
 
 @pytest.mark.parametrize("share", [-0.2, 1.2])
