@@ -13,8 +13,9 @@ from scipy.special import erf
 from pipeline.arrays import Float, Image
 from pipeline.geometry.rigid import inverse, transform
 from stages.calibrate.gauge import premises
-from stages.calibrate.gauge.edges import brightest_grey, detect, detector, fit_steps, measure_edges
+from stages.calibrate.gauge.edges import detect, detector, fit_steps, measure_edges
 from stages.calibrate.gauge.geometry import Gauge, gauge_of
+from stages.calibrate.gauge.white import brightest_grey
 from tests.gauge_runs import USUAL, facts, stated_probe
 from tests.quiet import quiet_context
 

@@ -264,14 +264,9 @@ def test_a_wall_without_measurements_is_refused() -> None:
     wall = small_wall(length_mm=10.0)
     colours = error_colours(wall)
     none = dataclasses.replace(wall.radius_map, radius_mm=np.full_like(wall.radius_map.radius_mm, np.nan))
+    wall = dataclasses.replace(wall, radius_map=none)
     with pytest.raises(UnusableError, match="no cell of the wall"):
-        make_mesh(
-            dataclasses.replace(wall, radius_map=none),
-            smooth_photo(),
-            colours,
-            MeshParameters(),
-            quiet_context(),
-        )
+        make_mesh(wall, smooth_photo(), colours, MeshParameters(), quiet_context())
 
 
 def test_normals_are_those_of_open3d() -> None:

@@ -23,7 +23,6 @@ from stages.calibrate.gauge.adjust import Measurements
 from stages.calibrate.gauge.edges import (
     Edges,
     Sighting,
-    brightest_grey,
     find_fiducials,
     joined,
     measure_edges,
@@ -40,6 +39,7 @@ from stages.calibrate.gauge.premises import require_gauge
 from stages.calibrate.gauge.result import GaugeCalibration, calibration_of, warn_of_misfit
 from stages.calibrate.gauge.solve import Finding, RingSource, first_unknowns, solve
 from stages.calibrate.gauge.state import GaugeParameters, Unknowns
+from stages.calibrate.gauge.white import brightest_grey
 
 __all__ = ["GAUGE", "GaugeCalibration", "GaugeParameters", "calibrate_gauge", "require_gauge"]
 

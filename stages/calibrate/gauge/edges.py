@@ -16,11 +16,10 @@ from scipy.special import erf
 from pipeline.arrays import Bool, Float, Image, Int
 from pipeline.geometry.rigid import inverse, transform
 from pipeline.instrument.camera import Camera
-from pipeline.recording.base import Recording
-from pipeline.recording.images import WHITE, luma_of_white
 from pipeline.system.parallel import in_threads
 from stages.calibrate.gauge.geometry import Gauge
 from stages.calibrate.gauge.state import GaugeParameters
+from stages.calibrate.gauge.white import BELOW_WHITE_GREY
 
 # Samples of a profile across an edge.
 _PROFILE = 21
@@ -37,14 +36,6 @@ _CONTOUR_PX = 0.5
 _LEAST_STEP_GREY, _INSIDE, _MOST_NOISE, _BLUR_PX = 8.0, 0.6, 0.12, (0.3, 2.5)
 # White ends where it falls by this part of the step (chosen: noise of 1 % of it seldom makes that fall).
 _WHITE_ENDS = 0.03
-# White counts as overexposed so few grey levels below the brightest, of which compression takes a few off.
-BELOW_WHITE_GREY = 5
-# Pictures are clipped below the range's white where so many times more pixels lie within 5 levels of the
-# commonest bright one than in as many below (chosen: a ridge of light on a wall has 2.4 times), of
-# this share of all, and hardly any above. Below 230, the clip of limited range, bright wall is no clip.
-_PILED, _LEAST_SHARE, _ABOVE_PILE, _DARKEST_CLIP = 4.0, 1e-4, 0.05, 230
-# Chosen: so many pictures show at which grey level all of them are clipped.
-LOOKED_AT = 6
 # Least σ, and the part of the border over which a profile reaches. Debt: data/debts.md.
 _LEAST_SIGMA_PX, _OF_BORDER = 0.03, 0.85
 # Markers are drawn in cells; the outermost is black all round.
@@ -77,7 +68,8 @@ def detector(dictionary: str) -> cv2.aruco.ArucoDetector:
     """Return a detector of the markers of OpenCV's ``dictionary``.
 
     It looks for them in three sizes. Six, every 8 px, take twice the time and find 423 markers in 48 pictures
-    of four gauges where three find 421.
+    of four gauges where three find 421. Of drawn markers of 16 px, blurred by 1 px, half of which are lost to
+    either, six find 90 and three 80.
     """
     parameters = cv2.aruco.DetectorParameters()
     parameters.adaptiveThreshWinSizeMin = 7
@@ -154,30 +146,6 @@ def joined(parts: list[Edges]) -> Edges:
     return Edges(**{k: np.concatenate([getattr(p, k) for p in parts]) for k in vars(parts[0])})
 
 
-def clip_level(images: Iterable[Image], white: int) -> int:
-    """Return the grey level at which images are clipped: ``white``, or below it where pixels pile up there.
-
-    Some cameras clip below the white that their video's range allows, or state another range.
-    """
-    count = sum((np.bincount(image.ravel(), minlength=256) for image in images), np.zeros(256, np.int64))
-    level = _DARKEST_CLIP + int(np.argmax(count[_DARKEST_CLIP:]))
-    low, high = level - BELOW_WHITE_GREY, level + BELOW_WHITE_GREY + 1
-    pile, above, below = count[low:high].sum(), count[high:].sum(), count[2 * low - high : low].sum()
-    piled = pile > max(_PILED * below, _LEAST_SHARE * count.sum()) and above < _ABOVE_PILE * pile
-    return min(white, level) if piled else white
-
-
-def brightest_grey(recording: Recording, frames: Int) -> int:
-    """Return the grey level at which pictures are clipped, from a few of the ``frames`` that can be read.
-
-    The first of them tells the luma of white.
-    """
-    few = frames[:: max(len(frames) // LOOKED_AT, 1)]
-    both = zip(recording.read(few, "grey"), recording.read(few, "bgr"), strict=True)
-    seen = [(grey.copy(), bgr) for (_, grey), (_, bgr) in both if grey is not None and bgr is not None]
-    return clip_level((grey for grey, _ in seen), luma_of_white(*seen[0])) if seen else WHITE
-
-
 def measure_edges(
     image: Image,
     index: int,
@@ -190,7 +158,7 @@ def measure_edges(
 ) -> tuple[Edges, int]:
     """Measure the borders of fiducials (M,) in an image of the frame ``index``, near where they should be.
 
-    ``white`` is the grey level at which pictures are clipped: see `clip_level`.
+    ``white`` is the grey level at which pictures are clipped: see `stages.calibrate.gauge.white.clip_level`.
 
     Also return the number of edges left out because the white beside them is overexposed: its blur is cut
     off at the brightest level, so that the edge seems to lie inside the black square.

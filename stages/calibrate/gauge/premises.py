@@ -13,17 +13,11 @@ from pipeline.geometry.rigid import inverse, transform
 from pipeline.instrument.camera import Camera
 from pipeline.machine.stage import Context
 from pipeline.recording.base import Illumination, Recording
-from stages.calibrate.gauge.edges import (
-    BELOW_WHITE_GREY,
-    LOOKED_AT,
-    Sighting,
-    brightest_grey,
-    detect,
-    detector,
-)
+from stages.calibrate.gauge.edges import Sighting, detect, detector
 from stages.calibrate.gauge.geometry import Gauge, gauge_of
 from stages.calibrate.gauge.poses import PosedFrames, disagreeing
 from stages.calibrate.gauge.state import GaugeParameters
+from stages.calibrate.gauge.white import BELOW_WHITE_GREY, LOOKED_AT, brightest_grey
 
 STAGE = "calibrate"
 # Fiducials of another size are refused beyond this share, of small ones beyond the error of a side between
