@@ -38,8 +38,8 @@ from stages.twin.scene import Ring
 from stages.twin.sides import darker_side, of_led, slow_side
 from stages.twin.steps import (
     FEWEST_FRAMES,
-    OWN_STEP,
     first_frame,
+    name_of_step,
     of_a_light,
     side_at_once,
     steps_named,
@@ -79,20 +79,20 @@ def causes(
     found: list[Mismatch] = []
     slow: list[Mismatch] = []
     steps: dict[str, tuple[Fitted, Cells, list[str]]] = {}
-    for light, cells in (("LEDs", lit), ("laser", line)):
+    for light, cells, other in (("LEDs", lit, line), ("laser", line, lit)):
         if cells is None or len(cells.frame) < FEWEST_FRAMES:
             continue
         if light == "LEDs":
             base, laws = lit_laws(cells, lighting, ring, share_of_frames(samples, ring, cells.frame))
         else:
             base, laws = line_laws(cells)
-        chosen, base, unsure = _chosen(cells, base, laws, light)
+        chosen, base, unsure = _chosen(cells, base, laws, light, other)
         for best, rivals in chosen:
             if best.law.name == "step":
                 steps[light] = best, cells, rivals
             else:
                 found.append(_mismatch(best, rivals, cells, ring))
-        found += _flicker_or_else(cells, base, unsure, light, ring)
+        found += _flicker_or_else(cells, base, unsure, light, ring, other)
         if light == "laser":
             found += (*dim_at_times(cells, base, ring), *banding_of_line(cells, ring))
         if unsure is not None and unsure[0].probability <= FALSE_ALARM:
@@ -101,7 +101,7 @@ def causes(
 
 
 def _chosen(
-    cells: Cells, base: Float, laws: Sequence[Law], light: str
+    cells: Cells, base: Float, laws: Sequence[Law], light: str, other: Cells | None
 ) -> tuple[list[Chosen], Float, Chosen | None]:
     """Return the causes found one after the other, each with rivals that fit as well, and the base with them.
 
@@ -118,7 +118,7 @@ def _chosen(
         best = _by_other_sectors(_simplest(_at_once_first(tries, cells)), cells, base)
         if size_of(best) <= _LEAST[best.law.name]:
             break
-        rivals = _rivals(best, tries, light)
+        rivals = _rivals(best, tries, cells, light, other)
         if best.probability > FALSE_ALARM or not _at_once(best, cells):  # what fits less well is none either
             unsure = best, rivals
             break
@@ -132,10 +132,12 @@ def _chosen(
     return chosen, base, unsure
 
 
-def _rivals(best: Fitted, tries: Sequence[Fitted], light: str) -> list[str]:
+def _rivals(
+    best: Fitted, tries: Sequence[Fitted], cells: Cells, light: str, other: Cells | None
+) -> list[str]:
     """Return names of other laws that fit about as well, however many places each of them tried."""
     return [
-        OWN_STEP[light] if o.law.name == "step" else o.law.name
+        name_of_step(o, cells, light, other) if o.law.name == "step" else o.law.name
         for o in tries
         if o.law.name not in (best.law.name, "lamp_sector")
         and size_of(o) > _LEAST[o.law.name]
@@ -259,7 +261,7 @@ def _mismatch(best: Fitted, rivals: list[str], cells: Cells, ring: Ring) -> Mism
 
 
 def _flicker_or_else(
-    cells: Cells, base: Float, unsure: Chosen | None, light: str, ring: Ring
+    cells: Cells, base: Float, unsure: Chosen | None, light: str, ring: Ring, other: Cells | None
 ) -> list[Mismatch]:
     """Return flicker, or the slow change that explains most of it.
 
@@ -270,14 +272,16 @@ def _flicker_or_else(
         return found  # a sector changes no frame alone
     if flicker(cells, np.concatenate([base, unsure[0].change[None]]), light, ring):
         return found
-    return [_flicker_or(found[0], unsure, cells, light)]
+    return [_flicker_or(found[0], unsure, cells, light, other)]
 
 
-def _flicker_or(found: Mismatch, unsure: Chosen, cells: Cells, light: str) -> Mismatch:
+def _flicker_or(found: Mismatch, unsure: Chosen, cells: Cells, light: str, other: Cells | None) -> Mismatch:
     """Return flicker that may as well be an uncertain cause, or one of its rivals."""
     cause, rivals = unsure
-    what, names = "a step of brightness", [found.name, OWN_STEP[light], *rivals]
+    what, names = "a step of brightness", [found.name, *rivals]
     place: tuple[NamedFigure, ...] = (first_frame(cells.frame, int(cause.place[0])),)
+    if cause.law.name == "step":
+        names.insert(1, name_of_step(cause, cells, light, other))
     if cause.law.name in _AROUND:
         place = of_led(cause, cells)
         what, names = f"an LED that fails at image azimuth {place[1].value:.0f}°", ["flicker", "led_dead"]

@@ -26,7 +26,7 @@ half of the picture that every half must; sectors from one half to the next; lea
 be usable for it to count. Chosen."""
 _HALVES = (np.arange(SECTORS) - np.arange(0, SECTORS, _SIDES_APART)[:, None]) % SECTORS < SECTORS // 2
 """(H, S) sectors in each half of the picture."""
-OWN_STEP = {"LEDs": "lamp_step", "laser": "laser_step"}
+_OWN_STEP = {"LEDs": "lamp_step", "laser": "laser_step"}
 _FEWEST_BLOCKS, _PARTS = 40, (0.25, 0.75)
 """Least blocks that two frames must have in common; quantiles of their distance from the picture's middle up
 to which they are its middle, and from which they are its border. Chosen."""
@@ -171,8 +171,7 @@ def steps_named(
         same = _same_step(best, cells.frame[first - 1 : first + 1], other)
         if same and light == "laser" and "LEDs" in steps:
             continue  # already reported
-        own = OWN_STEP[light]
-        name = {True: "exposure_step", False: own, None: f"exposure_step or {own}"}[same]
+        name = _named(same, light)
         # With drift all frames measure a step, without it only the frames beside it: σ includes their
         # disagreement.
         sd = float(np.exp(best.size) * np.hypot(best.sd, at_once(best, cells) - best.size))
@@ -197,6 +196,18 @@ def steps_named(
             said, ring.whole(cells.frame[first]),
         ))  # fmt: skip
     return found
+
+
+def name_of_step(step: Fitted, cells: Cells, light: str, other: Cells | None) -> str:
+    """Return the name of a step of one light; as for `steps_named`, cells of the ``other`` light decide."""
+    first = int(step.place[0])
+    return _named(_same_step(step, cells.frame[first - 1 : first + 1], other), light)
+
+
+def _named(same: bool | None, light: str) -> str:
+    """Return the name of a step by whether the other light steps alike; None if that is not known."""
+    own = _OWN_STEP[light]
+    return {True: "exposure_step", False: own, None: f"exposure_step or {own}"}[same]
 
 
 def _percent(change: float) -> str:

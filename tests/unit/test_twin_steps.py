@@ -7,7 +7,7 @@ import pytest
 
 from pipeline.instrument.probe import Lighting
 from stages.twin import causes as of_time
-from stages.twin.causes import _at_once_first, causes
+from stages.twin.causes import _at_once_first, _rivals, causes
 from stages.twin.cells import SECTORS, Fitted, Law
 from tests.unit.frame_cells import AZIMUTH_DEG, FRAMES, RING, cells_with, found_in_cells, step_from
 
@@ -87,3 +87,17 @@ def test_a_side_that_should_darken_at_once_and_does_not_hides_no_step_that_fits_
     )
     monkeypatch.setattr(of_time, "_at_once", lambda found, cells: found.law.name == "step")
     assert [f.law.name for f in _at_once_first([led, step], None)] == kept
+
+
+@pytest.mark.parametrize(
+    ("line", "name"),
+    [(None, "exposure_step or lamp_step"), (-0.1, "exposure_step"), (0.0, "lamp_step")],
+)
+def test_a_step_that_fits_as_well_as_an_led_is_named_by_what_the_laser_frames_show(line, name):
+    """It was a lamp's in any case: an exposure that stepped was told as "led_dead or lamp_step"."""
+    law = Law("step", step_from(8)[None] + np.zeros((1, 1, SECTORS)), np.array([[8.0]]))
+    step = Fitted(law, 0, -0.1, 0.002, 1e-9, np.ones(FRAMES), 2.0, 1.0)
+    lit = cells_with(-0.1 * step_from(8))
+    other = None if line is None else cells_with(line * step_from(8), 1)
+    led = replace(step, law=Law("led_dead", law.columns, np.array([[0.3, 8.0, 0.17]])), size=0.8)
+    assert _rivals(led, [led, step], lit, "LEDs", other) == [name]
