@@ -109,7 +109,8 @@ def _measured(
     if not rings:
         raise UnusableError(
             "rings", "no laser ring was found in any frame", frames=frames.tolist(),
-            hint="is the laser on, the probe inside the pipe, and the exposure long enough?",
+            hint="is the laser on, the probe inside the pipe, and the exposure long enough? Where LEDs are "
+            "on, too, colour tells the line: switch them off with a monochrome camera or a white laser",
         )  # fmt: skip
     return samples
 

@@ -185,6 +185,13 @@ def white_wall(ring, seed, texture):
     return np.clip(np.rint(noisy), 0, 255).astype(np.uint8)
 
 
+def test_a_line_without_a_colour_on_a_lit_wall_is_refused_with_what_to_do():
+    ring, texture = off_centre(165.0, 8.0), np.ones(SIZE[::-1])
+    grey = {i: lit_image(ring, i, texture).mean(-1, keepdims=True).astype(np.uint8) for i in range(2)}
+    with pytest.raises(UnusableError, match="switch them off with a monochrome camera"):
+        extracted({i: np.repeat(image, 3, -1) for i, image in grey.items()}, ["both"] * 2)
+
+
 def test_the_position_of_a_clipped_line_on_a_bright_wall_is_within_sigma():
     """The other channels go on rising where the laser's clips: the line was off by up to 1.6 px."""
     ring, random = off_centre(165.0, 8.0), np.random.default_rng(3)
