@@ -114,6 +114,10 @@ class RollingShutter(Scalar):
 
     name = "rolling_shutter"
     amplitudes = one(name, 0.01)
+    # The rates of the motion are those of the fitted poses: where these err, as those of pictures without
+    # fiducials do near a turn of the travel, the size comes out too small. Nine simulated cases (ring level,
+    # .018 to .030 s) came out between 9 % too small and 1 % too large; rms beyond noise 3 %.
+    law_sigma = 0.03
     words = "The shutter is rolling: the last row is exposed {readout_s:.4f} s after the first."
 
     def image_shift_px(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
