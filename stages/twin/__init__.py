@@ -272,7 +272,7 @@ def _report(comparison: Comparison, found: tuple[Mismatch, ...], context: Contex
 
 PHOTOMETRY = Stage(
     "photometry",
-    "22",
+    "23",
     PhotometryParameters,
     measure_photometry,
     "camera noise, lamps, laser line, blur and dirt on the window, from the frames of a run",

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
+from scipy.stats import norm
 
-from pipeline.adjustment.robust import robust_spread
 from pipeline.arrays import Bool, Byte, Float, Float32, Int
 from pipeline.artefacts.twin import Look, Mismatch, NamedFigure
 
@@ -77,12 +77,19 @@ def defective_pixels(images: Sequence[Byte], lit: Sequence[bool], seen: Bool) ->
         sums += np.stack([image, image * np.uint8(shows_wall)])
         more = np.minimum(more, beyond)
         less = np.minimum(less, -beyond) if shows_wall else less
-    kept = robust_spread(total[seen] / len(images)) if seen.any() else 0.0
+    kept = _spread(total[seen] / len(images))
     hot, dead = (
         _alone(_single((a >= max(_LEAST_GREY, _BEYOND * kept)) & seen), way * mean)
         for a, way, mean in ((more, 1, sums[0] / len(images)), (less, -1, sums[1] / sum(lit)))
     )
     return DefectivePixels(hot, dead, seen)
+
+
+def _spread(offset: Float) -> float:
+    """Return 1 σ of pixels' constant offsets (N,), from the wider side: black cuts off the other one."""
+    if not len(offset):
+        return 0.0
+    return float(np.abs(np.quantile(offset, norm.cdf([-1.0, 1.0]))).max())
 
 
 def _single(differs: Bool) -> Int:

@@ -48,6 +48,18 @@ def test_the_tail_of_a_dark_pattern_is_not_a_defect_but_a_hot_pixel_in_it_is():
     assert found.statement.startswith("1 single pixels are too bright in all frames, 0 too dark")
 
 
+def test_a_dark_pattern_that_black_cuts_off_has_no_defects_in_its_tail():
+    """Half of the pixels were at 0 in dark frames, which lowered the spread: tens were defects."""
+    offset = 4.0 * np.random.default_rng(1).standard_normal(SHAPE)
+    lit = [k % 4 == 0 for k in range(24)]
+    images = [np.clip(70.0 * shows_wall + offset, 0, 255).astype(np.uint8) for shows_wall in lit]
+    assert defective_pixels(images, lit, SEEN).mismatches() == ()
+    for image in images:
+        image[20, 30] += 50
+    (found,) = defective_pixels(images, lit, SEEN).mismatches()
+    assert found.statement.startswith("1 single pixels are too bright in all frames, 0 too dark")
+
+
 @pytest.mark.parametrize("azimuth_deg", [4, 20, 88, 120])
 def test_a_thin_scratch_on_the_window_is_not_a_row_of_dead_pixels(azimuth_deg):
     """A scratch as narrow as a defect differs from the five pixels around it only at single places."""
