@@ -154,10 +154,13 @@ class LitPictures:
 
 
 def _agreement(pictures: Float) -> float:
-    """Return the mean correlation between pairs of pictures (P, n), each of zero mean."""
+    """Return the median correlation between pairs of pictures (P, n), each of zero mean.
+
+    A single picture in which a strut, a glint or dirt is in front of the wall agrees with no other.
+    """
     one, other = np.triu_indices(len(pictures), 1)
     unit = pictures / pictures.std(1, keepdims=True)
-    return float(np.mean(unit[one] * unit[other]))
+    return float(np.median(np.mean(unit[one] * unit[other], axis=1)))
 
 
 def _misfit(pictures: Float) -> float:
