@@ -98,7 +98,7 @@ def warn_of_sparse(limits: Sequence[Detectable], wanted_mm: float, held: HeldOve
     if not sparse:
         return
     worst = max(sparse, key=lambda d: d.ring_spacing_mm)
-    apart = worst.ring_spacing_mm
+    apart, advised = worst.ring_spacing_mm, widest_spacing_mm(wanted_mm, needed_rings)
     needed = (
         f"not even large defects are found reliably{_where(sparse, limits)}"
         if any(math.isinf(d.depth_mm) for d in sparse)
@@ -109,7 +109,7 @@ def warn_of_sparse(limits: Sequence[Detectable], wanted_mm: float, held: HeldOve
         f"{needed}: rings lie up to {apart:.2g} mm apart there, and {needed_rings} must cross a defect. "
         "Smaller ones are missed or unconfirmed, however deep, unless one ring crosses them and the photo "
         f"shows them. What to do: for defects of {wanted_mm:.2g} mm, pull the probe at most "
-        f"{widest / apart:.2g} times as fast (rings {widest:.2g} mm apart), light the laser in more of the "
+        f"{advised / apart:.2g} times as fast (rings {advised:.2g} mm apart), light the laser in more of the "
         "pictures, or record at a higher frame rate"
     )
 

@@ -6,11 +6,13 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
+from pipeline.adjustment.shared_light import HeldOver
 from pipeline.artefacts.findings import Defects, Detectable
 from pipeline.export.tables import write_defects
 from pipeline.pages.notation import limits
 from stages.defects import DefectParameters, find_defects
-from stages.defects.limits import LEAST_SIZE_MM, widest_spacing_mm
+from stages.defects.limits import LEAST_SIZE_MM, rings_needed, widest_spacing_mm
+from stages.defects.report import warn_of_sparse
 from tests.quiet import quiet_context
 from tests.synthetic_wall import bare_recording, grey_texture, smooth_noise, wall_of
 
@@ -78,6 +80,16 @@ def test_where_rings_are_farther_apart_the_smallest_defect_is_larger_and_a_warni
     (warning,) = [w for w in told if "rings lie up to" in w]
     assert f"at {far.from_mm:.0f}–{far.to_mm:.0f} mm" in warning
     assert f"{widest_spacing_mm(5.0, 2) / 3:.2g} times as fast" in warning
+
+
+def test_advised_speed_lets_as_many_rings_cross_a_defect_as_are_needed() -> None:
+    """Beside "6 must cross a defect", a speed was advised at which two do."""
+    held = HeldOver(0.8 ** np.arange(17))
+    assert rings_needed(held) > 2
+    told: list[str] = []
+    sparse = Detectable(0.0, 90.0, 3.0, 20.0, 0.3, 8.0, 1.0, 1.0)
+    warn_of_sparse((sparse,), 5.0, held, replace(quiet_context(), warn=told.append))
+    assert f"rings {widest_spacing_mm(5.0, rings_needed(held)):.2g} mm apart" in told[0]
 
 
 @pytest.mark.parametrize("length_mm", [4.0, 8.0])
