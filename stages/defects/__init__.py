@@ -58,6 +58,7 @@ from stages.defects.report import (
     report_limits,
     report_unconfirmed,
     warn_of_drops,
+    warn_of_nothing,
     warn_of_shallow,
     warn_of_short_ones,
     warn_of_sparse,
@@ -124,6 +125,7 @@ def find_defects(
     limits = detectable(measured, seeds, credibility, texture, wall.held, parameters)
     report_limits(limits, context)
     warn_of_shallow(limits, parameters.min_depth_mm, context)
+    warn_of_nothing(limits, parameters.min_size_mm, context)
     warn_of_sparse(limits, parameters.min_size_mm, wall.held, context)
     warn_of_short_ones(wall.held, measured.spacing_mm, context)
     return Defects(items, expected, limits, alone)
@@ -239,5 +241,5 @@ def _defects_of_run(
 
 
 DEFECTS = Stage(
-    "defects", "66", DefectParameters, _defects_of_run, "defects as instances with depth, clock and kind"
+    "defects", "67", DefectParameters, _defects_of_run, "defects as instances with depth, clock and kind"
 )

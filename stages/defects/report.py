@@ -91,6 +91,18 @@ def warn_of_shallow(limits: Sequence[Detectable], asked_mm: float, context: Cont
     )
 
 
+def warn_of_nothing(limits: Sequence[Detectable], wanted_mm: float, context: Context) -> None:
+    """Warn where not even large defects are found although rings are close enough for the wanted diameter."""
+    widest = widest_spacing_mm(wanted_mm, LEAST_RINGS)
+    nothing = [d for d in limits if math.isinf(d.depth_mm) and d.ring_spacing_mm <= widest]
+    if nothing:
+        context.warn(
+            f"not even large defects are found reliably{_where(nothing, limits)}: the laser line is too "
+            "unsteady there, or shows less than half of the wall. What to do: record with less compression, "
+            "a sharper picture and a clean, dry window"
+        )
+
+
 def warn_of_sparse(limits: Sequence[Detectable], wanted_mm: float, held: HeldOver, context: Context) -> None:
     """Warn where rings lie too far apart for enough of them to cross defects of the wanted diameter, mm."""
     widest, needed_rings = widest_spacing_mm(wanted_mm, LEAST_RINGS), rings_needed(held)
