@@ -68,9 +68,12 @@ def warn_of_drops(contradicted: int, context: Context) -> None:
 
 
 def report_limits(limits: Sequence[Detectable], context: Context) -> None:
-    """Report from which size and depth on nine of ten defects are found on most of the pipe."""
-    if limits:
-        usual = usual_limit(limits)
+    """Report from which size and depth on nine of ten defects are found on most of the pipe.
+
+    Where none are found on most of it, `warn_of_nothing` and `warn_of_sparse` say so.
+    """
+    usual = usual_limit(limits) if limits else None
+    if usual is not None and math.isfinite(usual.size_mm):
         context.report("nine of ten defects are found from a diameter of", usual.size_mm, "mm")
         context.report("and from a depth of", usual.depth_mm, "mm")
 

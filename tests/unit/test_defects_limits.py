@@ -12,7 +12,7 @@ from pipeline.export.tables import write_defects
 from pipeline.pages.notation import limits
 from stages.defects import DefectParameters, find_defects
 from stages.defects.limits import LEAST_SIZE_MM, rings_needed, widest_spacing_mm
-from stages.defects.report import warn_of_sparse
+from stages.defects.report import report_limits, warn_of_sparse
 from tests.quiet import quiet_context
 from tests.synthetic_wall import bare_recording, grey_texture, smooth_noise, wall_of
 
@@ -109,6 +109,15 @@ def test_stretch_of_which_rings_measured_less_than_half_has_no_limit() -> None:
     assert sum("not even large defects" in w and "less than half of the wall" in w for w in warned) == 1
     assert np.isinf(told.limit_at(120.0).depth_mm)
     assert np.isfinite(told.limit_at(20.0).depth_mm)
+
+
+def test_a_pipe_on_which_nothing_is_found_reports_no_size() -> None:
+    numbers: list[float] = []
+    context = replace(quiet_context(), report=lambda name, value, unit="": numbers.append(value))
+    report_limits([Detectable(0.0, 50.0, 1.0, np.inf, np.inf, 3.0, 1.0, 0.5)], context)
+    assert not numbers
+    report_limits([Detectable(0.0, 50.0, 1.0, 4.0, 0.3, 3.0, 1.0, 0.5)], context)
+    assert numbers == [4.0, 0.3]
 
 
 def test_rings_at_one_place_have_no_limit() -> None:
