@@ -35,6 +35,8 @@ def cuts(pictures: Pictures, shown: Int, left_out: Bool, time_s: Float) -> Int:
     before = pictures.partner[place]
     lit = (shown[before] == Light.WALL) & np.isfinite(pictures.change[place])
     place, before = place[lit], before[lit]
+    if len(place) < _FEWEST:
+        return np.empty(0, np.int64)
     same = time_s[place] - time_s[before] < (place - before + 0.5) * np.median(np.diff(time_s))
     if same.sum() < _FEWEST:
         return np.empty(0, np.int64)

@@ -8,8 +8,8 @@ import pytest
 
 from pipeline.adjustment.shared_light import HeldOver
 from pipeline.artefacts.findings import Defects, Detectable
+from pipeline.export.report.detectable import limits
 from pipeline.export.tables import write_defects
-from pipeline.pages.notation import limits
 from stages.defects import DefectParameters, find_defects
 from stages.defects.limits import LEAST_SIZE_MM, rings_needed, widest_spacing_mm
 from stages.defects.report import report_limits, warn_of_sparse

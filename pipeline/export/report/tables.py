@@ -10,6 +10,7 @@ import numpy as np
 from pipeline.artefacts.findings import Defect, Defects, Sections
 from pipeline.artefacts.measured import RingSamples, RingValidity, Trajectory, Wall, WallTexture
 from pipeline.artefacts.model import Overlays
+from pipeline.export.report.detectable import limits
 from pipeline.export.report.page import Card, Table
 from pipeline.export.run_record import mean_diameter
 from pipeline.geometry.axis import distance_along
@@ -148,7 +149,7 @@ def _found(summary: RunSummary) -> Card:
     if defects is None:
         return Card("What was found", "not searched", ())
     lines = [
-        *notation.limits(defects.detectable),
+        *limits(defects.detectable),
         f"{defects.false_alarm_rate:.2g} false findings are expected in such a recording, from the wall's "
         "texture and from glints that two rings show at the same place",
     ]
