@@ -8,7 +8,7 @@ A field may be an array, a number, a string, a tuple of such, a nested artefact,
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from enum import IntEnum
 
 import numpy as np
@@ -212,10 +212,18 @@ class RadiusMap(WallMap):
         Number of ring samples that contributed.
     misalignment_mm : (S, A) float32
         Radius without laser misalignment correction minus ``radius_mm``.
+    kernel_mm : (S,) or None
+        1 σ of the kernel along the pipe by which rings were smoothed; None where they were not.
     """
 
     count: Int
     misalignment_mm: Float32
+    kernel_mm: Float | None = field(default=None, kw_only=True)
+
+    def kernel_in(self, rows: slice = slice(None)) -> Float:
+        """Return the kernel's 1 σ (n,), mm, in some rows; 0 where rings were not smoothed."""
+        of_rows = self.distance_mm[rows]
+        return np.zeros(len(of_rows)) if self.kernel_mm is None else np.asarray(self.kernel_mm[rows])
 
 
 @dataclass(frozen=True)

@@ -81,7 +81,8 @@ def write_radius_map(wall: Wall, folder: Path) -> None:
     arrays = {n: getattr(radius, n) for n in (*places, *measured, "sigma_random_mm", "misalignment_mm")}
     # Compression level 1: NumPy's default of 6 needs 2.5 times as long for 1 % less.
     with ZipFile(folder / "radius_map.npz", "w", ZIP_DEFLATED, compresslevel=1) as archive:
-        for name, values in (arrays | {"displaced_mm": radius.displaced_in()}).items():
+        rows = {"displaced_mm": radius.displaced_in(), "kernel_mm": radius.kernel_in()}
+        for name, values in (arrays | rows).items():
             with archive.open(f"{name}.npy", "w", force_zip64=True) as stream:
                 np.lib.format.write_array(stream, np.asanyarray(values))
 

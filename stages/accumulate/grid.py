@@ -28,8 +28,7 @@ WIDTH_IN_RINGS = 0.4
 # Share of a ring from which its distance belongs to the map: half and twice as much change nothing on open-1
 # and open-3, whose rings end within a cell.
 _SEEN_SHARE = 0.1
-# Columns from which the scatter of distant rings is estimated: every fourth, 2° apart, errs by 1 % of it.
-_SOME_COLUMNS = 4
+_SOME_COLUMNS = 4  # for the scatter of distant rings: every fourth column, 2° apart, errs by 1 % of it
 
 
 @dataclass(frozen=True)
@@ -108,25 +107,28 @@ def rings_on_columns(parts: Iterable[WallSamples], rings: int, grid: MapGrid) ->
     return RingColumns(sort(distance), sort(radius), sort(1 / weight), sort(misalignment), sort(count))
 
 
+def kernel_mm(columns: RingColumns, smoothing_mm: float) -> float:
+    """Return 1 σ of the kernel along the pipe, mm: as asked, or wider where rings are sparse."""
+    return max(smoothing_mm, WIDTH_IN_RINGS * _usual_spacing(columns))
+
+
 def gridded(
-    columns: RingColumns, grid: MapGrid, smoothing_mm: float, largest_gap_mm: float, held: HeldOver
+    columns: RingColumns, grid: MapGrid, width: float, largest_gap_mm: float, held: HeldOver
 ) -> tuple[Float32, Float32, Int, Float32]:
     """Return radius, its random 1 σ, sample count and misalignment error, each (S, A); NaN where unseen.
 
-    The noise of single samples is not the whole error: speckle is correlated between neighbouring azimuths,
-    and each ring has a pose error. The scatter of rings is therefore measured from two maps of every other
-    ring. If a codec carried light over from ring to ring (``held``), it is measured from rings that share
-    none.
+    The kernel has 1 σ ``width``, mm. The noise of single samples is not the whole error: speckle is
+    correlated between neighbouring azimuths, and each ring has a pose error. The scatter of rings is
+    therefore measured from two maps of every other ring. If a codec carried light over from ring to ring
+    (``held``), it is measured from rings that share none.
     """
-    spacing = _usual_spacing(columns)
-    width = max(smoothing_mm, WIDTH_IN_RINGS * spacing)
     radius, sigma, count, misalignment = _map_of(columns, grid, width, largest_gap_mm)
     halves = [
         _map_of(columns.every_other(first), grid, 2 * width, 2 * largest_gap_mm)[:2] for first in (0, 1)
     ]
     sigma = sigma * _excess(halves, grid)
     rough = sigma * _roughness(radius, sigma, grid)
-    shared = _shared(columns, held, width / max(spacing, 1e-9))
+    shared = _shared(columns, held, width / max(_usual_spacing(columns), 1e-9))
     return radius, _with_shared(rough, sigma, shared), count, misalignment
 
 

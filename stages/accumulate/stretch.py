@@ -13,7 +13,7 @@ from pipeline.artefacts.measured import PointCloud, RadiusMap, Wall
 from pipeline.artefacts.wall_map import FixedToProbe
 from pipeline.geometry.axis import PipeAxis
 from pipeline.machine.scratch import Scratch
-from stages.accumulate.grid import WIDTH_IN_RINGS, MapGrid, gridded, rings_on_columns
+from stages.accumulate.grid import WIDTH_IN_RINGS, MapGrid, gridded, kernel_mm, rings_on_columns
 from stages.accumulate.survey import RingsOnWall, RingSurvey, WallSamples, centred, some_at_a_time
 
 # Rows of a stretch, to limit memory.
@@ -74,10 +74,14 @@ def map_of(
     part = grid.rows(stretch.from_row, stretch.to_row)
     samples = (s for _, s in _centred_samples(rings, survey, stretch.near))
     columns = rings_on_columns(samples, len(stretch.near), part)
-    radius, random, count, misalignment = gridded(columns, part, smoothing_mm, gap_mm, held)
+    width = kernel_mm(columns, smoothing_mm)
+    radius, random, count, misalignment = gridded(columns, part, width, gap_mm, held)
     total = np.hypot(random, systematic_mm).astype(np.float32)
     total[~np.isfinite(radius)] = np.nan
-    return RadiusMap(part.distance_mm, part.azimuth_rad, radius, total, random, count, misalignment)
+    return RadiusMap(
+        part.distance_mm, part.azimuth_rad, radius, total, random, count, misalignment,
+        kernel_mm=np.full(len(radius), width),
+    )  # fmt: skip
 
 
 def empty_wall(
@@ -88,7 +92,10 @@ def empty_wall(
     single = np.float32
     radius, sigma, random, misalignment = (scratch.zeros(shape, single) for _ in range(4))
     counts = scratch.zeros(shape, np.int64)
-    radius_map = RadiusMap(grid.distance_mm, grid.azimuth_rad, radius, sigma, random, counts, misalignment)
+    radius_map = RadiusMap(
+        grid.distance_mm, grid.azimuth_rad, radius, sigma, random, counts, misalignment,
+        kernel_mm=np.zeros(len(radius)),
+    )  # fmt: skip
     xyz, normal = (scratch.zeros((points, 3), single) for _ in range(2))
     own_sigma, own_radius, distance, azimuth = (scratch.zeros((points,), single) for _ in range(4))
     frame = scratch.zeros((points,), np.int64)
@@ -99,7 +106,7 @@ def empty_wall(
 def fill(wall: Wall, stretch: Stretch, radius_map: RadiusMap, rings: RingsOnWall, survey: RingSurvey) -> None:
     """Write a stretch's own rows and the points of its own rings."""
     mine = slice(stretch.first - stretch.from_row, stretch.last - stretch.from_row)
-    for name in ("radius_mm", "sigma_mm", "sigma_random_mm", "count", "misalignment_mm"):
+    for name in ("radius_mm", "sigma_mm", "sigma_random_mm", "count", "misalignment_mm", "kernel_mm"):
         getattr(wall.radius_map, name)[stretch.first : stretch.last] = getattr(radius_map, name)[mine]
     start = np.cumsum(survey.count) - survey.count
     for rows, samples in _centred_samples(rings, survey, stretch.own):

@@ -52,9 +52,8 @@ _DEEPEST_MM = 30.0
 # What is deeper than so much of its diameter is a hole, and no ring shows its bottom; larger defects than the
 # largest template's are not examined (both chosen).
 _STEEP, _LARGEST_MM = 0.4, 48.0
-# 1 σ of the kernel by which the map is interpolated along the pipe: in ring spacings, and at least, mm; as
-# the stage accumulate has it unless told otherwise.
-_KERNEL_RINGS, _KERNEL_MM = 0.4, 0.3
+# A narrower kernel, mm, leaves each row with its nearest ring.
+_NARROWEST_MM = 1e-3
 # Rows and rings this far off influence what the filters show of a defect: the reach of the largest template.
 _MARGIN_MM = 28.0
 # A row counts as measured if at least half of its circle was.
@@ -81,8 +80,8 @@ class _Along:
     at_mm : (S,)
     ring_mm : (R,)
         Where rings lie, in order.
-    spacing_mm : float
-        Median distance of rings, of which the map has the width of its kernel.
+    kernel_mm : (S,)
+        1 σ of the kernel by which rings were smoothed along the pipe.
     ways_mm : (S, 2)
         Way to the nearest ring, and to the one with which there are enough, to the farthest sample needed.
     noise : (S,)
@@ -93,7 +92,7 @@ class _Along:
 
     at_mm: Float
     ring_mm: Float
-    spacing_mm: float
+    kernel_mm: Float
     ways_mm: Float
     noise: Float
     measured: Float
@@ -158,7 +157,8 @@ def _along(wall: MeasuredWall, photo: WallTexture, needed: int) -> _Along | None
     ways = np.hypot(KDTree(ring_mm[:, None]).query(s[within, None], k=[1, needed])[0], around)
     noise = np.nan_to_num(sigma[within] / wall.relief.typical.sigma_mm, nan=1.0)
     shown = _photo_share(photo, s[within])
-    return _Along(s[within], ring_mm, wall.spacing_mm, ways, noise, measured[within], shown)
+    kernel = np.maximum(wall.relief.radius_map.kernel_in(within), _NARROWEST_MM)
+    return _Along(s[within], ring_mm, kernel, ways, noise, measured[within], shown)
 
 
 def _pitch_mm(wall: MeasuredWall, measured: float, rings: int) -> float:
@@ -238,12 +238,12 @@ def _responses(along: _Along, rows: slice, width: float, detection: Detection) -
     Both (n,) are for a defect in the middle of each of some rows.
     """
     at = along.at_mm[rows]
-    s = along.at_mm[(np.abs(along.at_mm - at.mean()) < _far(at)) & (along.measured >= _MEASURED)]
+    near = (np.abs(along.at_mm - at.mean()) < _far(at)) & (along.measured >= _MEASURED)
+    s, kernel = along.at_mm[near], along.kernel_mm[near]
     rings = along.ring_mm[np.abs(along.ring_mm - at.mean()) < _far(at) + _PIECE_MM]
-    kernel = max(_KERNEL_MM, _KERNEL_RINGS * along.spacing_mm)
     # The nearest ring always has weight, however far it is.
     off2 = (s[:, None] - rings) ** 2
-    weight = np.exp(-0.5 * (off2 - off2.min(1, keepdims=True)) / kernel**2)
+    weight = np.exp(-0.5 * (off2 - off2.min(1, keepdims=True)) / kernel[:, None] ** 2)
     mapped = weight / weight.sum(1, keepdims=True) @ np.exp(-0.5 * ((rings[:, None] - at) / width) ** 2)
     filters = detection.filters[: len(ROUND_MM)]
     scores = [_score(s, mapped, width, t) / f.height_sigma_mm for t, f in zip(ROUND_MM, filters, strict=True)]

@@ -72,6 +72,17 @@ def test_the_wall_is_reconstructed_within_sigma(shape) -> None:
     assert np.median(sigma) < 0.04
 
 
+@pytest.mark.parametrize("smoothing_mm", [0.3, 1.5, 4.0])
+def test_the_map_states_the_kernel_that_flattens_what_is_short(smoothing_mm: float) -> None:
+    """The limit of detection took the kernel for the default one, and was too low where it was wider."""
+    at, _, depth, width = PIT
+    ridge = lambda s, psi: RADIUS + depth * np.exp(-0.5 * ((s - at) / width) ** 2) + 0 * psi  # noqa: E731
+    got = accumulated(drawn_rings(ridge, 0.005), smoothing_mm=smoothing_mm).radius_map
+    top = float(np.median(got.radius_mm[got.row(at)])) - RADIUS
+    (kernel,) = np.unique(got.kernel_in())
+    assert top == pytest.approx(depth * width / np.hypot(width, kernel), rel=0.05)
+
+
 def test_sigma_equals_the_noise() -> None:
     got = accumulated(drawn_rings()).radius_map
     error = (got.radius_mm - RADIUS)[4:-4]

@@ -5,11 +5,13 @@ from dataclasses import fields, replace
 
 import numpy as np
 import pytest
+from scipy.ndimage import gaussian_filter1d
 
 from pipeline.adjustment.shared_light import HeldOver
 from pipeline.artefacts.findings import Defects, Detectable
 from pipeline.export.report.detectable import limits
 from pipeline.export.tables import write_defects
+from stages.accumulate.grid import WIDTH_IN_RINGS
 from stages.defects import DefectParameters, find_defects
 from stages.defects.limits import LEAST_SIZE_MM, rings_needed, widest_spacing_mm
 from stages.defects.report import report_limits, warn_of_sparse
@@ -20,14 +22,17 @@ AZIMUTH = -np.pi + np.arange(360) * np.pi / 180
 RADIUS, SIGMA, LENGTH_MM, STEP_MM = 38.0, 0.03, 62.0, 0.5
 
 
-def wall_with(ring_mm, relief=None, seed=1, length_mm=LENGTH_MM):
-    """Return a wall with rings only at some distances, interpolated between them as a map is."""
+def wall_with(ring_mm, relief=None, seed=1, length_mm=LENGTH_MM, kernel_mm=0.0):
+    """Return a wall with rings only at some distances, interpolated between them as a map is, smoothed."""
     s = np.arange(0.0, length_mm, STEP_MM)
     noise = smooth_noise(np.random.default_rng(seed), (len(ring_mm), len(AZIMUTH)), SIGMA, 1.0)
     shown = RADIUS + noise + (0.0 if relief is None else relief(ring_mm))
     radius = np.stack([np.interp(s, ring_mm, column) for column in shown.T], -1)
+    radius = gaussian_filter1d(radius, kernel_mm / STEP_MM, axis=0) if kernel_mm else radius
     wall, rings = wall_of(s, AZIMUTH, radius, SIGMA), wall_of(ring_mm, AZIMUTH, shown, SIGMA).cloud
-    return replace(wall, cloud=rings)
+    stated = np.full(len(s), max(kernel_mm, WIDTH_IN_RINGS * np.diff(ring_mm).min()))
+    radius_map = replace(wall.radius_map, kernel_mm=stated)
+    return replace(wall, cloud=rings, radius_map=radius_map)
 
 
 def search(wall, warned=None):
@@ -50,10 +55,10 @@ def bumps(size_mm, depth_mm, random, offset_mm):
     return places, relief
 
 
-def share_found(size_mm, depth_mm, spacing_mm):
-    """Return which share of 12 bumps is found where rings are so far apart."""
+def share_found(size_mm, depth_mm, spacing_mm, kernel_mm=0.0):
+    """Return which share of 12 bumps is found where rings are so far apart, and so smoothed."""
     places, relief = bumps(size_mm, depth_mm, np.random.default_rng(3), spacing_mm)
-    told = search(wall_with(np.arange(0.0, LENGTH_MM, spacing_mm), relief)).items
+    told = search(wall_with(np.arange(0.0, LENGTH_MM, spacing_mm), relief, kernel_mm=kernel_mm)).items
     near = lambda d, z, hours: abs(d.peak_distance_mm - z) < 4 and abs(d.peak_clock - hours) < 0.5  # noqa: E731
     hours = [(z, (np.degrees(a) / 30 + 3) % 12) for z, a in places]
     return np.mean([any(near(d, z, h) for d in told) for z, h in hours])
@@ -66,6 +71,13 @@ def test_what_lies_at_the_limit_is_found_and_what_is_half_as_large_or_deep_is_no
     assert share_found(limit.size_mm, 0.5 * limit.depth_mm, spacing_mm) < 0.4
     if limit.size_mm > LEAST_SIZE_MM:
         assert share_found(0.5 * limit.size_mm, limit.depth_mm, spacing_mm) < 0.4
+
+
+def test_what_lies_at_the_limit_of_a_wall_that_was_smoothed_more_is_found() -> None:
+    """The kernel was taken for the default one whatever `smoothing_mm` was: none of 12 was found."""
+    (limit,) = search(wall_with(np.arange(0.0, LENGTH_MM, 1.0), kernel_mm=4.0)).detectable
+    assert share_found(limit.size_mm, limit.depth_mm, 1.0, 4.0) >= 0.8
+    assert share_found(limit.size_mm, 0.5 * limit.depth_mm, 1.0, 4.0) < 0.4
 
 
 def test_where_rings_are_farther_apart_the_smallest_defect_is_larger_and_a_warning_says_where() -> None:
