@@ -155,7 +155,7 @@ def _found_in(
             continue
         kept = measurer.without_contradicted(region, every_point, whole)
         if region.sign * kept.allowed.depth_mm >= scene.min_depth_mm:
-            top = float(region.cut(score.astype(float))[region.mask].max())
+            top = kept.best(region.cut(score.astype(float)))
             seen_by, fixed_mm = scene.seen_by, _fixed_in(region, fixed)
             evidence = evidence_for(kept.here, kept.allowed, kept.surface, seen_by, fixed_mm, top)
             return _described(region, measurer, scene, (whole, kept), evidence)

@@ -27,6 +27,7 @@ from scipy.special import ndtr
 
 from pipeline.artefacts.findings import Defect
 from stages.defects.corroborate import LEAST_RINGS, MANY_RINGS, Evidence
+from stages.defects.depth import KNOWN
 from stages.defects.noise_tail import NoiseTail
 
 # The scores of real findings are taken to be log-uniform over this factor.
@@ -49,8 +50,6 @@ COUNTED = 0.5
 # Largest stated probability, as counted: of 319 painted findings with .95 and more, .975 were real [.951,
 # .989] (`python -m tests.benchmarks.bench_painted_findings`).
 MOST_SURE = 0.98
-# A depth is significant from 1.96 σ on: zero is then outside its 95 % interval.
-_KNOWN = 1.96
 
 
 @dataclass(frozen=True)
@@ -145,7 +144,7 @@ def chance_of_depth(defect: Defect, min_depth_mm: float) -> float:
 
 def is_depth_known(defect: Defect) -> bool:
     """Return whether zero is outside the 95 % interval of a depth."""
-    return abs(defect.depth_mm) >= _KNOWN * defect.depth_sigma_mm
+    return abs(defect.depth_mm) >= KNOWN * defect.depth_sigma_mm
 
 
 def credibility_of(

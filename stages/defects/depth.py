@@ -33,6 +33,8 @@ SHARPENING = 0.3  # 1 σ of a correction for a peak's curvature, relative to the
 # 88 defects painted into two open recordings were in their 95 % interval, with it 92 and 91 % of 82 (`python
 # -m tests.benchmarks.bench_painted_findings`).
 _TOP_SHAPE = 0.04
+# A depth is significant from 1.96 σ on: zero is then outside its 95 % interval.
+KNOWN = 1.96
 _MARGIN_MM = 2.5
 _LEAST = 24
 _SHAPE_PRIOR_MM = 0.35  # 0.07 mm, the noise of independent samples, over 0.2, the prior 1 σ of ln p
@@ -51,6 +53,11 @@ class Depth:
     sigma_mm: float
     bias_mm: float
     peak: tuple[int, int]
+
+    @property
+    def is_known(self) -> bool:
+        """Whether zero is outside its 95 % interval."""
+        return abs(self.depth_mm) >= KNOWN * self.sigma_mm
 
     def as_written(self) -> Depth:
         """Return the depth rounded as in defects.json, so that report and table agree in their last digit."""

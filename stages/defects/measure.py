@@ -7,13 +7,14 @@ from functools import cached_property
 
 import numpy as np
 
+from pipeline.arrays import Bool, Float
 from stages.defects.all_round import bore_beside, goes_round, measure_all_round
 from stages.defects.clean import CleanWall
 from stages.defects.depth import Depth, is_small, measure_depth
-from stages.defects.neighbours import RingsAtPeak, rings_at_peak
+from stages.defects.neighbours import MEAN_MM, RingsAtPeak, rings_at_peak
 from stages.defects.parameters import DefectParameters
 from stages.defects.segment import Region
-from stages.defects.surface import MeasuredWall, Surface
+from stages.defects.surface import MeasuredWall, Surface, cells_of
 
 # At most so many rings with a glint on them are left out when a region is measured (chosen).
 _MOST_LEFT_OUT = 4
@@ -45,6 +46,19 @@ class Measured:
             return None
         return self.rings.contradicted_frame(self.depth)
 
+    def best(self, score: Float) -> float:
+        """Return the largest ``score`` (H, W) of the region's window, away from rings that were left out."""
+        away = self.here.mask & ~self._marred()[:, None]
+        return float(score[away if away.any() else self.here.mask].max())
+
+    def _marred(self) -> Bool:
+        """Return which rows (H,) of the region are within 1 mm of a ring that was left out."""
+        near, relief = self.surface.near, self.surface.relief
+        row, _, inside = cells_of(near, relief, self.here)
+        at = row[inside & np.isin(near.frame, self.surface.left_out)] - self.here.row
+        rows = np.arange(len(self.here.mask))[:, None]
+        return np.asarray((np.abs(rows - at) * relief.cell_mm[0] <= MEAN_MM).any(1))
+
     @cached_property
     def allowed(self) -> Depth:
         """The depth that the rings beside the deepest one allow; what goes all round needs no such limit."""
@@ -73,11 +87,15 @@ class Measurer:
         return Measured(here, surface, self._depth(region, here, surface))
 
     def without_contradicted(self, region: Region, every_point: bool, whole: Measured) -> Measured:
-        """Return a region measured without the rings that their neighbours contradict, removed one by one."""
+        """Return a region measured without the rings that their neighbours contradict, removed one by one.
+
+        Only where the region has a depth without them: rings on both sides show it there, or it is known
+        elsewhere, as that of corrosion with a glint at its end. What one ring alone shows keeps its depth.
+        """
         kept = whole
         while (frame := kept.contradicted_frame) is not None:
             left = self.measured(region, every_point, (*kept.surface.left_out, frame))
-            if left is None:
+            if left is None or not (kept.rings.shown_beside or left.allowed.is_known):
                 break
             kept = left
         return kept

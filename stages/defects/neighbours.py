@@ -25,7 +25,7 @@ from stages.defects.surface import Surface, cells_of, chosen, of_usual_sigma
 _BESIDE, _TOP_QUANTILE, _LEAST_OF_RING = 1.6, 0.8, 3
 _SHOWN_SIGMAS = 2.0  # of the wall's own unevenness, as for the evidence that confirms a finding
 # A depth is a mean over 1 mm: that much of a ring, around a finding's peak, is compared with it.
-_MEAN_MM = 1.0
+MEAN_MM = 1.0
 # If both neighbours of a ring miss a round pit, the pit is narrower than two ring spacings.
 _NARROW, _HALF = 2.0, 0.5
 
@@ -38,7 +38,7 @@ def frames_at_peak(depth: Depth, region: Region, surface: Surface) -> Int:
     single rings for it.
     """
     width = region.mask.any(0).sum() * surface.relief.cell_mm[1]
-    if (1 - _TOP_QUANTILE) * width <= _MEAN_MM:
+    if (1 - _TOP_QUANTILE) * width <= MEAN_MM:
         return np.zeros(0, np.int64)
     sure = replace(surface, near=chosen(surface.near, of_usual_sigma(surface.near)))
     rings = rings_at_peak(depth, region, sure)
@@ -96,16 +96,17 @@ class RingsAtPeak:
         return replace(depth, depth_mm=float(np.sign(depth.depth_mm)) * self.allowed_mm, sigma_mm=sigma)
 
     def contradicted_frame(self, depth: Depth) -> int | None:
-        """Return the frame whose ring alone shows more depth than its neighbours allow; None if none does.
-
-        Only where rings on both sides show the finding, too, so that it has a depth without that frame.
-        """
+        """Return the frame whose ring alone shows more depth than its neighbours allow; None if none does."""
         if not len(self.frame) or abs(depth.depth_mm) <= self.allowed_mm:
             return None
+        return int(self.frame[self.deepest])
+
+    @property
+    def shown_beside(self) -> bool:
+        """Whether rings on both sides of the deepest one show the finding, too."""
         shown = self.top_mm[self.beside] >= _SHOWN_SIGMAS * self.noise_mm
         side = np.sign(self.at_mm[self.beside] - self.at_mm[self.deepest])
-        both = bool((side < 0).any() and (side > 0).any())
-        return int(self.frame[self.deepest]) if both and shown.all() else None
+        return bool((side < 0).any() and (side > 0).any() and shown.all())
 
     @property
     def may_be_a_pit(self) -> bool:
@@ -171,13 +172,13 @@ class _Samples:
     @property
     def about(self) -> Bool:
         """Which samples are near the peak; a finding may lie askew by up to 45° to the pipe's axis."""
-        return np.abs(self.around_mm) <= _MEAN_MM + np.abs(self.along_mm)
+        return np.abs(self.around_mm) <= MEAN_MM + np.abs(self.along_mm)
 
     def summary(self, spacing_mm: float) -> tuple[float, ...]:
         """Return at, top, foot, peak and width of `RingsAtPeak` for samples that are all of one ring, mm."""
         about = np.sort(self.out_mm[self.about])
         pitch = float(np.ptp(self.around_mm[self.about])) / (len(about) - 1)
-        peak = float(about[-max(round(_MEAN_MM / max(pitch, 1e-9)), 1) :].mean())
+        peak = float(about[-max(round(MEAN_MM / max(pitch, 1e-9)), 1) :].mean())
         own = self.out_mm[self.inside] if self.inside.sum() >= _LEAST_OF_RING else about
         foot = float(np.median(own))
         high = (self.out_mm > (peak + foot) / 2) & (np.abs(self.around_mm) <= _NARROW * spacing_mm)

@@ -59,6 +59,15 @@ def test_the_range_of_a_pit_on_one_ring_includes_its_depth(step_mm, wide_mm, pit
     assert abs(finding.depth_mm - true) < 1.96 * finding.depth_sigma_mm
 
 
+@pytest.mark.parametrize("end_mm", [15.0, 16.0])
+def test_a_glint_on_one_ring_at_the_end_of_corrosion_leaves_it_its_depth(end_mm):
+    """No ring beyond the glint shows the corrosion: it was 1.13 ± .76 mm, and often unconfirmed."""
+    finding, _ = patch_with_pit(1.0, 0.5, 2.0, 1.8, 5, (end_mm, 0.0))
+    assert finding.peak_distance_mm < MIDDLE + 12
+    assert abs(finding.depth_mm - 0.5) < 0.1
+    assert "single rings show up to" in finding.statement
+
+
 def test_single_rings_beside_the_peak_of_a_narrow_finding_do_not_confirm_it():
     """Glints 0.9 mm wide were confirmed by rings whose noise reached half as much within 1 mm."""
     cells = SimpleNamespace(relief=SimpleNamespace(cell_mm=(0.5, 0.45)))
