@@ -4,55 +4,18 @@ from dataclasses import fields, replace
 
 import numpy as np
 import pytest
-from scipy.ndimage import maximum_filter
 
-from pipeline.adjustment.shared_light import NOTHING_HELD, HeldOver
+from pipeline.adjustment.shared_light import HeldOver
 from pipeline.artefacts.cloud_along import cloud_along
 from pipeline.artefacts.measured import RingSamples, RingValidity
 from stages.defects import DefectParameters, find_defects
-from stages.defects.corroborate import Evidence, photo_stands_out
-from stages.defects.credibility import chance_of_depth, credibility_of, is_depth_known
-from stages.defects.detect import detect
-from stages.defects.noise_tail import Law, NoiseTail, noise_tail
-from stages.defects.noise_tail import tail_of as tail_of_peaks
+from stages.defects.credibility import is_depth_known
 from stages.defects.relief import smooth_shape_removed
 from stages.defects.segment import Region
 from stages.defects.surface import MeasuredWall
 from tests.quiet import quiet_context
 from tests.synthetic_wall import bare_recording, grey_texture, smooth_noise, wall_of
-
-DISTANCE, RADIUS, SIGMA = np.arange(0, 60, 1.0), 38.0, 0.02
-AZIMUTH = -np.pi + np.arange(360) * np.pi / 180
-PLACE = slice(100, 112)
-
-
-def found(
-    rings,
-    depth_mm=-1.0,
-    photo=False,
-    unsure=False,
-    held=NOTHING_HELD,
-    noise_mm=SIGMA,
-    warned=None,
-    displaced_mm=0.0,
-):
-    """Return the findings where so many rings (rows of the map) depart from the wall by ``depth_mm``."""
-    random = np.random.default_rng(5)
-    radius = RADIUS + smooth_noise(random, (len(DISTANCE), len(AZIMUTH)), noise_mm, 1.0)
-    radius[30 : 30 + rings, PLACE] += depth_mm
-    wall = wall_of(DISTANCE, AZIMUTH, radius, noise_mm)
-    radius_map = replace(wall.radius_map, displaced_mm=np.full(len(DISTANCE), displaced_mm))
-    wall = replace(wall, held=held, radius_map=radius_map)
-    if unsure:
-        sigma = wall.cloud.sigma_mm.reshape(radius.shape).copy()
-        sigma[30 : 30 + rings, PLACE] *= 10
-        wall = replace(wall, cloud=replace(wall.cloud, sigma_mm=sigma.ravel()))
-    texture = grey_texture(wall)
-    texture.bgra[..., :3] += random.integers(0, 8, (*radius.shape, 1), np.uint8)
-    if photo:
-        texture.bgra[30 : 30 + rings, PLACE, :3] = 60
-    context = quiet_context() if warned is None else replace(quiet_context(), warn=warned.append)
-    return find_defects(bare_recording(2 * RADIUS, None), wall, texture, DefectParameters(), context)
+from tests.unit.dented_rows import AZIMUTH, DISTANCE, PLACE, RADIUS, SIGMA, found
 
 
 @pytest.mark.parametrize("depth_mm", [-1.0, 1.0])
@@ -216,103 +179,6 @@ def test_findings_on_a_bright_line_are_doubted_if_there_are_more_than_by_chance(
     doubted = bright if bright > 1 else 0
     assert (len(told.items), len(told.unconfirmed)) == (len(SPOTS) - doubted, doubted)
     assert all("brighter" in d.statement for d in told.unconfirmed)
-
-
-def tail_of(radius):
-    """Return the tail of the distribution of a wall's noise, and its score."""
-    wall = wall_of(DISTANCE, AZIMUTH, RADIUS + radius, SIGMA)
-    relief = smooth_shape_removed(wall.radius_map, DefectParameters())
-    context = quiet_context()
-    seeds = detect(relief, 0.05, context.scratch, context.progress)
-    return noise_tail(relief, seeds, np.zeros(radius.shape, bool)), seeds.score
-
-
-@pytest.mark.parametrize("heavy", [False, True])
-def test_the_tail_of_the_noise_predicts_the_number_of_high_peaks(heavy):
-    """The prediction is within a factor of two of the count, whose own error is its square root."""
-    random, told, counted = np.random.default_rng(4), 0.0, 0
-    for _ in range(12):
-        noise = smooth_noise(random, (len(DISTANCE), len(AZIMUTH)), SIGMA, 1.0)
-        if heavy:
-            noise *= np.exp(0.6 * smooth_noise(random, noise.shape, 1.0, 6.0))
-        tail, score = tail_of(noise)
-        told += tail.above(4.3)
-        top = score == maximum_filter(score, 9, mode="wrap")
-        counted += int((top & (score > 4.3)).sum())
-    assert counted > 3
-    chance = 2 * np.sqrt(counted)
-    assert (counted - chance) / 2 < told < 2 * (counted + chance)
-
-
-@pytest.mark.parametrize(("power", "scale"), [(2, 1.0), (2, 3.0), (1, 0.6)])
-def test_the_tail_is_estimated_from_peaks_below_the_threshold(power, scale):
-    """Peaks above it become findings: a tail counted from the remaining ones gave a quarter of such peaks."""
-    excess = scale * np.random.default_rng(7).exponential(size=4000)
-    peaks = (power * excess + NoiseTail.FROM**power) ** (1 / power)
-    told, counted = tail_of_peaks(peaks[peaks < 4.8], 4.8).above(5.2), np.sum(peaks > 5.2)
-    assert counted / 2 < told + 1 < 2 * (counted + 1)
-
-
-def evidence(rings, score=30.0, bright=False):
-    return Evidence(rings, False, score, bright=bright)
-
-
-def probability(of, among, tail=None, widths=None):
-    """Return the probability of a finding among others."""
-    told = found(2).items[0]
-    tail, widths = tail or NoiseTail(20.0, (Law(2, 1.2),)), widths or [0.03] * len(among)
-    here = credibility_of(among, widths, 50, tail)
-    return here.chance_against_clutter(of) * chance_of_depth(told, 0.2)
-
-
-def test_two_rings_among_many_unconfirmed_ones_are_probably_false_and_many_rings_stay_sure():
-    quiet, hard = [evidence(8)] * 4 + [evidence(2)], [evidence(8)] * 4 + [evidence(2)] + [evidence(1)] * 300
-    assert probability(evidence(2), quiet) > 0.9 > 0.5 > probability(evidence(2), hard, widths=[0.3] * 305)
-    assert probability(evidence(8), hard, widths=[0.3] * 305) > 0.9
-
-
-def test_a_finding_no_higher_than_the_noise_of_its_recording_is_doubted():
-    several = [evidence(5)] * 4
-    heavy = NoiseTail(200.0, (Law(2, 6.0),))
-    assert probability(evidence(5, 5.6), several) > 0.9 > 0.3 > probability(evidence(5, 5.6), several, heavy)
-    assert probability(evidence(5, 30.0), several, heavy) > 0.95
-
-
-def test_the_photo_raises_the_probability_of_a_finding_or_lowers_it_a_little():
-    several, heavy = [evidence(5)] * 4, NoiseTail(200.0, (Law(2, 2.4),))
-
-    def told(score, photo):
-        return probability(replace(evidence(5, score), photo=photo), several, heavy)
-
-    unknown, doubted, borne_out = (told(6.8, photo) for photo in (None, False, True))
-    assert doubted < unknown - 0.1 < unknown + 0.2 < borne_out
-    # A dent on plain wall leaves no trace in the photo: one that stands out of the noise stays sure.
-    assert told(9.0, False) > 0.97
-
-
-def test_a_photo_that_stands_out_at_many_glints_confirms_nothing():
-    """At seven of 15 glints, photos with streaks stood out: a false pit of 1.59 ± .68 mm had .93."""
-    alone = [evidence(1)] * 8
-    streaked = [replace(e, photo=k % 2 == 0) for k, e in enumerate(alone)]
-    pit = replace(evidence(1), photo=True)
-    among = [evidence(5)] * 2 + [pit]
-    assert probability(pit, [*among, *alone]) > 0.6 > 0.4 > probability(pit, [*among, *streaked])
-
-
-def test_a_finding_and_the_few_that_may_be_real_do_not_count_against_their_photo():
-    pit, two = replace(evidence(1), photo=True), [evidence(2)] * 3
-    assert probability(pit, [*two, pit]) > 0.95
-    assert probability(pit, [*two, pit, pit, pit]) > 0.95
-
-
-def test_an_unknown_photo_changes_no_probability():
-    wall = wall_of(DISTANCE, AZIMUTH, np.full((len(DISTANCE), len(AZIMUTH)), RADIUS), SIGMA)
-    relief = smooth_shape_removed(wall.radius_map, DefectParameters()).rows(slice(0, len(DISTANCE)))
-    place, unseen = Region(30, 100, np.ones((4, 12), bool), 1.0), grey_texture(wall)
-    unseen.bgra[..., 3] = 0
-    assert photo_stands_out(grey_texture(wall), relief, place) is False
-    assert photo_stands_out(unseen, relief, place) is None
-    assert photo_stands_out(grey_texture(wall), relief, replace(place, all_round=True)) is None
 
 
 def test_the_depth_on_one_ring_is_limited_by_its_neighbours():

@@ -6,11 +6,8 @@ import numpy as np
 import pytest
 
 from pipeline.errors import InputError
-from pipeline.instrument.camera.fisheye import KannalaBrandt
-from pipeline.instrument.laser import LaserSheet
-from pipeline.instrument.probe import Probe
 from pipeline.physics.catalogue import EFFECTS
-from pipeline.physics.effect import CourseKind, FixedTo
+from pipeline.physics.effect import FixedTo
 from stages.diagnose.effects.base import Travel
 from stages.diagnose.effects.library import (
     LIBRARY,
@@ -22,9 +19,10 @@ from stages.diagnose.effects.library import (
     texture_shift_px,
     without,
 )
-from stages.diagnose.effects.nameless import STEADY, GenericTerm, Moves, PatternInCourse
+from stages.diagnose.effects.nameless import STEADY, GenericTerm, Moves
 from stages.diagnose.effects.vocabulary import GENERIC, VOCABULARY
-from tests.unit.wall_points import Bore, plain_probe, ring_points, texture_points
+from tests.unit.effect_points import BORE, known_probe, line, texture
+from tests.unit.wall_points import Bore, plain_probe, ring_points
 
 # What an effect on positions or readings must not change.
 LEAVES_TEXTURE = {
@@ -32,24 +30,6 @@ LEAVES_TEXTURE = {
     "baseline_drift", "pixel_locking", "albedo_bias", "subsurface", "line_skew", "vignetting",
 }  # fmt: skip
 READINGS = {"encoder_scale", "encoder_slip", "encoder_backlash", "time_offset", "motion_blur"}
-BORE = Bore(42.0, (4.0, -7.0, 0.0), (0.03, -0.02, 1.0))
-
-
-def known_probe():
-    camera = KannalaBrandt((1600, 1200), (366.1, 366.1), (800.0, 600.0), (-0.0118, 0.0008, -0.0008, 0.0))
-    laser = LaserSheet(23.4, 3e-4, -2e-4, cone_rad=-2e-4)
-    return Probe(camera, laser, np.zeros((20, 20)))
-
-
-def line(count=72):
-    points = ring_points(known_probe(), BORE, count)
-    slope = 0.2 * np.sin(3 * points.azimuth_rad)
-    return replace(points, albedo_slope_per_mm=slope, distance_mm=np.full(count, 20.0))
-
-
-def texture():
-    points = texture_points(known_probe(), BORE)
-    return replace(points, distance_mm=np.full(len(points.uv), 37.0))
 
 
 def travel():
@@ -272,60 +252,3 @@ def test_vignetting_moves_the_line_inward_in_proportion_to_its_variance():
     sigma_px = 0.15 * 50.8 / (22.0**2 + 50.8**2) * 360.0
     shift = LIBRARY["vignetting"].line_shift_px(points, (), np.array([2.0]))
     assert shift == pytest.approx(-2.0 * sigma_px**2 * (50.8 / 22.0) / 360.0, rel=1e-6)
-
-
-def generic_columns(points, wanted, of_line):
-    """Return columns of the generic terms of the line or of the image, constant and linear in time."""
-    terms = [term for term in GENERIC if (term.moves is Moves.LINE) is of_line]
-    growing = [(PatternInCourse(term, CourseKind.RAMP), (10.0,)) for term in terms]
-    each = [*((term, STEADY) for term in terms), *growing]
-    return np.concatenate([wanted(model, points, shape) for model, shape in each], axis=-1)
-
-
-def test_generic_terms_can_mimic_a_tilted_sheet_but_not_everything():
-    rings = [
-        ring_points(plain_probe(), Bore(r), 90, time_s=t) for r, t in ((35.0, 1.0), (42.0, 4.0), (50.8, 9.0))
-    ]
-    basis = np.concatenate([generic_columns(ring, columns, of_line=True) for ring in rings])
-
-    def left(model, shape=()):
-        column = np.concatenate([columns(model, ring, shape) for ring in rings])[:, 0]
-        fitted = basis @ np.linalg.lstsq(basis, column, rcond=1e-12)[0]
-        return np.linalg.norm(column - fitted) / np.linalg.norm(column)
-
-    assert basis.shape == (270, 72)
-    assert left(LIBRARY["laser_tilt"]) < 1e-6
-    assert left(LIBRARY["sheet_waviness"], (6.0,)) > 0.5
-
-
-@pytest.mark.parametrize("name", ["principal_point", "focal_scale", "radial_distortion", "sensor_tilt"])
-def test_generic_terms_can_mimic_a_wrong_lens_on_texture(name):
-    walls = [texture_points(plain_probe(), Bore(42.0), ahead) for ahead in (10.0, 25.0, 45.0, 80.0)]
-    basis = np.concatenate([generic_columns(wall, texture_columns, of_line=False) for wall in walls]).reshape(
-        -1, 144
-    )
-    column = np.concatenate([texture_columns(LIBRARY[name], wall, ()) for wall in walls])[..., 0].ravel()
-    fitted = basis @ np.linalg.lstsq(basis, column, rcond=1e-12)[0]
-    assert np.linalg.norm(column - fitted) < 1e-6 * np.linalg.norm(column)
-
-
-def test_generic_terms_move_either_the_line_or_the_whole_image():
-    points, wall = line(), texture()
-    for term in GENERIC:
-        size = np.full(len(term.amplitudes), 0.1)
-        assert ring_shift_px(term, points, (0.0,), size).any() or term.moves is Moves.AROUND
-        assert bool(texture_shift_px(term, wall, (0.0,), size).any()) == (term.moves is not Moves.LINE)
-
-
-@pytest.mark.parametrize(
-    ("moves", "exponent", "formula"),
-    [
-        (Moves.LINE, 0, "δr = a cos 2(ψ − ψ₀)"),
-        (Moves.LINE, 1, "δr = a (r/50)^1 cos 2(ψ − ψ₀)"),
-        (Moves.OUTWARD, 0, "image outward: a cos 2(ψ − ψ₀)"),
-        (Moves.OUTWARD, 3, "image outward: a θ^3 cos 2(ψ − ψ₀)"),
-    ],
-)
-def test_a_formula_has_no_power_of_nought(moves: Moves, exponent: int, formula: str) -> None:
-    (term,) = (g for g in GENERIC if (g.moves, g.harmonic, g.exponent) == (moves, 2, exponent))
-    assert term.formula(STEADY) == formula

@@ -8,148 +8,17 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
-from pipeline.adjustment.bordered import BorderedSystem, Factor, landmark_steps
 from pipeline.adjustment.elimination import BLOCK
-from pipeline.adjustment.levenberg_marquardt import Damping
 from pipeline.adjustment.motion_priors import trembling
-from pipeline.adjustment.normal_equations import BandedCholesky
-from pipeline.adjustment.robust import Cauchy, GemanMcClure, Loss, Squares
-from pipeline.adjustment.rows import LandmarkRows, Rows, Step
-from pipeline.arrays import Float, Int
+from pipeline.adjustment.rows import Step
+from pipeline.arrays import Float
 from pipeline.geometry.rigid import from_parts, rotation_from_vector, vector_from_rotation
 from stages.motion.bundle_adjustment.equations import Equations, Measurements, Scales, linearised, scales_of
 from stages.motion.bundle_adjustment.solver import adjust, ends_in_line, estimate_state, trembles
 from stages.motion.bundle_adjustment.unknowns import State
 from stages.motion.parameters import MotionParameters
 from tests.motion_scene import SHAKE, displaced, scene
-
-FRAMES, BORDER, OWN = 9, 6, 3
-
-
-def random_rows(random: np.random.Generator, count: int = 90, reach: int = 3) -> Rows:
-    first = random.integers(0, FRAMES - reach, count)
-    frame = first[:, None] + np.array([0, 1, reach])
-    return Rows(
-        frame, random.standard_normal((count, 3, BLOCK)), random.standard_normal((count, BORDER)),
-        random.standard_normal(count), random.uniform(0.7, 1.4, count),
-    )  # fmt: skip
-
-
-def random_landmarks(random: np.random.Generator, count: int = 7, reach: int = 4) -> LandmarkRows:
-    first = random.integers(0, FRAMES - reach, count)
-    frame = np.concatenate([f + np.arange(reach) for f in first])
-    m = len(frame)
-    draw = random.standard_normal
-    return LandmarkRows(
-        reach * np.arange(count + 1), frame, draw((m, 2, 6)), draw((m, 2, 3)), draw((m, 2, OWN)),
-        draw((m, 2)), random.uniform(0.7, 1.4, m), draw((count, 3)), draw((count, BORDER)), draw(count),
-        random.uniform(0.7, 1.4, count),
-    )  # fmt: skip
-
-
-def dense(rows: Rows, marks: LandmarkRows) -> tuple[Float, Float, Float]:
-    """Return Jacobian, residual and weight of all equations; unknowns are frames, border, landmarks."""
-    count = len(marks.start) - 1
-    border_at, marks_at = BLOCK * FRAMES, BLOCK * FRAMES + BORDER
-    size = marks_at + 3 * count
-    j, r, w = [], [], []
-    for k in range(len(rows.residual)):
-        line = np.zeros(size)
-        for p, f in enumerate(rows.frame[k]):
-            line[BLOCK * f : BLOCK * f + BLOCK] += rows.by_frame[k, p]
-        line[border_at:marks_at] = rows.by_border[k]
-        j.append(line), r.append(rows.residual[k]), w.append(rows.weight[k])
-    for k in range(count):
-        mine = slice(marks_at + 3 * k, marks_at + 3 * k + 3)
-        line = np.zeros(size)
-        line[border_at:marks_at], line[mine] = marks.surface_by_border[k], marks.surface_by_point[k]
-        j.append(line), r.append(marks.surface_residual[k]), w.append(marks.surface_weight[k])
-        for m in range(marks.start[k], marks.start[k + 1]):
-            for i in range(2):
-                line, f = np.zeros(size), BLOCK * marks.frame[m]
-                line[f : f + 6], line[mine] = marks.by_pose[m, i], marks.by_point[m, i]
-                line[marks_at - OWN : marks_at] = marks.by_instrument[m, i]
-                j.append(line), r.append(marks.residual[m, i]), w.append(marks.weight[m])
-    return np.array(j), np.array(r), np.array(w)
-
-
-def frame_covariance(factor: Factor, frames: Int) -> Float:
-    """Return (len(frames), 7, 7) marginal covariances."""
-    each = np.arange(len(frames))
-    return np.asarray(factor.joint_covariance(frames)[each, :, each])
-
-
-@pytest.mark.parametrize("damping", [0.0, 0.3])
-@pytest.mark.parametrize("seed", range(3))
-def test_steps_and_covariances_agree_with_dense_normal_equations(seed: int, damping: float) -> None:
-    random = np.random.default_rng(seed)
-    rows, marks = random_rows(random), random_landmarks(random)
-    j, r, w = dense(rows, marks)
-    normal = (j * w[:, None]).T @ j
-    system = BorderedSystem(FRAMES, BORDER, 4)
-    system.add(rows)
-    inverse, right = system.add_landmarks(marks, damping)
-    factor = system.factor()
-    frames, border = factor.step()
-    points = landmark_steps(marks, inverse, right, frames, border)
-    got = np.concatenate([frames.ravel(), border, points.ravel()])
-    own = slice(BLOCK * FRAMES, BLOCK * FRAMES + BORDER)
-    last = np.arange(len(normal)) >= own.stop
-    damped = normal + damping * np.diag(np.diag(normal) * last)
-    np.testing.assert_allclose(got, np.linalg.solve(damped, -(j * w[:, None]).T @ r), rtol=1e-7, atol=1e-9)
-    covariance = np.linalg.inv(damped)
-    np.testing.assert_allclose(factor.border_covariance(), covariance[own, own], rtol=1e-7, atol=1e-10)
-    for f, block in zip((0, 4, 8), frame_covariance(factor, np.array([0, 4, 8])), strict=True):
-        at = slice(BLOCK * f, BLOCK * f + BLOCK)
-        np.testing.assert_allclose(block, covariance[at, at], rtol=1e-7, atol=1e-10)
-
-
-@pytest.mark.parametrize("sparse", [False, True], ids=["full", "every other frame sees its neighbours only"])
-@pytest.mark.parametrize(("frames", "lags"), [(1, 1), (2, 2), (23, 5), (40, 20), (40, 3), (9, 1), (70, 35)])
-def test_the_banded_factor_solves_banded_systems(frames: int, lags: int, sparse: bool) -> None:
-    random = np.random.default_rng(frames)
-    size = 3 * frames
-    a = random.standard_normal((size, size))
-    lag = np.abs(np.subtract.outer(np.arange(size) // 3, np.arange(size) // 3))
-    dark = np.arange(size) // 3 % 2 > 0
-    coupled = lag < np.where(sparse & (dark | dark[:, None]), min(lags, 3), lags)
-    full = np.where(coupled, a + a.T, 0) + 4 * size * np.eye(size)
-    band = np.zeros((frames, lags, 3, 3))
-    for f in range(frames):
-        for back in range(min(lags, f + 1)):
-            band[f, back] = full[3 * f : 3 * f + 3, 3 * (f - back) : 3 * (f - back) + 3]
-    right = random.standard_normal((size, 3))
-    np.testing.assert_allclose(
-        BandedCholesky.of_band(band).solve(right), np.linalg.solve(full, right), atol=1e-10
-    )
-
-
-def test_an_undetermined_system_is_refused() -> None:
-    system = BorderedSystem(FRAMES, BORDER, 4)
-    with pytest.raises(np.linalg.LinAlgError):
-        system.factor()
-
-
-@pytest.mark.parametrize("loss", [Squares(), Cauchy(2.5), GemanMcClure(0.7)])
-def test_weights_are_the_derivatives_of_the_costs(loss: Loss) -> None:
-    residual, sigma, h = np.linspace(0.01, 3, 40), np.linspace(0.1, 0.5, 40), 1e-6
-    slope = (loss.cost(residual + h, sigma) - loss.cost(residual - h, sigma)) / (2 * h)
-    np.testing.assert_allclose(loss.weight(residual, sigma) * residual, slope, rtol=1e-5)
-    small = 1e-4 * sigma
-    np.testing.assert_allclose(loss.cost(small, sigma), 0.5 * (small / sigma) ** 2, rtol=1e-4)
-
-
-def test_damping_grows_faster_with_every_failure_and_vanishes_after_good_steps() -> None:
-    first = Damping().after(0.0)
-    second = first.after(-1.0)
-    assert second.value / first.value > first.value / 1e-7 > 1
-    assert not second.is_slight
-    better = second
-    for _ in range(4):
-        better = better.after(1.0)
-    assert better.is_slight
-    assert better.value < 1e-6 * second.value
-    assert second.after(0.5).value == pytest.approx(second.value)
+from tests.unit.dense_equations import BORDER, FRAMES, dense, frame_covariance, random_landmarks, random_rows
 
 
 def stepped(at: State, step: Float) -> State:
