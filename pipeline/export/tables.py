@@ -142,7 +142,7 @@ def write_centreline(trajectory: Trajectory, folder: Path) -> None:
         rows = csv.writer(stream, lineterminator="\n")
         rows.writerow(_POINT)
         for s, p, u in zip(distance, xyz, sigma, strict=True):
-            rows.writerow([*(f"{v:.6g}" for v in (s, *p, *u)), _piece_at(pieces, float(s))])
+            rows.writerow([*(_decimal(v) for v in (s, *p, *u)), _piece_at(pieces, float(s))])
     with (folder / "route.csv").open("w", newline="", encoding="utf-8") as stream:
         rows = csv.writer(stream, lineterminator="\n")
         rows.writerow(_PIECE)
@@ -181,7 +181,12 @@ def _row(piece: PipePiece) -> list[str]:
         math.degrees(piece.angle_rad), math.degrees(piece.angle_sigma_rad), clock, piece.radius_mm,
         piece.radius_sigma_mm,
     )  # fmt: skip
-    return [piece.kind, *(f"{v:.6g}" if math.isfinite(v) else "" for v in numbers), piece.standard]
+    return [piece.kind, *(_decimal(v) for v in numbers), piece.standard]
+
+
+def _decimal(value: float) -> str:
+    """Return six digits, at most six of them decimals, so that a rounding error reads 0; unknown is empty."""
+    return f"{round(value, 6) + 0.0:.6g}" if math.isfinite(value) else ""
 
 
 def _parts(

@@ -175,3 +175,12 @@ def test_a_way_too_short_for_a_decision_is_no_straight_length(tmp_path: Path) ->
     (piece,) = csv.DictReader((tmp_path / "route.csv").read_text().splitlines())
     assert (piece["kind"], piece["angle_deg"], piece["angle_sigma_deg"]) == ("undecided", "", "")
     assert float(piece["length_mm"]) > 70
+
+
+def test_a_rounding_error_of_a_zero_is_written_as_zero(tmp_path: Path) -> None:
+    """A route started at −1.3e-18 mm."""
+    piece = PipePiece("straight", -1.3e-18, 80.0, 0.1, 0.0, 0.01)
+    write_centreline(replace(chain(curved((80.0, 0.004, 0.0))).seen, pieces=(piece,)), tmp_path)
+    (row,) = csv.DictReader((tmp_path / "route.csv").read_text().splitlines())
+    assert row["from_mm"] == "0"
+    assert "e-" not in (tmp_path / "route.csv").read_text()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cache
 from types import SimpleNamespace
 from typing import Any, cast
@@ -11,7 +11,6 @@ import cv2
 import numpy as np
 import pytest
 
-from pipeline.arrays import Float
 from pipeline.artefacts.measured import Trajectory
 from pipeline.artefacts.motion import Displaced
 from pipeline.export.run_record import mean_diameter
@@ -19,21 +18,19 @@ from pipeline.geometry.axis import straight_axis
 from stages.accumulate import AccumulateParameters, accumulate_wall
 from stages.motion import MotionParameters, estimate_motion
 from stages.motion.bore import ONE_BORE, Bore
-from stages.motion.bundle_adjustment.equations import Measurements
 from stages.motion.bundle_adjustment.image_scale import ScaleDrift, drift_of_scale
 from stages.motion.bundle_adjustment.solver import Estimate, estimate_state
 from stages.motion.tracking.landmarks import TrackedPoses
-from stages.motion.windows import steady_scale
 from stages.motion.windows.steady_scale import SteadyRun, with_steady_scale
 from stages.motion.windows.submaps import Window
 from stages.triangulate import TriangulateParameters, triangulate_rings
 from tests.drawn_run import RADIUS, DrawnRun, drawn_run
-from tests.motion_scene import RING_PX, Scene, scene
+from tests.motion_scene import Scene, scene
 from tests.quiet import quiet_context
 from tests.ring_images import MemorySource
+from tests.unit.growing_run import GROWS, WHOLE, textured
 
 FRAMES, LANDMARKS = 60, 500
-GROWS = 0.005
 PARAMETERS = MotionParameters(match_bias_px=0.01)
 REDUCER = replace(ONE_BORE, rings_mm=np.arange(2.0), rings_wider_mm=np.arange(2.0))
 
@@ -90,11 +87,6 @@ def test_a_small_change_of_the_rings_may_be_either() -> None:
     assert np.ptp(drift.stated_sigma) * drift.ring_mm > 0.05
 
 
-def textured(poses: TrackedPoses) -> SimpleNamespace:
-    """Return texture followed with these poses in patches of 4.6 mm."""
-    return SimpleNamespace(poses=poses, grid=SimpleNamespace(step_mm=0.22, length_mm=54.0))
-
-
 def steady_run(bore: Bore, lost: float, **changes: float) -> SteadyRun:
     """Return the result for the image scale of a run in a ``bore`` with so many lit pictures ``lost``."""
     made, estimate = adjusted(**changes)
@@ -140,100 +132,6 @@ def test_an_encoder_whose_scale_changes_is_not_a_picture_that_shrinks() -> None:
     steady.warn(replace(quiet_context(), warn=told.append))
     assert len(told) == 1
     assert "or the encoder's does" in told[0]
-
-
-FEW = 16
-WHOLE = Window(0, FEW)
-
-
-@dataclass(frozen=True)
-class WholeRun:
-    """A run in one bore, measured like a scene."""
-
-    made: Scene
-    image_scale: Float | None = None
-    bore: Bore = ONE_BORE
-    whole: Window = WHOLE
-
-    @property
-    def time_s(self) -> Float:
-        return self.made.measured.time_s
-
-    @property
-    def texture(self) -> SimpleNamespace:
-        none_lost = np.zeros(FEW, bool)
-        return textured(TrackedPoses(np.arange(FEW), self.made.truth.T_pc, none_lost))
-
-    def measured(self, window: Window, parameters: MotionParameters) -> Measurements:
-        """Return the same measurements with the scale as recorded."""
-        was = self.made.measured
-        if self.image_scale is None:
-            return was
-        tracks = was.tracks.reduced(self.image_scale, was.probe.camera.centre_px)
-        larger = RING_PX * (self.image_scale - 1)[was.rings.frame, None] * was.rings.by_pixel
-        return replace(was, tracks=tracks, rings=replace(was.rings, xyz_c=was.rings.xyz_c - larger))
-
-
-@pytest.mark.parametrize(("again", "corrected"), [(1.0, True), (0.1, False)])
-def test_a_drift_that_is_not_found_again_is_not_removed(
-    again: float, corrected: bool, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Behind a noise filter a drift of .55 % was removed, and .07 % were found by the next estimate."""
-    made, parameters = scene(FEW, 100, noise=0.1, picture_grows=GROWS), MotionParameters()
-    estimate = estimate_state(made.truth, made.measured, parameters)
-    drift, found = drift_of_scale(estimate, made.measured), iter([1.0, 1.0, 1.0, again])
-    monkeypatch.setattr(
-        steady_scale, "drift_of_scale", lambda *_: replace(drift, at_frames=next(found) * drift.at_frames)
-    )
-    monkeypatch.setattr(steady_scale, "estimate_state", lambda *_: estimate)
-    run = WholeRun(made)
-    steady = with_steady_scale(cast(Any, run), WHOLE, estimate, made.measured, parameters, cast(Any, None))
-    assert steady.corrected == steady.drift.certain == (steady.scale is not None) == corrected
-    assert steady.drift.contradicted != corrected
-    assert steady.scale_sigma is not None
-    assert (steady.scale_sigma >= np.abs(drift.at_frames)).all()
-    assert steady.distance_sigma > 0
-
-
-def test_a_drift_with_contradicting_evidence_is_reported_as_such() -> None:
-    """It was called undecided for lack of texture, or not reported: p of a constant scale decided."""
-    made = scene(FEW, 100, noise=0.1, picture_grows=GROWS)
-    drift = drift_of_scale(estimate_state(made.truth, made.measured, MotionParameters()), made.measured)
-    for p_neither in (0.0, 1.0):
-        told: list[str] = []
-        refused = replace(drift, p_neither=p_neither, contradicted=True)
-        refused.warn(replace(quiet_context(), warn=told.append), corrected=False)
-        assert not refused.certain
-        assert not refused.ambiguous
-        assert len(told) == 1
-        assert "texture and rings do not agree" in told[0]
-        assert "too little texture" not in told[0]
-
-
-def test_behind_a_film_of_water_no_drift_is_removed(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Flowing water "made the picture grow"; with that removed, radii were .17 mm too small."""
-    made, parameters = scene(FEW, 100, noise=0.1, picture_grows=GROWS), MotionParameters(match_bias_px=0.01)
-    estimate = estimate_state(made.truth, made.measured, parameters)
-    monkeypatch.setattr(steady_scale, "wall_twice", lambda *_: SimpleNamespace(is_certain=True))
-    steady = with_steady_scale(
-        cast(Any, WholeRun(made)), WHOLE, estimate, made.measured, parameters, lambda *_: None
-    )
-    assert not steady.corrected
-    assert steady.drift.contradicted
-    assert steady.scale_sigma is not None
-
-
-def test_a_real_drift_is_found_again_and_removed() -> None:
-    made = scene(FEW, 100, noise=0.1, picture_grows=GROWS)
-    parameters = MotionParameters(match_bias_px=0.01)
-    estimate = estimate_state(made.truth, made.measured, parameters)
-    steady = with_steady_scale(
-        cast(Any, WholeRun(made)), WHOLE, estimate, made.measured, parameters, lambda *_: None
-    )
-    assert steady.corrected
-    assert not steady.drift.contradicted
-    assert steady.scale is not None
-    assert np.ptp(steady.scale) == pytest.approx(GROWS, rel=0.1)
 
 
 @pytest.mark.parametrize(("course", "told"), [((-1, 0.5, 1), True), ((-1, 1, -0.5), False)])
