@@ -16,17 +16,11 @@ from stages.diagnose.late_pictures import Exposure, how_late
 from stages.diagnose.result import Value, Verdict
 from stages.diagnose.travel.events import with_events
 from stages.diagnose.travel.evidence import TravelEstimate, _estimates
-from stages.diagnose.travel.model import TravelFit, fitted
+from stages.diagnose.travel.model import TravelFit
 from tests.diagnosed import DIFFERS, answer
 from tests.travel_cases import read
 from tests.travel_cases import seen as sight
 from tests.unit.late_pictures import late, sizes
-
-
-@pytest.fixture(scope="module")
-def thirty_a_second() -> TravelFit:
-    """Return a fit of pictures that follow each other by 1/30 s; its contents do not matter."""
-    return fitted(sight(np.random.default_rng(8), every=6), read(), (), None)
 
 
 @pytest.mark.parametrize(

@@ -23,8 +23,14 @@ from tests.gauge_runs import (
     GaugeRun,
     driven,
     facts,
+    made_run,
     stated_probe,
 )
+
+
+@pytest.fixture(scope="module")
+def run() -> GaugeRun:
+    return made_run(1)
 
 
 def _sightings(gauge: Gauge, seen: Gauge | None = None, least: int = 20) -> list[Sighting]:
