@@ -22,6 +22,8 @@ from stages.twin.scene import Scene
 from stages.twin.state import PhotometricState
 
 Coloured = Iterable[tuple[int, Byte | None]]
+_UNSURE = {"", "window_dirt"}
+"""Names of sides that are told by small changes of grey between angles of view: none, or one of several."""
 _FEW = 8
 """Most lit frames whose colours are compared: decoding colour takes three times as long."""
 _EVERY_PX, _BRIGHT, _CLIPPED = 8, 8.0, 250
@@ -104,11 +106,13 @@ def beside_colour(
 ) -> tuple[tuple[Mismatch, ...], tuple[Mismatch, ...]]:
     """Return effects on the whole picture that remain beside a change of colour, and those withdrawn for it.
 
-    It is among what changes ``over_time``. Withdrawn are sides without a name, which are told by small
-    changes of grey between angles of view.
+    It is among what changes ``over_time``. Withdrawn are sides without a certain name, which are told by
+    small changes of grey between angles of view.
     """
     colour = any(m.channel == "colour" for m in over_time)
-    left = tuple(m for m in found if colour and not m.name and m.fixed_to == "image" and _has_side(m))
+    left = tuple(
+        m for m in found if colour and set(m.names) & _UNSURE and m.fixed_to == "image" and _has_side(m)
+    )
     said = "{} But the colour of wall differs from its photo, too, which changes its grey likewise."
     withdrawn = tuple(replace(m, statement=said.format(m.statement)) for m in left)
     return tuple(m for m in found if m not in left), withdrawn

@@ -7,7 +7,7 @@ at many polar angles as the probe advances, which shows the difference. Lamps th
 that is not circular make first and second harmonics around the picture; these are fitted freely at every
 polar angle.
 
-This justifies a place, but no name: no more than a thousandth of an LED's light is narrower than these
+This justifies a place and a class: no more than a thousandth of an LED's light is narrower than these
 harmonics, and dirt on the window, shade or a third harmonic have effects of the same size.
 """
 
@@ -29,6 +29,7 @@ from stages.twin.scene import Scene
 from stages.twin.significance import ratio_over_frames
 from stages.twin.switched import share_at
 
+_CLASS = "led_dead or uneven_lamps or window_dirt"
 _LEAST, _SURE = 0.25, 3.0
 """Smallest loss that is mentioned, chosen; and its significance, σ."""
 _LOBE = 0.15
@@ -55,8 +56,8 @@ def seen_from(samples: BlockSamples, scene: Scene) -> tuple[Float32, Float32]:
 def dead_led(samples: BlockSamples | None, scene: Scene) -> tuple[Mismatch, ...]:
     """Return the side that is dark in all frames as by a dim LED, if wall seen at several angles shows it.
 
-    It has no name and no size, since other patterns that stay still in the picture look the same. Its azimuth
-    is chosen among all by what is wider than the first harmonic; what is narrower than the second must agree.
+    It has no size, since other patterns that stay still in the picture look the same. Its azimuth is chosen
+    among all by what is wider than the first harmonic; what is narrower than the second must agree.
     """
     if samples is None or len(samples.number) < _FEWEST_FRAMES:
         return ()
@@ -79,11 +80,12 @@ def dead_led(samples: BlockSamples | None, scene: Scene) -> tuple[Mismatch, ...]
     said = (
         f"Near the lamps the wall is too dark about image azimuth {where:.0f}°, compared with the same "
         "wall seen farther ahead, as if an LED there were dim in all frames. Dirt or shade on the window, or "
-        "another pattern that stays still in the picture, looks the same. What to do: check the LEDs."
+        "lamps that shine unevenly in another way, look the same. What to do: check the LEDs, clean the "
+        "window, and record again."
     )
     at = NamedFigure("azimuth_deg", where, 180 / LED_AZIMUTHS, "deg")
     look = scene.ring.at(int(samples.number[0]), law.azimuth_rad)
-    return (Mismatch("", "intensity", "image", (at,), (), min(chance, 1.0), nan, nan, said, look),)
+    return (Mismatch(_CLASS, "intensity", "image", (at,), (), min(chance, 1.0), nan, nan, said, look),)
 
 
 def _chance(size: float, sd: float) -> float:

@@ -55,8 +55,9 @@ class Suspected:
         Returns the sentence about the size so measured.
     least : float
         Lower bound of that size. A smaller one shows that the law has not its true shape: it is not reported.
-    unnamed : bool
-        Whether it is reported without its name, and not withdrawn, if other frames do not confirm the law.
+    otherwise : str
+        Names, of which one must hold, under which it is reported if other frames do not confirm the law;
+        without any it is then withdrawn.
     """
 
     mismatch: Mismatch
@@ -67,7 +68,7 @@ class Suspected:
     measured: Callable[[Shown, Float], float] | None = None
     said: Callable[[float], str] | None = None
     least: float = -np.inf
-    unnamed: bool = False
+    otherwise: str = ""
 
     def from_other_half(self, frame: int) -> Float:
         """Return the law's numbers from the half of the frames that does not contain this one."""
@@ -106,8 +107,8 @@ def _judged(one: Suspected, again: Again) -> tuple[Mismatch, bool]:
     chi2 = [float(squares[seen].sum()) / total for squares in (before, after)]
     found = replace(one.mismatch, chi2_before=chi2[0], chi2_after=chi2[1])
     if len(fall) < _FEWEST or sigma < _SURE or chance > FALSE_ALARM:
-        if one.unnamed:
-            return replace(one.mismatch, name=""), True
+        if one.otherwise:
+            return replace(one.mismatch, name=one.otherwise), True
         return _withdrawn(found, fall, sigma), False
     if sizes and np.mean(sizes) >= one.least:
         found = _with_size(found, sizes, one.said)

@@ -1,4 +1,4 @@
-"""Light on the wall of laser frames that follows no known pattern, or comes and goes: it has no name."""
+"""Light on the wall of laser frames that follows no known pattern, or comes and goes: a class of causes."""
 
 from __future__ import annotations
 
@@ -13,6 +13,13 @@ from stages.twin.scene import Ring
 
 LEAST_LEVEL, _FEWEST_FRAMES = 1.0, 3
 """Smallest stray light that is reported, grey levels: rounding alone cannot make as much. Fewest frames."""
+
+
+LIGHT = "ambient_light or codec or halo or interreflection"
+ELSE = (
+    "light of the line from wall to wall or scattered by the lens, or what a codec retains of the frame "
+    "before. What to do: record some frames with laser and LEDs off: other light remains in them"
+)
 
 
 def glow(stray: Sequence[Float], frame: Int, ring: Ring) -> Suspected | None:
@@ -42,9 +49,8 @@ def glow(stray: Sequence[Float], frame: Int, ring: Ring) -> Suspected | None:
     said = (
         f"In {len(bright)} of {len(frame)} laser frames that were examined there is light on the wall away "
         f"from the line; from frame {first} to {last} the mean is {level.mean():.1f} grey levels: LEDs "
-        "that are not quite off, other light, light of the line from wall to wall, or what a codec retains "
-        "of the frame before."
+        f"that are not quite off, other light, {ELSE}."
     )
     size = (NamedFigure("level", float(level.mean()), sd, "grey levels"),)
-    found = Mismatch("", "intensity", "time", place, size, nan, nan, nan, said, ring.whole(first))
+    found = Mismatch(LIGHT, "intensity", "time", place, size, nan, nan, nan, said, ring.whole(first))
     return Suspected(found, None, frame[span], level[:, None])

@@ -21,7 +21,7 @@ from stages.twin.cells import chance_of, sigmas
 from stages.twin.compare import of_blocks
 from stages.twin.darkness import level_of_no_wall
 from stages.twin.gate import Suspected
-from stages.twin.glow import LEAST_LEVEL, glow
+from stages.twin.glow import ELSE, LEAST_LEVEL, glow
 from stages.twin.locate import FALSE_ALARM
 from stages.twin.render import Region, TwinFrame
 from stages.twin.scene import Scene
@@ -235,7 +235,7 @@ class WholePictures:
         found = self._mismatch(
             name, "wall", NamedFigure("level", float(grey.mean()), sd, "grey levels"), chance, "stray",
             f"With the LEDs off, wall away from the line has up to {grey.mean():.1f} grey levels: "
-            "other light, light of the line from wall to wall, or what a codec retains of the frame before.",
+            f"other light, {ELSE}.",
         )  # fmt: skip
         return Suspected(found, stray(k), self.frames_of("stray"), size)
 

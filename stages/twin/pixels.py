@@ -86,10 +86,14 @@ def defective_pixels(images: Sequence[Byte], lit: Sequence[bool], seen: Bool) ->
 
 
 def _spread(offset: Float) -> float:
-    """Return 1 σ of pixels' constant offsets (N,), from the wider side: black cuts off the other one."""
+    """Return 1 σ of pixels' constant offsets (N,): 1 σ to either side, or from 2 σ to 3 σ: the widest.
+
+    Black cuts off the darker pixels: half of them or more, where it is clipped. Then only the tail shows σ.
+    """
     if not len(offset):
         return 0.0
-    return float(np.abs(np.quantile(offset, norm.cdf([-1.0, 1.0]))).max())
+    low, high, inner, outer = np.quantile(offset, norm.cdf([-1.0, 1.0, 2.0, 3.0]))
+    return float(max(-low, high, outer - inner))
 
 
 def _single(differs: Bool) -> Int:

@@ -34,6 +34,8 @@ _WIDEST, _SMOOTH, _ALIKE, _OF_HEIGHT, _OF_NOISE = 65, 3, 2, 0.2, 8.0
 smoothed, bins by which the quadrants of one ring may differ, and share of a band's height from which a bin
 counts; all chosen. σ of one bin by which light must stand out: noise alone spans 5.5 σ from its lowest to its
 highest of two hundred bins, and 8 σ in 3 of 10 000 quadrants."""
+_EITHER = "ghost_ring or second_line"
+"""Light apart from the line whose course is not known: the wall mirrors the line, or glass does."""
 _OF_QUADRANT = float(np.sinc(1 / _QUADRANTS))
 """Share of a cosine around the picture that its means over quadrants keep."""
 
@@ -106,7 +108,7 @@ def _suspected(ring: Ring, band: _Band, ratio: Float, chance: float, frame: Int)
     return Suspected(
         _told(ring, band, at, chance, frame), second_line, frame, sizes,
         measured=share_of_second, said=partial(_said, at), least=float(band.each.mean()),
-        unnamed=bool(place[1:].any()),
+        otherwise=_EITHER if place[1:].any() else "",
     )  # fmt: skip
 
 
@@ -143,7 +145,8 @@ def _said(at: Float, share: float, but: str = "") -> str:
     return (
         f"Light {100 * share:.0f} % as bright as the line{but} lies apart from it, at {at.min():.2f} to "
         f"{at.max():.2f} of its radius around the picture: a mirror image of the line on the wall, or a "
-        "ghost of window or lens."
+        "ghost of window or lens. What to do: record in a bore of another diameter: a mirror image then lies "
+        "elsewhere beside the line, a ghost does not."
     )
 
 

@@ -111,11 +111,11 @@ class Sums:
     def glints(self, whole: Sequence[Mismatch], on_window: Sequence[Mismatch] = ()) -> tuple[Mismatch, ...]:
         """Return spots far brighter than predicted; ``whole`` are confirmed effects on the whole picture.
 
-        Spots of lit frames are left out where something ``on_window`` surely bends light: a drop, or what
-        displaces the line.
+        Spots of lit frames are left out where something ``on_window`` bends light: what is likeliest a
+        drop, or what displaces the line.
         """
         stray = [m.parameters[0].value for m in whole if set(m.names) & set(STRAY_NAMES)]
-        bends = [m for m in on_window if m.name == "droplet" or m.channel == "line"]
+        bends = [m for m in on_window if m.names[0] == "droplet" or m.channel == "line"]
         lit, laser = self.spots
         return (*lit.found(bent=bends), *laser.found(max(stray, default=0.0)))
 

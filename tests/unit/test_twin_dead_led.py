@@ -74,7 +74,7 @@ def _dirt(theta, phi):
         lambda theta, phi: 0.05 * np.cos(3 * phi) * (theta - 1),
     ],
 )
-def test_what_looks_like_a_dim_led_is_reported_but_never_named(light, monkeypatch):
+def test_what_looks_like_a_dim_led_is_never_told_to_be_one_alone(light, monkeypatch):
     """Dirt and an oval bore got this name, at chances of 1e-9 and with sizes off by six σ."""
     monkeypatch.setattr(sums, "uneven_lamps", lambda *_: ())
     monkeypatch.setattr(sums, "separated_from_wall", lambda *_: ((), ()))
@@ -82,7 +82,7 @@ def test_what_looks_like_a_dim_led_is_reported_but_never_named(light, monkeypatc
     suspected, dark, untold = sums.Sums._lamps(frames, _samples(light), False)
     assert (suspected, untold) == ((), ())
     assert all("Dirt or shade on the window" in one.statement and not one.parameters for one in dark)
-    assert all(one.name == "" for one in dark)
+    assert all(one.names == ("led_dead", "uneven_lamps", "window_dirt") for one in dark)
 
 
 def test_the_place_of_a_possibly_dim_led_is_reported():

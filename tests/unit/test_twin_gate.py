@@ -26,13 +26,13 @@ def test_two_tests_of_the_same_improvements_give_alarms_no_more_often_than_state
     assert np.mean(np.array(chance) < 0.05) < 0.04
 
 
-@pytest.mark.parametrize("unnamed", [True, False])
-def test_light_that_is_there_but_follows_no_law_loses_its_name_only(unnamed):
+@pytest.mark.parametrize("otherwise", ["ghost_ring or second_line", ""])
+def test_light_that_is_there_but_follows_no_law_loses_its_certain_name_only(otherwise):
     found = Mismatch("second_line", "line", "line", (), (), 1e-9, np.nan, np.nan, "Light beside the line.")
-    suspected = Suspected(found, lambda shown, size: None, np.arange(8), np.ones((8, 1)), unnamed=unnamed)
+    suspected = Suspected(found, lambda shown, size: None, np.arange(8), np.ones((8, 1)), otherwise=otherwise)
     kept, withdrawn = judged([suspected], lambda frames: [])
-    assert [m.name for m in kept] == [""] * unnamed
-    assert [m.name for m in withdrawn] == ["second_line"] * (not unnamed)
+    assert [m.name for m in kept] == [otherwise] * bool(otherwise)
+    assert [m.name for m in withdrawn] == ["second_line"] * (not otherwise)
 
 
 def test_consecutive_frames_count_as_fewer_independent_ones():

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from stages.twin.glow import glow
+from stages.twin.glow import LIGHT, glow
 from stages.twin.scene import Ring
 
 RING = Ring((160.0, 120.0), 70.0, 50.0, 25.0)
@@ -18,7 +18,7 @@ def test_light_that_comes_during_the_run_is_told_with_its_frames():
     light = found([0.1, 0.0, -0.1, 16.0, 17.0, 16.5]).mismatch
     assert [p.value for p in light.place] == [24, 40]
     assert light.parameters[0].value == pytest.approx(16.5)
-    assert (light.name, found([0.6] * 6), found([np.nan] * 6)) == ("", None, None)
+    assert (light.name, found([0.6] * 6), found([np.nan] * 6)) == (LIGHT, None, None)
     assert found([0.0, 9.0, 9.0, np.nan]) is None
 
 

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from stages.twin.glow import LIGHT
 from tests.unit.whole_pictures import (
     AWAY,
     PHI,
@@ -27,8 +28,8 @@ def test_a_mirror_image_of_the_line_is_found_and_a_glow_about_the_line_is_not_ta
     assert named(laser=lambda p, r: p + 8 * np.exp(-0.5 * (away / 1.5) ** 2)) == ["second_line"]
     for reach in (8, 25):
         glow = 40 * np.exp(-abs(AWAY - 70) / reach)
-        # At most as light on the wall: a second line without a name would be another one.
-        assert named(laser=lambda p, r, more=glow: p + more) == [""] * (reach == 25)
+        # At most as light on the wall.
+        assert named(laser=lambda p, r, more=glow: p + more) == [LIGHT] * (reach == 25)
 
 
 @pytest.mark.parametrize("peak", [20, 40])
@@ -52,7 +53,7 @@ def test_the_share_of_a_second_ring_without_a_name_has_no_sigma():
     """Its height in means over quarters of the picture was 2.2 ± .15 % where .0925 was drawn."""
     away = AWAY - 70 * (0.7 + 0.08 * np.sin(4 * PHI) + 0.04 * np.cos(PHI))
     (found,), _ = found_in(laser=lambda p, r: p + 14 * np.exp(-0.5 * (away / 1.5) ** 2))
-    assert (found.name, found.parameters[0].sd) == ("", np.inf)
+    assert (found.name, found.parameters[0].sd) == ("ghost_ring or second_line", np.inf)
     assert "may be brighter" in found.statement
 
 

@@ -94,6 +94,7 @@ def test_pale_wall_in_other_light_is_not_a_glint(name, glints):
     ("name", "channel", "told"),
     [
         ("droplet", "intensity", 0),
+        ("droplet or window_dirt or window_scatter", "intensity", 0),
         ("window_dirt", "intensity", 1),
         ("window_dirt or window_scatter or droplet", "intensity", 1),
     ],

@@ -7,6 +7,7 @@ import pytest
 
 from stages.twin.cells import chance_of
 from stages.twin.gate import judged
+from stages.twin.glow import LIGHT
 from stages.twin.picture import WholePictures, _brings_light
 from stages.twin.stray_light import STRAY_NAMES
 from tests.unit.whole_pictures import (
@@ -28,15 +29,15 @@ def test_stray_light_is_named_by_what_it_falls_on():
     glow = 8 * np.exp(-0.5 * ((AWAY - 70) / 25) ** 2)
     (name,) = named(laser=lambda p, r: p + glow)
     assert "interreflection" in name
-    # Even light on all of the wall is no known pattern: it is reported without a name.
-    assert named(laser=lambda p, r: p + 5) == [""]
+    # Even light on all of the wall is no known pattern: it is one of several causes.
+    assert named(laser=lambda p, r: p + 5) == [LIGHT]
     assert named(laser=lambda p, r: p + 0.5) == []
 
 
 def _stray_names(light, scene=SCENE, dark=OUTSIDE):
     """Return the confirmed names of light that wall of mean reflectance 1 reflects with the LEDs off.
 
-    Light of no known pattern has an empty name.
+    Light of no known pattern has the name of a class.
 
     The wall ends where it is ``dark``; the scene defines how far the LEDs light it.
     """
@@ -61,20 +62,20 @@ def test_uniform_light_on_wall_that_no_lamp_reaches_is_found_from_darker_places(
     """Wall behind the LEDs was taken for black: light on it hid the light on all of the wall."""
     reached = SimpleNamespace(**{**vars(SCENE), "outside": AWAY > 110})
     assert _stray_names(lambda pale: 22 * pale, reached) == ["ambient_light"]
-    assert _stray_names(lambda pale: 6 * (pale - 1), reached) == [""]
+    assert _stray_names(lambda pale: 6 * (pale - 1), reached) == [LIGHT]
     assert _stray_names(lambda pale: 6 * (pale - 1), reached, AWAY > 110) == []
 
 
 @pytest.mark.parametrize("haze", [0.0, 20.0, -6.0])
 def test_texture_of_lit_frames_kept_by_a_codec_is_not_light(haze):
     """A pattern with mean 0, or another mean, was ambient light at a chance of 1e-15."""
-    assert _stray_names(lambda pale: 6 * (pale - 1) + haze) == [""] * (haze > 0)
+    assert _stray_names(lambda pale: 6 * (pale - 1) + haze) == [LIGHT] * (haze > 0)
 
 
 def test_a_pattern_is_not_light_because_the_pictures_flicker():
     """The wall's mean, too uncertain to contradict, counted as agreement: this was ambient light."""
     random = np.random.default_rng(4)
-    assert _stray_names(lambda pale: 6 * (pale - 1) + random.normal(0, 8)) == [""]
+    assert _stray_names(lambda pale: 6 * (pale - 1) + random.normal(0, 8)) == [LIGHT]
 
 
 def test_without_a_place_that_sees_no_wall_uniform_light_is_not_reported():
