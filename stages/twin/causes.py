@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from scipy.stats import norm
+from scipy.stats import t
 
 from pipeline.adjustment.robust import spread_about_median
 from pipeline.arrays import Float
@@ -200,7 +200,10 @@ def _places(law: Law) -> int:
 
 
 def _by_other_sectors(best: Fitted, cells: Cells, base: Float) -> Fitted:
-    """Return a dim sector with the probability that the scatter of the other sectors makes one as deep."""
+    """Return a dim sector with the probability that the scatter of the other sectors makes one as deep.
+
+    Wall differs in patches: scatter is known from no more places than sectors of that width fit beside it.
+    """
     if best.law.name != "laser_sector":
         return best
     with_it = np.concatenate([base, best.change[None]])
@@ -208,7 +211,8 @@ def _by_other_sectors(best: Fitted, cells: Cells, base: Float) -> Fitted:
     seen = cells.usable.any(0)
     left = np.where(cells.usable, rest, 0.0).sum(0)[seen] / cells.usable.sum(0)[seen]
     depth = float(np.abs(best.change).max())
-    chance = 2 * SECTORS * float(norm.sf(depth / max(spread_about_median(left), 1e-6)))
+    beside = 360 / float(best.place[1]) - 1
+    chance = 2 * SECTORS * float(t.sf(depth / max(spread_about_median(left), 1e-6), beside))
     return replace(best, probability=min(1.0, max(best.probability, chance)))
 
 

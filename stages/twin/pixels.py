@@ -92,8 +92,8 @@ def _spread(offset: Float) -> float:
     """
     if not len(offset):
         return 0.0
-    low, high, inner, outer = np.quantile(offset, norm.cdf([-1.0, 1.0, 2.0, 3.0]))
-    return float(max(-low, high, outer - inner))
+    low, high, inner, outer = (float(np.quantile(offset, norm.cdf(z))) for z in (-1.0, 1.0, 2.0, 3.0))
+    return max(-low, high, outer - inner)
 
 
 def _single(differs: Bool) -> Int:

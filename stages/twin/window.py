@@ -86,7 +86,7 @@ class WindowPlace:
         away = np.hypot(u - self.place.u_px, v - self.place.v_px)
         inside = away < self._reach_px
         use = inside & part & free[box]
-        must = away < self.place.radius_px if self.bends else inside
+        must = away < self.place.radius_px
         if use[must].sum() < _WHOLE * must.sum():
             return
         filled = np.where(part, level, level[use].mean()).astype(np.float32)

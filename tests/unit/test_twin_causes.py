@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.ndimage import gaussian_filter1d
 
 from pipeline.instrument.probe import Lighting
 from stages.twin.causes import _may_be, causes
@@ -122,6 +123,13 @@ def test_a_dim_sector_is_found_at_its_place():
     assert sector.place[0].value == pytest.approx(45, abs=6)
     assert sector.place[1].value == pytest.approx(40, abs=16)
     assert sector.parameters[0].value == pytest.approx(0.6, abs=0.1)
+
+
+@pytest.mark.parametrize("seed", [0, 4])
+def test_wall_that_is_paler_in_patches_is_no_dim_sector(seed):
+    """Of 60 drawn walls 36 were a dim sector, up to 120° wide: patches were taken for single sectors."""
+    patches = gaussian_filter1d(np.random.default_rng(seed).standard_normal(SECTORS), 1.0, mode="wrap")
+    assert found_in_cells(line=0.15 * patches[None] / patches.std()) == ()
 
 
 def test_flicker_of_one_light_is_found():

@@ -63,6 +63,19 @@ def test_effects_on_the_window_are_confirmed_by_frames_or_withdrawn(name):
     assert found.chi2_after < found.chi2_before
 
 
+def test_dirt_is_named_beside_wall_that_is_not_known():
+    """A speck near the border of the view was no dirt: within twice its radius wall had to be known."""
+    random = np.random.default_rng(3)
+    place = WindowPlace(ImagePlace(120.0, 100.0, 18.0, -0.3, 0.02, 1e-6))
+    for frame in range(9):
+        level = _textured(random)
+        recorded = _dirty_picture(level, "window_dirt") + 2 * random.standard_normal(level.shape)
+        twin = _frame(level)
+        twin.region[:, :108] = Region.EDGE
+        place.add(frame, recorded.astype(np.float32), twin, np.ones(level.shape, bool))
+    assert place.judged("image").name == "window_dirt"
+
+
 def test_texture_with_more_contrast_than_the_photo_is_not_scatter():
     random = np.random.default_rng(3)
     place = WindowPlace(ImagePlace(120.0, 100.0, 18.0, -0.3, 0.02, 1e-6))
