@@ -277,7 +277,7 @@ def _of_geometry(
     }
 
 
-LINE_PROFILE = Stage("line_profile", "5", Parameters, examine_line, "effects that the line's profile shows")
+LINE_PROFILE = Stage("line_profile", "6", Parameters, examine_line, "effects that the line's profile shows")
 FIDUCIALS = Stage(
     "fiducials", "9", GaugeParameters, measure_fiducials, "a gauge run's rings and fiducials", "gauge"
 )
@@ -285,7 +285,7 @@ FREE_MOTION = Stage(
     "free_motion", "2", MotionParameters, adjust_freely, "an inspection's motion without encoder", "motion"
 )
 GAUGE_EVIDENCE = Stage(
-    "evidence", "62", DiagnosisParameters, examine_gauge, "what a gauge run shows of effects", "diagnosis"
+    "evidence", "63", DiagnosisParameters, examine_gauge, "what a gauge run shows of effects", "diagnosis"
 )
 FIELD_EVIDENCE = Stage(
     "evidence", "26", DiagnosisParameters, examine_field, "what an inspection shows of effects", "diagnosis"

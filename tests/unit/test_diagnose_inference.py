@@ -10,7 +10,10 @@ from pipeline.adjustment.rows import Rows
 from stages.diagnose.effects.library import LIBRARY
 from stages.diagnose.effects.vocabulary import VOCABULARY
 from stages.diagnose.gauge.elimination import (
+    KINDS,
     Equations,
+    FrameSums,
+    InCourses,
     OwnUnknowns,
     Part,
     eliminate_globals,
@@ -231,3 +234,17 @@ def test_a_score_that_comes_from_few_cells_is_less_significant():
     assert one_sure is not None
     # The tail of F(2, 20) beyond 18.
     assert one_sure.p_value == pytest.approx(3.4e-5, rel=0.02)
+
+
+def test_courses_of_one_law_give_the_equations_of_all_their_columns():
+    random = np.random.default_rng(5)
+    laws, m = equations(random), motion(random)
+    factor = random.normal(size=(len(KINDS), FRAMES, 8))
+    e = replace(laws, courses=InCourses(np.array([0, 1, 2, 3, 4, 4, 2, 4]), factor))
+    part = Part(np.arange(FRAMES) > 2, (0,))
+    of_parts = [FrameSums.of(e).reduced(m, p) for p in (Part(np.ones(FRAMES, bool)), part)]
+    for told, full in zip(of_parts, (e.in_full(), e.in_full().of(part)), strict=True):
+        known = eliminate_poses(full, m, FRAMES)
+        assert told.information == pytest.approx(known.information, rel=1e-9, abs=1e-9)
+        assert told.right == pytest.approx(known.right, rel=1e-9, abs=1e-9)
+        assert told.pose_by_global == pytest.approx(known.pose_by_global, rel=1e-9, abs=1e-9)

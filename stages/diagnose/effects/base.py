@@ -9,9 +9,9 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -90,6 +90,13 @@ class ImagePoints:
         rho += self.shifted_px if self.shifted_px is not None else 0.0
         left = np.sinc(self.across_px) if self.across_px is not None else np.ones(len(rho))
         return np.asarray(left[:, None] * np.stack([np.cos(2 * np.pi * rho), np.sin(2 * np.pi * rho)], -1))
+
+    @cached_property
+    def moments(self) -> ImagePoints:
+        """One point of each frame: a course depends on the frame alone."""
+        first = np.unique(self.frame, return_index=True)[1]
+        each: dict[str, Any] = {f.name: getattr(self, f.name) for f in fields(self)}
+        return replace(self, **{name: v[first] for name, v in each.items() if isinstance(v, np.ndarray)})
 
     @cached_property
     def patterns(self) -> dict[tuple[str, Shape, bool], Float]:

@@ -10,7 +10,7 @@ import numpy as np
 
 from pipeline.arrays import Float
 from pipeline.physics.catalogue import effect
-from stages.diagnose.effects.base import EffectModel, ImagePoints, Shape, Travel
+from stages.diagnose.effects.base import EffectModel, ImagePoints, Shape, SumOfLaws, Travel
 from stages.diagnose.effects.camera import CAMERA_MODELS
 from stages.diagnose.effects.laser import LASER_MODELS, PHOTOMETRIC_MODELS
 from stages.diagnose.effects.pose import POSE_MODELS
@@ -74,9 +74,9 @@ def _by_course(
     made: Callable[[EffectModel, ImagePoints, Shape], Float], model: EffectModel, points: ImagePoints,
     shape: Shape,
 ) -> Float:  # fmt: skip
-    """Return an effect's columns; those of a static law, shared by its courses, are computed once."""
+    """Return an effect's columns; those of a law, shared by its courses, are computed once."""
     factored = model.factored(points, shape)
-    if factored is None and not model.linear:
+    if factored is None and isinstance(model, SumOfLaws) and not model.linear:
         return made(model, points, shape)
     parts, static, own = factored or ((), model, shape)
     key = (static.name, own, made is _line_columns)

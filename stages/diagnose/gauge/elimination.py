@@ -6,10 +6,12 @@ The result is the evidence over the shared columns. B. Triggs et al., "Bundle ad
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields, replace
+from functools import cached_property
 from itertools import pairwise
 
+import numba
 import numpy as np
 from scipy.sparse import csr_array
 
@@ -19,7 +21,7 @@ from pipeline.adjustment.rows import Rows
 from pipeline.arrays import Bool, Float, Int
 
 POSE = 6
-RING, EDGE, ENCODER = 0, 1, 2
+RING, EDGE, ENCODER = KINDS = 0, 1, 2
 _REACH = 4
 # Information, relative to that of the best determined pose, that holds an undetermined pose in place.
 _HOLD = 1e-10
@@ -30,7 +32,34 @@ class Part:
     """Some frames (N,) of a run, and some kinds of its measurements."""
 
     frames: Bool
-    kinds: tuple[int, ...] = (RING, EDGE, ENCODER)
+    kinds: tuple[int, ...] = KINDS
+
+
+@dataclass(frozen=True)
+class InCourses:
+    """Columns of the globals as laws times a factor of the frame: many courses share few laws.
+
+    Attributes
+    ----------
+    law : (C,) int
+        Column of the law in `Equations.by_global`.
+    factor : (K, N, C)
+        By kind of measurement and frame.
+    """
+
+    law: Int
+    factor: Float
+
+    @staticmethod
+    def plain(law: Int, frames: int) -> InCourses:
+        """Return laws (C,) as they are."""
+        return InCourses(law, np.ones((len(KINDS), frames, len(law))))
+
+    @staticmethod
+    def joined(parts: Sequence[InCourses]) -> InCourses:
+        """Return the columns of all parts, one after the other."""
+        factor = np.concatenate([p.factor for p in parts], axis=-1)
+        return InCourses(np.concatenate([p.law for p in parts]), factor)
 
 
 @dataclass(frozen=True)
@@ -42,7 +71,7 @@ class Equations:
     frame : (M,) int
     by_pose : (M, 6)
     by_global : (M, G − E)
-        Derivatives by the globals that any measurement may depend on.
+        Derivatives by the globals that any measurement may depend on; of laws only, where there are courses.
     residual, weight : (M,)
         Of rings and edges in px, of the encoder in mm.
     cell : (M,) int
@@ -57,6 +86,8 @@ class Equations:
         Derivative by the shift of that edge.
     edges : slice
         Indices of the E shifts of edges among all G globals.
+    courses : InCourses or None
+        The G − E columns, if they are not those of ``by_global`` as they are.
     """
 
     frame: Int
@@ -70,11 +101,13 @@ class Equations:
     edge: Int
     by_edge: Float
     edges: slice
+    courses: InCourses | None = None
 
     @property
     def size(self) -> int:
         """Number of globals."""
-        return int(self.by_global.shape[1] + self.edges.stop - self.edges.start)
+        columns = self.by_global.shape[1] if self.courses is None else len(self.courses.law)
+        return int(columns + self.edges.stop - self.edges.start)
 
     @property
     def place(self) -> Int:
@@ -88,9 +121,17 @@ class Equations:
 
     def at(self, rows: slice | Int) -> Equations:
         """Return the measurements at these rows."""
-        return replace(
-            self, **{f.name: getattr(self, f.name)[rows] for f in fields(self) if f.name != "edges"}
-        )
+        return replace(self, **{name: getattr(self, name)[rows] for name in BY_ROW})
+
+    def in_full(self) -> Equations:
+        """Return the same equations with a column for each course of each law."""
+        if self.courses is None:
+            return self
+        by_global = self.by_global[:, self.courses.law] * self.courses.factor[self.kind, self.frame]
+        return replace(self, by_global=by_global, courses=None)
+
+
+BY_ROW = frozenset(f.name for f in fields(Equations)) - {"edges", "courses"}
 
 
 def of_no_edge(count: int) -> tuple[Int, Float, slice]:
@@ -121,32 +162,130 @@ class Reduced:
     taken: Float
 
 
-def eliminate_poses(equations: Equations, motion: Rows, frames: int) -> Reduced:
-    """Return the normal equations over the globals with the poses at their optimum.
+@dataclass(frozen=True)
+class OfKind:
+    """Sums of the weighted measurements of one kind over each of F frames.
 
-    ``motion`` are equations of the poses alone, 6 parameters per frame.
+    Attributes
+    ----------
+    kind : int
+    frame : (F,) int
+    used : (U,) int
+        The columns of `Equations.by_global` that they depend on; the residual follows them in what is below.
+    products, by_pose, pose : (F, U + 1, U + 1), (F, 6, U + 1), (F, 6, 6)
     """
-    size, place = equations.size, equations.place
-    corner = np.zeros((size + 1, size + 1))
-    blocks, mixed = np.zeros((frames, POSE, POSE)), np.zeros((frames, POSE, size + 1))
-    for rows, used in by_kind(equations):
-        part = equations.at(rows)
-        root = np.sqrt(part.weight)[:, None]
-        at = np.append(place[used], size)
-        by_pose = part.by_pose * root
-        wide = np.concatenate([part.by_global[:, used], part.residual[:, None]], 1) * root
-        corner[np.ix_(at, at)] += wide.T @ wide
-        for k, (own, of_frame) in enumerate(by_frame(part, frames)):
-            if len(of_frame):
-                blocks[k] += by_pose[own].T @ by_pose[own]
-                mixed[k][:, at] += by_pose[own].T @ wide[own]
-    _add_edges(equations, corner, mixed)
+
+    kind: int
+    frame: Int
+    used: Int
+    products: Float
+    by_pose: Float
+    pose: Float
+
+    @staticmethod
+    def of(kind: int, part: Equations, used: Int) -> OfKind:
+        """Return the sums of measurements of one kind."""
+        order = np.argsort(part.frame, kind="stable")
+        root = np.sqrt(part.weight[order])[:, None]
+        wide = np.concatenate([part.by_global[np.ix_(order, used)], part.residual[order, None]], 1) * root
+        pose = part.by_pose[order] * root
+        frame, first = np.unique(part.frame[order], return_index=True)
+        products = np.zeros((len(frame), wide.shape[1], wide.shape[1]))
+        by_pose, of_pose = np.zeros((len(frame), POSE, wide.shape[1])), np.zeros((len(frame), POSE, POSE))
+        for k, (begin, end) in enumerate(pairwise([*first, len(order)])):
+            own, turned = wide[begin:end], pose[begin:end].T
+            products[k], by_pose[k], of_pose[k] = own.T @ own, turned @ own, turned @ pose[begin:end]
+        return OfKind(kind, frame, used, products, by_pose, of_pose)
+
+    def add(self, part: Part, courses: InCourses, place: Int, corner: Float, mixed: Float) -> None:
+        """Add the sums over a part of the run to the normal equations of the globals and poses.
+
+        ``place`` (C,) are the indices of the columns among the globals; the residual is the last.
+        """
+        here = np.flatnonzero(part.frames[self.frame] & (self.kind in part.kinds))
+        shown = np.flatnonzero(np.isin(courses.law, self.used))
+        law = np.append(np.searchsorted(self.used, courses.law[shown]), len(self.used))
+        at = np.append(place[shown], len(corner) - 1)
+        factor = np.ones((len(here), len(at)))
+        factor[:, :-1] = courses.factor[self.kind][np.ix_(self.frame[here], shown)]
+        total = np.zeros((len(at), len(at)))
+        _spread(self.products[here], factor, law, total)
+        corner[np.ix_(at, at)] += total
+        by_pose = self.by_pose[here][:, :, law] * factor[:, None]
+        mixed[np.ix_(self.frame[here], np.arange(POSE), at)] += by_pose
+
+
+@numba.njit(cache=True, nogil=True)
+def _spread(products, factor, law, out):  # type: ignore[no-untyped-def]
+    """Add to ``out`` (C, C) the products (F, U, U) of C courses' laws (C,) times their factors (F, C)."""
+    for k in range(len(products)):
+        for i in range(len(law)):
+            for j in range(len(law)):
+                out[i, j] += products[k, law[i], law[j]] * factor[k, i] * factor[k, j]
+
+
+@dataclass(frozen=True)
+class FrameSums:
+    """Measurements summed over each frame: whatever whole frames and kinds are asked about later.
+
+    Attributes
+    ----------
+    equations : Equations
+    kinds : tuple of OfKind
+    """
+
+    equations: Equations
+    kinds: tuple[OfKind, ...]
+
+    @staticmethod
+    def of(equations: Equations) -> FrameSums:
+        """Return the sums of all measurements."""
+        each = ((equations.at(rows), used) for rows, used in by_kind(equations))
+        return FrameSums(equations, tuple(OfKind.of(int(part.kind[0]), part, used) for part, used in each))
+
+    @cached_property
+    def courses(self) -> InCourses:
+        """The columns; where there are no courses, each as it is."""
+        columns, frames = self.equations.by_global.shape[1], int(self.equations.frame.max(initial=0)) + 1
+        return self.equations.courses or InCourses.plain(np.arange(columns), frames)
+
+    def reduced(self, motion: Rows, part: Part) -> Reduced:
+        """Return the normal equations over the globals of a part of the run, with its poses at the optimum.
+
+        ``motion`` are equations of the poses alone, 6 parameters per frame.
+        """
+        frames = len(part.frames)
+        size, place = self.equations.size, self.equations.place
+        corner, mixed = np.zeros((size + 1, size + 1)), np.zeros((frames, POSE, size + 1))
+        blocks = np.zeros((frames, POSE, POSE))
+        for one in self.kinds:
+            one.add(part, self.courses, place, corner, mixed)
+            here = part.frames[one.frame] & (one.kind in part.kinds)
+            blocks[one.frame[here]] += one.pose[here]
+        _add_edges(self._of_edges(part), corner, mixed)
+        return _without_poses(corner, mixed, blocks, motion)
+
+    def _of_edges(self, part: Part) -> Equations:
+        """Return the measurements of fiducials' edges in a part of the run."""
+        use = (self.equations.edge >= 0) & part.frames[self.equations.frame]
+        use &= np.isin(self.equations.kind, part.kinds)
+        return self.equations.at(np.flatnonzero(use)).in_full()
+
+
+def eliminate_poses(equations: Equations, motion: Rows, frames: int) -> Reduced:
+    """Return `FrameSums.reduced` of all measurements."""
+    return FrameSums.of(equations).reduced(motion, Part(np.ones(frames, bool)))
+
+
+def _without_poses(corner: Float, mixed: Float, blocks: Float, motion: Rows) -> Reduced:
+    """Return the equations of the globals; ``blocks`` (N, 6, 6) and ``mixed`` are those of the poses."""
+    frames, _, size = mixed.shape
     band, pull = _band(blocks, motion)
     mixed[:, :, -1] += pull
-    flat = mixed.reshape(-1, size + 1)
+    flat = mixed.reshape(-1, size)
     solved = BandedCholesky.of_band(band).solve(flat)
     corner = corner - flat.T @ solved
-    by_global = solved.reshape(frames, POSE, size + 1)
+    by_global = solved.reshape(frames, POSE, size)
     misfit = float(corner[-1, -1] + motion.weight @ motion.residual**2)
     return Reduced(
         (corner[:-1, :-1] + corner[:-1, :-1].T) / 2, -corner[:-1, -1], misfit,

@@ -17,14 +17,14 @@ from stages.diagnose.effects.base import EffectModel, Shape
 from stages.diagnose.effects.vocabulary import VOCABULARY
 from stages.diagnose.gauge.elimination import ENCODER as ENCODER_ROW
 from stages.diagnose.gauge.elimination import (
-    Equations,
+    FrameSums,
     OwnUnknowns,
     Part,
     Reduced,
     eliminate_globals,
     eliminate_poses,
 )
-from stages.diagnose.gauge.linearise import asking, beside, linearise
+from stages.diagnose.gauge.linearise import beside, in_courses, linearise
 from stages.diagnose.gauge.points import BASELINE_SIGMA_PX, BASELINE_SIZE
 from stages.diagnose.gauge.run import GaugeRun, Linearised, Term
 from stages.diagnose.gauge.score_spread import score_inflation
@@ -169,28 +169,25 @@ def evidence(
         The whole run's first.
     """
     at = found.at(run)
-    whole = asking(run, found.state, at, asked, with_baseline=True)
-    each = [whole, *(whole.of(part) for part in parts)]
-    return tuple(_reduced(run, found, asked, equations, at.motion, with_spread) for equations in each)
+    sums = FrameSums.of(in_courses(run, found.state, at, asked, with_baseline=True))
+    everything = Part(np.ones(len(found.state.T_pc), bool))
+    return tuple(_reduced(run, found, asked, sums, p, at.motion, with_spread) for p in (everything, *parts))
 
 
 def _reduced(
-    run: GaugeRun,
-    found: Fit,
-    asked: Sequence[tuple[EffectModel, Shape]],
-    equations: Equations,
-    motion: Rows,
-    with_spread: bool,
-) -> Evidence:
-    """Return the evidence of equations, all but the shared columns eliminated."""
-    reduced = eliminate_poses(equations, motion, len(found.state.T_pc))
-    own = own_unknowns(run, found, equations.size)
+    run: GaugeRun, found: Fit, asked: Sequence[tuple[EffectModel, Shape]], sums: FrameSums, part: Part,
+    motion: Rows, with_spread: bool,
+) -> Evidence:  # fmt: skip
+    """Return the evidence of a part of the run, all but the shared columns eliminated."""
+    reduced = sums.reduced(motion, part)
+    own = own_unknowns(run, found, sums.equations.size)
     left, misfit = eliminate_globals(reduced, own)
     names, value = kept_columns(found, asked)
     inflation, degrees = np.ones(len(names)), np.full(len(names), np.inf)
     if with_spread:
         stated = found.state.stated
         before = block_diag(np.diag([stated.encoder_scale_sigma**-2.0]), instrument_information(stated))
+        equations = sums.equations.of(part).in_full()
         inflation, degrees = score_inflation(equations, reduced, left, own.out, _by_effect(names), before)
     information, right = left.information, left.right
     # From the point of linearisation back to the stated instrument.

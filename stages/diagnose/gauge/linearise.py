@@ -7,7 +7,8 @@ same noise fewer millimetres, so that in millimetres it would fit better than th
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import fields, replace
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from scipy.linalg import block_diag
@@ -28,7 +29,16 @@ from stages.diagnose.effects.library import (
     texture_columns,
     texture_shift_px,
 )
-from stages.diagnose.gauge.elimination import EDGE, POSE, RING, Equations, of_no_edge
+from stages.diagnose.gauge.elimination import (
+    BY_ROW,
+    EDGE,
+    KINDS,
+    POSE,
+    RING,
+    Equations,
+    InCourses,
+    of_no_edge,
+)
 from stages.diagnose.gauge.elimination import ENCODER as ENCODER_ROW
 from stages.diagnose.gauge.points import (
     BASELINE_SIZE,
@@ -63,8 +73,7 @@ def linearise(run: GaugeRun, state: Unknowns, terms: Sequence[Term]) -> Linearis
     parts.append(_ring_part(run, state, rings, ring_at, residual, terms))
     if run.encoder is not None:
         parts.append(_encoder_part(run, run.encoder, state, travel, terms))
-    arrays = [f.name for f in fields(Equations) if f.name != "edges"]
-    joined = {name: np.concatenate([getattr(p, name) for p in parts]) for name in arrays}
+    joined: dict[str, Any] = {name: np.concatenate([getattr(p, name) for p in parts]) for name in BY_ROW}
     smooth = smooth_motion_rows(state.T_pc, run.time_s, run.motion_sigma, 0)
     motion = replace(smooth, by_frame=np.ascontiguousarray(smooth.by_frame[..., :POSE]))
     return Linearised(Equations(**joined, edges=state.layout.marker), motion, ring_at, edge_at, travel)
@@ -95,18 +104,59 @@ def asking(
 
     Measurements without a valid prediction get no weight.
     """
+    return in_courses(run, state, at, asked, with_baseline).in_full()
+
+
+def in_courses(
+    run: GaugeRun, state: Unknowns, at: Linearised, asked: Sequence[tuple[EffectModel, Shape]],
+    with_baseline: bool = False,
+) -> Equations:  # fmt: skip
+    """Return the same equations with one column for each law, whatever its courses."""
     run.watch()
-    equations = at.equations
-    own, count = equations.by_global.shape[1], sum(len(model.amplitudes) for model, _ in asked)
-    size = own + count + BASELINE_SIZE * with_baseline
-    by_global = np.zeros((len(equations.frame), size))
+    equations, own = at.equations, at.equations.by_global.shape[1]
+    laws, courses = _in_courses(at, asked, own, len(run.time_s))
+    first = own + sum(len(law.amplitudes) for law, _ in laws)
+    end = first + BASELINE_SIZE * with_baseline
+    by_global = np.zeros((len(equations.frame), end))
     by_global[:, :own] = equations.by_global
-    _ask(run, state, at, asked, by_global[:, own : own + count])
-    bad = ~np.isfinite(by_global[:, own : own + count]).all(1)
+    _ask(run, state, at, laws, by_global[:, own:first])
+    bad = ~np.isfinite(by_global[:, own:first]).all(1)
     if with_baseline:
-        by_global[:, own + count :] = _baseline(run, at)
+        by_global[:, first:] = _baseline(run, at)
     by_global[bad] = 0.0
-    return replace(equations, by_global=by_global, weight=np.where(bad, 0.0, equations.weight))
+    baseline = InCourses.plain(np.arange(first, end), len(run.time_s))
+    return replace(
+        equations, by_global=by_global, weight=np.where(bad, 0.0, equations.weight),
+        courses=InCourses.joined([courses, baseline]),
+    )  # fmt: skip
+
+
+def _in_courses(
+    at: Linearised, asked: Sequence[tuple[EffectModel, Shape]], own: int, frames: int
+) -> tuple[list[tuple[EffectModel, Shape]], InCourses]:
+    """Return the laws of what is asked about, each once; then ``own`` columns, and after them those asked.
+
+    The columns of laws follow the ``own`` ones in that order.
+    """
+    place, end = dict[tuple[str, Shape], Int](), own
+    laws, parts = list[tuple[EffectModel, Shape]](), [InCourses.plain(np.arange(own), frames)]
+    moments = {RING: at.rings.moments, EDGE: at.edges.moments}
+    for model, shape in asked:
+        factored = {kind: model.factored(points, shape) for kind, points in moments.items()}
+        _, law, of_law = factored[RING] or ((), model, shape)
+        if (law.name, of_law) not in place:
+            place[law.name, of_law] = np.arange(end, end := end + len(law.amplitudes))
+            laws.append((law, of_law))
+        columns = place[law.name, of_law]
+        if factored[RING] is None:
+            parts.append(InCourses.plain(columns, frames))
+            continue
+        # Courses of the library have no influence on the encoder's readings.
+        each = np.zeros((len(KINDS), frames, len(model.amplitudes)))
+        for kind, (factors, *_) in ((k, f) for k, f in factored.items() if f is not None):
+            each[kind, moments[kind].frame] = np.repeat(np.stack(factors, -1), len(columns), axis=1)
+        parts.append(InCourses(np.tile(columns, each.shape[-1] // len(columns)), each))
+    return laws, InCourses.joined(parts)
 
 
 def _ask(

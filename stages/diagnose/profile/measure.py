@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import cv2
 import numba
 import numpy as np
 from scipy.stats import norm
@@ -18,6 +17,7 @@ from stages.rings.sectors import Sectors, sectors_of
 
 SECTORS = 72
 REACH_PX, STEP_PX = 60.0, 0.5
+_BESIDE_PX = 40.0
 FIT_WIDTHS, CORE_WIDTHS = 5.0, 4.5
 _TRUSTED = 0.97
 _MOST = 0.5
@@ -100,6 +100,19 @@ def stack_frame(  # type: ignore[no-untyped-def]
             k += 1
 
 
+@numba.njit(cache=True, nogil=True)
+def mean_beside(image, start, pixel, radius, line, least, most):  # type: ignore[no-untyped-def]
+    """Return the mean grey level of the pixels whose distance to the line (A,) is in [least, most), px."""
+    total, count = 0, 0
+    for a in range(line.size):
+        low = first_at_least(radius, start[a], start[a + 1], line[a] - most)
+        for k in range(low, first_at_least(radius, low, start[a + 1], line[a] + most)):
+            if least <= abs(radius[k] - line[a]) < most:
+                total += image[pixel[k]]
+                count += 1
+    return total / count if count else np.nan
+
+
 @dataclass(frozen=True)
 class LineProfiles:
     """Profiles across the line, by frame and azimuth sector.
@@ -163,10 +176,12 @@ def measure_profiles(recording: Recording, rings: RingSamples) -> LineProfiles:
     for k, (_, image) in enumerate(recording.read(rings.frame[rows], "grey")):
         if image is None:
             continue
-        tiles.append(_tile_means(image))
+        tiles.append(tile_means(image))
         line, width = _line(rings, rows[k])
         slope = (np.roll(line, -_SLOPE_SECTORS) - np.roll(line, _SLOPE_SECTORS)) / (2 * _SLOPE_SECTORS * step)
-        beside[k] = float(image.ravel()[sectors.pixels_near(line, 40.0, REACH_PX)].mean())
+        beside[k] = mean_beside(
+            image.ravel(), sectors.start, sectors.pixel, sectors.radius_px, line, _BESIDE_PX, REACH_PX
+        )
         stack_frame(
             image.ravel(), sectors.start, sectors.pixel, sectors.radius_px, sectors.offset_rad, line, slope,
             width, rings.valid[rows[k]], beside[k], trusted, FIT_WIDTHS, CORE_WIDTHS, REACH_PX, STEP_PX,
@@ -191,12 +206,15 @@ def _line(rings: RingSamples, row: int) -> tuple[Float, Float]:
     return radius, np.clip(width, 0.5 * np.median(width), 2 * np.median(width))
 
 
-def _tile_means(image: Image) -> Float32:
-    size = (image.shape[1] // _TILE_PX, image.shape[0] // _TILE_PX)
-    return np.asarray(cv2.resize(image.astype(np.float32), size, interpolation=cv2.INTER_AREA))
+def tile_means(image: Image) -> Float:
+    """Return the mean grey levels (h, w) of whole tiles."""
+    rows, columns = (n // _TILE_PX for n in image.shape)
+    whole = image[: rows * _TILE_PX, : columns * _TILE_PX]
+    of_rows = whole.reshape(rows, _TILE_PX, -1).sum(axis=1, dtype=np.uint32)
+    return np.asarray(of_rows.reshape(rows, columns, _TILE_PX).mean(axis=2) / _TILE_PX)
 
 
-def _dark_level(tiles: list[Float32]) -> tuple[float, float]:
+def _dark_level(tiles: list[Float]) -> tuple[float, float]:
     """Return the grey level of the darkest place, from the means of tiles (h, w) of every frame, and its 1 σ.
 
     The darkest of many tiles is also dark by chance: by two of their 1 σ at the chosen percentile. That σ is
