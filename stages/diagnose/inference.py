@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy import stats
+from scipy.special import fdtrc
 
 from pipeline.adjustment.normal_equations import covariance_of, log_determinant, marginalised
 from pipeline.arrays import Float, Int
@@ -233,7 +233,7 @@ class Around:
         statistic = float(right @ np.linalg.solve(spread, right))
         # Relative variances are averaged, so that columns of well-known scatter support those with few cells.
         degrees = 1 / max(1 / DEGREES, float(np.mean(1 / self.evidence.degrees[block])))
-        p_value = float(stats.f.sf(statistic / len(block), len(block), degrees))
+        p_value = float(fdtrc(len(block), degrees, statistic / len(block)))
         return Score(
             np.asarray(amplitude, np.float64), covariance, statistic, p_value, float(right @ amplitude)
         )

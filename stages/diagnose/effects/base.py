@@ -95,8 +95,9 @@ class ImagePoints:
     def moments(self) -> ImagePoints:
         """One point of each frame: a course depends on the frame alone."""
         first = np.unique(self.frame, return_index=True)[1]
-        each: dict[str, Any] = {f.name: getattr(self, f.name) for f in fields(self)}
-        return replace(self, **{name: v[first] for name, v in each.items() if isinstance(v, np.ndarray)})
+        each = {f.name: getattr(self, f.name) for f in fields(self)}
+        rows: dict[str, Any] = {name: v[first] for name, v in each.items() if isinstance(v, np.ndarray)}
+        return replace(self, **rows)
 
     @cached_property
     def patterns(self) -> dict[tuple[str, Shape, bool], Float]:

@@ -17,6 +17,7 @@ from stages.rings.sectors import Sectors, sectors_of
 
 SECTORS = 72
 REACH_PX, STEP_PX = 60.0, 0.5
+# Light beside the line begins here: farther away than a blurred line's skirt (chosen).
 _BESIDE_PX = 40.0
 FIT_WIDTHS, CORE_WIDTHS = 5.0, 4.5
 _TRUSTED = 0.97
