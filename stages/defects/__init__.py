@@ -241,5 +241,5 @@ def _defects_of_run(
 
 
 DEFECTS = Stage(
-    "defects", "68", DefectParameters, _defects_of_run, "defects as instances with depth, clock and kind"
+    "defects", "69", DefectParameters, _defects_of_run, "defects as instances with depth, clock and kind"
 )
