@@ -213,9 +213,10 @@ def faded(state: PhotometricState, found: Sequence[Mismatch], ring: Ring) -> tup
         change, nan = float(np.expm1(slope)), float("nan")
         sd = float((high - low) / 2 / norm.isf((1 - _CONFIDENCE) / 2) * np.exp(slope))
         said = (
-            f"From the first to the last frame the {light} {'gains' if change > 0 else 'loses'} "
-            f"{100 * abs(change):.0f} % of the brightness that the wall's photo predicts: the light changes "
-            "slowly, or the brightness of the photo along the pipe does, as with LEDs that change slowly."
+            f"From the first to the last frame {'lit wall' if light == 'LEDs' else 'the line'} becomes "
+            f"{100 * abs(change):.0f} % {'brighter' if change > 0 else 'darker'} than the wall's photo "
+            f"predicts: the {light} may change slowly, or the photo along the pipe does, as where LEDs fade "
+            "in whose light it was made."
         )
         size, look = NamedFigure("change", change, sd, "relative"), ring.whole(int(course.frame[-1]))
         made.append(Mismatch("", channel, "time", (), (size,), nan, nan, nan, said, look))

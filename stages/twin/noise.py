@@ -167,15 +167,18 @@ def photon_transfer(windows: list[NoiseWindows], black: Figure, white: float) ->
     """Return the noise from windows of several frames; σ from leaving out one frame at a time.
 
     Each part of the noise is at least 0, except in the estimate of σ: parts clipped at 0 in every fit would
-    have σ 0. Windows of one grey level determine only the sum of the parts, which is then read noise; with
-    few levels, or where all frames but one have few, every σ is infinite.
+    have σ 0. Errors of the photo that do not recur look like non-uniformity: the truth is taken to be uniform
+    between the parts fitted with and without it. Windows of one grey level determine only the sum of the
+    parts, which is then read noise; with few levels, or where all frames but one have few, no σ is finite.
     """
     value, others = _fitted(_Cells.of(windows)), (windows[:k] + windows[k + 1 :] for k in range(len(windows)))
     each = [_Cells.of(some) for some in (windows, *others)]
     parted = [c.free for c in each if c is not None and c.part_the_noise]
     if len(parted) < len(each):
         return _camera_noise(value, np.full(4, np.inf), black, white)
-    read, per_level, square, gamma = np.nan_to_num(left_out_sd(np.array(parted[1:])), nan=np.inf)
+    sd = np.nan_to_num(left_out_sd(np.array(parted[1:])), nan=np.inf)
+    apart = each[0].free - each[0].even if each[0] is not None else np.zeros(4)
+    read, per_level, square, gamma = np.hypot(sd, apart / np.sqrt(3))
     uneven = _of_root(float(value[2]), float(square))
     return _camera_noise(value, np.array([read, per_level, uneven, gamma]), black, white)
 
@@ -236,6 +239,12 @@ class _Cells:
         """Return read variance, variance per level, squared non-uniformity (all unclipped), and γ."""
         size = np.linalg.lstsq(self.design, np.ones_like(self.level), rcond=None)[0]
         return np.array([*size, self.gamma])
+
+    @property
+    def even(self) -> Float:
+        """Return the same for pixels that are all alike."""
+        size = np.linalg.lstsq(self.design[:, :2], np.ones_like(self.level), rcond=None)[0]
+        return np.array([*size, 0.0, self.gamma])
 
     @property
     def gamma(self) -> float:

@@ -234,7 +234,8 @@ def _on_wall(
     return Mismatch(
         "", "intensity", "wall", place, (size,), chance, nan, nan,
         f"{at} the wall is {100 * abs(value[most]):.0f} % {way} "
-        "than its photo: it shines differently from each side, or the radius map is wrong there.",
+        "than its photo: it shines differently from each side, its photo was made through dirt on the window "
+        "or in a glint, or the radius map is wrong there.",
         look,
     )  # fmt: skip
 

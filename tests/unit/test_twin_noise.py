@@ -68,6 +68,18 @@ def test_read_noise_in_grey_levels_does_not_need_the_number_of_electrons():
     assert np.median([n.read_electrons.sd for n in made]) > 0.15 * true * 40
 
 
+def test_the_sigma_of_noise_includes_that_errors_of_the_photo_look_like_uneven_pixels():
+    """In a rendered recording 1.33 ± .07 grey levels were told for 1.09: errors grew with brightness."""
+    random = np.random.default_rng(3)
+    each = [random.uniform(38, 140, 400) for _ in range(6)]
+    made = [
+        NoiseWindows(x, (1.267 + 0.0114 * x + 0.37 + 1.2e-4 * x**2) * random.chisquare(140, 400) / 140)
+        for x in each
+    ]
+    read = photon_transfer(made, BLACK, 255.0).read_levels
+    assert abs(read.value - np.sqrt(1.267 - 1 / 12)) < 2 * read.sd
+
+
 @pytest.mark.parametrize(("power", "known"), [(1.0, False), (0.4, True)])
 def test_a_response_is_known_only_if_read_noise_does_not_look_alike(power, known):
     """Read noise of 1.3 grey levels under a linear response was told as an exponent of 1.45 ± .02."""
