@@ -89,6 +89,14 @@ def judged(suspected: Sequence[Suspected], again: Again) -> tuple[tuple[Mismatch
     return tuple(m for m, kept in made if kept), tuple(m for m, kept in made if not kept)
 
 
+def first_confirmed(
+    suspected: Sequence[Suspected], again: Again
+) -> tuple[tuple[Mismatch, ...], tuple[Mismatch, ...]]:
+    """Return the first confirmed one of effects that a single cause has; if none is, those withdrawn."""
+    kept, withdrawn = judged(suspected, again)
+    return kept[:1], () if kept else withdrawn
+
+
 def _judged(one: Suspected, again: Again) -> tuple[Mismatch, bool]:
     """Return the mismatch with the figures from frames rendered again, and whether its name stays."""
     if one.law is None:

@@ -97,15 +97,16 @@ def response_of(samples: BlockSamples | None, ring: Ring) -> tuple[Suspected, ..
 def focus_of(
     state: PhotometricState, whole: WholePictures, named: Sequence[Mismatch]
 ) -> tuple[Suspected, ...]:
-    """Return a blur of lit frames, or else of the line; ``named`` are confirmed laws of whole pictures.
+    """Return a blur of lit frames, and of the line; ``named`` are confirmed laws of whole pictures.
 
-    If contrast follows another power than the photo's, curvature says nothing about blur.
+    A lens out of focus makes both, and the photo may hide one of them. If contrast follows another power than
+    the photo's, curvature says nothing about blur.
     """
     if any(m.name == "response" for m in named):
         return ()
     moved = sum(m.parameters[0].value for m in named if m.name == "motion_blur")
     half_variance = whole.even_blur(state.sharpness) - moved**2 / 2
-    return _defocus(whole, half_variance) or _not_sharp(state.line, whole)
+    return (*_defocus(whole, half_variance), *_not_sharp(state.line, whole))
 
 
 def _defocus(whole: WholePictures, half_variance: Float) -> tuple[Suspected, ...]:

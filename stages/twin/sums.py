@@ -16,7 +16,7 @@ from stages.twin.cells import Cells, CellsOfFrames, sectors_of
 from stages.twin.compare import Comparison, exposure_of
 from stages.twin.dead_led import dead_led
 from stages.twin.fine_noise import FineNoise
-from stages.twin.gate import Suspected, judged
+from stages.twin.gate import Suspected, first_confirmed, judged
 from stages.twin.glints import SpotsOfFrames
 from stages.twin.lamp_power import power_of_lamps
 from stages.twin.lamps import beside_response, separated_from_wall, uneven_lamps
@@ -153,7 +153,7 @@ class Sums:
         if self.comparison.wall_is_clipped:
             kept, unsure = beside_clipping(kept)
             withdrawn = (*withdrawn, *unsure)
-        focus, not_focus = judged(focus_of(self._state, self.whole, kept), again)
+        focus, not_focus = first_confirmed(focus_of(self._state, self.whole, kept), again)
         return (*kept, *focus, *dark), (*withdrawn, *not_focus, *of_wall)
 
     def _lamps(

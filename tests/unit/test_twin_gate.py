@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from pipeline.artefacts.twin import Mismatch
-from stages.twin.gate import Suspected, _borne_out, judged
+from stages.twin.gate import Suspected, _borne_out, first_confirmed, judged
 from stages.twin.significance import significance_over_frames
 
 
@@ -33,6 +33,22 @@ def test_light_that_is_there_but_follows_no_law_loses_its_certain_name_only(othe
     kept, withdrawn = judged([suspected], lambda frames: [])
     assert [m.name for m in kept] == [otherwise] * bool(otherwise)
     assert [m.name for m in withdrawn] == ["second_line"] * (not otherwise)
+
+
+def test_a_blur_that_lit_frames_do_not_confirm_may_be_confirmed_by_the_line():
+    """A line blurred by 2.5 px was not told: lit frames had suggested a blur that the photo has, too."""
+
+    def one(name, law):
+        found = Mismatch(name, "intensity", "image", (), (), 1e-9, np.nan, np.nan, "Blurred.")
+        return Suspected(found, law, np.arange(8), np.ones((8, 1)))
+
+    lit, line = one("defocus", lambda shown, size: None), one("thick_sheet", None)
+    assert [[m.name for m in some] for some in first_confirmed((lit, line), lambda frames: [])] == [
+        ["thick_sheet"],
+        [],
+    ]
+    assert len(first_confirmed((line, line), lambda frames: [])[0]) == 1
+    assert len(first_confirmed((lit,), lambda frames: [])[1]) == 1
 
 
 def test_consecutive_frames_count_as_fewer_independent_ones():

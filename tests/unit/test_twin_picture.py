@@ -81,6 +81,9 @@ def test_a_wide_line_is_kept_if_recorded_frames_fit_no_line_of_a_focused_lens(re
     line = SimpleNamespace(blur_px=Figure(2.4, 0.1))
     whole = SimpleNamespace(frames_of=lambda law: np.arange(8), scene=SCENE)
     (suspected,) = focus_of(SimpleNamespace(line=line, sharpness=np.zeros(4)), _blind(whole), ())
+    both = SimpleNamespace(**vars(whole), frame={"blur": np.arange(8)})
+    both.even_blur, both.loses_texture = lambda sharpness: np.full(8, 2.0), True
+    assert len(focus_of(SimpleNamespace(line=line, sharpness=np.zeros(4)), both, ())) == 2
 
     def again(line):
         return _ring(line(LINE_LIGHT).blur_px.value)

@@ -143,7 +143,7 @@ def test_a_laser_that_dims_slowly_is_reported_without_a_name_and_first_frames_wi
 
     (fade,) = told(-0.5)
     assert (fade.name, fade.channel, fade.fixed_to) == ("", "line", "time")
-    assert "loses" in fade.statement
+    assert "darker than" in fade.statement
     assert not told(-0.5, (replace(fade, name="laser_step"),)), "a step was already reported"
     assert not any(m for _ in range(100) for m in (*told(0.0), *told(0.0, first=-0.5)))
     sizes = [p for _ in range(300) for m in told(-0.5) for p in m.parameters]

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import cv2
 import numpy as np
 
-from stages.twin.gate import judged
+from stages.twin.gate import first_confirmed, judged
 from stages.twin.line_light import _plain_line
 from stages.twin.name import focus_of, response_of
 from stages.twin.picture import WholePictures
@@ -81,7 +81,9 @@ def found_in(lit=lambda p, r: p, laser=lambda p, r: p, of_sharpness=0.0, judge=N
     state = SimpleNamespace(sharpness=np.full(4, of_sharpness), lamp=True, line=None)
     first = (*whole.suspected(state.sharpness), *response_of(blocks.samples(), RING))
     kept, withdrawn = judged(first, lambda frames: [(f, shown[f]) for f in frames])
-    focus, not_focus = judged(focus_of(state, whole, kept), lambda frames: [(f, shown[f]) for f in frames])
+    focus, not_focus = first_confirmed(
+        focus_of(state, whole, kept), lambda frames: [(f, shown[f]) for f in frames]
+    )
     return (*kept, *focus), (*withdrawn, *not_focus)
 
 
