@@ -239,11 +239,6 @@ class Around:
         )
 
 
-def score(evidence: Evidence, stated: Stated, block: Int, given: Int | None = None) -> Score | None:
-    """Return the score of columns ``block``, with the instrument and the columns ``given`` free."""
-    return Around.of(evidence, stated, given).score(block)
-
-
 def eliminated(evidence: Evidence, stated: Stated, block: Int, free: Int) -> tuple[Float, Float, Float]:
     """Return information (Q, Q) and right side (Q,) of columns ``block``, with columns ``free`` eliminated.
 

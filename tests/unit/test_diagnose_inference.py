@@ -24,12 +24,12 @@ from stages.diagnose.gauge.formula import joint_p
 from stages.diagnose.gauge.score_spread import score_inflation
 from stages.diagnose.inference import (
     INSTRUMENT,
+    Around,
     Column,
     Evidence,
     Stated,
     estimate,
     places_of,
-    score,
     total,
 )
 
@@ -157,7 +157,7 @@ def test_a_deviation_within_the_stated_uncertainty_is_no_discovery():
 
     def p_value(size: float) -> float:
         of = evidence_of(design, design[:, 1] * size, columns)
-        found = score(of, stated, places_of(of, CONE, ()))
+        found = Around.of(of, stated).score(places_of(of, CONE, ()))
         assert found is not None
         assert found.amplitude[0] == pytest.approx(size, rel=1e-3)
         return found.p_value
@@ -171,7 +171,8 @@ def test_correlated_neighbours_widen_the_errors_of_data_but_not_the_stated_ones(
     one = np.random.default_rng(5).normal(size=(500, 1))
     design = 1e3 * np.concatenate([one, one], 1)
     plain, alike = (
-        score(evidence_of(design, design[:, 1] * 0.05, columns, f), stated, np.array([1])) for f in (1.0, 9.0)
+        Around.of(evidence_of(design, design[:, 1] * 0.05, columns, f), stated).score(np.array([1]))
+        for f in (1.0, 9.0)
     )
     assert plain is not None
     assert alike is not None
@@ -187,7 +188,7 @@ def test_scores_of_noise_are_uniform():
     p_values = []
     for _ in range(300):
         noise = random.normal(size=300) + design[:, 0] * random.normal()
-        found = score(evidence_of(design, noise, columns), stated, np.array([1, 2]))
+        found = Around.of(evidence_of(design, noise, columns), stated).score(np.array([1, 2]))
         assert found is not None
         p_values.append(found.p_value)
     assert stats.kstest(p_values, "uniform").pvalue > 1e-3
@@ -220,7 +221,7 @@ def test_a_score_that_comes_from_few_cells_is_less_significant():
     of = evidence_of(random.normal(size=(500, 1)), random.normal(size=500), (Column("a", ""),))
     of = replace(of, right=6.0 * np.sqrt(np.diag(of.information)))
     stated, block = Stated((), np.zeros((0, 0))), np.array([0])
-    many, few = (score(replace(of, degrees=np.array([d])), stated, block) for d in (np.inf, 10.0))
+    many, few = (Around.of(replace(of, degrees=np.array([d])), stated).score(block) for d in (np.inf, 10.0))
     assert many is not None
     assert few is not None
     assert many.statistic == few.statistic == pytest.approx(36.0)
@@ -230,7 +231,7 @@ def test_a_score_that_comes_from_few_cells_is_less_significant():
         of, columns=(Column("a", ""), Column("a", "b")), information=np.eye(2), score_covariance=np.eye(2),
         right=np.array([6.0, 0.0]), degrees=np.array([10.0, np.inf]),
     )  # fmt: skip
-    one_sure = score(both, stated, np.array([0, 1]))
+    one_sure = Around.of(both, stated).score(np.array([0, 1]))
     assert one_sure is not None
     # The tail of F(2, 20) beyond 18.
     assert one_sure.p_value == pytest.approx(3.4e-5, rel=0.02)

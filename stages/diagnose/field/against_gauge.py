@@ -18,7 +18,7 @@ from stages.diagnose.gauge.examine import Examined
 from stages.diagnose.gauge.fit import evidence
 from stages.diagnose.gauge.run import Term
 from stages.diagnose.gauge.scan import Scored
-from stages.diagnose.inference import Evidence, Score, Stated, places_of, score
+from stages.diagnose.inference import Around, Evidence, Score, Stated, places_of
 from stages.diagnose.result import Confirmation
 
 # Inspection and gauge run confirm or refute each other only where the 1 σ of one is below this share of the
@@ -42,9 +42,9 @@ def not_refuted(shown: Sequence[Scored], gauge: Examined, stated: Stated) -> tup
         return tuple(shown)
     searched = gauge.searched
     about = evidence(searched.run, searched.nothing, [(s.model, s.shape) for s in asked])[0]
-    out = []
+    around, out = Around.of(about, stated), []
     for s in shown:
-        own = score(about, stated, places_of(about, s.model, s.shape)) if s in asked else None
+        own = around.score(places_of(about, s.model, s.shape)) if s in asked else None
         size = float(np.linalg.norm(s.score.amplitude))
         telling = own is not None and np.sqrt(np.trace(own.covariance)) < TELLING * size
         if own is None or not telling or same(
@@ -126,6 +126,7 @@ def _own_score(term: Term, found: FieldEvidence, stated: Stated) -> tuple[Shape,
         whole = found.about([(term.model, shape) for shape in shapes])
     if whole is None:
         return None
-    each = ((shape, score(whole, stated, places_of(whole, term.model, shape))) for shape in shapes)
+    around = Around.of(whole, stated)
+    each = ((shape, around.score(places_of(whole, term.model, shape))) for shape in shapes)
     seen = [(shape, own) for shape, own in each if own is not None]
     return max(seen, key=lambda pair: pair[1].statistic, default=None)

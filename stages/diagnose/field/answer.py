@@ -17,7 +17,7 @@ from stages.diagnose.field.evidence import FieldEvidence, travels
 from stages.diagnose.field.extended_answer import each_once, with_class, with_statement, with_unexplained
 from stages.diagnose.field.unexplained import why_unexplained
 from stages.diagnose.gauge.scan import Scored
-from stages.diagnose.inference import DETECTED, INSTRUMENT, Evidence, Stated, places_of, score, stated_belief
+from stages.diagnose.inference import DETECTED, INSTRUMENT, Around, Evidence, Stated, places_of, stated_belief
 from stages.diagnose.record_next import AGAIN, record_next
 from stages.diagnose.result import (
     Confirmation,
@@ -103,10 +103,11 @@ def scores_of(
     """Return every effect's score at its best shape, the most significant first."""
     best: dict[str, Scored] = {}
     tried: dict[str, int] = {}
+    around = Around.of(whole, stated)
     for name, shape in sorted({(c.effect, c.shape) for c in whole.columns if c.effect != INSTRUMENT}):
         if name not in library:
             continue
-        result = score(whole, stated, places_of(whole, library[name], shape))
+        result = around.score(places_of(whole, library[name], shape))
         if result is None or not library[name].possible(shape, result.amplitude):
             continue
         tried[name] = tried.get(name, 0) + 1
