@@ -80,8 +80,12 @@ class RingSamples:
 
     def pixels(self) -> Float:
         """Return (F, A, 2) pixel coordinates (u, v) of the samples."""
+        return self.pixels_of(slice(None))
+
+    def pixels_of(self, ring: int | slice) -> Float:
+        """Return (A, 2) pixel coordinates (u, v) of one ring's samples, or those of several (n, A, 2)."""
         direction = np.stack([np.cos(self.azimuth_rad), np.sin(self.azimuth_rad)], -1)
-        return np.asarray(self.centre_px + self.radius_px[..., None].astype(np.float64) * direction)
+        return np.asarray(self.centre_px + self.radius_px[ring][..., None].astype(np.float64) * direction)
 
     def some(self, rows: slice) -> RingSamples:
         """Return some of the rings: those of a slice of the F frames."""

@@ -153,11 +153,16 @@ def _found_in(
         whole = measurer.measured(region, every_point)
         if whole is None:
             continue
+        spots = scene.seen_by.spots_in(whole.here, whole.depth, whole.surface)
+        clear = measurer.measured(region, every_point, tuple(spots)) if spots else whole
+        is_spot = bool(spots) and (clear is None or not clear.depth.is_known)
+        whole = whole if clear is None or is_spot else clear
         kept = measurer.without_contradicted(region, every_point, whole)
         if region.sign * kept.allowed.depth_mm >= scene.min_depth_mm:
             top = kept.best(region.cut(score.astype(float)))
             seen_by, fixed_mm = scene.seen_by, _fixed_in(region, fixed)
-            evidence = evidence_for(kept.here, kept.allowed, kept.surface, seen_by, fixed_mm, top)
+            evidence = evidence_for(kept.here, kept.allowed, kept.surface, seen_by, fixed_mm, top, spots)
+            evidence = replace(evidence, spot=is_spot)
             return _described(region, measurer, scene, (whole, kept), evidence)
     return None
 

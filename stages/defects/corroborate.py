@@ -9,6 +9,7 @@ may in every ring be an effect of that end.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -22,8 +23,10 @@ from stages.defects.depth import Depth
 from stages.defects.marred import without_glints
 from stages.defects.neighbours import frames_at_peak, shown_in_a_row
 from stages.defects.parallax import LitPictures
+from stages.defects.photo import photo_stands_out
 from stages.defects.relief import Relief
 from stages.defects.segment import Region
+from stages.defects.shining_spot import frames_with_spots
 from stages.defects.surface import Surface, cells_of, of_usual_sigma
 
 LEAST_RINGS = 2
@@ -36,9 +39,6 @@ _BRIGHT = 0.9
 # Half of the asked rings must be bright there. A codec repeats a glint in one or two pictures before and
 # after it, so that up to five rings show it; six or more rings are asked one by one.
 _MOST, MANY_RINGS = 0.5, 6
-# The photo confirms a finding if it is darker or brighter there than at all of 40 places around the pipe: for
-# each of the two this happens by chance once in 41 times.
-_PLACES = 40
 # A finding counts as fixed to the image if what is fixed makes up half of its depth in half of its cells.
 # Chosen: for a droplet's own finding it does in nine of ten cells, for a defect beside a droplet in none.
 _FIXED_SHARE = 0.5
@@ -69,6 +69,8 @@ class Evidence:
         six or more rings show it, of most of them.
     contradicted : bool
         Whether lit pictures, taken when the line was elsewhere, show the wall without it.
+    spot : bool
+        Whether its depth is that of rings in which a spot of the wall shines beside the line.
     in_probe_path, behind_drop : bool
         Whether the probe would have collided with it; whether lit pictures show the wall displaced there, but
         only while the line passed it.
@@ -83,11 +85,12 @@ class Evidence:
     contradicted: bool = False
     in_probe_path: bool = False
     behind_drop: bool = False
+    spot: bool = False
 
     @property
     def on_wall(self) -> bool:
         """Whether it belongs to the wall, and is not explained by the probe or by the end of the line."""
-        return not (self.fixed or self.edge or self.moved_over or self.in_probe_path)
+        return not (self.fixed or self.edge or self.moved_over or self.in_probe_path or self.spot)
 
     @property
     def moved_over(self) -> bool:
@@ -106,6 +109,11 @@ class Evidence:
             return (
                 "It stays at one place of the image while the wall goes by, as something on the window or on "
                 "the probe does: see the warnings of the stage accumulate"
+            )
+        if self.spot:
+            return (
+                "A bright spot of the wall beside the line was taken for it: the spot stays in place while "
+                "the line passes, and without the rings that show it there is no such depth"
             )
         if self.contradicted:
             return (
@@ -149,23 +157,37 @@ class Witnesses:
     pictures: LitPictures | None = None
     held: HeldOver = NOTHING_HELD
 
+    def spots_in(self, region: Region, depth: Depth, surface: Surface) -> list[int]:
+        """Return the frames whose rings show a spot beside the line; none without rings and poses."""
+        if self.rings is None or self.pictures is None:
+            return []
+        probe, motion = self.pictures.probe, self.pictures.motion
+        return frames_with_spots(region, depth.depth_mm, surface.relief, self.rings, probe, motion)
+
 
 def evidence_for(
-    region: Region, depth: Depth, surface: Surface, seen_by: Witnesses, fixed_mm: Float, score: float
+    region: Region,
+    depth: Depth,
+    surface: Surface,
+    seen_by: Witnesses,
+    fixed_mm: Float,
+    score: float,
+    spots: Sequence[int] = (),
 ) -> Evidence:
     """Return the evidence for and against a finding.
 
     ``fixed_mm`` (H, W) is the displacement that stays at one place of the image, ``score`` the largest
-    matched-filter response, σ. The photo is projected onto the measured wall: where the depth shifts the
-    photo by more than the finding's size, the photo differs there because of the depth and is no independent
-    evidence.
+    matched-filter response, σ. Rings of the frames ``spots`` show a spot beside the line and do not count.
+    The photo is projected onto the measured wall: where the depth shifts the photo by more than the finding's
+    size, the photo differs there because of the depth and is no independent evidence.
     """
     relief = surface.relief
     size = min(n * c for n, c in zip(region.mask.shape, relief.cell_mm, strict=True))
     shifted = abs(depth.depth_mm) > size
     # A pit inside a wide patch covers less than a fifth of any ring's samples: its peak is examined, too.
     frames = frames_behind(region, depth.depth_mm, surface), frames_at_peak(depth, region, surface)
-    showing = without_glints(np.union1d(*frames), region, surface, seen_by.rings)
+    clear = np.setdiff1d(np.union1d(*frames), np.asarray(spots, np.int64))
+    showing = without_glints(clear, region, surface, seen_by.rings)
     pictures = seen_by.pictures
     evidence = Evidence(
         seen_by.held.independent(shown_in_a_row(showing, region, surface, seen_by.rings)),
@@ -266,35 +288,3 @@ def frames_behind(region: Region, depth_mm: float, surface: Surface) -> Int:
     frame, ring, count = np.unique(points.frame[inside], return_inverse=True, return_counts=True)
     showing = np.bincount(ring, np.sign(depth_mm) * deviation > limit, len(frame))
     return np.asarray(frame[showing >= np.maximum(_TOP_SHARE * count, LEAST_SAMPLES)])
-
-
-def photo_stands_out(texture: WallTexture, relief: Relief, region: Region) -> bool | None:
-    """Whether the photo differs from its surroundings more in the region than at all places beside it.
-
-    None, undecided, for what goes all round the pipe and where there is no photo.
-    """
-    if region.all_round:
-        return None
-    turns = np.arange(1, _PLACES + 1) * len(relief.azimuth_rad) // (_PLACES + 1)
-    here = abs(darkness(texture, relief, region))
-    beside = [abs(darkness(texture, relief, region.turned(int(turn)))) for turn in turns]
-    return bool(here > np.nanmax(beside, initial=0.0)) if np.isfinite(here) else None
-
-
-def darkness(texture: WallTexture, relief: Relief, region: Region) -> float:
-    """Return by which fraction the photo is darker inside than in a frame around it; NaN without a photo."""
-    margin = max(4, min(region.mask.shape) // 2)
-    rows = np.arange(region.row - margin, region.row + region.mask.shape[0] + margin)
-    columns = np.arange(region.column - margin, region.column + region.mask.shape[1] + margin)
-    s = relief.distance_mm[0] + rows * relief.cell_mm[0]
-    psi = relief.azimuth_rad[0] + columns * (relief.azimuth_rad[1] - relief.azimuth_rad[0])
-    i = np.rint((s - texture.distance_from_mm) / texture.mm_per_px).astype(int)
-    j = np.rint((psi - texture.azimuth_from_rad) / texture.rad_per_px).astype(int)
-    j %= max(1, round(2 * np.pi / texture.rad_per_px))
-    known = np.ix_((i >= 0) & (i < texture.bgra.shape[0]), j < texture.bgra.shape[1])
-    photo = texture.bgra[np.ix_(i[known[0][:, 0]], j[known[1][0]])]
-    inside = np.pad(region.mask, margin)[known]
-    grey, seen = photo[..., :3].mean(-1), photo[..., 3] > 0
-    if not (inside & seen).any() or not (~inside & seen).any():
-        return float("nan")
-    return float(1 - grey[inside & seen].mean() / max(1.0, float(grey[~inside & seen].mean())))

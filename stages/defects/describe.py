@@ -18,9 +18,10 @@ from pipeline.artefacts.findings import (
 )
 from pipeline.artefacts.measured import PointCloud
 from pipeline.pages import notation
-from stages.defects.corroborate import Witnesses, darkness
+from stages.defects.corroborate import Witnesses
 from stages.defects.depth import Depth
 from stages.defects.grow import millimetre_mean
+from stages.defects.photo import darkness
 from stages.defects.portraits import Features, probabilities
 from stages.defects.relief import Relief
 from stages.defects.segment import Region

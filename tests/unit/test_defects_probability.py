@@ -7,11 +7,12 @@ import pytest
 from scipy.ndimage import maximum_filter
 
 from stages.defects import DefectParameters
-from stages.defects.corroborate import Evidence, photo_stands_out
+from stages.defects.corroborate import Evidence
 from stages.defects.credibility import chance_of_depth, credibility_of
 from stages.defects.detect import detect
 from stages.defects.noise_tail import Law, NoiseTail, noise_tail
 from stages.defects.noise_tail import tail_of as tail_of_peaks
+from stages.defects.photo import photo_stands_out
 from stages.defects.relief import smooth_shape_removed
 from stages.defects.segment import Region
 from tests.quiet import quiet_context
