@@ -246,5 +246,5 @@ def _defects_of_run(
 
 
 DEFECTS = Stage(
-    "defects", "69", DefectParameters, _defects_of_run, "defects as instances with depth, clock and kind"
+    "defects", "70", DefectParameters, _defects_of_run, "defects as instances with depth, clock and kind"
 )

@@ -6,13 +6,16 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.ndimage import gaussian_filter1d
+from scipy.ndimage import gaussian_filter1d, median_filter
 
 from pipeline.adjustment.robust import MAD_TO_SIGMA, basis_of, ring_harmonics, robust_spread, row_median
 from pipeline.arrays import Bool, Float, runs_of
 from pipeline.artefacts.measured import RadiusMap
 from stages.defects.along import sample, slow_along, stretches
 from stages.defects.parameters import DefectParameters
+
+# Beads up to this length, such as most welds, stand out of a running median over twice as much (chosen).
+_SHORT_MM = 10.0
 
 
 @dataclass(frozen=True)
@@ -163,8 +166,8 @@ def smooth_shape_removed(
         return np.asarray(radius(rows) - slow[rows] @ basis.T)
 
     rings = _by_ring(deviation, radius_map)
-    welds = weld_rows(deviation, rings[:, 0], step, parameters)
-    motion = _interpolated_across(rings, welds, round(2.0 / step))
+    welds = weld_rows(deviation, rings[:, 0], slow[:, 0], step, parameters)
+    motion = _interpolated_across(rings, slow, welds, round(2.0 / step))
     beads = _in_bands(welds, len(rings))[:, None] & np.isfinite(rings)
     shifted = motion.copy()
     shifted[:, 1:3] = np.where(beads, rings, motion)[:, 1:3]
@@ -220,39 +223,60 @@ def _in_bands(bands: tuple[slice, ...], count: int) -> Bool:
     return out
 
 
-def _interpolated_across(rings: Float, bands: tuple[slice, ...], margin: int) -> Float:
-    """Return the ring harmonics (S, 5), interpolated across welds with a margin and across unseen rows."""
+def _interpolated_across(rings: Float, slow: Float, bands: tuple[slice, ...], margin: int) -> Float:
+    """Return the ring harmonics (S, 5), relative to ``slow``, straight across welds and unseen rows.
+
+    Near a step of the bore the slow shape bends where the wall does not: their sum is straight.
+    """
     known = np.isfinite(rings[:, 0])
     for band in bands:
         known[max(0, band.start - margin) : band.stop + margin] = False
     if not known.any():
         return np.zeros_like(rings)
     at = np.flatnonzero(known)
-    return np.stack([np.interp(np.arange(len(rings)), at, c[at]) for c in rings.T], -1)
+    rows = np.clip(np.arange(len(rings)), at[0], at[-1])
+    return np.stack([np.interp(rows, at, c[at]) for c in (slow + rings).T], -1) - slow[rows]
 
 
 def weld_rows(
-    deviation: Callable[[slice], Float], mean_mm: Float, step: float, parameters: DefectParameters
-) -> tuple[slice, ...]:
+    deviation: Callable[[slice], Float], mean_mm: Float, slow_mm: Float, step: float,
+    parameters: DefectParameters,
+) -> tuple[slice, ...]:  # fmt: skip
     """Return the rows of all beads that go round the pipe.
 
     ``deviation`` gives some rows (rows, A) of the wall's deviation from its slow shape, ``mean_mm`` (S,) the
-    mean of each row of it, ``step`` the spacing of rows; all mm.
+    mean of each row of it, ``slow_mm`` (S,) the slow shape's mean, ``step`` the spacing of rows; all mm.
+
+    The slow shape is too low before a step of the bore and too high behind it, or the other way round, and
+    all beads of the pipe would have to be higher than that. A running median keeps a step as it is: beads are
+    looked for above the slow shape, and short ones above the running median as well.
     """
     mean = gaussian_filter1d(np.nan_to_num(mean_mm), 0.5 / step)
-    limit = max(parameters.min_depth_mm / 2, 6 * robust_spread(mean))
+    median = median_filter(slow_mm + mean, 2 * round(_SHORT_MM / step) + 1, mode="nearest") - slow_mm
+    out: list[slice] = []
+    for base in (np.zeros_like(mean), median):
+        beads = _beads(deviation, mean, base, step, parameters)
+        out += [bead for bead in beads if not any(bead.start < b.stop and b.start < bead.stop for b in out)]
+    return tuple(sorted(out, key=lambda r: r.start))
+
+
+def _beads(
+    deviation: Callable[[slice], Float], mean: Float, base: Float, step: float, parameters: DefectParameters
+) -> list[slice]:
+    """Return the rows of beads by which the smoothed ``mean`` (S,) of rows stands out of a ``base`` (S,)."""
+    limit = max(parameters.min_depth_mm / 2, 6 * robust_spread(mean - base))
     longest = int(parameters.max_weld_mm / step)
     out: list[slice] = []
     for sign in (-1.0, 1.0):
-        height = sign * mean
+        height = sign * (mean - base)
         for rows in runs_of(height > limit):
             peak = rows.start + int(np.argmax(height[rows]))
             bead = _run_around(height, peak, max(limit / 2, 0.15 * height[peak]), longest)
             if bead is None or bead in out:
                 continue
-            if _all_round(sign * deviation(bead), height[peak]):
+            if _all_round(sign * (deviation(bead) - base[bead][:, None]), height[peak]):
                 out.append(bead)
-    return tuple(sorted(out, key=lambda r: r.start))
+    return out
 
 
 def _run_around(height: Float, peak: int, level: float, longest: int) -> slice | None:

@@ -38,8 +38,8 @@ def glints(rng, count):
     return out
 
 
-def searched(radius_mm):
-    wall = wall_of(DISTANCE, AZIMUTH, radius_mm, NOISE_MM)
+def searched(radius_mm, distance_mm=DISTANCE):
+    wall = wall_of(distance_mm, AZIMUTH, radius_mm, NOISE_MM)
     recording = bare_recording(2 * RADIUS)
     return find_defects(recording, wall, grey_texture(wall), DefectParameters(draws=20), quiet_context())
 
@@ -112,6 +112,19 @@ def test_a_bead_between_bores_of_two_widths_is_a_bead():
     bead = relief(drawn, DISTANCE, AZIMUTH, RADIUS, rng)
     found = searched(RADIUS + step + bead + smooth_noise(rng, SHAPE, NOISE_MM, 1.5))
     assert [d for d in found.items if d.kind == "weld" and d.probability > 0.9]
+
+
+@pytest.mark.parametrize("step_mm", [1.5, -1.5])
+def test_a_weld_in_a_short_run_over_a_step_of_the_bore_is_found(step_mm):
+    """The slow shape was .5 mm off on either side of the step, which hid a weld of .9 mm 21 mm away."""
+    distance = np.arange(0, 42, 0.5)
+    bore = RADIUS + step_mm / 2 * (1 + np.tanh(distance - 30.0)) - 0.9 * np.exp(-(((distance - 9) / 2) ** 2))
+    noise = smooth_noise(np.random.default_rng(4), (len(distance), len(AZIMUTH)), NOISE_MM, 1.5)
+    found = searched(bore[:, None] + noise, distance)
+    welds = [d for d in found.items if d.clock_to - d.clock_from > 11.9]
+    assert [d.kind for d in welds] == ["weld"]
+    assert welds[0].depth_mm == pytest.approx(-0.9, abs=1.96 * welds[0].depth_sigma_mm)
+    assert abs(welds[0].peak_distance_mm - 9) < 1
 
 
 def test_the_probability_of_a_bead_depends_on_how_well_the_bore_beside_it_is_known():
