@@ -40,6 +40,20 @@ def test_a_diameter_with_the_same_error_as_distance_is_evidence_against_the_prob
     assert doubt == pytest.approx(0.02 if wider else 0.0), "σ of radii must include the reported deviation"
 
 
+def test_a_difference_too_small_for_a_warning_is_reported_with_its_sigma() -> None:
+    """An encoder that was 1 % off over a short run, 2.4 σ, was mentioned nowhere."""
+    warned: list[str] = []
+    told: dict[str, float] = {}
+    context = replace(
+        quiet_context(), warn=warned.append, report=lambda name, value, unit="": told.update({name: value})
+    )
+    EncoderScale(1 / 1.01, 0.003, 0.003).warn(context, 0.0)
+    assert not warned
+    more, sigma = told.values()
+    assert more == pytest.approx(1.0)
+    assert sigma == pytest.approx(0.42, abs=0.01)
+
+
 @pytest.mark.parametrize("scale", [0.98, 1.004])
 def test_texture_that_is_not_trusted_does_not_contradict_an_encoder(scale: float) -> None:
     found = EncoderScale(scale, 0.0005, 0.0005)
