@@ -246,5 +246,5 @@ def _defects_of_run(
 
 
 DEFECTS = Stage(
-    "defects", "70", DefectParameters, _defects_of_run, "defects as instances with depth, clock and kind"
+    "defects", "71", DefectParameters, _defects_of_run, "defects as instances with depth, clock and kind"
 )

@@ -25,8 +25,7 @@ from stages.defects.surface import DeviationPoints, Surface
 _FEW_RINGS = 5.0
 _BELL_CLEAR_MM = 5.0
 _BELL_MISFIT = 0.12
-# If the height of the bell has a σ of more than this share of it, the bell is not used: the depth is what the
-# rings themselves show, and its σ includes that the peak may lie between them.
+# If the height of the bell has a σ of more than this share of it, the bell is not used.
 _BELL_UNKNOWN = 0.5
 SHARPENING = 0.3  # 1 σ of a correction for a peak's curvature, relative to the correction
 # 1 σ by which the top departs from a bell, as a share of the depth. Without it, 85 and 90 % of the depths of
@@ -144,11 +143,12 @@ class Noise:
 def _between_rings(
     relief: Relief, region: Region, points: DeviationPoints, noise: Noise, depth_mm: float, sigma_mm: float
 ) -> tuple[float, float]:
-    """Return depth and 1 σ, mm, of the fitted bell if a bell describes the defect; else those given."""
+    """Return depth and 1 σ, mm, of the fitted bell if a bell describes the defect.
+
+    Else the depth is what the rings themselves show, and its σ includes that the peak may lie between them.
+    """
     bell = fit_bell(relief, region, points, noise)
-    if bell is None or bell.residual_mm > _BELL_MISFIT * bell.height_mm:
-        return depth_mm, sigma_mm
-    if bell.sigma_mm > _BELL_UNKNOWN * bell.height_mm:
+    if bell is None or not bell.is_known:
         return depth_mm, float(np.hypot(sigma_mm, SHARPENING * depth_mm))
     return bell.height_mm, float(np.hypot(bell.sigma_mm, SHARPENING * (bell.height_mm - depth_mm)))
 
@@ -174,6 +174,12 @@ class Bell:
     height_mm: float
     sigma_mm: float
     residual_mm: float
+
+    @property
+    def is_known(self) -> bool:
+        """Whether the points show a bell, and its height."""
+        fits = self.residual_mm <= _BELL_MISFIT * self.height_mm
+        return fits and self.sigma_mm <= _BELL_UNKNOWN * self.height_mm
 
 
 def fit_bell(relief: Relief, region: Region, points: DeviationPoints, noise: Noise) -> Bell | None:

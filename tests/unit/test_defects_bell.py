@@ -9,7 +9,7 @@ import pytest
 
 from pipeline.artefacts.measured import PointCloud
 from stages.defects.clean import CleanWall
-from stages.defects.depth import Noise, fit_bell, measure_depth
+from stages.defects.depth import SHARPENING, Noise, _between_rings, fit_bell, measure_depth
 from stages.defects.measure import is_measured
 from stages.defects.relief import Relief, Typical
 from stages.defects.segment import Region
@@ -61,6 +61,15 @@ def test_an_oblique_ridge_keeps_its_height_between_rings(skew: float) -> None:
     x, y = np.meshgrid(*2 * [(np.arange(101) - 50) / 101])
     true = np.exp(-((x / 3) ** 2) - ((y - skew * x) / 0.8) ** 2).mean()
     assert found.height_mm == pytest.approx(true, abs=0.03)
+
+
+def test_where_no_bell_fits_sigma_includes_that_the_peak_may_lie_between_rings() -> None:
+    """A pit 3 mm wide between rings 1 mm apart was .33 ± .04 mm, and is .45 mm deep."""
+    region, uneven = Region(14, 350, np.ones((12, 20), bool), 1.0), points(1.0)
+    uneven = replace(uneven, deviation_mm=uneven.deviation_mm + 0.4 * np.sin(2 * uneven.column))
+    depth, sigma = _between_rings(relief(), region, uneven, noise(), 0.4, 0.04)
+    assert depth == 0.4
+    assert sigma == pytest.approx(np.hypot(0.04, SHARPENING * 0.4))
 
 
 def test_noise_that_points_share_is_part_of_the_sigma_of_a_height() -> None:
