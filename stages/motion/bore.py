@@ -31,7 +31,8 @@ class Bore:
     a reducer the width is that of its rings, linear between them: ``rings_mm`` (r,) and ``rings_wider_mm``
     (r,), which are then given for the whole pipe and hold the steps as well. From ``aside_from_mm`` on, the
     pipe is displaced across by ``aside_mm``, along x and y of its sections. The width depends on the
-    instrument: ``by_instrument`` (2, Q) mm per σ, times width and width squared.
+    instrument: ``by_instrument`` (2, Q) mm per σ, times width and width squared. Rings show the width
+    from the first to the last of ``measured_mm``, and nowhere else.
     """
 
     at_mm: Float
@@ -41,6 +42,7 @@ class Bore:
     rings_mm: Float = field(default_factory=lambda: np.zeros(1))
     rings_wider_mm: Float = field(default_factory=lambda: np.zeros(1))
     by_instrument: Float = field(default_factory=lambda: np.zeros((2, 0)))
+    measured_mm: tuple[float, float] = (-np.inf, np.inf)
 
     @staticmethod
     def of(radius_mm: Float, at_mm: Float) -> Bore:
@@ -48,20 +50,9 @@ class Bore:
         order = np.argsort(at_mm, kind="stable")
         order = order[np.isfinite(radius_mm[order])]
         radius_mm, at_mm = radius_mm[order], at_mm[order]
-        if len(radius_mm) < 2 * _FEWEST_RINGS_OF_LENGTH + 2:
+        if not len(at_mm):
             return ONE_BORE
-        n = min(rings_of_length(radius_mm, at_mm), len(radius_mm) // 2 - 1)
-        place = _steps(radius_mm, n)
-        if not len(place):
-            return ONE_BORE
-        usual = np.array([np.median(part) for part in np.split(radius_mm, place)])
-        of_length = np.repeat(usual, np.diff(place, prepend=0, append=len(radius_mm)))
-        smooth, middle = median_filter(radius_mm, 3), float(np.median(radius_mm))
-        reducer = _in_reducers(smooth - of_length, place)
-        if not reducer.any():
-            return Bore(at_mm[place], usual - middle)
-        wider = np.where(reducer, smooth, of_length) - middle
-        return replace(ONE_BORE, rings_mm=at_mm, rings_wider_mm=wider)
+        return replace(_between_rings(radius_mm, at_mm), measured_mm=(float(at_mm[0]), float(at_mm[-1])))
 
     @property
     def reduces(self) -> bool:
@@ -81,9 +72,16 @@ class Bore:
         inside = np.searchsorted(self.rings_mm, distance_mm)
         return np.asarray(np.concatenate([[0.0], slope, [0.0]])[inside])
 
-    def sigma_at(self, distance_mm: Float) -> Float:
-        """Return the 1 σ (M,), mm, of the width for texture at distances (M,): a slope may be displaced."""
-        return _PLACE_MM * np.abs(self.slope_at(distance_mm))
+    def sigma_at(self, distance_mm: Float, unmeasured_mm: float) -> Float:
+        """Return the 1 σ (M,), mm, of the width for texture at distances (M,), mm.
+
+        A slope may be displaced. Where no ring was, the width is known to ``unmeasured_mm`` only: texture is
+        seen farther ahead than the laser reaches, and a step there of 1.5 mm made a distance 2.2 % too short,
+        against an encoder that was right.
+        """
+        first, last = self.measured_mm
+        measured = (distance_mm >= first) & (distance_mm <= last)
+        return np.where(measured, _PLACE_MM * np.abs(self.slope_at(distance_mm)), unmeasured_mm)
 
     def width_by_instrument(self, wider_mm: Float) -> Float:
         """Return the change of widths (M,) per σ of the instrument (M, Q), mm."""
@@ -105,7 +103,11 @@ class Bore:
         """Return the bore with distance counted from ``start_mm``."""
         aside_from = self.aside_from_mm - start_mm
         at_mm, rings_mm = self.at_mm - start_mm, self.rings_mm - start_mm
-        return replace(self, at_mm=at_mm, rings_mm=rings_mm, aside_from_mm=aside_from)
+        first, last = self.measured_mm
+        return replace(
+            self, at_mm=at_mm, rings_mm=rings_mm, aside_from_mm=aside_from,
+            measured_mm=(first - start_mm, last - start_mm),
+        )  # fmt: skip
 
     def with_joint(self, at_mm: float, aside_mm: tuple[float, float], wider_mm: float) -> Bore:
         """Return the bore with a joint, after which the pipe is displaced by ``aside_mm`` and wider."""
@@ -122,6 +124,24 @@ class Bore:
 
 
 ONE_BORE = Bore(np.zeros(0), np.zeros(1))
+
+
+def _between_rings(radius_mm: Float, at_mm: Float) -> Bore:
+    """Return the bore that radii (F,) of rings at ascending distances (F,) show."""
+    if len(radius_mm) < 2 * _FEWEST_RINGS_OF_LENGTH + 2:
+        return ONE_BORE
+    n = min(rings_of_length(radius_mm, at_mm), len(radius_mm) // 2 - 1)
+    place = _steps(radius_mm, n)
+    if not len(place):
+        return ONE_BORE
+    usual = np.array([np.median(part) for part in np.split(radius_mm, place)])
+    of_length = np.repeat(usual, np.diff(place, prepend=0, append=len(radius_mm)))
+    smooth, middle = median_filter(radius_mm, 3), float(np.median(radius_mm))
+    reducer = _in_reducers(smooth - of_length, place)
+    if not reducer.any():
+        return Bore(at_mm[place], usual - middle)
+    wider = np.where(reducer, smooth, of_length) - middle
+    return replace(ONE_BORE, rings_mm=at_mm, rings_wider_mm=wider)
 
 
 def warn_of_steps(bore: Bore, context: Context) -> None:

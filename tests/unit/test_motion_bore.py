@@ -1,6 +1,6 @@
 """The bore estimated from rings: reducers, and the wall in them."""
 
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
@@ -10,9 +10,11 @@ from pipeline.geometry.axis import to_pipe
 from stages.motion import MotionParameters
 from stages.motion.bore import ONE_BORE, Bore, warn_of_steps
 from stages.motion.bundle_adjustment import equations, residuals
+from stages.motion.bundle_adjustment.solver import estimate_state
 from stages.motion.bundle_adjustment.unknowns import State
+from stages.motion.rings import RingBins
 from stages.motion.tracking.strips import StripGrid
-from tests.motion_scene import RADIUS, scene
+from tests.motion_scene import RADIUS, joint_at, scene
 from tests.quiet import quiet_context
 
 AT_MM = 0.8 * np.arange(100)
@@ -96,3 +98,31 @@ def test_strips_are_sampled_on_the_wall() -> None:
     grid = StripGrid(RADIUS, 480, 12.0, 60.0, wider)
     row = np.arange(60.0) / grid.step_mm
     assert np.hypot(*grid.wall(row, 0 * row)[:, :2].T) == pytest.approx(RADIUS + 6.5 * (np.arange(60) > 30))
+
+
+@pytest.mark.parametrize("step_mm", [-1.5, 1.5])
+def test_a_step_of_the_wall_that_no_ring_reaches_is_not_taken_for_distance(step_mm: float) -> None:
+    """Seen in texture alone, it made a distance 2.2 % too short, by 5 σ of the encoder that was right."""
+    frames, passed = 24, 12
+    made = scene(frames, 200, noise=1.0, encoder=False, seed=1, joint_mm=(step_mm, 0.0))
+    rings = made.measured.rings
+    reached = RingBins(*(getattr(rings, f.name)[rings.frame < passed] for f in fields(rings)))
+    at_mm = made.truth.T_pc[:passed, 2, 3] + made.measured.probe.laser.baseline_mm
+    assert at_mm[-1] < joint_at(frames), "control: no ring reaches the step"
+    start = replace(made.truth, bore=Bore.of(np.full(passed, RADIUS), at_mm))
+    found = estimate_state(start, replace(made.measured, rings=reached), MotionParameters(alike=1.0))
+    error_mm = found.state.T_pc[-1, 2, 3] - made.truth.T_pc[-1, 2, 3]
+    sigma_mm = float(np.sqrt(found.factor.joint_covariance(np.array([frames - 1]))[0, 2, 0, 2]))
+    assert sigma_mm < 0.1
+    assert abs(error_mm) < 2 * sigma_mm
+
+
+def test_texture_has_no_known_radius_where_no_ring_was() -> None:
+    made = scene(40, 90, seed=1)
+    bore = Bore.of(np.full(40, RADIUS), made.truth.T_pc[:, 2, 3] + 22.0)
+    at_mm = to_pipe(made.truth.axis, made.truth.xyz_p)[0]
+    rows = equations.landmark_rows(replace(made.truth, bore=bore), made.measured, MotionParameters())
+    measured = (at_mm > 22.0) & (at_mm < 22.0 + 1.2 * 39)
+    assert rows.surface_sigma[measured] == pytest.approx(0.1)
+    assert rows.surface_sigma[~measured].min() > RADIUS - 1
+    assert bore.counted_from(10.0).measured_mm == pytest.approx((12.0, 12.0 + 1.2 * 39))

@@ -266,7 +266,8 @@ def landmark_rows(state: State, measured: Measurements, parameters: MotionParame
         pass
     start = np.searchsorted(tracks.landmark, np.arange(len(state.xyz_p) + 1))
     relief, normal, by_border = residuals.surface(state, state.xyz_p)
-    unsure_mm = state.bore.sigma_at(to_pipe(state.axis, state.xyz_p)[0])
+    at_mm = to_pipe(state.axis, state.xyz_p)[0]
+    unsure_mm = state.bore.sigma_at(at_mm, state.nominal_radius_mm)
     return LandmarkRows(
         start, tracks.frame, by_pose, by_point, by_instrument, residual, tracks.sigma_px,
         normal, by_border, relief, np.hypot(parameters.surface_sigma_mm, unsure_mm), Cauchy(),
