@@ -279,7 +279,7 @@ PHOTOMETRY = Stage(
 )
 TWIN = Stage(
     "twin",
-    "79",
+    "80",
     TwinParameters,
     compare_with_twin,
     "recorded frames beside the same frames, re-rendered from what the run has measured",

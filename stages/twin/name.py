@@ -104,7 +104,7 @@ def focus_of(
     """
     if any(m.name == "response" for m in named):
         return ()
-    moved = sum(m.parameters[0].value for m in named if m.name == "motion_blur")
+    moved = sum(m.parameters[0].value for m in named if "motion_blur" in m.names)
     half_variance = whole.even_blur(state.sharpness) - moved**2 / 2
     return (*_defocus(whole, half_variance), *_not_sharp(state.line, whole))
 

@@ -134,16 +134,15 @@ def slope_error(surface: WallSurface, samples: BlockSamples, cells: Int, ring_st
     rows = np.flatnonzero((surface.distance_mm > first - more) & (surface.distance_mm < last + more))
     if not len(rows):
         return 0.0
-    part, sigma = slice(rows[0], rows[-1] + 1), (along_mm / step, SHADING_MM / around_mm)
+    sigma = (along_mm / step, SHADING_MM / around_mm)
     lost = np.hypot(*(
-        a[part] - gaussian_filter(a[part], sigma, mode=("nearest", "wrap"))
-        for a in (surface.along, surface.around)
+        a - gaussian_filter(a, sigma, mode=("nearest", "wrap")) for a in (surface.along, surface.around)
     ))  # fmt: skip
     column = np.arange(lost.shape[1]) * WALL_COLUMNS // lost.shape[1] + WALL_COLUMNS // 2
     away = np.abs(column[:, None] % WALL_COLUMNS - cells[:, 1][None])
     near = (np.minimum(away, WALL_COLUMNS - away) <= 1).any(1)
-    noise = _NOISY * float(np.median(lost))
-    return float(np.sqrt(max(float(lost[:, near].max()) ** 2 - noise**2, 0.0)))
+    noise = _NOISY * float(np.median(lost))  # of the whole map: about a weld, it is the weld's
+    return float(np.sqrt(max(float(lost[np.ix_(rows, near)].max()) ** 2 - noise**2, 0.0)))
 
 
 def touching(beyond: Bool) -> Int:

@@ -9,12 +9,11 @@ change σ² of the blur's variance along a direction α changes the picture L by
 from __future__ import annotations
 
 from collections import defaultdict
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import cv2
 import numpy as np
 
-from pipeline.adjustment.robust import robust_spread
 from pipeline.arrays import Bool, Float, Float32, Int
 from pipeline.artefacts.twin import Mismatch, NamedFigure
 from stages.twin.cells import chance_of, sigmas
@@ -26,7 +25,7 @@ from stages.twin.locate import FALSE_ALARM
 from stages.twin.render import Region, TwinFrame
 from stages.twin.scene import Scene
 from stages.twin.second_ring import ring_profile, second_ring
-from stages.twin.stray_light import STRAY_NAMES, stray, stray_lights
+from stages.twin.stray_light import STRAY_NAMES, brings_light, size_beside_one, stray, stray_lights
 from stages.twin.switched import BLOOM_PX, STEP, TILE, bloom, leaked, motion_blur
 
 _SURE, FEWEST_FRAMES = 3.0, 6
@@ -38,19 +37,17 @@ _ONE_WAY = 0.6
 OF_LAW = 0.2
 """Relative 1 σ of a blur because its shape is simplified: texture as fine as the blur bends more than its
 second derivative says."""
-_OF_MEAN = (0.3, 0.6, 0.3)
-"""Share by which the wall's mean brightness may differ from what each of the `stray_lights` predicts from its
-pattern. Chosen: simulated light that is even, or the lamps' own, differs by .00 to .08, a glow that is not
-exactly light bounced once by .03 to .25; a pattern without light, as a codec leaves it, by all of it."""
 _FINE_PX, _KEPT = 9, 1.0
 """Window, px, against which fine texture is compared, and share of its energy above which nothing is
 blurred."""
 _DIRECTIONS = ("even", "across", "slanted", "radial")
-_TRIMMED, _LEAST_SPREAD = 4, 0.1
-"""Rounds of excluding blocks that differ, and least scatter of blocks, grey levels."""
 _CLIPPED, _LEAST_BLOOM, _NEAR = 200, 0.01, 0.02
 """Fewest clipped pixels, smallest leak, and smallest spread."""
 _ALONG = "along the pipe"
+_OBLIQUE = (
+    "the photo has its blur as well, but was made where the wall is seen less obliquely. What to do: record "
+    "some frames at rest, in which only the lens blurs."
+)
 
 
 @dataclass
@@ -130,7 +127,7 @@ class WholePictures:
         if whole.sum() < TILE**2:
             return
         value, *columns = (a[whole].astype(float) for a in small[1:])
-        sizes = np.array([_size_beside_one(value, c) for c in columns])
+        sizes = np.array([size_beside_one(value, c) for c in columns])
         if self.scene.outside is None:
             sizes[:, -1] = np.nan
         else:
@@ -213,6 +210,9 @@ class WholePictures:
             f"Frames are blurred by {size:.1f} px (1 σ) {way}, and less across: they move during exposure.",
         )  # fmt: skip
         sizes, along = product[:, None], float(way == _ALONG)
+        if along:
+            said = f"{found.statement[:-1]}, or the lens is out of focus: {_OBLIQUE}"
+            found = replace(found, name="defocus or motion_blur", statement=said)
         return Suspected(
             found, motion_blur, self.frames_of("blur"), sizes, lambda m: np.array([_blur_px(m[0]), along])
         )
@@ -226,7 +226,7 @@ class WholePictures:
         chance, share = min(len(STRAY_NAMES) * chance_of(size[:, k]), 1.0), float(size[:, k].mean())
         if chance > FALSE_ALARM or share * level[:, k].mean() < LEAST_LEVEL:
             return None
-        if not _brings_light(k, mean[:, k], more[:, k]):
+        if not brings_light(k, mean[:, k], more[:, k]):
             return None
         others = [j for j, name in enumerate(STRAY_NAMES) if name != STRAY_NAMES[k]]
         rivals = [STRAY_NAMES[j] for j in others if sigmas(fall[:, k] - fall[:, j]) < _SURE]
@@ -267,33 +267,3 @@ def _blur_of(own: Float, cross: Float) -> Float:
     (du, dv, dr, dt), blur = size[1:5], size[5:]
     moved = np.array([du**2 + dv**2 + dr**2 + dt**2, du**2 - dv**2, 2 * du * dv, dr**2 - dt**2]) / 2
     return np.asarray(blur - moved)
-
-
-def _brings_light(law: int, mean: Float, more: Float) -> bool:
-    """Return whether the wall is as bright as an effect's pattern on it predicts.
-
-    ``mean`` (F,) is predicted, ``more`` the wall's brightness beyond that; NaN in frames that see no place
-    without wall, from which black is known. A pattern without light does not count: a codec leaves some.
-    """
-    known = np.isfinite(more)
-    if known.sum() < 2:
-        return False
-    sd = float(np.std(more[known], ddof=1) / np.sqrt(known.sum()))
-    return abs(float(more[known].mean())) + _SURE * sd < _OF_MEAN[law] * abs(float(mean[known].mean()))
-
-
-def _size_beside_one(value: Float, column: Float) -> Float:
-    """Return the size of a column (N,) fitted beside a constant, its 95 % quantile, and the fall of squares.
-
-    Then its mean level, and the brightness that remains beside it.
-    """
-    use, size, c = np.ones(len(value), bool), 0.0, column
-    for _ in range(_TRIMMED):  # a second line or a glint is not light on the wall
-        c = (column - column[use].mean()) * use
-        size = float(c @ (value - value[use].mean())) / max(float(c @ c), 1e-9)
-        rest = value - size * column
-        away = np.abs(rest - np.median(rest))
-        use = away < _SURE * max(robust_spread(away), _LEAST_SPREAD)
-    mean = size * float(column[use].mean())
-    more = float(value[use].mean()) - mean
-    return np.array([size, float(np.quantile(column, 0.95)), size**2 * float(c @ c), mean, more])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
+from pipeline.adjustment.robust import robust_spread
 from pipeline.arrays import Bool, Float, Float32
 from stages.twin.render import Region, TwinFrame
 from stages.twin.scene import Scene
@@ -12,6 +13,14 @@ from stages.twin.switched import Law, Pair, Shown, inner, on_line
 
 STRAY_NAMES = ("ambient_light", "interreflection", "ambient_light")
 """Of `stray_lights`."""
+_OF_MEAN = (0.3, 0.6, 0.3)
+"""Share by which the wall's mean brightness may differ from what each of the `stray_lights` predicts from its
+pattern. Chosen: simulated light that is even, or the lamps' own, differs by .00 to .08, a glow that is not
+exactly light bounced once by .03 to .25; a pattern without light, as a codec leaves it, by all of it."""
+_TRIMMED, _LEAST_SPREAD = 4, 0.1
+"""Rounds of excluding blocks that differ, and least scatter of blocks, grey levels."""
+_SURE = 3.0
+"""σ by which brightness must agree with a pattern, and beyond which blocks differ from it."""
 _ANGLE_RAD, _MOST_PALE = 0.05, 3.0
 """Step of polar angle within which the light changes by a few per cent, and the largest ratio of a place to
 the mean at its angle: more is not reflectance but an angle at which hardly any wall is seen."""
@@ -62,3 +71,33 @@ def _at_angle(theta_rad: Float32, lit: TwinFrame) -> Float32:
 
 def _dilated(use: Bool) -> Bool:
     return np.asarray(cv2.dilate(use.astype(np.uint8), np.ones((9, 9), np.uint8)) > 0)
+
+
+def brings_light(law: int, mean: Float, more: Float) -> bool:
+    """Return whether the wall is as bright as an effect's pattern on it predicts.
+
+    ``mean`` (F,) is predicted, ``more`` the wall's brightness beyond that; NaN in frames that see no place
+    without wall, from which black is known. A pattern without light does not count: a codec leaves some.
+    """
+    known = np.isfinite(more)
+    if known.sum() < 2:
+        return False
+    sd = float(np.std(more[known], ddof=1) / np.sqrt(known.sum()))
+    return abs(float(more[known].mean())) + _SURE * sd < _OF_MEAN[law] * abs(float(mean[known].mean()))
+
+
+def size_beside_one(value: Float, column: Float) -> Float:
+    """Return the size of a column (N,) fitted beside a constant, its 95 % quantile, and the fall of squares.
+
+    Then its mean level, and the brightness that remains beside it.
+    """
+    use, size, c = np.ones(len(value), bool), 0.0, column
+    for _ in range(_TRIMMED):  # a second line or a glint is not light on the wall
+        c = (column - column[use].mean()) * use
+        size = float(c @ (value - value[use].mean())) / max(float(c @ c), 1e-9)
+        rest = value - size * column
+        away = np.abs(rest - np.median(rest))
+        use = away < _SURE * max(robust_spread(away), _LEAST_SPREAD)
+    mean = size * float(column[use].mean())
+    more = float(value[use].mean()) - mean
+    return np.array([size, float(np.quantile(column, 0.95)), size**2 * float(c @ c), mean, more])

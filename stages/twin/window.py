@@ -36,7 +36,7 @@ fewest frames."""
 _OF_CONTRAST = 0.15
 """Largest share by which the photo's texture may differ from the frames': half a pixel of blur makes as
 much."""
-_BLURS, _AT_LINE = ("motion_blur", "defocus"), ("window_dirt", "window_scatter")
+_BLURS, _AT_LINE = {"motion_blur", "defocus"}, ("window_dirt", "window_scatter")
 _STATED = {
     "window_dirt": "dust or dirt on the window or the lens, or what shades it, takes away {}",
     "window_scatter": "something on the window or the lens scatters {}",
@@ -230,7 +230,7 @@ def separated_from_blur(
 
     Blur makes texture faint everywhere, and most where it is finest: that looks like scatter at some places.
     """
-    if not any(m.name in _BLURS for m in whole):
+    if not any(set(m.names) & _BLURS for m in whole):
         return tuple(found), ()
     unsure = tuple(m for m in found if "window_scatter" in m.names)
     said = "{} But whole frames are blurred, which looks the same here."

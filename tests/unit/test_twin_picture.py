@@ -59,6 +59,18 @@ def test_motion_blur_is_distinguished_from_defocus():
     assert named(lambda p, r: cv2.GaussianBlur(p, (0, 0), 2), of_sharpness=2.0) == ["defocus"]
 
 
+@pytest.mark.parametrize(("way", "name"), [(3, "defocus or motion_blur"), (1, "motion_blur")])
+def test_blur_along_the_pipe_may_be_a_lens_out_of_focus_seen_more_obliquely_than_in_the_photo(way, name):
+    """Frames blurred alike in all directions were told to move, and nothing else, by 2.1 ± .4 px."""
+    whole, blurs = WholePictures(SCENE), np.zeros((8, 2, 4))
+    blurs[:, :, way] = 2.0 + 0.1 * np.random.default_rng(3).standard_normal((8, 2))
+    whole.blur, whole.kept, whole.frame["blur"] = [None] * 8, [0.5] * 8, list(range(8))
+    whole._blurs = lambda: blurs
+    suspected = whole._motion_blur(np.zeros(4))
+    assert suspected.mismatch.name == name
+    assert ("at rest" in suspected.mismatch.statement) == (way == 3)
+
+
 def test_a_name_that_frames_rendered_again_do_not_confirm_is_withdrawn():
     for change, name in (
         (_moved, "motion_blur"),

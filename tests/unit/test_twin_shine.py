@@ -10,7 +10,7 @@ import pytest
 from pipeline.artefacts.twin import Mismatch, NamedFigure
 from pipeline.recording.base import Illumination
 from stages.twin.glints import SpotsOfFrames
-from stages.twin.on_wall import ring_step_mm, touching, unnamed
+from stages.twin.on_wall import ring_step_mm, slope_error, touching, unnamed
 from stages.twin.reference import BlocksOfFrames
 from stages.twin.render import Region, TwinFrame
 from stages.twin.scene import Ring
@@ -185,6 +185,17 @@ def test_an_error_of_slope_makes_wall_seem_to_shine_by_more_than_that_error(shin
     weld = replace(plain, along=(0.85 * s * np.exp(-0.5 * s**2)).astype(np.float32))
     assert len(_wall(lambda patch, aside: shine * patch * (aside - 0.8), weld)) == told
     assert len(_wall(lambda patch, aside: shine * patch * (aside - 0.8), plain)) == 1
+
+
+def test_what_smoothing_took_from_a_weld_is_not_noise_of_the_map():
+    """Noise was the median about a small region of a weld: two sound places were wet or polished."""
+    plain = plain_bore()
+    s = np.broadcast_to(plain.distance_mm[:, None] - 100, plain.radius_mm.shape)
+    weld = replace(plain, along=(0.4 * np.sin(2 * np.pi * s / 7) * (abs(s) < 3.5)).astype(np.float32))
+    blocks = SimpleNamespace(first_mm=float(plain.distance_mm[0]), cell_mm=2.5)
+    cells = np.array([[int((101.75 - blocks.first_mm) / 2.5), 20]])
+    assert slope_error(weld, blocks, cells, 1.2) > 0.05
+    assert slope_error(plain, blocks, cells, 1.2) == 0
 
 
 def test_the_brightness_of_wall_between_distant_rings_is_that_of_linear_interpolation():

@@ -8,8 +8,8 @@ import pytest
 from stages.twin.cells import chance_of
 from stages.twin.gate import judged
 from stages.twin.glow import LIGHT
-from stages.twin.picture import WholePictures, _brings_light
-from stages.twin.stray_light import STRAY_NAMES
+from stages.twin.picture import WholePictures
+from stages.twin.stray_light import STRAY_NAMES, brings_light
 from tests.unit.whole_pictures import (
     AWAY,
     FRAMES,
@@ -85,9 +85,9 @@ def test_without_a_place_that_sees_no_wall_uniform_light_is_not_reported():
 def test_frames_that_see_black_are_evidence_of_light_for_those_that_do_not():
     """One frame without black invalidated the evidence of all others, for ambient light or against it."""
     mean, bright = np.full(8, 4.0), np.array([0.1, -0.1, 0, 0.1, -0.1, 0.1, 0, np.nan])
-    assert all(_brings_light(law, mean, bright) for law in range(3))
-    assert not any(_brings_light(law, mean, bright - 4) for law in range(3))
-    assert not any(_brings_light(law, mean, np.where(np.arange(8) < 1, 0, np.nan)) for law in range(3))
+    assert all(brings_light(law, mean, bright) for law in range(3))
+    assert not any(brings_light(law, mean, bright - 4) for law in range(3))
+    assert not any(brings_light(law, mean, np.where(np.arange(8) < 1, 0, np.nan)) for law in range(3))
 
 
 SIZES = np.array([1.0, 0.7, 1.3, 0.9, 1.1, 0.8, 1.2, 1.0])
