@@ -15,7 +15,7 @@ from stages.diagnose.field.reduce import reduced, rings_after
 from stages.diagnose.field.run import FieldRun
 from stages.diagnose.field.run import ring_points as field_points
 from stages.diagnose.field.system import ENCODER_SCALE, field_system
-from stages.diagnose.gauge.elimination import RING
+from stages.diagnose.gauge.equations import RING
 from stages.diagnose.gauge.fit import Fit, fit
 from stages.diagnose.gauge.linearise import ring_mm_per_px
 from stages.diagnose.gauge.points import Moving

@@ -8,7 +8,7 @@ import pytest
 from pipeline.arrays import Float
 from stages.calibrate.gauge.state import Unknowns
 from stages.diagnose.effects.library import LIBRARY, ring_shift_px
-from stages.diagnose.gauge.elimination import RING
+from stages.diagnose.gauge.equations import RING
 from stages.diagnose.gauge.linearise import asking, linearise
 from stages.diagnose.gauge.run import GaugeRun, Term
 from stages.diagnose.gauge.search import prepare, weighed

@@ -9,17 +9,8 @@ from scipy import stats
 from pipeline.adjustment.rows import Rows
 from stages.diagnose.effects.library import LIBRARY
 from stages.diagnose.effects.vocabulary import VOCABULARY
-from stages.diagnose.gauge.elimination import (
-    KINDS,
-    Equations,
-    FrameSums,
-    InCourses,
-    OwnUnknowns,
-    Part,
-    eliminate_globals,
-    eliminate_poses,
-    of_no_edge,
-)
+from stages.diagnose.gauge.elimination import FrameSums, OwnUnknowns, eliminate_globals, eliminate_poses
+from stages.diagnose.gauge.equations import KINDS, Equations, InCourses, Part, of_no_edge
 from stages.diagnose.gauge.formula import joint_p
 from stages.diagnose.gauge.score_spread import score_inflation
 from stages.diagnose.inference import (

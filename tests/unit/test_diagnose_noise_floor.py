@@ -9,7 +9,7 @@ import pytest
 
 from stages.calibrate.gauge.edges import Edges
 from stages.diagnose.gauge.doubts import fits
-from stages.diagnose.gauge.elimination import EDGE, RING
+from stages.diagnose.gauge.equations import EDGE, RING
 from stages.diagnose.gauge.heldout import _in_other_pictures, repeatability_px
 from stages.diagnose.residual import RingResidual
 from stages.diagnose.result import FitQuality

@@ -10,7 +10,7 @@ from stages.diagnose import compared as module
 from stages.diagnose.effects.courses import Coursed, of_own_clock
 from stages.diagnose.effects.library import LIBRARY
 from stages.diagnose.gauge import heldout
-from stages.diagnose.gauge.elimination import Part
+from stages.diagnose.gauge.equations import Part
 from stages.diagnose.gauge.hypotheses import Regime
 from stages.diagnose.gauge.run import Term
 

@@ -13,7 +13,8 @@ from pipeline.adjustment.robust import cluster_variance
 from pipeline.adjustment.rows import Rows
 from pipeline.arrays import Float
 from stages.calibrate.gauge.terms import WALL_CELL_MM, wall_cells
-from stages.diagnose.gauge.elimination import RING, Equations, eliminate_poses, of_no_edge
+from stages.diagnose.gauge.elimination import eliminate_poses
+from stages.diagnose.gauge.equations import RING, Equations, of_no_edge
 from stages.diagnose.gauge.score_spread import beyond_cells, score_inflation
 
 _DRAWS, _POINTS = 60, 6000

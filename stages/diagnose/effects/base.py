@@ -9,9 +9,9 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 
@@ -90,14 +90,6 @@ class ImagePoints:
         rho += self.shifted_px if self.shifted_px is not None else 0.0
         left = np.sinc(self.across_px) if self.across_px is not None else np.ones(len(rho))
         return np.asarray(left[:, None] * np.stack([np.cos(2 * np.pi * rho), np.sin(2 * np.pi * rho)], -1))
-
-    @cached_property
-    def moments(self) -> ImagePoints:
-        """One point of each frame: a course depends on the frame alone."""
-        first = np.unique(self.frame, return_index=True)[1]
-        each = {f.name: getattr(self, f.name) for f in fields(self)}
-        rows: dict[str, Any] = {name: v[first] for name, v in each.items() if isinstance(v, np.ndarray)}
-        return replace(self, **rows)
 
     @cached_property
     def patterns(self) -> dict[tuple[str, Shape, bool], Float]:

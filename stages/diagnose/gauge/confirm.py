@@ -14,7 +14,7 @@ from stages.diagnose.agreement import Part as Measured
 from stages.diagnose.agreement import agreement, drawn, sized, turn_deg
 from stages.diagnose.effects.base import Shape
 from stages.diagnose.effects.library import ring_shift_px
-from stages.diagnose.gauge.elimination import EDGE, RING, Part
+from stages.diagnose.gauge.equations import EDGE, RING, Part
 from stages.diagnose.gauge.fit import Fit, evidence
 from stages.diagnose.gauge.hypotheses import Judged, Regime
 from stages.diagnose.gauge.points import SHARP, Moving, moved

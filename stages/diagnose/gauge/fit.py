@@ -15,15 +15,15 @@ from pipeline.geometry.rigid import from_parts, rotation_from_vector
 from stages.calibrate.gauge.state import ENCODER, OFFSET_SIGMA_MM, Unknowns
 from stages.diagnose.effects.base import EffectModel, Shape
 from stages.diagnose.effects.vocabulary import VOCABULARY
-from stages.diagnose.gauge.elimination import ENCODER as ENCODER_ROW
 from stages.diagnose.gauge.elimination import (
     FrameSums,
     OwnUnknowns,
-    Part,
     Reduced,
     eliminate_globals,
     eliminate_poses,
 )
+from stages.diagnose.gauge.equations import ENCODER as ENCODER_ROW
+from stages.diagnose.gauge.equations import Part
 from stages.diagnose.gauge.linearise import beside, in_courses, linearise
 from stages.diagnose.gauge.points import BASELINE_SIGMA_PX, BASELINE_SIZE
 from stages.diagnose.gauge.run import GaugeRun, Linearised, Term

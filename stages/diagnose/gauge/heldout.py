@@ -12,7 +12,8 @@ from scipy.spatial import cKDTree
 from pipeline.arrays import Bool, Float, Int
 from stages.calibrate.gauge.edges import Edges
 from stages.diagnose.effects.courses import of_own_clock
-from stages.diagnose.gauge.elimination import EDGE, RING, Equations, Part, eliminate_globals, eliminate_poses
+from stages.diagnose.gauge.elimination import FrameSums, eliminate_globals
+from stages.diagnose.gauge.equations import EDGE, RING, Equations, Part
 from stages.diagnose.gauge.fit import Fit, evidence, kept_columns, own_unknowns
 from stages.diagnose.gauge.hypotheses import Judged, Regime
 from stages.diagnose.gauge.linearise import asking
@@ -179,10 +180,9 @@ def _rms_px(run: GaugeRun, judged: Judged, parts: Sequence[Part], rules: Sequenc
     whole = asking(run, judged.fit.state, about, (), with_baseline=True)
     whole.by_global[:, -BASELINE_SIZE:] = 0.0
     columns, value = kept_columns(judged.fit, ())
-    squares = weights = 0.0
+    sums, squares, weights = FrameSums.of(whole), 0.0, 0.0
     for part, rule in zip(parts, rules, strict=True):
-        equations = whole.of(part)
-        reduced = eliminate_poses(equations, about.motion, len(judged.fit.state.T_pc))
+        equations, reduced = whole.of(part), sums.reduced(about.motion, part)
         left, _ = eliminate_globals(reduced, own_unknowns(run, judged.fit, equations.size))
         step = left.step + left.follow @ rule(Shared(columns, value, left.information, left.right))
         residual = _residual(equations, reduced.pose_step - reduced.pose_by_global @ step, step)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from stages.diagnose.effects.nameless import Nameless
-from stages.diagnose.gauge.elimination import Part
+from stages.diagnose.gauge.equations import Part
 from stages.diagnose.gauge.fit import Fit, evidence
 from stages.diagnose.gauge.run import GaugeRun, Term
 from stages.diagnose.gauge.sets import prior_sigma

@@ -29,17 +29,9 @@ from stages.diagnose.effects.library import (
     texture_columns,
     texture_shift_px,
 )
-from stages.diagnose.gauge.elimination import (
-    BY_ROW,
-    EDGE,
-    KINDS,
-    POSE,
-    RING,
-    Equations,
-    InCourses,
-    of_no_edge,
-)
-from stages.diagnose.gauge.elimination import ENCODER as ENCODER_ROW
+from stages.diagnose.gauge.elimination import POSE
+from stages.diagnose.gauge.equations import BY_ROW, EDGE, RING, Equations, InCourses, of_no_edge
+from stages.diagnose.gauge.equations import ENCODER as ENCODER_ROW
 from stages.diagnose.gauge.points import (
     BASELINE_SIZE,
     Moving,
@@ -114,7 +106,7 @@ def in_courses(
     """Return the same equations with one column for each law, whatever its courses."""
     run.watch()
     equations, own = at.equations, at.equations.by_global.shape[1]
-    laws, courses = _in_courses(at, asked, own, len(run.time_s))
+    laws, courses = at.in_courses(asked, len(run.time_s))
     first = own + sum(len(law.amplitudes) for law, _ in laws)
     end = first + BASELINE_SIZE * with_baseline
     by_global = np.zeros((len(equations.frame), end))
@@ -129,34 +121,6 @@ def in_courses(
         equations, by_global=by_global, weight=np.where(bad, 0.0, equations.weight),
         courses=InCourses.joined([courses, baseline]),
     )  # fmt: skip
-
-
-def _in_courses(
-    at: Linearised, asked: Sequence[tuple[EffectModel, Shape]], own: int, frames: int
-) -> tuple[list[tuple[EffectModel, Shape]], InCourses]:
-    """Return the laws of what is asked about, each once; then ``own`` columns, and after them those asked.
-
-    The columns of laws follow the ``own`` ones in that order.
-    """
-    place, end = dict[tuple[str, Shape], Int](), own
-    laws, parts = list[tuple[EffectModel, Shape]](), [InCourses.plain(np.arange(own), frames)]
-    moments = {RING: at.rings.moments, EDGE: at.edges.moments}
-    for model, shape in asked:
-        factored = {kind: model.factored(points, shape) for kind, points in moments.items()}
-        _, law, of_law = factored[RING] or ((), model, shape)
-        if (law.name, of_law) not in place:
-            place[law.name, of_law] = np.arange(end, end := end + len(law.amplitudes))
-            laws.append((law, of_law))
-        columns = place[law.name, of_law]
-        if factored[RING] is None:
-            parts.append(InCourses.plain(columns, frames))
-            continue
-        # Courses of the library have no influence on the encoder's readings.
-        each = np.zeros((len(KINDS), frames, len(model.amplitudes)))
-        for kind, (factors, *_) in ((k, f) for k, f in factored.items() if f is not None):
-            each[kind, moments[kind].frame] = np.repeat(np.stack(factors, -1), len(columns), axis=1)
-        parts.append(InCourses(np.tile(columns, each.shape[-1] // len(columns)), each))
-    return laws, InCourses.joined(parts)
 
 
 def _ask(

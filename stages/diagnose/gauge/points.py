@@ -7,7 +7,8 @@ recordings). They are unknowns of the recording, so that what is only baseline i
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
+from typing import Any
 
 import numpy as np
 
@@ -197,3 +198,11 @@ def rates(value: Float, time_s: Float, frames: int) -> Float:
     powers = (apart / span[:, None])[..., None] ** np.arange(min(_DEGREE, count - 1) + 1)
     slope = np.linalg.pinv(powers)[:, 1] / span[:, None]
     return np.asarray(np.einsum("nw,nwk->nk", slope, value[near]))
+
+
+def one_of_each_frame(points: ImagePoints) -> ImagePoints:
+    """Return one point of each frame: a course depends on the frame alone."""
+    first = np.unique(points.frame, return_index=True)[1]
+    each = {f.name: getattr(points, f.name) for f in fields(points)}
+    rows: dict[str, Any] = {name: v[first] for name, v in each.items() if isinstance(v, np.ndarray)}
+    return replace(points, **rows)

@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
+
+import numpy as np
 
 from pipeline.adjustment.levenberg_marquardt import Watch, unwatched
 from pipeline.adjustment.rows import Rows
-from pipeline.arrays import Float
+from pipeline.arrays import Float, Int
 from pipeline.files.codec import NOT_STORED
 from pipeline.physics.catalogue import EFFECTS
 from pipeline.recording.base import Encoder
 from stages.calibrate.gauge.edges import Edges
 from stages.calibrate.gauge.geometry import BoreRings
-from stages.diagnose.effects.base import Amplitude, EffectModel, ImagePoints, Shape, Travel
+from stages.diagnose.effects.base import Amplitude, EffectModel, Factored, ImagePoints, Shape, Travel
 from stages.diagnose.effects.courses import IN_TIME, Coursed
 from stages.diagnose.effects.nameless import Nameless
-from stages.diagnose.gauge.elimination import Equations
+from stages.diagnose.gauge.equations import EDGE, KINDS, RING, Equations, InCourses
+from stages.diagnose.gauge.points import one_of_each_frame
 
 
 @dataclass(frozen=True)
@@ -93,6 +97,47 @@ class Linearised:
     rings: ImagePoints
     edges: ImagePoints
     travel: Travel
+
+    def in_courses(
+        self, asked: Sequence[tuple[EffectModel, Shape]], frames: int
+    ) -> tuple[list[tuple[EffectModel, Shape]], InCourses]:
+        """Return the laws of what is asked about, each once, and the columns: the equations' own, then those.
+
+        The laws' columns follow the equations' own ones in that order.
+        """
+        own = end = self.equations.by_global.shape[1]
+        laws, place = list[tuple[EffectModel, Shape]](), dict[tuple[str, Shape], Int]()
+        parts = [InCourses.plain(np.arange(own), frames)]
+        moments = {RING: one_of_each_frame(self.rings), EDGE: one_of_each_frame(self.edges)}
+        for model, shape in asked:
+            factored = {kind: model.factored(points, shape) for kind, points in moments.items()}
+            _, law, of_law = factored[RING] or ((), model, shape)
+            if (law.name, of_law) not in place:
+                place[law.name, of_law] = np.arange(end, end + len(law.amplitudes))
+                end += len(law.amplitudes)
+                laws.append((law, of_law))
+            columns = place[law.name, of_law]
+            if factored[RING] is None:
+                parts.append(InCourses.plain(columns, frames))
+            else:
+                when = {kind: points.frame for kind, points in moments.items()}
+                parts.append(_in_course(columns, factored, when, frames))
+        return laws, InCourses.joined(parts)
+
+
+def _in_course(
+    columns: Int, factored: Mapping[int, Factored | None], when: Mapping[int, Int], frames: int
+) -> InCourses:
+    """Return a law's columns times each factor of its course, by kind at the frames of its points.
+
+    Courses of the library have no influence on the encoder's readings.
+    """
+    known = {kind: np.stack(of[0], -1) for kind, of in factored.items() if of is not None}
+    times = known[RING].shape[1]
+    each = np.zeros((len(KINDS), frames, times * len(columns)))
+    for kind, factors in known.items():
+        each[kind, when[kind]] = np.repeat(factors, len(columns), axis=1)
+    return InCourses(np.tile(columns, times), each)
 
 
 def pattern_of(term: Term) -> tuple[str, str, int | None]:

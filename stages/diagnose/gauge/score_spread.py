@@ -15,7 +15,8 @@ from pipeline.adjustment.normal_equations import Marginal
 from pipeline.adjustment.robust import cluster_variance, degrees_of, two_way_variance
 from pipeline.arrays import Float, Int
 from stages.calibrate.gauge.terms import WALL_CELL_MM
-from stages.diagnose.gauge.elimination import EDGE, ENCODER, RING, Equations, Reduced, by_frame, by_kind
+from stages.diagnose.gauge.elimination import Reduced
+from stages.diagnose.gauge.equations import EDGE, ENCODER, RING, Equations, by_frame, by_kind
 
 # Squares of wall per side of a cell; errors farther apart than a cell are taken as independent. Debt:
 # data/debts.md.

@@ -17,7 +17,7 @@ from stages.calibrate.gauge.state import GaugeParameters, SheetModel, Unknowns, 
 from stages.calibrate.gauge.terms import frame_spread
 from stages.diagnose.effects.base import EffectModel
 from stages.diagnose.effects.library import ring_shift_px, texture_shift_px
-from stages.diagnose.gauge.elimination import Equations
+from stages.diagnose.gauge.equations import Equations
 from stages.diagnose.gauge.fit import Fit, fit, fit_beside
 from stages.diagnose.gauge.linearise import linearise
 from stages.diagnose.gauge.points import widths_at
