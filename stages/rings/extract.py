@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+import itertools
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
-from itertools import chain, islice
 
 import numpy as np
 from pydantic import Field
@@ -17,6 +17,7 @@ from pipeline.instrument.probe import Probe
 from pipeline.machine.scratch import Scratch
 from pipeline.machine.stage import Context, Parameters
 from pipeline.recording.base import Illumination, Recording
+from pipeline.system.parallel import side_by_side
 from stages.rings.behind_dirt import set_right
 from stages.rings.expectation import warn_of_rings
 from stages.rings.glints import SAYING_RINGS
@@ -36,6 +37,9 @@ _LEARNING_FRAMES = 4
 # first and by .36, .27 and .2 px after one, two and four rounds.
 _ROUNDS = 4
 _AT_ONCE = 512
+# Parts of a recording that are traced side by side, on however many cores. Within each, a ring is searched
+# around the one before it.
+_PARTS = 2
 # Clipped pixels are searched up to so many line widths on either side of the line. If the line lies within
 # half a width of their middle, both of its flanks were fitted.
 _CLIP_WIDTHS, _CLIP_STEP, _ASIDE_WIDTHS = 3.0, 0.5, 0.5
@@ -95,17 +99,21 @@ def _measured(
     recording: Recording, probe: Probe, frames: Int, parameters: RingParameters, context: Context
 ) -> RingSamples:
     """Return the rings of frames (F,) as each image alone shows them."""
-    # Decoding continues in the background from here.
-    lasers = recording.read(recording.frames.of(Illumination.LASER), "grey")
-    both = recording.read(recording.frames.of(Illumination.BOTH), "bgr")
     sectors = sectors_of(recording.source, probe.camera.centre_px, parameters.azimuths)
-    found = chain(_laser_traces(lasers, recording, sectors), _lit_traces(both, probe, sectors))
-    samples, rings = _empty(frames, sectors, context.scratch), 0
-    for done, (frame, trace) in enumerate(found, 1):
-        if trace is not None and trace.coverage >= parameters.least_coverage:
-            _put(samples, int(np.searchsorted(frames, frame)), trace)
-            rings += 1
-        context.progress(done, len(frames))
+    samples, done = _empty(frames, sectors, context.scratch), itertools.count(1)
+
+    def put(found: Iterable[Found]) -> int:
+        """Store rings that were found in images, and return their number."""
+        rings = 0
+        for frame, trace in found:
+            if trace is not None and trace.coverage >= parameters.least_coverage:
+                _put(samples, int(np.searchsorted(frames, frame)), trace)
+                rings += 1
+            context.progress(next(done), len(frames))
+        return rings
+
+    lasers, both = _laser_traces(recording, sectors), _lit_traces(recording, probe, sectors)
+    rings = sum(sum(side_by_side(put, parts)) for parts in (lasers, both))
     if not rings:
         raise UnusableError(
             "rings", "no laser ring was found in any frame", frames=frames.tolist(),
@@ -121,18 +129,28 @@ def _typical(samples: RingSamples, wander: Wander) -> float:
     return float(wander.at(float(np.median(samples.amplitude[valid])))) if valid.any() else 0.0
 
 
-def _laser_traces(images: Images, recording: Recording, sectors: Sectors) -> Iterator[Found]:
-    """Trace frames lit by the laser alone, in the luma plane."""
-    first = [(frame, None if i is None else i.copy()) for frame, i in islice(images, _LEARNING_FRAMES)]
-    trace = _first_trace(first, recording, sectors)
-    clip_level = np.inf if trace is None else trace.response.clip_level
-    for frame, image in chain(first, images):
-        trace = None if image is None else trace_ring(image, sectors, clip_level, trace)
-        yield frame, trace
+def _laser_traces(recording: Recording, sectors: Sectors) -> list[Iterable[Found]]:
+    """Return the traced parts of the frames lit by the laser alone, in the luma plane."""
+    frames = recording.frames.of(Illumination.LASER)
+    first = _first_trace(recording, frames[:_LEARNING_FRAMES], sectors)
+    clip_level = np.inf if first is None else first.response.clip_level
+
+    def traced(part: Int, trace: RingTrace | None) -> Iterator[Found]:
+        for frame, image in recording.read(part, "grey"):
+            trace = None if image is None else trace_ring(image, sectors, clip_level, trace)
+            yield frame, trace
+
+    return [traced(part, None if at else first) for at, part in enumerate(np.array_split(frames, _PARTS))]
 
 
-def _lit_traces(images: Images, probe: Probe, sectors: Sectors) -> Iterator[Found]:
-    """Trace frames in which the wall is lit too, in the mixture of channels that shows the line best.
+def _lit_traces(recording: Recording, probe: Probe, sectors: Sectors) -> list[Iterable[Found]]:
+    """Return the traced parts of the frames in which the wall is lit too."""
+    parts = np.array_split(recording.frames.of(Illumination.BOTH), _PARTS)
+    return [_in_mixture(recording.read(part, "bgr"), probe, sectors) for part in parts]
+
+
+def _in_mixture(images: Images, probe: Probe, sectors: Sectors) -> Iterator[Found]:
+    """Trace images in which the wall is lit too, in the mixture of channels that shows the line best.
 
     The line is then placed in the mixture in which it is displaced least.
     """
@@ -203,11 +221,9 @@ def _without_dips(trace: RingTrace, bgr: Byte, sectors: Sectors, channel: int) -
     return replace(trace, fit=fit, validity=np.where(lost, RingValidity.SATURATED, trace.validity))
 
 
-def _first_trace(
-    images: Sequence[tuple[int, Image | None]], recording: Recording, sectors: Sectors
-) -> RingTrace | None:
-    """Return the ring of the first of ``images`` that shows one, with the grey level at which it clips."""
-    for frame, grey in images:
+def _first_trace(recording: Recording, frames: Int, sectors: Sectors) -> RingTrace | None:
+    """Return the ring of the first of ``frames`` that shows one, with the grey level at which it clips."""
+    for frame, grey in recording.read(frames, "grey"):
         trace = None if grey is None else trace_ring(grey, sectors, np.inf)
         _, bgr = (frame, None) if trace is None else next(recording.read([frame], "bgr"))
         if trace is None or grey is None or bgr is None:
