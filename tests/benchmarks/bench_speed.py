@@ -91,6 +91,7 @@ def run(recording: Path, folder: Path, apart: bool) -> None:
     job = prepare(recording, folder, probe=None, configuration=configuration())
     gc.freeze()  # as the command does
     run_job(replace(job, at_once=1 if apart else job.at_once), Selection(resume=False), SilentDisplay())
+    gc.freeze()
 
 
 def measured(recording: Path, given: argparse.Namespace) -> Measured:
