@@ -38,6 +38,7 @@ from pipeline.instrument.probe import Probe
 from pipeline.machine.stage import Context, Stage
 from pipeline.recording.base import Recording
 from pipeline.recording.checks import CheckedFrames
+from pipeline.system.parallel import in_threads
 from stages.defects.along import stretches
 from stages.defects.clean import clean_wall
 from stages.defects.corroborate import Evidence, Witnesses, evidence_for
@@ -108,7 +109,13 @@ def find_defects(
     cloud = cloud_along(wall.cloud)
     measured = MeasuredWall(relief, cloud, cloud.ring_spacing_mm())
     measurer = Measurer(measured, clean_wall(measured, regions), parameters, context.random)
-    looked_at = (_found_in(region, measurer, seeds.score, scene, wall.fixed) for region in regions)
+
+    def shown_by(own: tuple[Region, np.random.Generator]) -> Found | None:
+        """Return what a region shows, with random numbers that do not depend on the other regions."""
+        return _found_in(own[0], replace(measurer, random=own[1]), seeds.score, scene, wall.fixed)
+
+    own = zip(regions, context.random.spawn(len(regions)), strict=True)
+    looked_at = in_threads(shown_by, own, context.workers)
     found = [f for f in _with_progress(looked_at, len(regions), context) if f is not None]
     tail = noise_tail(relief, seeds, known)
     credibility = credibility_on(found, tail, measured)
