@@ -120,6 +120,8 @@ class Runner:
                 f"{self._at} failed: {problem}\n"
                 f"This is an error in the program. The log with the details: {self._folder.log}"
             ) from error
+        finally:
+            give_back_memory()
 
     def _complete_all(self, selection: Selection) -> None:
         """Complete every step as soon as its inputs exist; some run at the same time."""
@@ -181,7 +183,6 @@ class Runner:
         )
         self._folder.store.write(artefact, provenance)
         del artefact
-        give_back_memory()
         stored = self._folder.store.read(name, step.key, plain(step.output))
         if stored is None:
             raise TypeError(f"stage {name} made a {kind} that cannot be read back")

@@ -27,7 +27,8 @@ def keep_freed_memory() -> None:
     """Keep freed memory for what is allocated next, until `give_back_memory`.
 
     Otherwise an array of some megabytes is a new mapping, whose pages the system clears one by one at their
-    first use: 4 to 9 % of the processor time of texture and defects.
+    first use: 4 to 9 % of the processor time of texture and defects. Given back after every stage, it took
+    1.5 of 27 s of a run (open-1), for 307 thousand page faults in place of 114 thousand.
     """
     mallopt = getattr(ctypes.CDLL(None), "mallopt", None) if sys.platform == "linux" else None
     if mallopt is not None:
