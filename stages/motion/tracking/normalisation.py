@@ -13,6 +13,7 @@ import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
 from pipeline.arrays import Bool, Float, Float32
+from pipeline.system.parallel import side_by_side
 from stages.rings.kernels import FAST
 
 SOFTENING_PX = 1.2
@@ -66,13 +67,12 @@ def equally_sharp(contrast: Float32, coarse_uv: Float32, steps: tuple[int, int])
     share = np.linspace(0, 1, _BLURS)
     sizes = wanted.min(0) + share[:, None] * (wanted.max(0) - wanted.min(0))
     level = (_BLURS - 1) * np.clip((wanted[:, 0] - sizes[0, 0]) / max(np.ptp(sizes[:, 0]), 1e-6), 0, 1)
+    weights = [np.maximum(1 - np.abs(level - k), 0).astype(np.float32)[:, None] for k in range(_BLURS)]
+    parts = [(k, slice(r[0], r[-1] + 1)) for k, w in enumerate(weights) if (r := np.flatnonzero(w)).size]
+    blurred = side_by_side(lambda part: _blurred(contrast, part[1], *sizes[part[0]]), parts)
     out = np.zeros_like(contrast)
-    for k, (sigma_along, sigma_around) in enumerate(sizes):
-        weight = np.maximum(1 - np.abs(level - k), 0).astype(np.float32)[:, None]
-        rows = np.flatnonzero(weight)
-        if rows.size:
-            part = slice(rows[0], rows[-1] + 1)
-            out[part] += weight[part] * _blurred(contrast, part, sigma_along, sigma_around)
+    for (k, part), smooth in zip(parts, blurred, strict=True):
+        out[part] += weights[k][part] * smooth
     return out
 
 
