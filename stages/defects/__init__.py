@@ -253,5 +253,5 @@ def _defects_of_run(
 
 
 DEFECTS = Stage(
-    "defects", "71", DefectParameters, _defects_of_run, "defects as instances with depth, clock and kind"
+    "defects", "72", DefectParameters, _defects_of_run, "defects as instances with depth, clock and kind"
 )
