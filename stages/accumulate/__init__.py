@@ -201,7 +201,7 @@ def _wall_of_run(
 
 ACCUMULATE = Stage(
     "accumulate",
-    "28",
+    "29",
     AccumulateParameters,
     _wall_of_run,
     "point cloud and radius map around the pipe's own axis, with σ",

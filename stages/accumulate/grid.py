@@ -169,13 +169,13 @@ def _with_shared(rough: Float32, sigma: Float32, shared: float) -> Float32:
 def _shared(columns: RingColumns, held: HeldOver, width: float) -> float:
     """Return the true σ over that from neighbouring rings, for a mean of ``width`` rings; at least 1.
 
-    Rings are compared at a distance at which no light is carried over. The wall's own shape over that length
-    counts as error, too, because it cannot be distinguished from light that is carried over.
+    Rings are compared at a distance at which no light is carried over; the wall's own shape over that length,
+    too, counts as error. What rings share at any distance, fixed to the image, follows from their likeness.
     """
-    if held.rings <= 1 or columns.distance_mm.shape[1] < 2 * held.rings + 1:
+    if not held.alike or columns.distance_mm.shape[1] < 2 * held.rings + 1:
         return 1.0
     near, far = (max(_scatter(columns, apart), 1.0) for apart in (1, held.rings))
-    return max(far / near, 1.0) * held.gain_in_mean(width)
+    return max(far / near, 1.0) * held.unseen * held.gain_in_mean(width)
 
 
 def _scatter(columns: RingColumns, apart: int) -> float:

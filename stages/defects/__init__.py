@@ -39,6 +39,7 @@ from pipeline.machine.stage import Context, Stage
 from pipeline.recording.base import Recording
 from pipeline.recording.checks import CheckedFrames
 from pipeline.system.parallel import in_threads
+from stages.defects.all_along import may_be_on_window
 from stages.defects.along import stretches
 from stages.defects.clean import clean_wall
 from stages.defects.corroborate import Evidence, Witnesses, evidence_for
@@ -168,6 +169,8 @@ def _found_in(
         if region.sign * kept.allowed.depth_mm >= scene.min_depth_mm:
             top = kept.best(region.cut(score.astype(float)))
             seen_by, fixed_mm = scene.seen_by, _fixed_in(region, fixed)
+            if _may_be_on_window(region, measurer, seen_by):
+                fixed_mm = np.full_like(fixed_mm, np.inf)
             evidence = evidence_for(kept.here, kept.allowed, kept.surface, seen_by, fixed_mm, top, spots)
             evidence = replace(evidence, spot=is_spot)
             return _described(region, measurer, scene, (whole, kept), evidence)
@@ -218,6 +221,14 @@ def _fixed_in(region: Region, fixed: FixedToProbe | None) -> Float:
         return np.zeros(region.mask.shape)
     rows = fixed.departure_mm[region.row : region.row + len(region.mask)].astype(float)
     return region.counted_from(region.row).cut(rows)
+
+
+def _may_be_on_window(region: Region, measurer: Measurer, seen_by: Witnesses) -> bool:
+    """Return whether a region may be as long as the run because it is on the window."""
+    if seen_by.pictures is None:
+        return False
+    wall = measurer.wall
+    return may_be_on_window(region, wall.relief, wall.cloud, seen_by.pictures.motion)
 
 
 def _refuse_unseen(wall: Wall) -> None:

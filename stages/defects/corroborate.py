@@ -61,7 +61,7 @@ class Evidence:
     score : float
         Largest matched-filter response, σ.
     fixed : bool
-        Whether it stays at one place of the image while the wall goes by.
+        Whether it stays at one place of the image while the wall goes by, or may: it is as long as the run.
     edge : bool
         Whether it is deepest beside hidden wall.
     bright : bool
@@ -108,7 +108,7 @@ class Evidence:
         if self.fixed:
             return (
                 "It stays at one place of the image while the wall goes by, as something on the window or on "
-                "the probe does: see the warnings of the stage accumulate"
+                "the probe does. To tell: clean the window, or roll the probe by 30°, and record again"
             )
         if self.spot:
             return (

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, cast
 
 import numpy as np
 import pytest
+from scipy.ndimage import gaussian_filter1d
 
 from pipeline.adjustment.held_over import held_over
 from pipeline.adjustment.shared_light import HeldOver
@@ -167,3 +168,60 @@ def test_new_noise_hides_nothing_of_the_repeated_light() -> None:
     assert HeldOver(likeness).handed_on == pytest.approx(0.8, abs=0.03)
     # A codec that repeats most of a picture once, and no more.
     assert HeldOver(np.array([1, 0.79, 0.3, 0.1, 0.05, 0])).handed_on == pytest.approx(0.79, abs=0.03)
+
+
+def drifting(rings: int, held: float, fixed: float, seed: int = 1) -> tuple[Float, Float]:
+    """Return values (F, A) and places (F, A), px, of a line that drifts over errors fixed to the image.
+
+    Of unit variance, ``fixed`` is that of the errors, which change within a pixel; of the rest, ``held`` is
+    handed on from ring to ring.
+    """
+    random, fine = np.random.default_rng(seed), 10
+    place = 12 + 2 * np.sin(np.linspace(0, 9, rings))[:, None] + 0.5 * np.sin(np.linspace(0, 6.28, 720))
+    place = place + 0.3 * random.standard_normal((rings, 1))
+    errors = gaussian_filter1d(random.standard_normal((24 * fine, 720)), 0.5 * fine, axis=0)
+    at = np.rint(fine * place).astype(int)
+    of_image = np.sqrt(fixed) * errors[at, np.arange(720)] / errors.std()
+    return of_image + np.sqrt(1 - fixed) * rings_of(held, (rings, 720), seed + 1), place
+
+
+@pytest.mark.parametrize("held", [0.0, 0.5, 0.8])
+@pytest.mark.parametrize("fixed", [0.0, 0.4])
+def test_errors_of_the_image_are_not_light_of_earlier_pictures(held: float, fixed: float) -> None:
+    """Single JPEGs of a drifting line gave .35, .28, .23, ...: three rings counted as one."""
+    values, place = drifting(60, held, fixed)
+    found = held_over([values], 1.2 * np.arange(60), SAMPLE_MM, place)
+    both = fixed + (1 - fixed) * held
+    assert fixed == 0 or found.likeness[1] > 0.7 * both
+    assert found.repeated is not None or fixed == 0
+    light = found.likeness if found.repeated is None else found.repeated
+    assert light[1:5] == pytest.approx(held ** np.arange(1, 5), abs=0.08)
+    assert found.more_than_usual == (held > 0)
+    assert found.independent(3) == (3 if held == 0 else 2 if held == 0.5 else 1)
+    assert found.handed_on == pytest.approx(held, abs=0.1)
+
+
+def test_few_rings_do_not_tell_errors_of_the_image_apart() -> None:
+    values, place = drifting(16, 0.0, 0.4)
+    found = held_over([values], 1.2 * np.arange(16), SAMPLE_MM, place)
+    assert found.repeated is None
+    assert found.independent(3) < 3
+
+
+def test_light_handed_on_to_every_second_ring_is_detected() -> None:
+    """In drawn HEVC of alternating lights rings shared .04, .47, .02, .36, ...: it counted as .04."""
+    values = np.stack([rings_of(0.7, (60, 720), seed) for seed in (3, 4)], 1).reshape(120, 720)
+    found = held_over([values], 1.2 * np.arange(120), SAMPLE_MM)
+    assert found.likeness[1:4] == pytest.approx([0.0, 0.7, 0.0], abs=0.03)
+    assert found.more_than_usual
+    assert [found.independent(count) for count in (2, 8)] == [2, 3]
+
+
+@pytest.mark.parametrize("repeated", [0.05, 0.5])
+def test_only_repeated_light_is_warned_of_where_it_is_told_apart(repeated: float) -> None:
+    told: list[str] = []
+    context = SimpleNamespace(report=lambda *_: None, warn=told.append)
+    lags = np.arange(17.0)
+    warn_of_held(HeldOver(0.6**lags, repeated**lags), True, cast("Context", context))
+    assert len(told) == (repeated > 0.1)
+    assert not any("places of the image" in w for w in told)
