@@ -19,7 +19,7 @@ MOST_LASTING = 0.57
 """Reprojection error, in σ of matching, shared by a landmark's neighbouring matches, that is warned of: .44
 to .51 in open-1, open-2, at half their size, shaken, and in a scene of ours; .18 in open-3, of much noise;
 .63 in open-1 as HEVC of crf 32, .69 at crf 30, .85 with glints, dust and blur as well."""
-_TOO_FAR = 5.0
+TOO_FAR = 5.0
 """σ of a contradiction that is warned of. By independent Gaussian errors a correct probe is contradicted as
 much along one of its ten or so directions once in 10⁵ recordings; by errors that matches share, more
 often: how often is not known."""
@@ -54,12 +54,12 @@ class Contradiction:
     @property
     def of_probe(self) -> bool:
         """Whether the stated probe cannot be right."""
-        return self.farthest > _TOO_FAR
+        return self.farthest > TOO_FAR
 
     @property
     def certain(self) -> bool:
         """Whether pictures and stated probe contradict each other; texture may be wrong instead."""
-        return self.sigmas > _TOO_FAR
+        return self.sigmas > TOO_FAR
 
 
 def contradiction(trajectory: Trajectory, probe: Probe) -> Contradiction:
@@ -81,7 +81,7 @@ def contradiction(trajectory: Trajectory, probe: Probe) -> Contradiction:
     gain, direction = np.linalg.eigh(np.eye(len(moved)) - left)
     along, gain = direction.T @ moved, np.where(gain > _NO_EVIDENCE, gain, 1.0)
     sigmas = np.abs(along) / np.sqrt(gain)
-    wanted = np.where(sigmas > _TOO_FAR, along / gain, along)
+    wanted = np.where(sigmas > TOO_FAR, along / gain, along)
     farthest = float(np.abs(moved).max())
     return Contradiction(float(sigmas.max()), farthest, unsure @ moved, unsure @ direction @ wanted)
 

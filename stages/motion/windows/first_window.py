@@ -23,6 +23,7 @@ from stages.motion.bundle_adjustment.solver import (
 from stages.motion.bundle_adjustment.unknowns import State
 from stages.motion.encoder import EncoderReadings
 from stages.motion.parameters import MotionParameters
+from stages.motion.stated_probe import TOO_FAR
 from stages.motion.tracking.strips import StripGrid
 from stages.motion.windows.measured_run import MeasuredRun
 from stages.motion.windows.steady_laser import with_steady_laser
@@ -228,7 +229,7 @@ def with_scale(first: _Adjusted, unsure: float) -> tuple[_Adjusted, EncoderScale
         return first, None, float(np.hypot(unsure, _unseen_error(first.run)))
     if _lost_much(first):
         return _beside_lost_texture(first, scale, unsure)
-    if first.run.bore.reduces:
+    if first.run.bore.reduces or (scale.contradicted and _probe_does_not_fit(first)):
         scale = scale.without_trust_in_texture()
         unsure = scale.sigma
     if scale.contradicted:
@@ -236,6 +237,16 @@ def with_scale(first: _Adjusted, unsure: float) -> tuple[_Adjusted, EncoderScale
         run, measured = replace(first.run, probe=probe), replace(first.measured, probe=probe)
         first = replace(first, run=run, measured=measured).resumed()
     return first, scale, float(np.hypot(unsure, scale.doubt))
+
+
+def _probe_does_not_fit(first: _Adjusted) -> bool:
+    """Return whether laser and texture without the encoder move the stated probe by more than its σ allow.
+
+    Its baseline and focal length, which give the scale of distances, may then be wrong as well.
+    """
+    directions = first.run.probe.principal_uncertainties().shape[1]
+    moved = _without_encoder(first).state.instrument[:directions]
+    return float(np.abs(moved).max(initial=0.0)) > TOO_FAR
 
 
 def _unseen_error(run: MeasuredRun) -> float:
