@@ -111,7 +111,7 @@ def test_sigma_includes_what_the_probe_that_pictures_demand_would_change(
     agreed = estimate_motion(run.recording, run.probe, run.rings, run.points, parameters, context)
     assert not agreed.rivals
     assert not any("contradict each other" in words for words in told)
-    monkeypatch.setattr(stated_probe, "_TOO_FAR", 0.0)
+    monkeypatch.setattr(stated_probe, "TOO_FAR", 0.0)
     got = estimate_motion(run.recording, run.probe, run.rings, run.points, parameters, context)
     assert got.rivals
     assert got.distance_sigma_mm > agreed.distance_sigma_mm

@@ -89,6 +89,13 @@ class Adjusted:
         return self
 
 
+def without_encoder(moved: float) -> Any:
+    """Return an estimate without the encoder, which moves the probe by so many σ; texture's own σ follows."""
+    directions = probe().principal_uncertainties().shape[1]
+    texture = np.full(3, 9.0)
+    return SimpleNamespace(state=SimpleNamespace(instrument=np.r_[np.full(directions, moved), texture]))
+
+
 def window_that_lost(lost: Bool) -> Any:
     """Return the first window of 20 frames in a run that lost its texture in some (N,)."""
     poses = TrackedPoses(np.arange(len(lost)), np.zeros((len(lost), 4, 4)), lost)
@@ -150,9 +157,23 @@ def test_texture_lost_after_the_first_window_does_not_save_a_wrong_encoder(
 ) -> None:
     """Only the first window decides the scale: with its good texture an encoder 20 % off is rejected."""
     monkeypatch.setattr(first_window, "scale_of_encoder", lambda *_: EncoderScale(1.2, 0.002, 0.002))
+    monkeypatch.setattr(first_window, "_without_encoder", lambda _: without_encoder(1.0))
     _, found, _ = first_window.with_scale(window_that_lost(np.arange(60) >= 20), 0.001)
     assert found is not None
     assert found.contradicted
+
+
+@pytest.mark.parametrize(("moved", "rejected"), [(4.0, True), (6.0, False)])
+def test_beside_a_probe_that_does_not_fit_no_encoder_is_called_wrong(
+    moved: float, rejected: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With a principal point 50 σ off, a right encoder was rejected at 4 σ."""
+    monkeypatch.setattr(first_window, "scale_of_encoder", lambda *_: EncoderScale(1.02, 0.002, 0.002))
+    monkeypatch.setattr(first_window, "_without_encoder", lambda _: without_encoder(moved))
+    _, found, unsure = first_window.with_scale(window_that_lost(np.zeros(20, bool)), 0.001)
+    assert found is not None
+    assert found.contradicted == rejected
+    assert rejected or unsure >= 0.02
 
 
 @pytest.mark.parametrize(("lost", "sigma"), [(0, 0.001), (19, 0.048)])

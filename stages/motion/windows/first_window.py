@@ -240,10 +240,7 @@ def with_scale(first: _Adjusted, unsure: float) -> tuple[_Adjusted, EncoderScale
 
 
 def _probe_does_not_fit(first: _Adjusted) -> bool:
-    """Return whether laser and texture without the encoder move the stated probe by more than its σ allow.
-
-    Its baseline and focal length, which give the scale of distances, may then be wrong as well.
-    """
+    """Return whether the pictures alone move the probe, which gives distances their scale, beyond its σ."""
     directions = first.run.probe.principal_uncertainties().shape[1]
     moved = _without_encoder(first).state.instrument[:directions]
     return float(np.abs(moved).max(initial=0.0)) > TOO_FAR
