@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 
 from pipeline.arrays import Float
+from pipeline.physics.effect import CourseKind
 from stages.calibrate.gauge.state import Unknowns
-from stages.diagnose.effects.library import LIBRARY, ring_shift_px
+from stages.diagnose.effects.courses import Coursed
+from stages.diagnose.effects.library import LIBRARY, columns, ring_shift_px
 from stages.diagnose.gauge.equations import RING
-from stages.diagnose.gauge.linearise import asking, linearise
+from stages.diagnose.gauge.linearise import asking, in_courses, linearise
 from stages.diagnose.gauge.run import GaugeRun, Term
 from stages.diagnose.gauge.search import prepare, weighed
 from tests.gauge_runs import made_run, measured_run
@@ -77,3 +79,26 @@ def test_the_place_within_a_pixel_is_that_of_the_line_as_found_effects_displace_
     told = asking(measured, start, at, [(LIBRARY["pixel_locking"], ())])
     seen = (told.kind == RING) & (told.weight > 0)
     assert -told.by_global[seen, -1] == pytest.approx(locked[seen[told.kind == RING]], abs=0.01)
+
+
+@pytest.mark.parametrize("all_of_one", [False, True])
+def test_points_outside_the_view_leave_the_courses_of_laws_known(
+    run: tuple[GaugeRun, Unknowns], all_of_one: bool
+) -> None:
+    """A course was taken at the first point of each frame, wherever that is: the fit ended in an error."""
+    measured, start = run
+    rings = measured.rings
+    first = np.append(True, np.diff(rings.frame) > 0) & (rings.frame % 2 == 0)
+    away = rings.frame == rings.frame[0] if all_of_one else first
+    uv = np.where(away[:, None], rings.uv + 5000 * rings.outward, rings.uv)
+    beyond = replace(measured, rings=replace(rings, uv=uv))
+    at = linearise(beyond, start, ())
+    model = Coursed(LIBRARY["laser_cone"], (), CourseKind.DISTANCE)
+    told = in_courses(beyond, start, at, [(model, (100.0,))])
+    own = told.kind == RING
+    assert np.isfinite(told.courses.factor).all()
+    assert not told.weight[own][away].any()
+    assert told.weight[own][~away].all()
+    factor = at.rings.camera_distance_mm[~away] / 100
+    law = -columns(LIBRARY["laser_cone"], at.rings, ())[~away, 0]
+    assert told.in_full().by_global[own][~away, -1] == pytest.approx(factor * law, rel=1e-9, abs=1e-12)

@@ -36,6 +36,15 @@ class InCourses:
     law: Int
     factor: Float
 
+    @property
+    def known(self) -> Bool:
+        """Whether (K, N) all factors are known: a frame without a point in view has no distance."""
+        return np.asarray(np.isfinite(self.factor).all(axis=-1))
+
+    def where_known(self) -> InCourses:
+        """Return the same columns, 0 in frames whose factors are not known."""
+        return InCourses(self.law, np.where(self.known[..., None], self.factor, 0.0))
+
     @staticmethod
     def plain(law: Int, frames: int) -> InCourses:
         """Return laws (C,) as they are."""

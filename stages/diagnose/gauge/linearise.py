@@ -112,14 +112,14 @@ def in_courses(
     by_global = np.zeros((len(equations.frame), end))
     by_global[:, :own] = equations.by_global
     _ask(run, state, at, laws, by_global[:, own:first])
-    bad = ~np.isfinite(by_global[:, own:first]).all(1)
+    bad = ~np.isfinite(by_global[:, own:first]).all(1) | ~courses.known[equations.kind, equations.frame]
     if with_baseline:
         by_global[:, first:] = _baseline(run, at)
     by_global[bad] = 0.0
     baseline = InCourses.plain(np.arange(first, end), len(run.time_s))
     return replace(
         equations, by_global=by_global, weight=np.where(bad, 0.0, equations.weight),
-        courses=InCourses.joined([courses, baseline]),
+        courses=InCourses.joined([courses.where_known(), baseline]),
     )  # fmt: skip
 
 

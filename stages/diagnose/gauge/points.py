@@ -201,8 +201,9 @@ def rates(value: Float, time_s: Float, frames: int) -> Float:
 
 
 def one_of_each_frame(points: ImagePoints) -> ImagePoints:
-    """Return one point of each frame: a course depends on the frame alone."""
-    first = np.unique(points.frame, return_index=True)[1]
+    """Return one point of each frame, in view where one is: a course depends on the frame alone."""
+    order = np.lexsort((~np.isfinite(points.xyz_c).all(axis=1), points.frame))
+    first = order[np.unique(points.frame[order], return_index=True)[1]]
     each = {f.name: getattr(points, f.name) for f in fields(points)}
     rows: dict[str, Any] = {name: v[first] for name, v in each.items() if isinstance(v, np.ndarray)}
     return replace(points, **rows)
