@@ -61,6 +61,14 @@ def test_a_dark_pattern_that_black_cuts_off_has_no_defects_in_its_tail(spread, b
     assert found.statement.startswith("1 single pixels are too bright in all frames, 0 too dark")
 
 
+def test_one_hot_pixel_in_three_hundred_does_not_hide_them_all():
+    """They were the tail of the offsets: with more than one in 740, none was found."""
+    at = {(int(v), int(u)) for v, u in np.random.default_rng(9).integers(5, 115, (64, 2))}
+    assert len(at) > 0.003 * SEEN.size
+    (found,) = defective_pixels(*_frames(sorted(at))).mismatches()
+    assert found.parameters[0].value > 0.9 * len(at) / SEEN.size
+
+
 @pytest.mark.parametrize("azimuth_deg", [4, 20, 88, 120])
 def test_a_thin_scratch_on_the_window_is_not_a_row_of_dead_pixels(azimuth_deg):
     """A scratch as narrow as a defect differs from the five pixels around it only at single places."""
