@@ -229,8 +229,9 @@ def separated_from_blur(
     """Return what remains on the window, and what is withdrawn because whole pictures are blurred.
 
     Blur makes texture faint everywhere, and most where it is finest: that looks like scatter at some places.
+    A blurred line alone says nothing of texture, which frames then show as sharp as the photo does.
     """
-    if not any(set(m.names) & _BLURS for m in whole):
+    if not any(m.channel != "line" and set(m.names) & _BLURS for m in whole):
         return tuple(found), ()
     unsure = tuple(m for m in found if "window_scatter" in m.names)
     said = "{} But whole frames are blurred, which looks the same here."

@@ -6,9 +6,11 @@ from types import SimpleNamespace
 import cv2
 import numpy as np
 import pytest
+from scipy.ndimage import gaussian_filter
 
 from pipeline.artefacts.twin import Mismatch, NamedFigure
 from pipeline.recording.base import Illumination
+from stages.twin import on_wall
 from stages.twin.glints import SpotsOfFrames
 from stages.twin.on_wall import ring_step_mm, slope_error, touching, unnamed
 from stages.twin.reference import BlocksOfFrames
@@ -196,6 +198,22 @@ def test_what_smoothing_took_from_a_weld_is_not_noise_of_the_map():
     cells = np.array([[int((101.75 - blocks.first_mm) / 2.5), 20]])
     assert slope_error(weld, blocks, cells, 1.2) > 0.05
     assert slope_error(plain, blocks, cells, 1.2) == 0
+
+
+def test_a_region_of_a_long_wall_does_not_smooth_all_of_the_map(monkeypatch):
+    """In a wall of 20 m each region took 21 s."""
+    plain, smoothed = plain_bore(), []
+    rows = 20_000
+    noise = np.random.default_rng(2).normal(0, 0.01, (rows, 60)).astype(np.float32)
+    long = replace(
+        plain, distance_mm=np.arange(rows) * 0.5, radius_mm=np.full_like(noise, 50), along=noise, around=noise
+    )
+    monkeypatch.setattr(
+        on_wall, "gaussian_filter", lambda a, *b, **c: smoothed.append(len(a)) or gaussian_filter(a, *b, **c)
+    )
+    lost = on_wall.slope_error(long, SimpleNamespace(first_mm=0.0, cell_mm=2.5), np.array([[100, 20]]), 1.2)
+    assert sum(smoothed) < rows / 2
+    assert lost < 0.03
 
 
 def test_the_brightness_of_wall_between_distant_rings_is_that_of_linear_interpolation():

@@ -300,3 +300,5 @@ def test_scatter_is_withdrawn_where_whole_frames_are_blurred():
     assert [m.name for m in withdrawn] == ["window_scatter or window_dirt"]
     assert "blurred" in withdrawn[0].statement
     assert separated_from_blur(spots, [named("bloom")]) == (tuple(spots), ())
+    line = replace(named("defocus or thick_sheet"), channel="line")
+    assert separated_from_blur(spots, [line]) == (tuple(spots), ())
