@@ -48,9 +48,9 @@ def report_unconfirmed(defects: int, unconfirmed: int, lines: int, context: Cont
     if unconfirmed > max(_FEW_UNCONFIRMED, defects):
         context.warn(
             f"{unconfirmed} places are shown by one ring alone or are more likely false than real, beside "
-            f"{defects} defects: glints, splashes or compression were taken for the line. What to do: look "
-            "at the unconfirmed findings in the review; record again with less exposure of the laser, a "
-            "clean window or less compression"
+            f"{defects} defect{'' if defects == 1 else 's'}: glints, splashes or compression were taken for "
+            "the line. What to do: look at the unconfirmed findings in the review; record again with less "
+            "exposure of the laser, a clean window or less compression"
         )
 
 
