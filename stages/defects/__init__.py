@@ -264,5 +264,5 @@ def _defects_of_run(
 
 
 DEFECTS = Stage(
-    "defects", "73", DefectParameters, _defects_of_run, "defects as instances with depth, clock and kind"
+    "defects", "74", DefectParameters, _defects_of_run, "defects as instances with depth, clock and kind"
 )

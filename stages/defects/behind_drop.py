@@ -20,7 +20,7 @@ import numpy as np
 
 from pipeline.adjustment.robust import robust_spread
 from pipeline.arrays import Bool, Byte, Float, Float32, Int
-from pipeline.geometry.axis import distance_along, from_pipe
+from pipeline.geometry.axis import from_pipe
 from pipeline.geometry.rigid import inverse, transform
 from pipeline.recording.base import Illumination
 from stages.defects.depth import KNOWN
@@ -123,16 +123,14 @@ def _pictures(pictures: LitPictures, first_mm: float, last_mm: float) -> _Pictur
     """Return lit pictures taken while the line passed a stretch of the wall, and before and after that."""
     motion, recording = pictures.motion, pictures.recording
     index = np.flatnonzero(np.isin(motion.frame, recording.frames.of(Illumination.LED, Illumination.BOTH)))
-    line = distance_along(motion.axis, motion.T_pc[index]) + pictures.probe.laser.baseline_mm
+    line = pictures.line_mm[index]
     off = np.maximum(first_mm - line, line - last_mm)
     some = np.union1d(_some(index[off <= 0], _READ), _some(index[(off > 0) & (off < _FARTHEST_MM)], _READ))
     read = recording.read(motion.frame[some], "grey")
     image = {k: np.array(i) for k, (_, i) in zip(some, read, strict=True) if i is not None}
     kept = np.array(list(image), np.int64)
-    T_pc = motion.T_pc[kept]
-    line = distance_along(motion.axis, T_pc) + pictures.probe.laser.baseline_mm
     both = np.isin(motion.frame[kept], recording.frames.of(Illumination.BOTH))
-    return _Pictures(list(image.values()), inverse(T_pc), line, both)
+    return _Pictures(list(image.values()), inverse(motion.T_pc[kept]), pictures.line_mm[kept], both)
 
 
 def _some(index: Int, most: int) -> Int:

@@ -161,8 +161,7 @@ class Witnesses:
         """Return the frames whose rings show a spot beside the line; none without rings and poses."""
         if self.rings is None or self.pictures is None:
             return []
-        probe, motion = self.pictures.probe, self.pictures.motion
-        return frames_with_spots(region, depth.depth_mm, surface.relief, self.rings, probe, motion)
+        return frames_with_spots(region, depth.depth_mm, surface.relief, self.rings, self.pictures)
 
 
 def evidence_for(

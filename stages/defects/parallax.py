@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 
 import cv2
 import numpy as np
@@ -50,6 +51,11 @@ class LitPictures:
     recording: Recording
     probe: Probe
     motion: Trajectory
+
+    @cached_property
+    def line_mm(self) -> Float:
+        """Distances along the pipe (N,), mm, of the laser line in all poses."""
+        return distance_along(self.motion.axis, self.motion.T_pc) + self.probe.laser.baseline_mm
 
     def contradict(self, region: Region, relief: Relief) -> bool:
         """Whether pictures show the wall without a finding; False where fewer than two pictures show it.
@@ -103,7 +109,7 @@ class LitPictures:
     def drove_through(self, region: Region, depth: Depth, relief: Relief) -> bool:
         """Whether the camera passed the top of an inward finding at less than the radius of its own lamps."""
         row, column = region.row + depth.peak[0], region.column + depth.peak[1]
-        along = distance_along(self.motion.axis, self.motion.T_pc)
+        along = self.line_mm - self.probe.laser.baseline_mm
         s = relief.distance_mm[row]
         if depth.depth_mm >= 0 or not along.min() <= s <= along.max():
             return False
@@ -132,8 +138,7 @@ class LitPictures:
         """Yield pose (P to C) and grey picture of lit frames whose line is near but off ``s`` (H,), mm."""
         lit = np.isin(self.motion.frame, self.recording.frames.of(Illumination.LED, Illumination.BOTH))
         index = np.flatnonzero(lit)
-        line = distance_along(self.motion.axis, self.motion.T_pc[index]) + self.probe.laser.baseline_mm
-        off = np.abs(line - s.mean()) - np.ptp(s) / 2
+        off = np.abs(self.line_mm[index] - s.mean()) - np.ptp(s) / 2
         index = index[(off > _CLEAR_MM) & (off < _FARTHEST_MM)]
         some = index[np.unique(np.linspace(0, len(index) - 1, min(len(index), _PICTURES)).astype(int))]
         images = self.recording.read(self.motion.frame[some], "grey")

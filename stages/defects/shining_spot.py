@@ -9,19 +9,21 @@ light of relief moves on with the line. Such a spot is also brighter than the li
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from pipeline.arrays import Float
-from pipeline.artefacts.measured import RingSamples, Trajectory
-from pipeline.geometry.axis import distance_along, roll_at, to_pipe
+from pipeline.artefacts.measured import RingSamples
+from pipeline.geometry.axis import roll_at, to_pipe
 from pipeline.geometry.rigid import transform
-from pipeline.instrument.probe import Probe
+from stages.defects.parallax import LitPictures
 from stages.defects.relief import Relief
 from stages.defects.segment import Region
 
-# Rings up to 4 mm beyond a finding are compared: farther from the line a spot shines too weakly (chosen).
+# Rings up to 4 mm beyond a finding are compared, and light up to 4 mm from the line: farther off, a spot
+# shines too weakly (chosen).
 _REACH_MM = 4.0
 # Light stays at its place if it moves by less than a quarter of the way of the line, which has to be .5 mm:
 # on relief that would be a flank as steep as the line of sight itself, so that it could hardly be seen. Rings
@@ -57,17 +59,9 @@ class _Light:
     around_mm: float
     brightness: float
 
-    def stays_with(self, other: _Light) -> bool:
-        """Whether both are light of one place of the wall, and brighter than a line."""
-        way = abs(self.line_mm - other.line_mm)
-        bright = max(np.nan_to_num([self.brightness, other.brightness])) > _BRIGHTER
-        beside = abs(self.around_mm - other.around_mm) < _ASIDE_MM
-        stays = abs(self.place_mm - other.place_mm) < _STAYS * way
-        return bool(bright and beside and stays and _LEAST_WAY_MM < way < _FARTHEST_MM)
-
 
 def frames_with_spots(
-    region: Region, depth_mm: float, relief: Relief, rings: RingSamples, probe: Probe, motion: Trajectory
+    region: Region, depth_mm: float, relief: Relief, rings: RingSamples, pictures: LitPictures
 ) -> list[int]:
     """Return the frames whose rings show a spot in a region that stays in place as the line moves.
 
@@ -77,12 +71,36 @@ def frames_with_spots(
     if region.all_round:
         return []
     s = relief.distance_mm[region.row : region.row + len(region.mask)]
-    index = np.flatnonzero(np.isin(motion.frame, rings.frame))
-    line = distance_along(motion.axis, motion.T_pc[index]) + probe.laser.baseline_mm
-    near = index[(line > s[0] - _REACH_MM) & (line < s[-1] + _REACH_MM)]
-    looked = _Looked(region, relief, _DEPARTS * abs(depth_mm), rings, probe, motion)
-    lights = [light for k in near if (light := looked.light_in(int(k))) is not None]
-    return [one.frame for one in lights if any(one.stays_with(other) for other in lights)]
+    index = np.flatnonzero(np.isin(pictures.motion.frame, rings.frame))
+    line = pictures.line_mm[index]
+    near = (line > s[0] - _REACH_MM) & (line < s[-1] + _REACH_MM)
+    looked = _Looked(region, relief, _DEPARTS * abs(depth_mm), rings, pictures)
+    walls = looked.wall_mm(line[near])
+    seen = (looked.light_in(int(k), float(wall)) for k, wall in zip(index[near], walls, strict=True))
+    return _staying([light for light in seen if light is not None])
+
+
+def _staying(lights: Sequence[_Light]) -> list[int]:
+    """Return the frames of lights that are of one place of the wall with another, and brighter than a line.
+
+    Only lights near each other are compared: of a finding as long as the pipe there are very many.
+    """
+    line, place, around = (
+        np.array([getattr(light, f"{k}_mm") for light in lights]) for k in ("line", "place", "around")
+    )
+    bright = np.array([light.brightness for light in lights]) > _BRIGHTER
+    order = np.argsort(line)
+    out = []
+    for k in order:
+        first, last = np.searchsorted(line, line[k] + _FARTHEST_MM * np.array([-1, 1]), sorter=order)
+        others = order[first:last]
+        way = np.abs(line[others] - line[k])
+        stays = np.abs(place[others] - place[k]) < _STAYS * way
+        beside = np.abs(around[others] - around[k]) < _ASIDE_MM
+        far_enough = (way > _LEAST_WAY_MM) & (way < _FARTHEST_MM)
+        if (stays & beside & far_enough & (bright[others] | bright[k])).any():
+            out.append(lights[k].frame)
+    return sorted(out)
 
 
 @dataclass(frozen=True)
@@ -93,32 +111,36 @@ class _Looked:
     relief: Relief
     departs_mm: float
     rings: RingSamples
-    probe: Probe
-    motion: Trajectory
+    pictures: LitPictures
 
-    def light_in(self, k: int) -> _Light | None:
-        """Return the light of the ring in the ``k``-th pose that departs from the wall in the region."""
-        ring = int(np.searchsorted(self.rings.frame, self.motion.frame[k]))
-        T_pc, axis = self.motion.T_pc[k], self.motion.axis
-        camera_mm = distance_along(axis, T_pc[None])
+    def light_in(self, k: int, wall: float) -> _Light | None:
+        """Return the light of the ring in the ``k``-th pose that departs from the wall in the region.
+
+        ``wall`` is the smooth wall's radius there, mm.
+        """
+        motion, probe = self.pictures.motion, self.pictures.probe
+        ring = int(np.searchsorted(self.rings.frame, motion.frame[k]))
+        T_pc, axis = motion.T_pc[k], motion.axis
+        camera_mm = self.pictures.line_mm[k : k + 1] - probe.laser.baseline_mm
         off_middle, half = self._around(self.rings.azimuth_rad + roll_at(axis, camera_mm, T_pc[None])[0])
-        seen = np.isfinite(self.rings.radius_px[ring]) & (np.abs(off_middle) <= half)
-        if seen.sum() < _LEAST_SAMPLES:
-            return None
+        seen = np.flatnonzero(np.isfinite(self.rings.radius_px[ring]) & (np.abs(off_middle) <= half))
         uv, amplitude = self.rings.pixels_of(ring)[seen], self.rings.amplitude[ring]
-        s, _, radius = to_pipe(axis, transform(T_pc, self.probe.triangulate(uv)))
-        wall = self._wall_mm()
-        away = np.abs(radius - wall)
+        s, _, radius = to_pipe(axis, transform(T_pc, probe.triangulate(uv)))
+        meets = np.isfinite(s)  # beside the laser sheet, a rejected sample may be anything
+        if meets.sum() < _LEAST_SAMPLES:
+            return None
+        line_mm = float(np.median(s[meets]))
+        # The camera is close to the axis: along a line of sight, distance grows as the radius does.
+        place = camera_mm[0] + (s - camera_mm[0]) * wall / radius
+        away = np.where(np.abs(place - line_mm) < _REACH_MM, np.abs(radius - wall), 0.0)
         off = away > max(self.departs_mm, _TOP * away.max())
         if off.sum() < _LEAST_SAMPLES:
             return None
         beside = (np.abs(off_middle) > half) & (np.abs(off_middle) <= 2 * half) & self.rings.valid[ring]
         line = np.median(amplitude[beside]) if beside.any() else np.nan
-        # The camera is close to the axis: along a line of sight, distance grows as the radius does.
-        place = camera_mm[0] + (s - camera_mm[0]) * wall / radius
         return _Light(
-            frame=int(self.motion.frame[k]),
-            line_mm=float(np.median(s)),
+            frame=int(motion.frame[k]),
+            line_mm=line_mm,
             place_mm=float(np.median(place[off])),
             around_mm=float(wall * np.median(off_middle[seen][off])),
             brightness=float(np.median(amplitude[seen][off]) / line),
@@ -131,8 +153,8 @@ class _Looked:
         middle = self.relief.azimuth_rad[0] + self.region.column * step + half
         return np.asarray(np.angle(np.exp(1j * (azimuth_rad - middle)))), half
 
-    def _wall_mm(self) -> float:
-        """Return the radius of the smooth wall in the middle of the region, mm."""
-        rows, columns = self.region.mask.shape
-        middle = np.array([self.region.row + rows // 2]), np.array([self.region.column + columns // 2])
-        return float(self.relief.shape_at(*(m.astype(float) for m in middle))[0])
+    def wall_mm(self, line_mm: Float) -> Float:
+        """Return the radius (n,), mm, of the smooth wall at lines (n,), in the middle of the columns."""
+        row = (line_mm - self.relief.distance_mm[0]) / self.relief.cell_mm[0]
+        column = float(self.region.column + self.region.mask.shape[1] // 2)
+        return self.relief.shape_at(row, np.full_like(row, column))
