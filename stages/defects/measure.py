@@ -16,7 +16,8 @@ from stages.defects.parameters import DefectParameters
 from stages.defects.segment import Region
 from stages.defects.surface import MeasuredWall, Surface, cells_of
 
-# At most so many rings with a glint on them are left out when a region is measured (chosen).
+# At most so many rings with a glint on them are left out when a region is measured (chosen), besides those on
+# which a spot of the wall shines beside the line.
 _MOST_LEFT_OUT = 4
 
 
@@ -42,9 +43,7 @@ class Measured:
     @property
     def contradicted_frame(self) -> int | None:
         """The next frame to be left out, None where there is none."""
-        if self.here.all_round or len(self.surface.left_out) >= _MOST_LEFT_OUT:
-            return None
-        return self.rings.contradicted_frame(self.depth)
+        return None if self.here.all_round else self.rings.contradicted_frame(self.depth)
 
     def best(self, score: Float) -> float:
         """Return the largest ``score`` (H, W) of the region's window, away from rings that were left out."""
@@ -93,7 +92,9 @@ class Measurer:
         elsewhere, as that of corrosion with a glint at its end. What one ring alone shows keeps its depth.
         """
         kept = whole
-        while (frame := kept.contradicted_frame) is not None:
+        for _ in range(_MOST_LEFT_OUT):
+            if (frame := kept.contradicted_frame) is None:
+                break
             left = self.measured(region, every_point, (*kept.surface.left_out, frame))
             if left is None or not (kept.rings.shown_beside or left.allowed.is_known):
                 break

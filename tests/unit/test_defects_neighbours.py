@@ -7,6 +7,7 @@ import pytest
 from scipy.ndimage import uniform_filter
 
 from stages.defects import DefectParameters, find_defects
+from stages.defects.corroborate import Witnesses
 from stages.defects.depth import Depth
 from stages.defects.grow import millimetre_mean
 from stages.defects.judge import Found
@@ -64,6 +65,14 @@ def test_a_glint_on_one_ring_at_the_end_of_corrosion_leaves_it_its_depth(end_mm)
     """No ring beyond the glint shows the corrosion: it was 1.13 ± .76 mm, and often unconfirmed."""
     finding, _ = patch_with_pit(1.0, 0.5, 2.0, 1.8, 5, (end_mm, 0.0))
     assert finding.peak_distance_mm < MIDDLE + 12
+    assert abs(finding.depth_mm - 0.5) < 0.1
+    assert "single rings show up to" in finding.statement
+
+
+def test_a_glint_is_left_out_of_corrosion_on_which_four_rings_show_a_spot_of_the_wall(monkeypatch):
+    """Rings left out for a spot counted as glints, of which at most four are left out."""
+    monkeypatch.setattr(Witnesses, "spots_in", lambda *_: [24, 27, 30, 33])
+    finding, _ = patch_with_pit(1.0, 0.5, 2.0, 1.8, 5, (15.0, 0.0))
     assert abs(finding.depth_mm - 0.5) < 0.1
     assert "single rings show up to" in finding.statement
 
