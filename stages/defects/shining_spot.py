@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.arrays import Float
-from pipeline.artefacts.measured import RingSamples
+from pipeline.artefacts.measured import RingSamples, RingValidity
 from pipeline.geometry.axis import roll_at, to_pipe
 from pipeline.geometry.rigid import transform
 from stages.defects.parallax import LitPictures
@@ -136,7 +136,8 @@ class _Looked:
         off = away > max(self.departs_mm, _TOP * away.max())
         if off.sum() < _LEAST_SAMPLES:
             return None
-        beside = (np.abs(off_middle) > half) & (np.abs(off_middle) <= 2 * half) & self.rings.valid[ring]
+        valid = self.rings.validity[ring] == RingValidity.VALID
+        beside = (np.abs(off_middle) > half) & (np.abs(off_middle) <= 2 * half) & valid
         line = np.median(amplitude[beside]) if beside.any() else np.nan
         return _Light(
             frame=int(motion.frame[k]),
