@@ -7,12 +7,15 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from scipy.ndimage import maximum_filter1d, median_filter
 
+from pipeline.adjustment.robust import spread_about_median
 from pipeline.arrays import Float, Int
 from pipeline.machine.stage import Context
 
 _STEP_MM = 0.5
 """Change of radius, mm, that counts as a step of the bore: five times the relief around the smooth pipe
 (`surface_sigma_mm`). A choice."""
+_SURE = 5.0
+"""σ by which texture must show a step of the bore that no ring reaches (chosen)."""
 _LENGTH_RADII, _FEWEST_RINGS_OF_LENGTH = 0.5, 5
 """A length of a bore is at least half its radius long: welds and rings of deposit are shorter. A choice."""
 _MOST_RINGS_IN_STEP = 2
@@ -83,6 +86,16 @@ class Bore:
         measured = (distance_mm >= first) & (distance_mm <= last)
         return np.where(measured, _PLACE_MM * np.abs(self.slope_at(distance_mm)), unmeasured_mm)
 
+    def steps_beyond(self, distance_mm: Float, off_mm: Float) -> bool:
+        """Whether texture before the first ring or beyond the last lies on wall of another width.
+
+        ``off_mm`` (M,) is how far landmarks at distances (M,), mm, lie outside the wall that the rings show,
+        if nothing holds them to it. Their median must differ by a step that rings would tell, and surely.
+        """
+        first, last = self.measured_mm
+        sides = (off_mm[side] for side in (distance_mm < first, distance_mm > last))
+        return any(abs(float(np.median(off))) > max(_STEP_MM, _noise(off)) for off in sides if len(off))
+
     def width_by_instrument(self, wider_mm: Float) -> Float:
         """Return the change of widths (M,) per σ of the instrument (M, Q), mm."""
         return np.stack([wider_mm, wider_mm**2], -1) @ self.by_instrument
@@ -124,6 +137,11 @@ class Bore:
 
 
 ONE_BORE = Bore(np.zeros(0), np.zeros(1))
+
+
+def _noise(off_mm: Float) -> float:
+    """Return what the median of values (M,), mm, exceeds by chance once in three million sets of them."""
+    return _SURE * float(np.sqrt(np.pi / 2)) * spread_about_median(off_mm) / float(np.sqrt(len(off_mm)))
 
 
 def _between_rings(radius_mm: Float, at_mm: Float) -> Bore:

@@ -126,3 +126,20 @@ def test_texture_has_no_known_radius_where_no_ring_was() -> None:
     assert rows.surface_sigma[measured] == pytest.approx(0.1)
     assert rows.surface_sigma[~measured].min() > RADIUS - 1
     assert bore.counted_from(10.0).measured_mm == pytest.approx((12.0, 12.0 + 1.2 * 39))
+
+
+@pytest.mark.parametrize(
+    ("off_mm", "scatter_mm", "steps"),
+    [(0.0, 0.8, False), (0.3, 0.1, False), (1.5, 0.9, True), (-1.5, 0.9, True), (1.5, 30.0, False)],
+)
+def test_texture_beyond_the_rings_shows_a_step_or_lies_on_their_wall(
+    off_mm: float, scatter_mm: float, steps: bool
+) -> None:
+    """Free of the rings' radius, texture moved the sheet of open-3 by 14 σ, though its pipe has one bore."""
+    random = np.random.default_rng(5)
+    distance, off = np.arange(0.0, 90.0, 0.5), 0.02 * random.standard_normal(180)
+    beyond = distance > 60
+    off[beyond] = off_mm + scatter_mm * random.standard_normal(beyond.sum())
+    bore = replace(ONE_BORE, measured_mm=(0.0, 60.0))
+    assert bore.steps_beyond(distance, off) == steps
+    assert not bore.steps_beyond(distance[~beyond], off[~beyond]), "no texture is beyond the rings"

@@ -19,7 +19,7 @@ from stages.motion.bundle_adjustment.solver import (
 )
 from stages.motion.parameters import MotionParameters
 from stages.motion.tracking.strips import StripGrid
-from stages.motion.windows.first_window import scale_by_lag
+from stages.motion.windows.shared_error import scale_by_lag
 from tests.motion_scene import scene
 
 FRAMES = 40

@@ -16,7 +16,7 @@ from stages.motion.parameters import MotionParameters
 from stages.motion.tracking.landmarks import ObservationStore, Tracks
 from stages.motion.tracking.tracker import TrackedTexture
 from stages.motion.windows.error_chain import ErrorChain, Link
-from stages.motion.windows.first_window import with_shared_error
+from stages.motion.windows.shared_error import with_shared_error
 from stages.motion.windows.sliding_window import RunEstimate, adjust_run
 from stages.motion.windows.submap_joining import JoinedRun, join_submaps
 from stages.motion.windows.submaps import (

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipeline.adjustment.levenberg_marquardt import Watch
-from pipeline.instrument.camera import Camera
+from pipeline.geometry.axis import to_pipe
 from pipeline.machine.stage import Context
 from stages.motion.bundle_adjustment.encoder_delay import EncoderDelay, delay_of_encoder
 from stages.motion.bundle_adjustment.encoder_scale import EncoderScale, noise_of_encoder, scale_of_encoder
@@ -24,15 +24,12 @@ from stages.motion.bundle_adjustment.unknowns import State
 from stages.motion.encoder import EncoderReadings
 from stages.motion.parameters import MotionParameters
 from stages.motion.stated_probe import TOO_FAR
-from stages.motion.tracking.strips import StripGrid
 from stages.motion.windows.measured_run import MeasuredRun
+from stages.motion.windows.shared_error import scale_by_lag, with_shared_error
 from stages.motion.windows.steady_laser import with_steady_laser
 from stages.motion.windows.steady_scale import SteadyRun, with_steady_scale
 from stages.motion.windows.submaps import Window
 
-_SHARED_ERROR = 1 / 3
-"""Radial error that matches share over their median reprojection error: compared with a calibrated probe 0.05
-of 0.14 px in open-1-field, 0.2 of 0.60 px in its copy at crf 30."""
 _LAG = 1.2
 """Radial error of templates, which are cut far ahead, over the error that a landmark's neighbouring matches
 share: compared with true poses 0.2 to 0.45 px of 0.28 px in open-1-field's copy at crf 30."""
@@ -43,8 +40,6 @@ copy at crf 30 the stream's own motion vectors lag behind the wall by .3 px a pi
 60°. Distances of open-1 to open-3 at crf 30 without encoder are .43, .14 and -.20 % off without such matches,
 .71, .28 and .43 % with them. If the error is noise alone (0 px last in open-3, .2 px at crf 30), all are
 used."""
-_MOST_SHARED_PX = 2.0
-"""Where matches disagree by more, the parameter's own limit holds."""
 _IN_REDUCER = 0.005
 """Relative 1 σ of distances if texture alone gives them and was followed through a reducer: in five drawn
 ones, 12 to 15 % wider or narrower over 14 and 20 mm, they were off by .1 to 1.0 %, .5 % rms."""
@@ -163,7 +158,8 @@ def adjust_first(run: MeasuredRun, window: Window, parameters: MotionParameters,
     run, knock = with_steady_laser(run, parameters, watch)
     measured = run.measured(window, parameters)
     estimate = estimate_state(run.start(window, measured, parameters), measured, parameters, watch)
-    first, unsure = _with_shared_error(_Adjusted(run, window, parameters, measured, estimate, watch))
+    first = _held_beyond_rings(_Adjusted(run, window, parameters, measured, estimate, watch))
+    first, unsure = _with_shared_error(first)
     first, delay = _without_delay(first)
     first, scale, unsure = with_scale(_with_noise(first), unsure)
     steady = with_steady_scale(first.run, window, first.estimate, first.measured, first.parameters, watch)
@@ -171,6 +167,21 @@ def adjust_first(run: MeasuredRun, window: Window, parameters: MotionParameters,
     return FirstWindow(
         steady.run, first.parameters, steady.estimate, steady.measured, unsure, check, steady, knock
     )
+
+
+def _held_beyond_rings(first: _Adjusted) -> _Adjusted:
+    """Adjust again with texture beyond the rings held to their radius, unless it shows a step of the bore.
+
+    Free, its radius follows from parallax alone, whose errors moved the sheet of open-3 by 14 σ.
+    """
+    state, everywhere = first.estimate.state, (-np.inf, np.inf)
+    at_mm, _, _ = to_pipe(state.axis, state.xyz_p)
+    off_mm = first.estimate.adjusted.equations.texture.surface_residual
+    if state.bore.steps_beyond(at_mm, off_mm):
+        return first
+    run = replace(first.run, bore=replace(first.run.bore, measured_mm=everywhere))
+    held = replace(first, run=run, measured=run.measured(first.window, first.parameters))
+    return held.again(replace(state, bore=replace(state.bore, measured_mm=everywhere)))
 
 
 def _with_shared_error(first: _Adjusted) -> tuple[_Adjusted, float]:
@@ -273,27 +284,3 @@ def _without_encoder(first: _Adjusted) -> Estimate:
     """Return the motion from rings and texture alone: a late encoder would shift it."""
     start = replace(first.estimate.state, slip=0 * first.estimate.state.slip)
     return estimate_state(start, replace(first.measured, encoder=None), first.parameters, first.watch)
-
-
-def with_shared_error(parameters: MotionParameters, reprojection_px: float) -> MotionParameters:
-    """Return the parameters with the size of the radial error that the matches of this recording may share.
-
-    Blur and compression move all matches near one polar angle equally. A scale along the pipe absorbs such an
-    error without a residual, so its size is estimated from the scatter of the matches (`_SHARED_ERROR`).
-    """
-    shared = _SHARED_ERROR * reprojection_px
-    if shared <= parameters.match_bias_px:
-        return parameters
-    return parameters.model_copy(update={"match_bias_px": min(shared, _MOST_SHARED_PX)})
-
-
-def scale_by_lag(lag_px: float, grid: StripGrid, camera: Camera) -> float:
-    """Return the relative 1 σ of distances if templates are cut with an error ``lag_px`` far ahead.
-
-    A codec drops the texture of the dim wall far ahead and repeats it from the picture before. While the
-    camera passes such a template, its error shrinks, exactly as if the probe had moved farther, without a
-    residual.
-    """
-    ends = np.array([[grid.radius_mm, 0, grid.far_mm + ahead] for ahead in (-0.5, 0.5)])
-    px_per_mm = float(np.linalg.norm(np.diff(camera.project(ends).uv, axis=0)))
-    return lag_px / px_per_mm / grid.length_mm
