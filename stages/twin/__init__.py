@@ -279,7 +279,7 @@ PHOTOMETRY = Stage(
 )
 TWIN = Stage(
     "twin",
-    "81",
+    "82",
     TwinParameters,
     compare_with_twin,
     "recorded frames beside the same frames, re-rendered from what the run has measured",

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 
+import cv2
 import numpy as np
 from scipy.ndimage import grey_opening, uniform_filter1d
 
@@ -46,7 +47,8 @@ def ring_profile(ring: Ring, above: Float32, twin: TwinFrame, use: Bool) -> Floa
     if at is None:
         return None
     few = use[::STEP, ::STEP]
-    grey, (quadrant, ratio) = above[::STEP, ::STEP][few], (a[few] for a in at)
+    smooth = cv2.medianBlur(above, 3)  # a hot pixel would make a ring of the few pixels at its radius
+    grey, (quadrant, ratio) = smooth[::STEP, ::STEP][few], (a[few] for a in at)
     cell = np.floor((ratio / _REACH + 1) / 2 * _RATIOS).astype(int)
     inside = (cell >= 0) & (cell < _RATIOS)
     cell = quadrant[inside].astype(int) % _QUADRANTS * _RATIOS + cell[inside]
