@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipeline.adjustment.levenberg_marquardt import Watch
-from pipeline.geometry.axis import to_pipe
 from pipeline.machine.stage import Context
+from stages.motion.bundle_adjustment.beyond_rings import held_beyond_rings, known_everywhere
 from stages.motion.bundle_adjustment.encoder_delay import EncoderDelay, delay_of_encoder
 from stages.motion.bundle_adjustment.encoder_scale import EncoderScale, noise_of_encoder, scale_of_encoder
 from stages.motion.bundle_adjustment.equations import Measurements
@@ -170,18 +170,11 @@ def adjust_first(run: MeasuredRun, window: Window, parameters: MotionParameters,
 
 
 def _held_beyond_rings(first: _Adjusted) -> _Adjusted:
-    """Adjust again with texture beyond the rings held to their radius, unless it shows a step of the bore.
-
-    Free, its radius follows from parallax alone, whose errors moved the sheet of open-3 by 14 σ.
-    """
-    state, everywhere = first.estimate.state, (-np.inf, np.inf)
-    at_mm, _, _ = to_pipe(state.axis, state.xyz_p)
-    off_mm = first.estimate.adjusted.equations.texture.surface_residual
-    if state.bore.steps_beyond(at_mm, off_mm):
+    """Hold texture beyond the rings to their radius, here and in later windows, unless it shows a step."""
+    held = held_beyond_rings(first.estimate, first.measured, first.parameters, first.watch)
+    if held is first.estimate:
         return first
-    run = replace(first.run, bore=replace(first.run.bore, measured_mm=everywhere))
-    held = replace(first, run=run, measured=run.measured(first.window, first.parameters))
-    return held.again(replace(state, bore=replace(state.bore, measured_mm=everywhere)))
+    return replace(first, estimate=held, run=replace(first.run, bore=known_everywhere(first.run.bore)))
 
 
 def _with_shared_error(first: _Adjusted) -> tuple[_Adjusted, float]:

@@ -1,0 +1,34 @@
+"""Decides whether texture farther along than any ring lies on wall of the rings' radius."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from pipeline.adjustment.levenberg_marquardt import Watch
+from pipeline.geometry.axis import to_pipe
+from stages.motion.bore import Bore
+from stages.motion.bundle_adjustment.equations import Measurements
+from stages.motion.bundle_adjustment.solver import Estimate, estimate_state
+from stages.motion.parameters import MotionParameters
+
+
+def known_everywhere(bore: Bore) -> Bore:
+    """Return the bore with the width of its first and last ring also before and beyond these."""
+    return replace(bore, measured_mm=(-np.inf, np.inf))
+
+
+def held_beyond_rings(
+    free: Estimate, measured: Measurements, parameters: MotionParameters, watch: Watch
+) -> Estimate:
+    """Adjust again with texture beyond the rings held to their radius, unless it shows a step of the bore.
+
+    Free, its radius follows from parallax alone, whose errors moved the sheet of open-3 by 14 σ. With a step,
+    ``free`` itself is returned.
+    """
+    state = free.state
+    at_mm, _, _ = to_pipe(state.axis, state.xyz_p)
+    if state.bore.steps_beyond(at_mm, free.adjusted.equations.texture.surface_residual):
+        return free
+    return estimate_state(replace(state, bore=known_everywhere(state.bore)), measured, parameters, watch)
