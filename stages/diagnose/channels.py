@@ -282,7 +282,7 @@ FIDUCIALS = Stage(
     "fiducials", "9", GaugeParameters, measure_fiducials, "a gauge run's rings and fiducials", "gauge"
 )
 FREE_MOTION = Stage(
-    "free_motion", "4", MotionParameters, adjust_freely, "an inspection's motion without encoder", "motion"
+    "free_motion", "5", MotionParameters, adjust_freely, "an inspection's motion without encoder", "motion"
 )
 GAUGE_EVIDENCE = Stage(
     "evidence", "63", DiagnosisParameters, examine_gauge, "what a gauge run shows of effects", "diagnosis"
