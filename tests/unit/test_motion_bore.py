@@ -10,11 +10,13 @@ from pipeline.geometry.axis import to_pipe
 from stages.motion import MotionParameters
 from stages.motion.bore import ONE_BORE, Bore, warn_of_steps
 from stages.motion.bundle_adjustment import equations, residuals
+from stages.motion.bundle_adjustment.beyond_rings import held_beyond_rings
+from stages.motion.bundle_adjustment.equations import Measurements
 from stages.motion.bundle_adjustment.solver import estimate_state
 from stages.motion.bundle_adjustment.unknowns import State
 from stages.motion.rings import RingBins
 from stages.motion.tracking.strips import StripGrid
-from tests.motion_scene import RADIUS, joint_at, scene
+from tests.motion_scene import RADIUS, Scene, joint_at, scene
 from tests.quiet import quiet_context
 
 AT_MM = 0.8 * np.arange(100)
@@ -100,9 +102,8 @@ def test_strips_are_sampled_on_the_wall() -> None:
     assert np.hypot(*grid.wall(row, 0 * row)[:, :2].T) == pytest.approx(RADIUS + 6.5 * (np.arange(60) > 30))
 
 
-@pytest.mark.parametrize("step_mm", [-1.5, 1.5])
-def test_a_step_of_the_wall_that_no_ring_reaches_is_not_taken_for_distance(step_mm: float) -> None:
-    """Seen in texture alone, it made a distance 2.2 % too short, by 5 σ of the encoder that was right."""
+def beyond_the_rings(step_mm: float) -> tuple[Scene, Measurements, State]:
+    """Return a scene whose rings end before the wall's step, what is measured in it, and a start."""
     frames, passed = 24, 12
     made = scene(frames, 200, noise=1.0, encoder=False, seed=1, joint_mm=(step_mm, 0.0))
     rings = made.measured.rings
@@ -110,11 +111,29 @@ def test_a_step_of_the_wall_that_no_ring_reaches_is_not_taken_for_distance(step_
     at_mm = made.truth.T_pc[:passed, 2, 3] + made.measured.probe.laser.baseline_mm
     assert at_mm[-1] < joint_at(frames), "control: no ring reaches the step"
     start = replace(made.truth, bore=Bore.of(np.full(passed, RADIUS), at_mm))
-    found = estimate_state(start, replace(made.measured, rings=reached), MotionParameters(alike=1.0))
+    return made, replace(made.measured, rings=reached), start
+
+
+@pytest.mark.parametrize("step_mm", [-1.5, 1.5])
+def test_a_step_of_the_wall_that_no_ring_reaches_is_not_taken_for_distance(step_mm: float) -> None:
+    """Seen in texture alone, it made a distance 2.2 % too short, by 5 σ of the encoder that was right."""
+    made, measured, start = beyond_the_rings(step_mm)
+    found = estimate_state(start, measured, MotionParameters(alike=1.0))
     error_mm = found.state.T_pc[-1, 2, 3] - made.truth.T_pc[-1, 2, 3]
-    sigma_mm = float(np.sqrt(found.factor.joint_covariance(np.array([frames - 1]))[0, 2, 0, 2]))
+    last = np.array([len(made.truth.T_pc) - 1])
+    sigma_mm = float(np.sqrt(found.factor.joint_covariance(last)[0, 2, 0, 2]))
     assert sigma_mm < 0.1
     assert abs(error_mm) < 2 * sigma_mm
+
+
+@pytest.mark.parametrize("step_mm", [-1.5, 0.0, 1.5])
+def test_texture_beyond_the_rings_is_held_to_their_radius_unless_it_shows_a_step(step_mm: float) -> None:
+    _, measured, start = beyond_the_rings(step_mm)
+    parameters, watch = MotionParameters(alike=1.0), lambda *_: None
+    free = estimate_state(start, measured, parameters)
+    held = held_beyond_rings(free, measured, parameters, watch)
+    assert (held is free) == (step_mm != 0)
+    assert np.isinf(held.state.bore.measured_mm).all() == (step_mm == 0)
 
 
 def test_texture_has_no_known_radius_where_no_ring_was() -> None:

@@ -24,8 +24,17 @@ def held_beyond_rings(
 ) -> Estimate:
     """Adjust again with texture beyond the rings held to their radius, unless it shows a step of the bore.
 
-    Free, its radius follows from parallax alone, whose errors moved the sheet of open-3 by 14 σ. With a step,
-    ``free`` itself is returned.
+    Free, its radius follows from parallax alone, whose errors moved the sheet of open-3 by 14 σ.
+
+    Parameters
+    ----------
+    free : Estimate
+        With texture beyond the rings at any radius. It is returned itself if it shows a step there.
+
+    Raises
+    ------
+    UnusableError
+        When rings and texture do not determine the motion.
     """
     state = free.state
     at_mm, _, _ = to_pipe(state.axis, state.xyz_p)
