@@ -27,7 +27,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from pipeline.arrays import Float, Float32
+from pipeline.arrays import Bool, Float, Float32
 from pipeline.artefacts.cloud_along import cloud_along
 from pipeline.artefacts.findings import Defect, Defects
 from pipeline.artefacts.measured import RingSamples, Trajectory, Wall, WallTexture
@@ -46,7 +46,7 @@ from stages.defects.corroborate import Evidence, Witnesses, evidence_for
 from stages.defects.dark_lines import dark_lines, lies_beside
 from stages.defects.depth import Depth
 from stages.defects.describe import Scene, describe, describe_line
-from stages.defects.detect import detect
+from stages.defects.detect import Detection, detect
 from stages.defects.grow import footprint, grown
 from stages.defects.judge import Found, credibility_on, judged
 from stages.defects.limits import detectable
@@ -54,17 +54,8 @@ from stages.defects.measure import Measured, Measurer
 from stages.defects.noise_tail import noise_tail
 from stages.defects.parallax import LitPictures
 from stages.defects.parameters import DefectParameters
-from stages.defects.relief import smooth_shape_removed
-from stages.defects.report import (
-    report_found,
-    report_limits,
-    report_unconfirmed,
-    warn_of_drops,
-    warn_of_nothing,
-    warn_of_shallow,
-    warn_of_short_ones,
-    warn_of_sparse,
-)
+from stages.defects.relief import WallRelief, smooth_shape_removed
+from stages.defects.report import report_detectable, report_findings
 from stages.defects.segment import Region, regions_of
 from stages.defects.smear import flattened
 from stages.defects.surface import MeasuredWall
@@ -96,47 +87,57 @@ def find_defects(
         When too little of the wall was measured to determine the pipe's own shape.
     """
     _refuse_unseen(wall)
-    relief = smooth_shape_removed(wall.radius_map, parameters)
-    seeds = detect(relief, parameters.false_alarms, context.scratch, context.progress)
-    known = footprint(relief, grown(relief, seeds, parameters, context.scratch), context.scratch)
-    relief = smooth_shape_removed(wall.radius_map, parameters, known)
+    relief, seeds, known = _searched(wall, parameters, context)
     cells = grown(relief, seeds, parameters, context.scratch)
     regions = regions_of(relief, cells, parameters.join_mm, context.scratch)
-    scene = Scene(
-        Witnesses(texture, rings, pictures, wall.held),
-        recording.pipe.wall_thickness_mm,
-        parameters.min_depth_mm,
-    )
+    seen_by = Witnesses(texture, rings, pictures, wall.held)
+    scene = Scene(seen_by, recording.pipe.wall_thickness_mm, parameters.min_depth_mm)
     cloud = cloud_along(wall.cloud)
     measured = MeasuredWall(relief, cloud, cloud.ring_spacing_mm())
     measurer = Measurer(measured, clean_wall(measured, regions), parameters, context.random)
-
-    def shown_by(own: tuple[Region, np.random.Generator]) -> Found | None:
-        """Return what a region shows, with random numbers that do not depend on the other regions."""
-        return _found_in(own[0], replace(measurer, random=own[1]), seeds.score, scene, wall.fixed)
-
-    own = zip(regions, context.random.spawn(len(regions)), strict=True)
-    looked_at = in_threads(shown_by, own, context.workers)
-    found = [f for f in _with_progress(looked_at, len(regions), context) if f is not None]
+    found = _all_found(regions, measurer, seeds.score, scene, wall.fixed, context)
     tail = noise_tail(relief, seeds, known)
     credibility = credibility_on(found, tail, measured)
-    context.report("peaks of noise expected above the threshold", tail.above(seeds.threshold), "")
     confirmed, unconfirmed = judged(found, credibility, parameters.min_depth_mm)
     lines = list(_lines(measurer, found, scene, context))
     items, alone = _numbered(confirmed, 1), _numbered([*unconfirmed, *lines], len(confirmed) + 1)
-    expected = sum(1 - d.probability for d in items)
-    report_found(len(items), expected, context)
-    report_unconfirmed(len(items), len(unconfirmed), len(lines), context)
-    warn_of_drops(sum(f.evidence.moved_over for f in found), context)
+    limits = detectable(measured, seeds, credibility, texture, wall.held, parameters)
+    context.report("peaks of noise expected above the threshold", tail.above(seeds.threshold), "")
     rejected = len(regions) - len(found)
     context.report("rejected: shallower than the smallest depth or between rings", rejected, "detections")
-    limits = detectable(measured, seeds, credibility, texture, wall.held, parameters)
-    report_limits(limits, context)
-    warn_of_shallow(limits, parameters.min_depth_mm, context)
-    warn_of_nothing(limits, parameters.min_size_mm, context)
-    warn_of_sparse(limits, parameters.min_size_mm, wall.held, context)
-    warn_of_short_ones(wall.held, measured.spacing_mm, context)
-    return Defects(items, expected, limits, alone)
+    defects = Defects(items, sum(1 - d.probability for d in items), limits, alone)
+    report_findings(defects, len(lines), sum(f.evidence.moved_over for f in found), context)
+    report_detectable(limits, parameters, wall.held, measured.spacing_mm, context)
+    return defects
+
+
+def _searched(
+    wall: Wall, parameters: DefectParameters, context: Context
+) -> tuple[WallRelief, Detection, Bool]:
+    """Return the relief, where it exceeds the noise, and the cells that were left out of the smooth shape."""
+    relief = smooth_shape_removed(wall.radius_map, parameters)
+    seeds = detect(relief, parameters.false_alarms, context.scratch, context.progress)
+    known = footprint(relief, grown(relief, seeds, parameters, context.scratch), context.scratch)
+    return smooth_shape_removed(wall.radius_map, parameters, known), seeds, known
+
+
+def _all_found(
+    regions: Sequence[Region],
+    measurer: Measurer,
+    score: Float32,
+    scene: Scene,
+    fixed: FixedToProbe | None,
+    context: Context,
+) -> list[Found]:
+    """Return what the regions show, those left out that were not measured or are too shallow."""
+
+    def shown_by(own: tuple[Region, np.random.Generator]) -> Found | None:
+        """Return what a region shows, with random numbers that do not depend on the other regions."""
+        return _found_in(own[0], replace(measurer, random=own[1]), score, scene, fixed)
+
+    own = zip(regions, context.random.spawn(len(regions)), strict=True)
+    looked_at = in_threads(shown_by, own, context.workers)
+    return [f for f in _with_progress(looked_at, len(regions), context) if f is not None]
 
 
 def _numbered(found: Sequence[Defect], first: int) -> tuple[Defect, ...]:
@@ -167,13 +168,12 @@ def _found_in(
         whole = whole if clear is None or is_spot else clear
         kept = measurer.without_contradicted(region, every_point, whole)
         if region.sign * kept.allowed.depth_mm >= scene.min_depth_mm:
+            fixed_mm = _fixed_in(region, fixed, measurer, scene.seen_by)
             top = kept.best(region.cut(score.astype(float)))
-            seen_by, fixed_mm = scene.seen_by, _fixed_in(region, fixed)
-            if _may_be_on_window(region, measurer, seen_by):
-                fixed_mm = np.full_like(fixed_mm, np.inf)
-            evidence = evidence_for(kept.here, kept.allowed, kept.surface, seen_by, fixed_mm, top, spots)
-            evidence = replace(evidence, spot=is_spot)
-            return _described(region, measurer, scene, (whole, kept), evidence)
+            evidence = evidence_for(
+                kept.here, kept.allowed, kept.surface, scene.seen_by, fixed_mm, top, spots
+            )
+            return _described(region, measurer, scene, (whole, kept), replace(evidence, spot=is_spot))
     return None
 
 
@@ -215,8 +215,13 @@ def _displaced(depth: Depth, region: Region, measurer: Measurer) -> Depth:
     return replace(depth, sigma_mm=float(np.hypot(depth.sigma_mm, local_mm)))
 
 
-def _fixed_in(region: Region, fixed: FixedToProbe | None) -> Float:
-    """Return the displacement of the line that stays at one place of the image, over a region (H, W), mm."""
+def _fixed_in(region: Region, fixed: FixedToProbe | None, measurer: Measurer, seen_by: Witnesses) -> Float:
+    """Return the displacement of the line that stays at one place of the image, over a region (H, W), mm.
+
+    It is infinite where the region is as long as the run, and may be on the window for all that is known.
+    """
+    if _may_be_on_window(region, measurer, seen_by):
+        return np.full(region.mask.shape, np.inf)
     if fixed is None:
         return np.zeros(region.mask.shape)
     rows = fixed.departure_mm[region.row : region.row + len(region.mask)].astype(float)

@@ -46,6 +46,37 @@ _FIXED_SHARE = 0.5
 # a depth is averaged. All rows of a finding that the edge causes are, few of one that only touches it: more
 # than half of the rows decides.
 _EDGE_MM, _EDGE_SHARE = 1.0, 0.5
+# Why a finding is not counted, as sentences without their full stop.
+_STAYS_IN_IMAGE = (
+    "It stays at one place of the image while the wall goes by, as something on the window or on the probe "
+    "does. To tell: clean the window, or roll the probe by 30°, and record again"
+)
+_BESIDE_LINE = (
+    "A bright spot of the wall beside the line was taken for it: the spot stays in place while the line "
+    "passes, and without the rings that show it there is no such depth"
+)
+_SHOWN_WITHOUT = (
+    "Lit pictures taken before and after, when the line was elsewhere, show the wall without it: a drop or "
+    "dirt on the window may have moved the line while it passed"
+)
+_SHOWN_DISPLACED = (
+    "Lit pictures show the wall displaced there, but only while the line passed it: a drop or dirt on the "
+    "window may have moved the line as well"
+)
+_DROVE_THROUGH = (
+    "The probe drove past it, and its lamps would have struck it there: a reflection or stray light was "
+    "taken for the line"
+)
+_AT_EDGE = (
+    "It is deepest where the wall ceases to be seen: the line ends there, and what hides the wall may have "
+    "drawn it aside"
+)
+_ALONE = "No second, independent ring shows it, nor do one ring and the photo together"
+_LIKE_GLINT = (
+    "The line is brighter there than at nine of ten places of its ring, as of a glint or a reflection, and "
+    "more findings of this recording are that bright than chance explains"
+)
+_WEAK = "In this recording, more findings of this strength are expected to be false than real"
 
 
 @dataclass(frozen=True)
@@ -105,44 +136,17 @@ class Evidence:
     @property
     def doubt(self) -> str:
         """Why it is not counted, as a sentence without its full stop."""
-        if self.fixed:
-            return (
-                "It stays at one place of the image while the wall goes by, as something on the window or on "
-                "the probe does. To tell: clean the window, or roll the probe by 30°, and record again"
-            )
-        if self.spot:
-            return (
-                "A bright spot of the wall beside the line was taken for it: the spot stays in place while "
-                "the line passes, and without the rings that show it there is no such depth"
-            )
-        if self.contradicted:
-            return (
-                "Lit pictures taken before and after, when the line was elsewhere, show the wall without it: "
-                "a drop or dirt on the window may have moved the line while it passed"
-            )
-        if self.behind_drop:
-            return (
-                "Lit pictures show the wall displaced there, but only while the line passed it: a drop or "
-                "dirt on the window may have moved the line as well"
-            )
-        if self.in_probe_path:
-            return (
-                "The probe drove past it, and its lamps would have struck it there: a reflection or stray "
-                "light was taken for the line"
-            )
-        if self.edge:
-            return (
-                "It is deepest where the wall ceases to be seen: the line ends there, and what hides the "
-                "wall may have drawn it aside"
-            )
-        if not self.corroborated:
-            return "No second, independent ring shows it, nor do one ring and the photo together"
-        if self.bright:
-            return (
-                "The line is brighter there than at nine of ten places of its ring, as of a glint or a "
-                "reflection, and more findings of this recording are that bright than chance explains"
-            )
-        return "In this recording, more findings of this strength are expected to be false than real"
+        reasons = (
+            (self.fixed, _STAYS_IN_IMAGE),
+            (self.spot, _BESIDE_LINE),
+            (self.contradicted, _SHOWN_WITHOUT),
+            (self.behind_drop, _SHOWN_DISPLACED),
+            (self.in_probe_path, _DROVE_THROUGH),
+            (self.edge, _AT_EDGE),
+            (not self.corroborated, _ALONE),
+            (self.bright, _LIKE_GLINT),
+        )
+        return next((why for holds, why in reasons if holds), _WEAK)
 
 
 @dataclass(frozen=True)

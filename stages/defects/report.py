@@ -6,10 +6,11 @@ import math
 from collections.abc import Sequence
 
 from pipeline.adjustment.shared_light import HeldOver
-from pipeline.artefacts.findings import Detectable, usual_limit
+from pipeline.artefacts.findings import Defects, Detectable, usual_limit
 from pipeline.machine.stage import Context
 from stages.defects.corroborate import LEAST_RINGS
 from stages.defects.limits import rings_needed, widest_spacing_mm
+from stages.defects.parameters import DefectParameters
 
 # So few unconfirmed findings need no warning, since they are quickly looked at. A warning is due where one
 # defect in four is expected to be false.
@@ -24,6 +25,28 @@ _DEEPER = 2.0
 _SHORT_MM = 3.0
 # Number of stretches that a warning names (chosen).
 _NAMED = 4
+
+
+def report_findings(found: Defects, lines: int, moved_over: int, context: Context) -> None:
+    """Report and warn of what was found; ``lines`` of the photo alone, ``moved_over`` the window."""
+    report_found(len(found.items), found.false_alarm_rate, context)
+    report_unconfirmed(len(found.items), len(found.unconfirmed) - lines, lines, context)
+    warn_of_drops(moved_over, context)
+
+
+def report_detectable(
+    limits: Sequence[Detectable],
+    parameters: DefectParameters,
+    held: HeldOver,
+    ring_spacing_mm: float,
+    context: Context,
+) -> None:
+    """Report from which size and depth on defects are found, and warn where that is less than wanted."""
+    report_limits(limits, context)
+    warn_of_shallow(limits, parameters.min_depth_mm, context)
+    warn_of_nothing(limits, parameters.min_size_mm, context)
+    warn_of_sparse(limits, parameters.min_size_mm, held, context)
+    warn_of_short_ones(held, ring_spacing_mm, context)
 
 
 def report_found(defects: int, expected_false: float, context: Context) -> None:
