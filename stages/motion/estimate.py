@@ -14,6 +14,7 @@ from functools import partial
 import numpy as np
 
 from pipeline.artefacts.measured import RingPoints, RingSamples, Trajectory
+from pipeline.artefacts.motion import MotionEvent
 from pipeline.errors import UnusableError
 from pipeline.geometry.axis import distance_along, frames_at
 from pipeline.instrument.probe import Probe
@@ -97,20 +98,12 @@ def estimate_motion(
     joined = joined.with_scale_sigma(doubt)
     trajectory = trajectory_of(joined, recording.frames, probe, has_encoder)
     trajectory = lay_route(trajectory, joined.turn_variance, recording, probe, context)
-    grid = run.texture.grid
-    trajectory = beyond_cuts(trajectory, cut, grid.length_mm)
-    events = find_events(recording.frames, trajectory, run.texture.poses, joined.slip, has_encoder)
-    if run.encoder is not None:
-        sigmas = probe.encoder_scale_sigma, run.encoder.sigma_mm
-        warn_of_slips(events, trajectory, joined.slip, *sigmas, context)
+    trajectory = beyond_cuts(trajectory, cut, run.texture.grid.length_mm)
+    events = _events_of(run, joined, trajectory, recording, context)
     seen = SeenCentres(run.circles.centre_c, probe.laser.baseline_mm)
     shakes = camera_trembles(trajectory, run.texture.poses, seen)
     doubted = shakes or run.texture.poses.much_lost
-    if contradiction(trajectory, probe).certain:
-        allowed = [replace(probe, covariance=w.covariance) for w in wrong_parameters(trajectory, probe)]
-        few = parameters.model_copy(update={"iterations": min(_STEPS, parameters.iterations)})
-        others = (_with_probe(run, p, recording, few, context) for p in allowed)
-        trajectory = with_rivals(trajectory, [t for t in others if t is not None])
+    trajectory = _beside_other_probes(trajectory, run, recording, parameters, context)
     steady, believed = estimate.steady, with_doubtful_instrument(trajectory, probe, estimate.lasting, doubted)
     report_motion(context, estimate, run.texture, believed, shakes, wider)
     require_along_pipe(trajectory)
@@ -121,6 +114,35 @@ def estimate_motion(
         radius_doubt=doubt, displaced=displaced_in(estimate.wall_twice, trajectory.frame),
         knock=steady.run.knock,
     )  # fmt: skip
+
+
+def _events_of(
+    run: MeasuredRun, joined: JoinedRun, trajectory: Trajectory, recording: Recording, context: Context
+) -> tuple[MotionEvent, ...]:
+    """Return stops, reversals and slips along a trajectory; slips are warned of."""
+    has_encoder = run.encoder is not None
+    events = find_events(recording.frames, trajectory, run.texture.poses, joined.slip, has_encoder)
+    if run.encoder is not None:
+        sigmas = run.probe.encoder_scale_sigma, run.encoder.sigma_mm
+        warn_of_slips(events, trajectory, joined.slip, *sigmas, context)
+    return events
+
+
+def _beside_other_probes(
+    trajectory: Trajectory,
+    run: MeasuredRun,
+    recording: Recording,
+    parameters: MotionParameters,
+    context: Context,
+) -> Trajectory:
+    """Return a trajectory that knows the motions with other probes, where it contradicts the stated one."""
+    if not contradiction(trajectory, run.probe).certain:
+        return trajectory
+    wrong = wrong_parameters(trajectory, run.probe)
+    allowed = [replace(run.probe, covariance=w.covariance) for w in wrong]
+    few = parameters.model_copy(update={"iterations": min(_STEPS, parameters.iterations)})
+    others = (_with_probe(run, probe, recording, few, context) for probe in allowed)
+    return with_rivals(trajectory, [t for t in others if t is not None])
 
 
 def _with_probe(
