@@ -70,20 +70,43 @@ def contradiction(trajectory: Trajectory, probe: Probe) -> Contradiction:
     1 + e, so that x has the variance g: the reduction of the stated variance. Where pictures show little, x
     is small however wrong the statement is (A. H. Jazwinski, "Stochastic Processes and Filtering Theory",
     1970, on predicted residuals). The variance e is that of independent errors; errors that matches share
-    make d larger.
+    make d larger. Without an encoder, what moves the scale of all lengths is no
+    evidence.
     """
     unsure = probe.principal_uncertainties()
     if trajectory.instrument is None or not unsure.size:
         return Contradiction(0.0, 0.0, *np.zeros((2, len(probe.parameters))))
-    inverse = np.linalg.pinv(unsure)
-    moved = inverse @ (trajectory.instrument - probe.parameters)
-    left = 0.0 if (own := trajectory.instrument_covariance) is None else inverse @ own @ inverse.T
+    moved = np.linalg.pinv(unsure) @ (trajectory.instrument - probe.parameters)
+    by_pictures, left = moved_by_pictures(trajectory, probe)
     gain, direction = np.linalg.eigh(np.eye(len(moved)) - left)
-    along, gain = direction.T @ moved, np.where(gain > _NO_EVIDENCE, gain, 1.0)
+    along, gain = direction.T @ by_pictures, np.where(gain > _NO_EVIDENCE, gain, 1.0)
     sigmas = np.abs(along) / np.sqrt(gain)
     wanted = np.where(sigmas > TOO_FAR, along / gain, along)
     farthest = float(np.abs(moved).max())
     return Contradiction(float(sigmas.max()), farthest, unsure @ moved, unsure @ direction @ wanted)
+
+
+def moved_by_pictures(trajectory: Trajectory, probe: Probe) -> tuple[Float, Float]:
+    """Return a probe's change (Q,) and its covariance left (Q, Q), both along its principal uncertainties.
+
+    Without an encoder pictures do not show the scale of all lengths: what the adjustment says of it comes
+    from the motion that it expects, smooth by so many mm, and is left out. It demanded a baseline of 8
+    instead of 22 mm, by 8 σ, of a correct probe.
+    """
+    assert trajectory.instrument is not None
+    inverse = np.linalg.pinv(probe.principal_uncertainties())
+    moved = inverse @ (trajectory.instrument - probe.parameters)
+    if (own := trajectory.instrument_covariance) is None:
+        return moved, np.zeros((len(moved), len(moved)))
+    left = inverse @ own @ inverse.T
+    if np.isfinite(trajectory.encoder_scale):
+        return moved, left
+    length = np.array([name.endswith("_mm") for name in probe.parameter_names])
+    larger = inverse @ np.where(length, probe.parameters, 0.0)
+    one, information = np.eye(len(left)), np.linalg.inv(left)
+    rest = one - np.outer(larger, larger) / max(larger @ larger, np.finfo(float).tiny)
+    seen = one + rest @ (information - one) @ rest
+    return np.linalg.solve(seen, rest @ information @ moved), np.linalg.inv(seen)
 
 
 def with_rivals(trajectory: Trajectory, others: Sequence[Trajectory]) -> Trajectory:

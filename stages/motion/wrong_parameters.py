@@ -15,6 +15,7 @@ from scipy.optimize import minimize_scalar
 from pipeline.arrays import Float
 from pipeline.artefacts.measured import Trajectory
 from pipeline.instrument.probe import Probe
+from stages.motion.stated_probe import moved_by_pictures
 
 _LEAST_SHARE = 0.05
 """Probability below which a cause is left out: what is left out together is about as rare as the error of a
@@ -101,16 +102,12 @@ class _Evidence:
     @staticmethod
     def of(trajectory: Trajectory, probe: Probe) -> _Evidence:
         """Return the evidence in an adjusted probe: its own information less the stated one."""
-        unsure = probe.principal_uncertainties()
-        inverse = np.linalg.pinv(unsure)
-        assert trajectory.instrument is not None
-        assert trajectory.instrument_covariance is not None
-        left = inverse @ trajectory.instrument_covariance @ inverse.T
+        moved, left = moved_by_pictures(trajectory, probe)
         share, direction = np.linalg.eigh(left)
         share = np.clip(share, _REGULAR, 1.0)
         posterior = (direction / share) @ direction.T
-        pull = posterior @ inverse @ (trajectory.instrument - probe.parameters)
-        return _Evidence(unsure, posterior - np.eye(len(share)), pull)
+        unsure = probe.principal_uncertainties()
+        return _Evidence(unsure, posterior - np.eye(len(share)), posterior @ moved)
 
     def with_wider(self, sigma: Float) -> WrongParameters:
         """Return the evidence for parameters of 1 σ (P, K) that are as unsure as the pictures demand."""

@@ -28,7 +28,9 @@ def probe(covariance: np.ndarray) -> Probe:
     return Probe(camera, LaserSheet(22.0), covariance)
 
 
-def told(stated: Probe, change: np.ndarray | None, left: np.ndarray | None = None) -> dict[str, object]:
+def told(
+    stated: Probe, change: np.ndarray | None, left: np.ndarray | None = None, encoder_scale: float = 1.0
+) -> dict[str, object]:
     """Return numbers and warning of a run that changed the probe and ``left`` this covariance of it."""
     axis = PipeAxis(np.array([-9.0, 99.0]), np.zeros((2, 3)), np.tile(np.eye(3), (2, 1, 1)))
     poses, found = np.tile(np.eye(4), (3, 1, 1)), None if change is None else stated.parameters + change
@@ -39,7 +41,7 @@ def told(stated: Probe, change: np.ndarray | None, left: np.ndarray | None = Non
         np.zeros((3, 6, 6)),
         axis,
         50.0,
-        1.0,
+        encoder_scale,
         0.001,
         0.0005,
         (),
@@ -110,6 +112,19 @@ def test_a_direction_that_pictures_hardly_show_counts_against_what_they_show(
         assert "by the pictures alone the probe would change" in text
         assert f"cx by {0.03 * moved / gain:+.3g}" in text
         assert "dust, reflections or water" in text, "the pictures may be wrong as well"
+
+
+@pytest.mark.parametrize("encoder", [False, True])
+@pytest.mark.parametrize("name", ["baseline_mm", "cx"])
+def test_without_an_encoder_the_scale_of_all_lengths_is_no_evidence_against_the_probe(
+    name: str, encoder: bool
+) -> None:
+    """An even motion in mm shrank all lengths by 1e-5: a correct baseline was contradicted by 8 σ."""
+    stated, gain = probe(loose(cx=0.03, baseline_mm=0.008)), 1e-5
+    left = stated.covariance * np.where(at(name, 1.0) > 0, 1 - gain, 1.0)
+    change = -0.026 * np.sqrt(np.diagonal(stated.covariance)) * at(name, 1.0)
+    numbers = told(stated, change, left, 1.0 if encoder else float("nan"))
+    assert ("warning" in numbers) is (encoder or name == "cx")
 
 
 @pytest.mark.parametrize("seed", range(3))
