@@ -22,8 +22,9 @@ from stages.rings.behind_dirt import set_right
 from stages.rings.expectation import warn_of_rings
 from stages.rings.glints import SAYING_RINGS
 from stages.rings.lattice import lattices_of, take_out, warn_of_lattices
-from stages.rings.mixture import across_line, channel_of, excess_weights, line_weights, mix, wall_weights
+from stages.rings.mixture import across_line, channel_of, excess_weights, line_weights, wall_weights
 from stages.rings.noise import SURELY_UNCLIPPED, clip_level_of, noise_response
+from stages.rings.picture import Mixture
 from stages.rings.seam import seam_of, warn_of_seam
 from stages.rings.sectors import Sectors, sectors_of
 from stages.rings.trace import LOST, RingTrace, fitted_in, trace_ring
@@ -162,14 +163,14 @@ def _in_mixture(images: Images, probe: Probe, sectors: Sectors) -> Iterator[Foun
             continue
         before = trace
         if before is not None:
-            image = mix(bgr, weights)
+            image = Mixture(bgr, weights)
             trace = trace_ring(image, sectors, np.inf, before)
         if before is None or trace is None or trace.coverage < before.coverage - LOST:
             # Colours may have changed, so that weights learned from the pictures before hide the line.
             own = _first_weights(bgr, sectors, probe)
-            alone = trace_ring(mix(bgr, own), sectors, np.inf)
+            alone = trace_ring(Mixture(bgr, own), sectors, np.inf)
             if trace is None or (alone is not None and alone.coverage > trace.coverage):
-                weights, image, trace = own, mix(bgr, own), alone
+                weights, image, trace = own, Mixture(bgr, own), alone
         yield (
             frame,
             None if trace is None else _without_dips(_placed(trace, bgr, sectors), bgr, sectors, channel),
@@ -182,7 +183,7 @@ def _in_mixture(images: Images, probe: Probe, sectors: Sectors) -> Iterator[Foun
 def _first_weights(bgr: Byte, sectors: Sectors, probe: Probe) -> Float:
     """Return weights learned from an image in which the ring is found by the laser's colour alone."""
     weights = excess_weights(probe.laser.wavelength_nm)
-    trace = trace_ring(mix(bgr, weights), sectors, np.inf)
+    trace = trace_ring(Mixture(bgr, weights), sectors, np.inf)
     return weights if trace is None else wall_weights(bgr, sectors, trace, weights)
 
 
@@ -193,7 +194,7 @@ def _placed(trace: RingTrace, bgr: Byte, sectors: Sectors) -> RingTrace:
     """
     for _ in range(_ROUNDS):
         weights = line_weights(bgr, sectors, trace)
-        anew = None if weights is None else fitted_in(mix(bgr, weights), trace, sectors)
+        anew = None if weights is None else fitted_in(Mixture(bgr, weights), trace, sectors)
         if anew is None:
             break
         trace = anew

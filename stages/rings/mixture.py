@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.arrays import Byte, Float, Float32
+from pipeline.arrays import Byte, Float
 from pipeline.artefacts.measured import RingValidity
 from stages.rings.noise import QUANTISATION_VARIANCE, SURELY_UNCLIPPED
 from stages.rings.search import BAND_WIDTHS
@@ -13,9 +13,6 @@ from stages.rings.trace import RingTrace
 
 _BLUE_GREEN_NM, _GREEN_RED_NM = 490.0, 580.0
 _LINE_WIDTHS, _WALL_WIDTHS = 0.7, 4.0
-# The wall's colours are taken from every fourth pixel beside the line: of open-3's 46000 in a frame this
-# moves the line by .003 of its σ.
-_WALL_EVERY = 4
 # Samples across the line, in its widths: bell and straight background are told apart by both flanks. They
 # are used where most of the ring does not clip.
 _ACROSS, _MOST = np.arange(-3.0, 3.1, 0.5), 0.5
@@ -36,11 +33,6 @@ def channel_of(wavelength_nm: float) -> int:
     return 0 if wavelength_nm < _BLUE_GREEN_NM else 1 if wavelength_nm < _GREEN_RED_NM else 2
 
 
-def mix(bgr: Byte, weights: Float) -> Float32:
-    """Return the (H, W) mixture of an image (H, W, 3)."""
-    return np.asarray(bgr @ weights.astype(np.float32), np.float32)
-
-
 def wall_weights(bgr: Byte, sectors: Sectors, trace: RingTrace, otherwise: Float) -> Float:
     """Return (3,) weights of the mixture in which the line stands out best from the wall beside it.
 
@@ -48,10 +40,9 @@ def wall_weights(bgr: Byte, sectors: Sectors, trace: RingTrace, otherwise: Float
     in this mixture, because bright bands of wall do not show in it.
     """
     radius, width = trace.radius_everywhere(), trace.width_px
-    beside = sectors.pixels_near(radius, _WALL_WIDTHS * width, BAND_WIDTHS * width)[::_WALL_EVERY]
-    line = bgr.reshape(-1, 3)[sectors.pixels_near(radius, 0, _LINE_WIDTHS * width)].astype(float)
-    wall = bgr.reshape(-1, 3)[beside].astype(float)
-    weights = _discriminant(np.cov(wall.T), line.mean(0) - wall.mean(0))
+    line, _ = sectors.colours_near(bgr, radius, 0, _LINE_WIDTHS * width)
+    wall, spread = sectors.colours_near(bgr, radius, _WALL_WIDTHS * width, BAND_WIDTHS * width)
+    weights = _discriminant(spread, line - wall)
     return otherwise if weights is None else weights
 
 

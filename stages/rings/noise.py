@@ -8,9 +8,9 @@ from scipy.optimize import nnls
 
 from pipeline.adjustment.robust import robust_spread
 from pipeline.arrays import Byte, Int32
-from stages.rings.kernels import first_at_least
+from stages.rings.kernels import bell, first_at_least
+from stages.rings.picture import Image, channels, everywhere, grey_at
 from stages.rings.profile import WINDOW_WIDTHS, ProfileFit, Response
-from stages.rings.search import Image
 from stages.rings.sectors import Sectors
 
 QUANTISATION_VARIANCE = 1 / 12
@@ -23,9 +23,10 @@ SURELY_UNCLIPPED = 0.95
 
 def dark_response(image: Image, clip_level: float) -> Response:
     """Return a first guess from the image alone: median level and robust noise of neighbouring pixels."""
-    step = np.diff(image.astype(np.float32), axis=1)
+    grey = everywhere(image)
+    step = np.diff(grey.astype(np.float32), axis=1)
     variance = robust_spread(step) ** 2 / 2
-    return Response(float(np.median(image)), variance + QUANTISATION_VARIANCE, 0.0, clip_level)
+    return Response(float(np.median(grey)), variance + QUANTISATION_VARIANCE, 0.0, clip_level)
 
 
 def noise_response(image: Image, sectors: Sectors, fit: ProfileFit, guess: Response) -> Response:
@@ -35,7 +36,7 @@ def noise_response(image: Image, sectors: Sectors, fit: ProfileFit, guess: Respo
     """
     total, count, sectors = np.zeros(_BINS), np.zeros(_BINS), sectors.taken or sectors
     _residuals_by_level(
-        image.ravel(), sectors.start, sectors.pixel, sectors.radius_px, fit.radius_px, fit.width_px,
+        *channels(image), sectors.start, sectors.pixel, sectors.radius_px, fit.radius_px, fit.width_px,
         fit.amplitude, fit.background, guess.black, guess.clip_level, total, count,
     )  # fmt: skip
     used = count > _LEAST_RESIDUALS
@@ -50,21 +51,20 @@ def noise_response(image: Image, sectors: Sectors, fit: ProfileFit, guess: Respo
     )
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def _residuals_by_level(  # type: ignore[no-untyped-def]
-    image, start, pixel, radius, r, width, amplitude, background, black, clip_level, total, count
+    image, weights, start, pixel, radius, r, width, amplitude, background, black, clip_level, total, count
 ):
     for a in range(r.size):
         if not np.isfinite(r[a]):
             continue
-        half = WINDOW_WIDTHS * width[a]
+        half, per_width = WINDOW_WIDTHS * width[a], 1 / width[a]
         k = first_at_least(radius, start[a], start[a + 1], r[a] - half)
         while k < start[a + 1] and radius[k] < r[a] + half:
-            x = (radius[k] - r[a]) / width[a]
-            m = background[a] + amplitude[a] * np.exp(-0.5 * x * x)
-            level = int((m - black) / _BIN_LEVELS)
+            m = background[a] + amplitude[a] * bell((radius[k] - r[a]) * per_width)
+            level = int((m - black) * (1 / _BIN_LEVELS))
             if 0 <= level < total.size and m < clip_level:
-                total[level] += abs(image[pixel[k]] - m)
+                total[level] += abs(grey_at(image, weights, pixel[k]) - m)
                 count[level] += 1.0
             k += 1
 

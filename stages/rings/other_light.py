@@ -15,7 +15,8 @@ from scipy.ndimage import median_filter
 
 from pipeline.adjustment.robust import basis_of, ring_harmonics
 from pipeline.arrays import Bool, Float, Int
-from stages.rings.search import BAND_WIDTHS, Candidates, Image, search_band
+from stages.rings.picture import Image
+from stages.rings.search import BAND_WIDTHS, Candidates, search_band
 from stages.rings.sectors import Sectors
 
 # The brightest of the many spots on a ray follows Gumbel's distribution: its .99 quantile lies this many
@@ -73,8 +74,8 @@ def other_light(radius_px: Float, width_px: float, noise: float, image: Image, s
         1 σ of the line, px.
     noise
         1 σ of the dark image, grey levels.
-    image : (H, W)
-        Grey levels.
+    image
+        The picture.
     sectors
         The image cut into A sectors.
     """

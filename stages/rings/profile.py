@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numba
 import numpy as np
 
-from pipeline.arrays import Byte, Float, Float32
+from pipeline.arrays import Float
 from stages.rings.kernels import (
     FAST,
     bell,
@@ -25,6 +25,7 @@ from stages.rings.kernels import (
     neighbours_joined,
     solve,
 )
+from stages.rings.picture import Image, channels, grey_at
 from stages.rings.sectors import Sectors
 
 WINDOW_WIDTHS = 5.0
@@ -84,23 +85,33 @@ class ProfileFit(NamedTuple):
 
 
 def fit_line(
-    image: Byte | Float32, sectors: Sectors, seed_px: Float, width_px: float, response: Response
+    image: Image,
+    sectors: Sectors,
+    seed_px: Float,
+    width_px: float,
+    response: Response,
+    every: int = 1,
 ) -> ProfileFit:
-    """Fit the line near ``seed_px`` (A,) in every sector of ``image`` (H, W); NaN seeds are left out."""
+    """Fit the line near ``seed_px`` (A,) in the sectors of ``image`` (H, W), or in one of ``every`` so many.
+
+    NaN seeds are left out.
+    """
     known, sectors = np.isfinite(seed_px), sectors.taken or sectors
     filled = np.where(known, seed_px, np.nanmean(seed_px)) if known.any() else seed_px
     step = sectors.azimuth_rad[1] - sectors.azimuth_rad[0]
     slope = (np.roll(filled, -_SLOPE_SECTORS) - np.roll(filled, _SLOPE_SECTORS)) / (2 * _SLOPE_SECTORS * step)
+    fitted = np.full(len(seed_px), np.nan)
+    fitted[::every] = seed_px[::every]
     out = np.empty((len(ProfileFit._fields), len(seed_px)))
     _fit_sectors(
-        image.ravel(), sectors.start, sectors.pixel, sectors.radius_px, sectors.offset_rad,
-        seed_px, slope, width_px, response, response.trusted_level, out,
+        *channels(image), sectors.start, sectors.pixel, sectors.radius_px, sectors.offset_rad,
+        fitted, slope, width_px, response, response.trusted_level, out,
     )  # fmt: skip
     return ProfileFit(*out)
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
-def _gather(image, start, pixel, radius, offset, a, seed, slope, half, y, t):  # type: ignore[no-untyped-def]
+def _gather(image, weights, start, pixel, radius, offset, a, seed, slope, half, y, t):  # type: ignore[no-untyped-def]
     """Copy grey levels and distances to the seed of sector ``a``'s pixels near it; return their number.
 
     Where sectors are narrower than a pixel, whole neighbours are added until there is enough to fit.
@@ -112,7 +123,7 @@ def _gather(image, start, pixel, radius, offset, a, seed, slope, half, y, t):  #
         b = (a + turn) % sectors
         k = first_at_least(radius, start[b], start[b + 1], seed - half)
         while k < start[b + 1] and radius[k] <= seed + half and count < y.size:
-            y[count] = image[pixel[k]]
+            y[count] = grey_at(image, weights, pixel[k])
             t[count] = radius[k] - seed - slope * (offset[k] + turn * step)
             count += 1
             k += 1
@@ -233,7 +244,7 @@ def _settle(y, t, count, width, response, trusted, n, v, p):  # type: ignore[no-
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
-def _fit_sectors(image, start, pixel, radius, offset, seed, slope, width, response, trusted, out):  # type: ignore[no-untyped-def]
+def _fit_sectors(image, weights, start, pixel, radius, offset, seed, slope, width, response, trusted, out):  # type: ignore[no-untyped-def]
     n, v, p = np.empty((5, 5)), np.empty(5), np.empty(5)
     half = WINDOW_WIDTHS * width
     y, t = np.empty(int(8 * half) + 64), np.empty(int(8 * half) + 64)
@@ -241,7 +252,7 @@ def _fit_sectors(image, start, pixel, radius, offset, seed, slope, width, respon
     for a in range(seed.size):
         if not np.isfinite(seed[a]):
             continue
-        count = _gather(image, start, pixel, radius, offset, a, seed[a], slope[a], half, y, t)
+        count = _gather(image, weights, start, pixel, radius, offset, a, seed[a], slope[a], half, y, t)
         if count <= v.size or not _guess(y, t, count, width, p):
             continue
         chi2 = _settle(y, t, count, width, response, trusted, n, v, p)

@@ -9,11 +9,11 @@ import numba
 import numpy as np
 
 from pipeline.adjustment.robust import MAD_TO_SIGMA
-from pipeline.arrays import Byte, Float, Float32, Int
+from pipeline.arrays import Float, Float32, Int
 from stages.rings.kernels import FAST, first_at_least, neighbours_joined
+from stages.rings.picture import Image, channels, everywhere, grey_at
 from stages.rings.sectors import Sectors
 
-Image = Byte | Float32
 BAND_WIDTHS = 10.0
 _BELT_WIDTHS = 16.0
 _REACH_WIDTHS = 4.0
@@ -61,14 +61,14 @@ def search_band(
     radius, score = np.full((len(low_px), _CANDIDATES), np.nan), np.zeros((len(low_px), _CANDIDATES))
     template = matched_template(width_px)
     _search_sectors(
-        image.ravel(), sectors.start, sectors.pixel, sectors.radius_px, low_px, high_px, template,
+        *channels(image), sectors.start, sectors.pixel, sectors.radius_px, low_px, high_px, template,
         radius, score,
     )  # fmt: skip
     return Candidates(radius, score / noise)
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
-def _radial_profile(image, start, pixel, radius, a, aside, first, bins, total, count):  # type: ignore[no-untyped-def]
+def _radial_profile(image, weights, start, pixel, radius, a, aside, first, bins, total, count):  # type: ignore[no-untyped-def]
     """Compute the mean grey level in bins of one pixel from radius ``first``; return the number seen.
 
     The pixels are those of sector ``a`` and of ``aside`` sectors on either side, because a sector narrower
@@ -84,7 +84,7 @@ def _radial_profile(image, start, pixel, radius, a, aside, first, bins, total, c
             b = int(radius[k] - first + 0.5)
             if b >= bins:
                 break
-            total[b] += image[pixel[k]]
+            total[b] += grey_at(image, weights, pixel[k])
             count[b] += 1
             seen = max(seen, b + 1)
             k += 1
@@ -130,7 +130,7 @@ def _keep_peaks(response, low, high, first, radius, score):  # type: ignore[no-u
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
 def _search_sectors(  # type: ignore[no-untyped-def]
-    image, start, pixel, radius, low_px, high_px, template, found_px, score
+    image, weights, start, pixel, radius, low_px, high_px, template, found_px, score
 ):
     reach = template.size // 2
     size = int(np.nanmax(high_px - low_px)) + 2 * reach + 4
@@ -141,7 +141,7 @@ def _search_sectors(  # type: ignore[no-untyped-def]
         first = int(np.floor(low_px[a])) - reach
         bins = int(np.ceil(high_px[a])) + reach + 1 - first
         aside = neighbours_joined(start.size - 1, 0.5 * (low_px[a] + high_px[a]))
-        seen = _radial_profile(image, start, pixel, radius, a, aside, first, bins, total, count)
+        seen = _radial_profile(image, weights, start, pixel, radius, a, aside, first, bins, total, count)
         _correlate(total, seen, template, response)
         _keep_peaks(response, reach, seen - reach, first, found_px[a], score[a])
 
@@ -208,7 +208,7 @@ def _polar_image(image: Image, sectors: Sectors, ray: Int) -> Float32:
     map_u = u + radius * np.cos(sectors.azimuth_rad[ray])[:, None]
     map_v = v + radius * np.sin(sectors.azimuth_rad[ray])[:, None]
     out = cv2.remap(
-        image.astype(np.float32), map_u.astype(np.float32), map_v.astype(np.float32),
+        everywhere(image).astype(np.float32), map_u.astype(np.float32), map_v.astype(np.float32),
         cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT, borderValue=float("nan"),
     )  # fmt: skip
     return np.asarray(out, np.float32)

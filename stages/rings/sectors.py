@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numba
 import numpy as np
 
-from pipeline.arrays import Float, Float32, Int, Int32
+from pipeline.arrays import Byte, Float, Float32, Int, Int32
 from pipeline.recording.base import FrameSource
 from pipeline.recording.one_field import OneField
 from stages.rings.kernels import first_at_least
@@ -57,6 +57,17 @@ class Sectors:
         ring = radius_px.astype(np.float32)
         out = np.empty(_count_near(self.start, self.radius_px, ring, most_px), np.int32)
         return out[: _pick_near(self.start, self.pixel, self.radius_px, ring, least_px, most_px, out)]
+
+    def colours_near(
+        self, bgr: Byte, radius_px: Float, least_px: float, most_px: float
+    ) -> tuple[Float, Float]:
+        """Return mean (3,) and covariance (3, 3) of the colours of the same pixels of an image (H, W, 3)."""
+        total = _sums_near(
+            bgr.reshape(-1, 3), self.start, self.pixel, self.radius_px, radius_px.astype(np.float32),
+            least_px, most_px,
+        ).astype(float)  # fmt: skip
+        mean = total[:3, 3] / total[3, 3]
+        return mean, (total[:3, :3] - total[3, 3] * np.outer(mean, mean)) / (total[3, 3] - 1)
 
 
 def with_even_rows_taken(sectors: Sectors) -> Sectors:
@@ -112,6 +123,22 @@ def _pick_near(start, pixel, radius, ring, least, most, out):  # type: ignore[no
                 out[count] = pixel[k]
                 count += 1
     return count
+
+
+@numba.njit(cache=True, nogil=True)
+def _sums_near(bgr, start, pixel, radius, ring, least, most):  # type: ignore[no-untyped-def]
+    """Return the sums (4, 4) of the products of blue, green, red and 1 over the pixels of `_pick_near`."""
+    n = b = g = r = bb = bg = br = gg = gr = rr = np.int64(0)
+    for a in range(ring.size):
+        low = first_at_least(radius, start[a], start[a + 1], ring[a] - most)
+        for k in range(low, first_at_least(radius, low, start[a + 1], ring[a] + most)):
+            if least <= abs(radius[k] - ring[a]) < most:
+                p = pixel[k]
+                x, y, z = np.int64(bgr[p, 0]), np.int64(bgr[p, 1]), np.int64(bgr[p, 2])
+                n, b, g, r = n + 1, b + x, g + y, r + z
+                bb, bg, br = bb + x * x, bg + x * y, br + x * z
+                gg, gr, rr = gg + y * y, gr + y * z, rr + z * z
+    return np.array([[bb, bg, br, b], [bg, gg, gr, g], [br, gr, rr, r], [b, g, r, n]])
 
 
 @numba.njit(cache=True, nogil=True)

@@ -25,7 +25,8 @@ from scipy.optimize import nnls
 
 from pipeline.arrays import Bool, Float, Float32, Int
 from pipeline.artefacts.measured import RingValidity
-from stages.rings.mixture import excess_weights, mix
+from stages.rings.mixture import excess_weights
+from stages.rings.picture import Mixture
 from stages.rings.sectors import cut_sectors
 from stages.rings.trace import trace_ring
 from stages.twin.line_blocks import BlockLight, LineBlocks, light_of
@@ -62,7 +63,7 @@ def real_frame(file: Path) -> RealFrame:
     image[:, -2:] = 0
     size = (image.shape[1], image.shape[0])
     sectors = cut_sectors(size, (CENTRE[0] * size[0], CENTRE[1] * size[1]), 1440)
-    trace = trace_ring(mix(image, excess_weights(RED_NM)), sectors, 255.0)
+    trace = trace_ring(Mixture(image, excess_weights(RED_NM)), sectors, 255.0)
     assert trace is not None, file.name
     radius = np.where(trace.validity == RingValidity.VALID, trace.fit.radius_px, np.nan)
     by_block = radius.reshape(BLOCKS, -1)

@@ -17,7 +17,8 @@ from pipeline.instrument.camera import Camera
 from pipeline.instrument.laser import LaserSheet
 from pipeline.instrument.probe import Probe
 from stages.diagnose.effects.base import ImagePoints
-from stages.rings.mixture import excess_weights, mix
+from stages.rings.mixture import excess_weights
+from stages.rings.picture import Mixture
 from stages.rings.sectors import cut_sectors
 from stages.rings.trace import trace_ring
 
@@ -68,7 +69,7 @@ def rings_of(folder: Path) -> Rings:
         image[:, -2:] = 0
         size = (image.shape[1], image.shape[0])
         sectors = cut_sectors(size, (0.445 * size[0], 0.524 * size[1]), 1440)
-        trace = trace_ring(mix(image, excess_weights(RED_NM)), sectors, 255.0)
+        trace = trace_ring(Mixture(image, excess_weights(RED_NM)), sectors, 255.0)
         assert trace is not None, file.name
         radius = np.where(trace.validity == RingValidity.VALID, trace.fit.radius_px, np.nan)
         condensed = np.nanmedian(radius.reshape(BINS, -1), axis=1)

@@ -12,7 +12,8 @@ from pipeline.instrument.camera.fisheye import KannalaBrandt
 from pipeline.instrument.probe_file import read_probe
 from pipeline.recording import open_recording
 from stages.rings.extract import RingParameters, extract_rings
-from stages.rings.mixture import excess_weights, mix
+from stages.rings.mixture import excess_weights
+from stages.rings.picture import Mixture
 from stages.rings.sectors import cut_sectors
 from stages.rings.trace import trace_ring
 from tests.quiet import quiet_context
@@ -48,7 +49,7 @@ def scaled(camera, scale):
 def ring_points_mm(image, camera, plane):
     """Return the points of one colour image's ring in the laser plane; also the coverage."""
     sectors = cut_sectors(camera.image_size, camera.centre_px, 1440)
-    trace = trace_ring(mix(image, excess_weights(RED_NM)), sectors, 255.0)
+    trace = trace_ring(Mixture(image, excess_weights(RED_NM)), sectors, 255.0)
     assert trace is not None
     good = trace.validity == RingValidity.VALID
     psi, rho = sectors.azimuth_rad[good], trace.fit.radius_px[good]

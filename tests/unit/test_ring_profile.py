@@ -6,6 +6,8 @@ from scipy.optimize import least_squares
 
 from pipeline.recording.one_field import even_rows
 from stages.rings.kernels import bell
+from stages.rings.noise import noise_response
+from stages.rings.picture import Mixture
 from stages.rings.profile import WINDOW_WIDTHS, Response, fit_line
 from stages.rings.sectors import cut_sectors
 from stages.rings.sectors import with_even_rows_taken as one_field
@@ -150,3 +152,27 @@ def test_with_one_field_all_sectors_beside_the_centre_keep_their_pixels(sectors)
     taken, flat = one_field(sectors).taken, np.abs(np.sin(sectors.azimuth_rad)) < 0.7
     np.testing.assert_array_equal(np.diff(taken.start)[flat], np.diff(sectors.start)[flat])
     assert np.all(np.diff(taken.start) > 0)
+
+
+def test_a_mixture_is_fitted_like_the_picture_of_its_grey_levels(sectors):
+    random, radius = np.random.default_rng(5), off_centre(150.0, 10.0)
+    light = ring_light(SIZE, CENTRE, radius, WIDTH, AMPLITUDE)
+    bgr = np.dstack([exposed(share * light, random, read=1.0, shot=0.0) for share in (0.2, 1.0, 0.3)])
+    mixture = Mixture(bgr, np.array([-0.5, 1.0, -0.4]))
+    response = Response(0.1 * BLACK, 1.5, 0.0, np.inf)
+    seed_px = radius(sectors.azimuth_rad)
+    ours, plain = (fit_line(i, sectors, seed_px, WIDTH, response) for i in (mixture, mixture.everywhere()))
+    np.testing.assert_allclose(ours, plain, rtol=1e-4, atol=1e-4)
+    noise, plain_noise = (
+        noise_response(i, sectors, plain, response) for i in (mixture, mixture.everywhere())
+    )
+    np.testing.assert_allclose(noise, plain_noise, rtol=1e-4)
+
+
+def test_sectors_that_are_left_out_do_not_change_the_fit_of_the_others(sectors):
+    radius = off_centre(150.0, 40.0)
+    image = exposed(ring_light(SIZE, CENTRE, radius, WIDTH, AMPLITUDE), np.random.default_rng(6))
+    seed_px, response = radius(sectors.azimuth_rad), Response(BLACK, 1.0, 0.0, np.inf)
+    every, few = (fit_line(image, sectors, seed_px, WIDTH, response, n).radius_px for n in (1, 5))
+    assert np.array_equal(few[::5], every[::5])
+    assert np.isfinite(few).sum() == np.isfinite(every[::5]).sum() > 100

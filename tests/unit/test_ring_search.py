@@ -45,6 +45,16 @@ def test_pixels_near_a_ring_are_those_at_its_distance(sectors):
     assert np.array_equal(sectors.pixels_near(ring, 2.0, 5.0), sectors.pixel[(away >= 2.0) & (away < 5.0)])
 
 
+def test_colours_near_a_ring_are_those_of_its_pixels(sectors):
+    ring = off_centre(150.0, 20.0)(sectors.azimuth_rad)
+    bgr = np.random.default_rng(7).integers(0, 256, (*SIZE[::-1], 3), np.uint8)
+    bgr[..., 2] = bgr[..., 1] // 2 + bgr[..., 0] // 3
+    mean, covariance = sectors.colours_near(bgr, ring, 2.0, 5.0)
+    colours = bgr.reshape(-1, 3)[sectors.pixels_near(ring, 2.0, 5.0)]
+    np.testing.assert_allclose(mean, colours.mean(0))
+    np.testing.assert_allclose(covariance, np.cov(colours.T))
+
+
 @pytest.mark.parametrize(("radius", "along"), [(150.0, 0.0), (120.0, 45.0), (200.0, 15.0)])
 @pytest.mark.parametrize("width", [0.9, 1.6, 3.0])
 def test_a_ring_is_found_at_any_place_and_thickness(sectors, radius, along, width):

@@ -20,7 +20,8 @@ from stages.calibrate.boards.pictures import read_picture
 from stages.calibrate.boards.start import pose
 from stages.calibrate.laser.line import LaserPlaneParameters, measure_line, patch_around
 from stages.calibrate.laser.plane import BoardErrors, fit_plane_robustly
-from stages.rings.mixture import excess_weights, mix
+from stages.rings.mixture import excess_weights
+from stages.rings.picture import Mixture
 
 __all__ = ["LASER_PLANE", "LaserCalibration"]
 
@@ -143,7 +144,7 @@ def line_on_board(picture: LaserPicture, camera: Camera, parameters: LaserPlaneP
     posed = solve(first, corners, POSES_ONLY, parameters.huber_px)
     T_cb, square_mm = posed.T_cb[0], _square_mm(view)
     patch = patch_around(view.xyz_b, view.uv, T_cb, parameters.margin_squares * square_mm)
-    excess = mix(picture.image, excess_weights(parameters.wavelength_nm))
+    excess = Mixture(picture.image, excess_weights(parameters.wavelength_nm)).everywhere()
     xy_b = measure_line(excess, camera, patch, parameters)
     xyz_b = np.concatenate([xy_b, np.zeros((len(xy_b), 1))], 1)
     spread = pose_covariances(posed, corners, parameters.huber_px)[0]
