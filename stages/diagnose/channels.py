@@ -285,8 +285,8 @@ FREE_MOTION = Stage(
     "free_motion", "5", MotionParameters, adjust_freely, "an inspection's motion without encoder", "motion"
 )
 GAUGE_EVIDENCE = Stage(
-    "evidence", "63", DiagnosisParameters, examine_gauge, "what a gauge run shows of effects", "diagnosis"
+    "evidence", "64", DiagnosisParameters, examine_gauge, "what a gauge run shows of effects", "diagnosis"
 )
 FIELD_EVIDENCE = Stage(
-    "evidence", "28", DiagnosisParameters, examine_field, "what an inspection shows of effects", "diagnosis"
+    "evidence", "29", DiagnosisParameters, examine_field, "what an inspection shows of effects", "diagnosis"
 )

@@ -26,8 +26,8 @@ ASIDE = Motion(constant(20.0), constant(5.0), constant(-4.0), constant(YAW))
 # Seen from a camera at (5, −4) that leans by the yaw towards +x.
 BESIDE = Bore(RADIUS_MM, (-5.0 * np.cos(YAW), 4.0, -5.0 * np.sin(YAW)), (-np.sin(YAW), 0.0, np.cos(YAW)))
 PLACES = {"on the axis": (CENTRED, Bore(RADIUS_MM)), "beside it and leaning": (ASIDE, BESIDE)}
-# Large effects; allowed error of a prediction, per cent. The effects of a tilted tube on camera and
-# laser nearly cancel, so that second order weighs more; far ahead, subtracting the straight tube adds to it.
+# Large effects; allowed error of a prediction, per cent. The simulator undoes the straight tube, with which
+# the lens was calibrated, by glass the other way round: far ahead this differs from subtracting it.
 SWITCHES = {
     "laser_tilt": ((0.6, 40.0), 0.1),
     "laser_cone": ((0.3,), 0.1),
@@ -38,20 +38,23 @@ SWITCHES = {
     "principal_point": ((2.0, -60.0), 0.1),
     "focal_scale": ((0.004,), 0.1),
     "radial_distortion": ((0.004,), 0.1),
-    "sensor_tilt": ((0.001, 25.0), 0.3),
+    "sensor_tilt": ((0.001, 25.0), 0.1),
     "pixel_aspect": ((0.004,), 0.4),
     "pupil_shift": ((1.0,), 0.1),
     "baseline_drift": ((0.4, 2.0), 0.1),
     "focal_drift": ((0.004, 2.0), 0.1),
     "centre_drift": ((2.0, 100.0, 2.0), 0.1),
     "housing_glass": ((2.0,), 0.1),
-    "tube_wedge": ((0.05, 40.0), 4.0),
-    "tube_tilt": ((1.0, 40.0), 35.0),
+    "tube_wedge": ((0.5, 40.0), 4.0),
+    "tube_tilt": ((4.0, 40.0), 35.0),
     "dome_axial": ((0.5,), 1.0),
     "dome_lateral": ((0.5, 40.0), 1.0),
     "outside_index": ((0.333,), 0.1),
     "ovality": ((0.15, 40.0), 1.0),
 }
+
+# Of the ring, where that differs.
+OF_RING = {"tube_wedge": 1.0, "tube_tilt": 2.0}
 
 
 def asked(name, values):
@@ -70,6 +73,7 @@ def asked(name, values):
 @pytest.mark.parametrize("name", SWITCHES)
 def test_the_simulators_ring_is_where_the_diagnosis_predicts_it(name, place):
     values, per_cent = SWITCHES[name]
+    per_cent = OF_RING.get(name, per_cent)
     motion, bore = place
     plain = bench_truth(RADIUS_MM, motion)
     changed = switch_on(plain, [Switch(name, values)])

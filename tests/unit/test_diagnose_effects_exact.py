@@ -225,12 +225,15 @@ def test_a_faulty_tube_shifts_texture_along_and_around_as_predicted(name):
 def test_a_tilted_tube_displaces_the_laser_as_predicted():
     points = ring_points(plain_probe(), Bore(50.8))
     flat = np.column_stack([np.cos(points.azimuth_rad), np.sin(points.azimuth_rad), np.zeros(len(points.uv))])
-    place, ray = np.zeros_like(flat), flat
-    for radius_mm, ratio in ((14.0, 1 / GLASS), (16.0, GLASS)):
+    # The tube leans about the camera's viewpoint, so that its axis passes beside the laser.
+    source = np.array([0.0, 0.0, plain_probe().laser.baseline_mm])
+    place, ray = np.broadcast_to(source, flat.shape), flat
+    for radius_mm, ratio in ((13.0, 1 / GLASS), (15.0, GLASS)):
         place, ray = through_cylinder(place, ray, leaning(1.0, 40.0), radius_mm, ratio)
+    beyond = 50.8 - np.hypot(place[:, 0], place[:, 1])
+    met_mm = place[:, 2] + beyond * ray[:, 2] / np.hypot(ray[:, 0], ray[:, 1]) - source[2]
     predicted = LIBRARY["tube_tilt"].sheet_shift_mm(points, (1.0,), np.array(xy(1.0, 40.0)))
-    assert np.abs(ray - flat).max() < 1e-12
-    assert predicted == pytest.approx(place[:, 2], abs=2e-5)
+    assert predicted == pytest.approx(met_mm, abs=2e-5)
     assert predicted[np.argmin(np.abs(points.azimuth_rad - np.radians(40)))] > 0.01
 
 

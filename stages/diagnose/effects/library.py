@@ -14,6 +14,7 @@ from stages.diagnose.effects.base import EffectModel, ImagePoints, Shape, SumOfL
 from stages.diagnose.effects.camera import CAMERA_MODELS
 from stages.diagnose.effects.laser import LASER_MODELS, PHOTOMETRIC_MODELS
 from stages.diagnose.effects.pose import POSE_MODELS
+from stages.diagnose.effects.ring_geometry import turned_about_z
 from stages.diagnose.effects.window import WINDOW_MODELS
 
 _MODELS = (*LASER_MODELS, *CAMERA_MODELS, *WINDOW_MODELS, *POSE_MODELS, *PHOTOMETRIC_MODELS)
@@ -38,7 +39,8 @@ def ring_shift_px(model: EffectModel, points: ImagePoints, shape: Shape, amplitu
     """Return by how much (M,), px, the ring is found farther out in the image, at the same image azimuth.
 
     The sheet's new intersection with the wall is computed in the half-plane of each point's azimuth; the
-    image shift is taken there, and read along the image radius with the ring's own inclination.
+    image shift is taken there, and read along the image radius with the ring's own inclination. A shift
+    around the image brings another place of the wall to a pixel's azimuth: the shift of that place counts.
     """
     ring = points.ring
     moved = points
@@ -49,8 +51,14 @@ def ring_shift_px(model: EffectModel, points: ImagePoints, shape: Shape, amplitu
             break
         xyz = points.xyz_c + sheet[:, None] * ring.per_sheet_c + wall[:, None] * ring.per_wall_c
         moved = _moved(points, xyz)
-    shift = moved.uv - points.uv + model.image_shift_px(moved, shape, amplitude)
-    return ring.read(shift) + model.line_shift_px(moved, shape, amplitude)
+    shift = model.image_shift_px(moved, shape, amplitude)
+    around = ring.around(shift)
+    if np.any(around):
+        turn_rad = around / ring.rho_px
+        elsewhere = model.image_shift_px(_turned(moved, -turn_rad), shape, amplitude)
+        shift = turned_about_z(elsewhere, turn_rad)
+    found = ring.read_small(moved.uv - points.uv + shift) + around**2 / (2 * ring.rho_px)
+    return found + model.line_shift_px(moved, shape, amplitude)
 
 
 def texture_shift_px(model: EffectModel, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
@@ -133,6 +141,14 @@ def _slope(prediction: Callable[[Float], Float], model: EffectModel, k: int) -> 
 def _moved(points: ImagePoints, xyz_c: Float) -> ImagePoints:
     uv = points.uv + points.probe.camera.project(xyz_c).uv - points.projected_uv
     return replace(points, xyz_c=xyz_c, uv=np.asarray(uv))
+
+
+def _turned(points: ImagePoints, angle_rad: Float) -> ImagePoints:
+    """Return the points, with the wall, turned about the optical axis by angles (M,)."""
+    centre, each = points.probe.camera.centre_px, (points.xyz_c, points.normal_c, points.along_c)
+    xyz_c, normal_c, along_c = (turned_about_z(v, angle_rad) for v in each)
+    uv = centre + turned_about_z(points.uv - centre, angle_rad)
+    return replace(points, uv=uv, xyz_c=xyz_c, normal_c=normal_c, along_c=along_c)
 
 
 def without(names: Collection[str]) -> Mapping[str, EffectModel]:

@@ -39,18 +39,16 @@ class RingGeometry:
     rho_px: Float
     by_point: Float
 
-    def read(self, shift_px: Float) -> Float:
-        """Return how much (M,), px, farther out the line is found at one image azimuth after shifts (M, 2).
-
-        A shift across the radius counts by the line's inclination to the circle through it, which
-        distinguishes a shifted image from a tilted sheet in an off-centre ring, and by the circle's
-        curvature.
-        """
-        across = _cross(self.outward_px, shift_px)
-        return self.read_small(shift_px) - across**2 / (2 * self.rho_px)
+    def around(self, shift_px: Float) -> Float:
+        """Return the part (M,) of shifts (M, 2) across the image radius, px."""
+        return _cross(self.outward_px, shift_px)
 
     def read_small(self, shift_px: Float) -> Float:
-        """Return `read` to first order in the shifts."""
+        """Return how much (M,), px, farther out the line is found at one azimuth after small shifts (M, 2).
+
+        A shift across the radius counts by the line's inclination to the circle through it, which
+        distinguishes a shifted image from a tilted sheet in an off-centre ring.
+        """
         return _cross(shift_px, self.tangent_px) / _cross(self.outward_px, self.tangent_px)
 
     def read_move(self, way_c: Float) -> Float:
@@ -92,3 +90,10 @@ def _sheet_normal(laser: LaserSheet, xyz_c: Float, psi: Float, unit_q: Float) ->
 
 def _cross(a: Float, b: Float) -> Float:
     return np.asarray(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
+
+
+def turned_about_z(vector: Float, angle_rad: Float) -> Float:
+    """Return vectors (M, 2) or (M, 3) turned about the optical axis by angles (M,)."""
+    c, s = np.cos(angle_rad), np.sin(angle_rad)
+    x, y = vector[:, 0], vector[:, 1]
+    return np.column_stack([c * x - s * y, s * x + c * y, vector[:, 2:]])
