@@ -48,8 +48,9 @@ from stages.twin.sums import MOST_STRAY, Sums
 from stages.twin.worst import maps_of, worst_places
 
 _EVERY, _COLOURED, _CLIPPED_FRAMES = 10, 3, 8
-"""Frames from one compared frame to the next where none is withheld. Laser frames whose colours are checked
-for clipping: decoding colour takes three times as long. Least number of them that show what leaks."""
+"""Frames from one compared frame to the next where none is withheld. Laser frames whose colours give that of
+the line and its clipping: decoding colour takes three times as long. Least number of them that show what
+leaks."""
 _ROUNDS = 3
 """Rounds in which the displacement of texture is measured, each in frames drawn with the one before: the
 second finds a third of the first, the fourth hardly any."""
@@ -126,9 +127,9 @@ def photometry_of(
     sampled = sample_frames(
         recording, frames.frame[measured], frames.illumination[measured], parameters.sampled
     )
-    state = estimate_state(scene, sampled, rings, context)
     lines = [s.frame for s in sampled if s.light == Illumination.LASER]
     colour = list(recording.read(np.array(lines[:: max(len(lines) // _COLOURED, 1)], np.int64), "bgr"))
+    state = estimate_state(scene, sampled, colour, rings, context)
     state = replace(state, line_clipped=clipped_line(scene, colour), photo_black=black_of_photo(colour))
     defects = defective_pixels(
         [s.image.astype(np.uint8) for s in sampled],
@@ -272,14 +273,14 @@ def _report(comparison: Comparison, found: tuple[Mismatch, ...], context: Contex
 
 PHOTOMETRY = Stage(
     "photometry",
-    "26",
+    "27",
     PhotometryParameters,
     measure_photometry,
     "camera noise, lamps, laser line, blur and dirt on the window, from the frames of a run",
 )
 TWIN = Stage(
     "twin",
-    "82",
+    "83",
     TwinParameters,
     compare_with_twin,
     "recorded frames beside the same frames, re-rendered from what the run has measured",

@@ -11,6 +11,8 @@ from stages.twin.state import PhotometricState
 _NEVER_TOLD = (
     "Vignetting cannot be separated from the LEDs' lobe: both act by the polar angle alone. If it "
     "changes slowly, the photo of the wall changes with it, and frames fit nearly as well.",
+    "Noise, electrons per grey level and non-uniformity are those of the decoded frames. A lossy codec "
+    "removes noise and adds errors of its own: only frames coded without loss show the camera's.",
     "A power response cannot be separated from the wall's contrast, since the photo has it, too. Gamma "
     "is estimated from the noise, which a video codec changes: it does not prove a nonlinear response.",
     "Lamps that are uneven in all frames, other than by one dim LED, can be distinguished from wall that "

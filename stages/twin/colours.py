@@ -8,7 +8,7 @@ by its colour: that resembles light that is dim on one side.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -16,12 +16,12 @@ import numpy as np
 from pipeline.arrays import Byte, Float, Int
 from pipeline.artefacts.twin import Look, Mismatch, NamedFigure
 from stages.twin.cells import sigmas
+from stages.twin.line_colour import Coloured
 from stages.twin.reflectance import LUMA_BGR
 from stages.twin.render import Region, Renderer
 from stages.twin.scene import Scene
 from stages.twin.state import PhotometricState
 
-Coloured = Iterable[tuple[int, Byte | None]]
 _UNSURE = {"", "window_dirt"}
 """Names of sides that are told by small changes of grey between angles of view: none, or one of several."""
 _FEW = 8

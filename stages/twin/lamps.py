@@ -10,11 +10,12 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 from scipy.stats import norm, theilslopes
 
 from pipeline.arrays import Float, Int
 from pipeline.artefacts.twin import Mismatch, NamedFigure
-from stages.twin.cells import SECTORS, centred, sector_azimuth_rad
+from stages.twin.cells import SECTORS, Cells, centred, sector_azimuth_rad
 from stages.twin.dead_led import seen_from
 from stages.twin.gate import Suspected
 from stages.twin.lamp_light import Course, LampLight
@@ -40,6 +41,11 @@ _MOSTLY, _SURE_OF_WALL, _PARTS, _OVER_CELLS = 0.5, 3.0, 6, 4.0
 significance in σ; parts of the frames, each left out once for that σ. Least ratio of the pattern's variance
 on the same wall to that within a cell, where wall that is paler on one side varies alike: below it the share
 would be too large by more than a quarter."""
+_BESIDE = 0.5
+"""Spread of compared frames about the curve through the measured ones, over the spread of these, below which
+light changes slowly: flicker leaves about 1, an exposure that swings by a third 1.3 times in 12 frames .1.
+And the spread of measured frames over that of compared ones below which the photo may be the cause: flicker
+makes it 1 to 3 (6 recordings), wall that shines .1."""
 _FADES, _CONFIDENCE = 0.25, 0.99
 """Least slow change of a light, as a logarithm, that is reported: the photo errs by less, as for a dim sector
 of the laser. Confidence with which it must be larger. Chosen."""
@@ -170,16 +176,22 @@ def _harmonics(lamp: LampLight, scene: Scene) -> tuple[Float, float]:
 
 
 def flicker_of_measured(
-    state: PhotometricState, found: Sequence[Mismatch], ring: Ring
+    state: PhotometricState,
+    found: Sequence[Mismatch],
+    ring: Ring,
+    compared: tuple[Cells | None, Cells | None] = (None, None),
 ) -> tuple[Mismatch, ...]:
     """Return flicker that frames used by the measurement show; ``found`` is what the compared frames showed.
 
-    Compared frames lie at regular steps: lights that flicker in step with them look steady.
+    Compared frames lie at regular steps: lights that flicker in step with them look steady. Those of LEDs and
+    laser have ``compared`` cells in steady light: where they lie on the curve through the measured frames,
+    the light changes slowly.
     """
     named = {name for m in found for name in m.names}
+    cells = dict(zip(_VARIES, compared, strict=True))
     made = []
     for name, light, channel, course in _courses(state):
-        if name in named:
+        if name in named or _changes_slowly(course, cells[name]):
             continue
         spread, nan = course.spread, float("nan")
         if spread < max(_VARIES[name], _SURE * float(np.median(course.sd))):
@@ -194,6 +206,38 @@ def flicker_of_measured(
         look = ring.whole(int(course.frame[0]))
         made.append(Mismatch(name, channel, "time", (), (size,), nan, nan, nan, said, look))
     return tuple(made)
+
+
+def beside_measured(found: Sequence[Mismatch], state: PhotometricState) -> tuple[Mismatch, ...]:
+    """Return findings; flicker of the compared frames has no name where measured frames do not vary.
+
+    The photo fits the frames that it was made from: where wall shines, it errs in the others.
+    """
+    steady = {name: c for name, _, _, c in _courses(state)}
+    return tuple(_or_photo(m, steady[m.name]) if m.name in steady else m for m in found)
+
+
+def _or_photo(flicker: Mismatch, measured: Course) -> Mismatch:
+    """Return flicker, without a name if frames that the photo was made from vary much less."""
+    if measured.spread >= _BESIDE * flicker.parameters[0].value:
+        return flicker
+    said = (
+        f"{flicker.statement} But {len(measured.frame)} measured frames between them vary by "
+        f"{100 * measured.spread:.1f} % only: the wall's photo was made from these and may err in the "
+        "others, as where wall shines, or lights flicker in step with them."
+    )
+    return replace(flicker, name="", statement=said)
+
+
+def _changes_slowly(course: Course, cells: Cells | None) -> bool:
+    """Return whether compared frames follow a smooth curve through the measured ones."""
+    if cells is None:
+        return False
+    between = (cells.frame > course.frame[0]) & (cells.frame < course.frame[-1])
+    mean = cells.log_ratio.sum(1) / np.maximum(cells.usable.sum(1), 1)
+    beside = mean - CubicSpline(course.frame, course.log_value)(cells.frame)
+    left = replace(course, frame=cells.frame[between], log_value=beside[between])
+    return len(left.frame) > 2 and left.spread < _BESIDE * course.spread
 
 
 def faded(state: PhotometricState, found: Sequence[Mismatch], ring: Ring) -> tuple[Mismatch, ...]:

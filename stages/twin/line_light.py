@@ -13,11 +13,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.ndimage import map_coordinates
-from scipy.optimize import nnls
 
 from pipeline.adjustment.robust import robust_spread
 from pipeline.arrays import Float, Float32, Int
 from stages.twin.lamp_light import DARK, Course, Figure
+from stages.twin.line_colour import Colour
 from stages.twin.scene import LineSight, Scene
 
 # The line's bell lies within this many widths (99.7 % of a Gaussian); light beyond it is the halo.
@@ -26,10 +26,6 @@ _SECTORS, _FINE = 36, 20
 PROFILE_WIDTHS = 6.0
 """The line's profile is described over this many widths to each side; light farther out is not modelled."""
 _CORE_WIDTHS, _MIDDLE_WIDTHS = 1.0, 0.4
-
-_COLOUR_ROUNDS = 4
-"""Times that colour and power are estimated in turn; a fifth round changes the shares by less than their
-σ."""
 
 PixelNoise = Callable[[Float32], Float32]
 
@@ -111,9 +107,11 @@ class LineLight:
 class LineSamples:
     """Collects the brightness of the line in sectors of frames, and its profile."""
 
-    def __init__(self, scene: Scene, black: float, white: float, sheet_mm: float, width_px: float) -> None:
+    def __init__(
+        self, scene: Scene, black: float, white: float, sheet_mm: float, width_px: float, colour: Colour
+    ) -> None:
         self._scene, self._black, self._white = scene, black, white
-        self._sheet_mm, self._width_px = sheet_mm, width_px
+        self._sheet_mm, self._width_px, self._colour = sheet_mm, width_px, colour
         self._kept: list[tuple[int, LineSight, Float32]] = []
 
     def add(self, frame: int, image: Float32, sight: LineSight) -> None:
@@ -126,10 +124,9 @@ class LineSamples:
             return None
         sheet_px = np.median(np.concatenate([self._sheet_mm / s.mm_per_px for _, s, _ in self._kept]))
         blur = float(np.sqrt(max(self._width_px**2 - sheet_px**2, 0.3**2)))
-        light = self._with_power(_plain_line(self._sheet_mm, blur))
-        for _ in range(_COLOUR_ROUNDS):
-            light = self._with_power(self._with_colour(light))
-        return self._with_profile(light)
+        colour, colour_sd = self._colour
+        light = replace(_plain_line(self._sheet_mm, blur), colour=colour, colour_sd=colour_sd)
+        return self._with_profile(self._with_power(light))
 
     def _with_power(self, light: LineLight) -> LineLight:
         """Return the light with its power around the image and over time."""
@@ -139,28 +136,6 @@ class LineSamples:
         frames = np.array([f for f, _, _ in self._kept])
         known = Course(frames, course, course_sd)
         return replace(light, level=float(np.exp(level)), log_power=power, course=known)
-
-    def _with_colour(self, light: LineLight) -> LineLight:
-        """Return the light with the weights of the photo's colours that the line's brightness follows."""
-        each = np.array([self._colour_in(light, *kept) for kept in self._kept])
-        design, value = np.concatenate(each[:, :, :3]), np.concatenate(each[:, :, 3])
-        share = nnls(design, value)[0]
-        of_frame = np.array([nnls(e[:, :3], e[:, 3])[0] for e in each])
-        sd = of_frame.std(0) / np.sqrt(max(len(each) - 1, 1))
-        total = max(float(share.sum()), 1e-9)
-        return light if share.sum() <= 0 else replace(light, colour=share / total, colour_sd=sd / total)
-
-    def _colour_in(self, light: LineLight, frame: int, sight: LineSight, grey: Float32) -> Float:
-        """Return the line's brightness by each colour, per degree of azimuth, and the recorded one."""
-        line, _ = light.line_and_slope(sight, light.course.at(frame))
-        _, width = light.peak(sight)
-        use = np.isfinite(line) & (np.abs(sight.offset_px) < _CORE_WIDTHS * width)
-        use &= grey + self._black < self._white
-        degree = np.floor(np.degrees(sight.phi_rad[use]) + 180).astype(int) % 360
-        light_of = line[use] / np.maximum(light.colour @ sight.reflectance[:, use], 1e-6)
-        parts = (*(light_of * c for c in sight.reflectance[:, use]), grey[use])
-        sums = np.stack([np.bincount(degree, p, 360) for p in parts], 1)
-        return np.asarray(sums / np.maximum(np.sqrt(np.abs(sums[:, 3:])), 1.0), float)
 
     def with_speckle(self, light: LineLight, noise: PixelNoise) -> LineLight:
         """Return the light with the variation of single pixels across the line beyond the camera's noise.

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from pipeline.artefacts.twin import Mismatch
 from stages.twin.causes import causes
-from stages.twin.colours import Coloured, colour_over_run
+from stages.twin.colours import colour_over_run
 from stages.twin.fine_noise import beside_coding
-from stages.twin.lamps import faded, flicker_of_measured
+from stages.twin.lamps import beside_measured, faded, flicker_of_measured
+from stages.twin.line_colour import Coloured
 from stages.twin.reference import BlockSamples
 from stages.twin.scene import Scene
 from stages.twin.state import PhotometricState
@@ -21,10 +22,11 @@ def changes_over_time(
 
     ``coloured`` yields numbers and colour pictures (H, W, 3) of lit frames.
     """
-    found, slow = causes(*sums.cells(), scene.probe.lighting, scene.ring, samples)
-    found = or_on_window(found)
-    for also in (flicker_of_measured, faded):
-        found = (*found, *also(state, found, scene.ring))
+    cells = sums.cells()
+    found, slow = causes(*cells, scene.probe.lighting, scene.ring, samples)
+    found = beside_measured(or_on_window(found), state)
+    found = (*found, *flicker_of_measured(state, found, scene.ring, cells))
+    found = (*found, *faded(state, found, scene.ring))
     coding = sums.fine.step(scene.ring)
     found, beside = beside_coding(found, coding)
     return (*found, *coding, *colour_over_run(scene, state, coloured)), (*slow, *beside)

@@ -42,7 +42,7 @@ _FINE_PX, _KEPT = 9, 1.0
 blurred."""
 _DIRECTIONS = ("even", "across", "slanted", "radial")
 _CLIPPED, _LEAST_BLOOM, _NEAR = 200, 0.01, 0.02
-"""Fewest clipped pixels, smallest leak, and smallest spread."""
+"""Fewest clipped pixels, and fewest beside them in each part; smallest leak, and smallest spread."""
 _ALONG = "along the pipe"
 _OBLIQUE = (
     "the photo has its blur as well, but was made where the wall is seen less obliquely. What to do: record "
@@ -60,8 +60,8 @@ class WholePictures:
     blur, kept, stray, bloom, ghost : list
         For each frame: own and cross sums of both halves of the picture; share of the fine texture's energy;
         sizes of the `stray_lights`, their levels, falls of χ² and means, and by how much the wall's mean
-        above what sees no wall exceeds them; leak along columns and rows; brightness over ln of the ratio of
-        radii in four quadrants.
+        above what sees no wall exceeds them; leak along columns and rows in two parts of the picture;
+        brightness over ln of the ratio of radii in four quadrants.
     frame : dict of str to list of int
         Frames used for each effect.
     """
@@ -142,16 +142,23 @@ class WholePictures:
     def add_clipped(self, frame: int, above: Float32, twin: TwinFrame, free: Bool) -> None:
         """Add any frame: what leaks from clipped pixels along columns, and along rows for comparison.
 
-        Not on the line: errors of its profile beside clipped pixels are larger than what leaks.
+        Not on the line: errors of its profile beside clipped pixels are larger than what leaks. Wet streaks
+        along the pipe shine above and below clipped pixels, too, but only where they are steep in the
+        picture: parts of it where the pipe runs more up or more across are examined separately.
         """
         if (~free).sum() < _CLIPPED:
             return
-        spread = leaked(free)
+        spread, steep = leaked(free), np.abs(np.tan(self.scene.polar[1])) > 1
         near = free & np.isin(twin.region, (Region.DARK, Region.WALL)) & (spread[0] + spread[1] > _NEAR)
-        columns = np.stack([*(s[near] for s in spread), twin.level[near]]).astype(float)
-        rest = (above - twin.level)[near].astype(float)
-        own = columns @ columns.T + 1e-6 * np.eye(3)
-        self.bloom.append(np.linalg.solve(own, columns @ rest)[:2])
+        parts = [near & steep, near & ~steep]
+        if min(int(p.sum()) for p in parts) < _CLIPPED:
+            return
+        each = []
+        for part in parts:
+            columns = np.stack([*(s[part] for s in spread), twin.level[part]]).astype(float)
+            own = columns @ columns.T + 1e-6 * np.eye(3)
+            each.append(np.linalg.solve(own, columns @ (above - twin.level)[part].astype(float))[:2])
+        self.bloom.append(np.array(each))
         self.frame["bloom"].append(frame)
 
     def suspected(self, sharpness: Float) -> tuple[Suspected, ...]:
@@ -243,9 +250,9 @@ class WholePictures:
         if len(self.bloom) < FEWEST_FRAMES:
             return None
         leak = np.stack(self.bloom) / 255.0
-        more = leak[:, 0] - leak[:, 1]
-        size, chance = float(more.mean()), chance_of(more)
-        if chance > FALSE_ALARM or sigmas(more) < _SURE or size < _LEAST_BLOOM:
+        more = (leak[..., 0] - leak[..., 1]).T
+        size, chance = float(more.mean()), max(map(chance_of, more))
+        if chance > FALSE_ALARM or min(map(sigmas, more)) < _SURE or size < _LEAST_BLOOM:
             return None
         found = self._mismatch(
             "bloom", "image", NamedFigure("leak", size, np.inf, "of full scale"), chance, "bloom",
@@ -253,7 +260,7 @@ class WholePictures:
             f"columns. If it fades to 1/e over {BLOOM_PX:.0f} px, about {100 * size:.0f} % of full scale "
             "leaks from each in all; how far it reaches is not measured, and with it the share is uncertain.",
         )  # fmt: skip
-        return Suspected(found, bloom, self.frames_of("bloom"), 255.0 * leak)
+        return Suspected(found, bloom, self.frames_of("bloom"), 255.0 * leak.mean(1))
 
 
 def _blur_px(product: float) -> float:

@@ -19,6 +19,8 @@ from stages.twin.reference import BlockSamples
 from stages.twin.scene import Ring
 
 _DIMS = ("window_dirt", "window_scatter", "droplet")
+_SURELY, _NEARLY_ALL = 2.0, 0.99
+"""σ by which a place must be brighter; largest share of the light that a photo is taken to lack."""
 SIDE_DEG = 90.0
 """Half the width of a side: a lamp lights at least half of the picture."""
 
@@ -26,12 +28,13 @@ SIDE_DEG = 90.0
 def separated_from_photo(
     found: Sequence[Mismatch], ring: Ring
 ) -> tuple[tuple[Mismatch, ...], tuple[Mismatch, ...]]:
-    """Return what is on the window, and unnamed places that dim ones may have left in the photo.
+    """Return what is on the window, and places that dim ones may have left in the photo.
 
-    The latter are brighter, by less than what is dim, and at its image azimuth.
+    The latter are brighter, by no more than a photo so dim would make them, and at its image azimuth. That
+    other light is mixed in, as by scatter, makes a dark stain of the photo brighter, too.
     """
     dim = [m for m in found if set(m.names) & set(_DIMS)]
-    left = [m for m in found if not m.name and any(_may_be_left_by(m, d, ring) for d in dim)]
+    left = [m for m in found if any(_may_be_left_by(m, d, ring) for d in dim if d is not m)]
     said = "{} But the photo may be darker there, as it was made through what lies at the same azimuth."
     withdrawn = tuple(replace(m, statement=said.format(m.statement)) for m in left)
     return tuple(m for m in found if m not in left), withdrawn
@@ -93,9 +96,18 @@ def _meets(found: Mismatch, change: Mismatch, samples: BlockSamples | None, ring
 
 
 def _may_be_left_by(bright: Mismatch, dim: Mismatch, ring: Ring) -> bool:
-    sizes = [next((p.value for p in m.parameters if p.name == "share"), 0.0) for m in (bright, dim)]
-    if not 0 < -sizes[0] < sizes[1]:
+    """Return whether a place is brighter, by no more than where its photo lacks what a dim place takes."""
+    taken, (more, sd) = _of(dim, "share"), _of(bright, "brighter")
+    if not bright.name:
+        more, sd = -_of(bright, "share")[0], _of(bright, "share")[1]
+    most = min(taken[0] + _SURELY * taken[1], _NEARLY_ALL)
+    if not 0 < more - _SURELY * sd < most / (1 - most):
         return False
     discs = [d for d in map(disc_of, (bright, dim)) if d is not None]
-    (one, wide), (other, more) = (d.around(ring.centre_px) for d in discs)
-    return abs(half_turn(one - other)) < wide + more
+    (one, wide), (other, reach) = (d.around(ring.centre_px) for d in discs)
+    return abs(half_turn(one - other)) < wide + reach
+
+
+def _of(found: Mismatch, name: str) -> tuple[float, float]:
+    """Return a figure of a mismatch and its 1 σ; 0 without it."""
+    return next(((p.value, p.sd) for p in found.parameters if p.name == name), (0.0, 0.0))

@@ -68,12 +68,13 @@ def fall_of_spot(sums: Float32, start: Float, beyond: float) -> FittedLaw:
     relative to that. The σ includes the changes when parts of the frames are left out, and the difference
     between the spot's middle and the fitted shape.
     """
-    frames, fall = np.arange(len(sums)), np.zeros(len(sums))
+    frames, fall, shown = np.arange(len(sums)), np.zeros(len(sums)), np.zeros(len(sums))
     whole = sums.sum(0)
     best = _fitted_spot(whole, start, beyond)
     for half in (frames % 2 == 0, frames % 2 == 1):
         shape = _spot(_fitted_spot(sums[half].sum(0), best[None], beyond), sums.shape[2:])
-        fall[~half] = (2 * shape * sums[~half, 0] - shape**2 * sums[~half, 1]).sum((1, 2))
+        cross, own = ((shape**k * sums[~half, k - 1]).sum((1, 2)) for k in (1, 2))
+        fall[~half], shown[~half] = 2 * cross - own, cross / np.maximum(own, 1e-9)
     parts = np.array_split(frames, min(PARTS, len(frames)))
     fits = np.array([_fitted_spot(whole - sums[p].sum(0), best[None], beyond) for p in parts])
     without = fits[:, 0] / (1 - fits[:, 5])
@@ -84,7 +85,7 @@ def fall_of_spot(sums: Float32, start: Float, beyond: float) -> FittedLaw:
     weight = max(float((middle * whole[1]).sum()), 1e-9)
     off = float((middle * (whole[0] - shape * whole[1])).sum()) / weight
     sd = float(np.hypot(np.hypot(spread, off), _OF_LIGHT))
-    return FittedLaw(fall, NamedFigure("share", float(best[0] / (1 - best[5])), sd))
+    return FittedLaw(fall, NamedFigure("share", float(best[0] / (1 - best[5])), sd), shown)
 
 
 def _spot(place: Float, shape: tuple[int, ...]) -> Float:

@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.arrays import Bool, Byte, Float, Float32, Int
+from pipeline.arrays import Bool, Float, Float32, Int
 from pipeline.artefacts.measured import RingSamples
 from pipeline.machine.stage import Context
 from pipeline.recording.base import Illumination, Recording
 from stages.twin.fixed_pattern import FixedPattern, fixed_pattern
 from stages.twin.lamp_light import LampLight, LampSamples
+from stages.twin.line_colour import FULL_SCALE, Coloured, line_colour
 from stages.twin.line_light import LineLight, LineSamples
 from stages.twin.noise import CameraNoise, black_and_white, photon_transfer, windows_of
 from stages.twin.scene import LitSight, Scene
@@ -23,8 +23,6 @@ _LEAST_LEVEL = 4.0
 """Grey levels above black below which lit wall is not used."""
 _USUAL_WIDTH_PX = 1.2
 _ZONES = 4
-_FULL_SCALE = 250
-"""Grey level of 255 from which a channel counts as clipped: coding changes clipped pixels by a few levels."""
 _MOST_CLIPPED = 0.25
 """Share of the line's middle: if a quarter of it is clipped to half of its light, an eighth is lost, which is
 half of the smallest sector loss that is named."""
@@ -35,6 +33,9 @@ _NOISE_FRAMES = 6
 _OUTSIDE_LEVEL, _EDGE_PX = 6.0, 8
 """Pixels that no lit frame shows brighter are outside the view; its border is as wide as the second number,
 px."""
+_RIM_PX = 2
+"""Rows and columns at each side of the picture that cameras and coders fill differently, px: the middle of a
+5 × 5 filter, as of demosaicing (H. Malvar et al., 2004), is that far from its rim."""
 
 
 @dataclass(frozen=True)
@@ -135,13 +136,14 @@ def sample_frames(recording: Recording, usable: Int, light: NDArray[np.str_], mo
 
 
 def estimate_state(
-    scene: Scene, sampled: list[Sampled], rings: RingSamples, context: Context
+    scene: Scene, sampled: list[Sampled], coloured: Coloured, rings: RingSamples, context: Context
 ) -> PhotometricState:
-    """Return the state that fits the sampled frames best."""
+    """Return the state that fits the sampled frames best; ``coloured`` are laser frames (H, W, 3)."""
     black, white = black_and_white([s.image for s in sampled])
     width = float(np.nanmedian(rings.width_px)) if np.isfinite(rings.width_px).any() else _USUAL_WIDTH_PX
     lamps = LampSamples(scene, black.value, white)
-    lines = LineSamples(scene, black.value, white, scene.probe.laser.line_sigma_mm, width)
+    colour = line_colour(scene, coloured, width)
+    lines = LineSamples(scene, black.value, white, scene.probe.laser.line_sigma_mm, width, colour)
     lit: list[tuple[Sampled, LitSight]] = []
     for done, s in enumerate(sampled):
         T_pc = scene.pose(s.frame)
@@ -164,7 +166,7 @@ def estimate_state(
     return PhotometricState(noise, lamp, line, at, sharpness, place_px, outside, edge, pattern=pattern)
 
 
-def clipped_line(scene: Scene, frames: Iterable[tuple[int, Byte | None]]) -> float:
+def clipped_line(scene: Scene, frames: Coloured) -> float:
     """Return the share of the line's middle at which its strongest channel is at full scale.
 
     ``frames`` yields numbers and colour pictures (H, W, 3). Their grey does not show it, because it continues
@@ -178,16 +180,16 @@ def clipped_line(scene: Scene, frames: Iterable[tuple[int, Byte | None]]) -> flo
         middle = np.abs(line.offset_px) < _USUAL_WIDTH_PX
         colour = image[line.row[middle], line.column[middle]]
         if len(colour):
-            found.append(float((colour[:, int(colour.mean(0).argmax())] >= _FULL_SCALE).mean()))
+            found.append(float((colour[:, int(colour.mean(0).argmax())] >= FULL_SCALE).mean()))
     return float(np.median(found)) if found else 0.0
 
 
-def clipped_pixels(frames: Iterable[tuple[int, Byte | None]]) -> dict[int, Bool]:
+def clipped_pixels(frames: Coloured) -> dict[int, Bool]:
     """Return, by frame number, the pixels (H, W) of colour pictures that have a channel at full scale."""
-    return {n: np.asarray((image >= _FULL_SCALE).any(-1)) for n, image in frames if image is not None}
+    return {n: np.asarray((image >= FULL_SCALE).any(-1)) for n, image in frames if image is not None}
 
 
-def black_of_photo(frames: Iterable[tuple[int, Byte | None]]) -> float:
+def black_of_photo(frames: Coloured) -> float:
     """Return the grey level of the darkest tenth of colour laser frames, which have the photo's range.
 
     NaN without any such frame.
@@ -198,10 +200,12 @@ def black_of_photo(frames: Iterable[tuple[int, Byte | None]]) -> float:
 
 
 def _view(lit: list[Float32], black: float, scene: Scene) -> tuple[Bool, Bool]:
-    """Return pixels that no lit frame shows, and pixels next to those."""
+    """Return pixels that no lit frame shows, and pixels next to those or to the rim of the picture."""
     valid = scene.polar[2]
+    rim = np.ones_like(valid)
+    rim[_RIM_PX:-_RIM_PX, _RIM_PX:-_RIM_PX] = False
     if not lit:
-        return ~valid, np.zeros_like(valid)
+        return ~valid, rim
     outside = (np.max(lit, 0) < black + _OUTSIDE_LEVEL) | ~valid
     # The dark middle of the pipe and dark wall are inside: only what is connected to the picture's corners is
     # outside.
@@ -210,7 +214,7 @@ def _view(lit: list[Float32], black: float, scene: Scene) -> tuple[Bool, Bool]:
     outside = np.isin(label, list(corners)) if count > 1 and corners else np.zeros_like(outside)
     kernel = np.ones((2 * _EDGE_PX + 1,) * 2, np.uint8)
     border = cv2.dilate(outside.astype(np.uint8), kernel) - cv2.erode(outside.astype(np.uint8), kernel)
-    return outside, border > 0
+    return outside, (border > 0) | rim
 
 
 @dataclass(frozen=True)

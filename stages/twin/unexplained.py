@@ -1,4 +1,4 @@
-"""Places of the image that are darker or brighter in all frames, and that no effect on the window explains.
+"""Places of the image that are darker or brighter in all frames, where no single effect is confirmed.
 
 A housing that shades a side nearly completely, for example, leaves hardly any photo behind it: frames show
 wall there that is many times as bright as its photo, and no dirt, scatter or drop makes that.
@@ -39,9 +39,9 @@ def unexplained(place: ImagePlace, samples: BlockSamples | None) -> Mismatch | N
     said = (
         f"About ({place.u_px:.0f}, {place.v_px:.0f}), within {place.radius_px:.0f} px, the image differs by "
         f"{100 * size:.0f} % (r.m.s.) from the re-rendered one, alike in the {len(frames)} compared frames "
-        "that could be judged there, whatever wall passes by. No dirt, scatter or drop explains it: a part "
-        "of the probe may shade the wall there, or light other than the lamps' falls on it, and the photo of "
-        "the wall was made through it, too."
+        "that could be judged there, whatever wall passes by. They confirm none of dirt, scatter and a drop "
+        "alone: several may be there, a part of the probe may shade the wall, or light other than the lamps' "
+        "falls on it, and the photo of the wall was made through it, too."
     )
     nan, look = float("nan"), Look(int(samples.number[0]), place.u_px, place.v_px, 4 * place.radius_px)
     change = NamedFigure("change", size, sd, "relative")

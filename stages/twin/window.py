@@ -18,6 +18,7 @@ from pipeline.artefacts.twin import Look, Mismatch, NamedFigure
 from stages.twin.cells import sigmas
 from stages.twin.locate import FALSE_ALARM, LEAST_CHANGE, ImagePlace
 from stages.twin.render import Region, TwinFrame
+from stages.twin.significance import ratio_over_frames
 from stages.twin.spot import PARTS, WIDEST_PX, FittedLaw, fall_of_spot
 
 _POWER_STEP, _ASIDE_PX = 0.4, 0.5
@@ -165,7 +166,18 @@ class WindowPlace:
             return None
         if name == "window_dirt":
             law = replace(law, size=_with_photo(law.size))
-        return self._mismatch([name, *rivals], law, chance)
+        found = self._mismatch([name, *rivals], law, chance)
+        if name != "window_scatter":
+            return found
+        return replace(found, parameters=(*found.parameters, self._brighter(spots[:, 0], (u, v, radius))))
+
+    def _brighter(self, dirt: Float32, place: tuple[float, float, float]) -> NamedFigure:
+        """Return by how much all of the place is brighter than its twin; ``dirt`` is (F, 2, h, w)."""
+        row, column = np.mgrid[: dirt.shape[2], : dirt.shape[3]]
+        inside = np.hypot(column - place[0], row - place[1]) < place[2]
+        cross, own = dirt[:, :, inside].sum(2, dtype=float).T
+        change, sd = ratio_over_frames(np.stack([-cross, own], 1), PARTS)
+        return NamedFigure("brighter", change, sd, "relative")
 
     def _likeliest(self, tried: Mapping[str, FittedLaw]) -> tuple[str, list[str]]:
         """Return the likeliest effect, and those that frames do not distinguish from it.

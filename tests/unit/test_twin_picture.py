@@ -38,7 +38,8 @@ def _moved(picture, random):
 
 
 def _bloomed(picture, random):
-    spot = 300 * np.exp(-0.5 * (((U - 160) / 12) ** 2 + ((V - 50) / 8) ** 2))
+    spots = (((U - u) / 12) ** 2 + ((V - v) / 8) ** 2 for u, v in ((160, 50), (250, 120)))
+    spot = sum(300 * np.exp(-0.5 * away) for away in spots)
     over = np.maximum(picture + spot - WHITE, 0).astype(np.float32)
     tail = np.exp(-np.abs(np.arange(-40, 41)) / 6.0)
     leaked = cv2.sepFilter2D(over, -1, np.ones(1), tail / tail.sum())
@@ -145,6 +146,17 @@ def test_bloom_is_found_along_columns_only():
     # Its σ was that from frame to frame, ± .005 beside a true .26, though its reach is only assumed.
     assert (bloom.name, leak.sd) == ("bloom", np.inf)
     assert "If it fades to 1/e over 6 px" in bloom.statement
+
+
+@pytest.mark.parametrize("at", [(1.3,), (1.3, 0.2), (0.2,)])
+def test_wet_streaks_along_the_pipe_that_clip_are_no_bloom(at):
+    """Streaks below the probe, which shone along the pipe, were "bloom of 52 % of full scale"."""
+
+    def wet(picture, random):
+        shine = sum(np.exp(-0.5 * ((PHI - a) * AWAY / 5) ** 2 - ((AWAY - 90) / 25) ** 2) for a in at)
+        return picture + 400 * shine
+
+    assert "bloom" not in named(wet)
 
 
 @pytest.mark.parametrize("leak", [0.0, 40.0])

@@ -1,5 +1,7 @@
 """Dirt that the photo contains as well is not reported a second time where frames show the wall beside it."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -34,6 +36,14 @@ def test_dirt_contained_in_the_photo_is_withdrawn_at_its_azimuth(bright, left):
     assert len(withdrawn) == left
     assert all("darker there" in m.statement for m in withdrawn)
     assert separated_from_photo((bright,), _RING) == ((bright,), ())
+
+
+@pytest.mark.parametrize(("brighter", "left"), [(0.3, True), (0.03, False), (0.9, False)])
+def test_a_dark_stain_of_the_photo_is_no_scatter(brighter, left):
+    """Beside dirt that took .6 of the light, its stain in the photo was "scatter of 86 %"."""
+    dust, stain = _place("window_dirt", 497.0, 468.0, 0.37), _place("window_scatter", 530.0, 513.0, 0.86)
+    stain = replace(stain, parameters=(*stain.parameters, NamedFigure("brighter", brighter, 0.02)))
+    assert len(separated_from_photo((dust, stain), _RING)[1]) == left
 
 
 @pytest.mark.parametrize(
