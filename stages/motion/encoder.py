@@ -121,25 +121,36 @@ def warn_of_unread(encoder: EncoderReadings, tracked: TrackedPoses, frames: Int,
     )
 
 
-def contradicted(encoder: EncoderReadings, tracked: TrackedPoses, context: Context) -> bool:
-    """Return whether the wall's texture shows another motion than the encoder; reported if so."""
-    if len(tracked.frames) < 2:
-        return False
+def contradicted(encoder: EncoderReadings, tracked: TrackedPoses) -> bool:
+    """Return whether the wall's texture shows another motion than the encoder."""
+    differs, judged = _differing_steps(encoder, tracked)
+    return bool(judged.sum() >= _LEAST_STEPS and differs[judged].mean() >= _CONTRADICTED)
+
+
+def warn_of_contradiction(
+    encoder: EncoderReadings, tracked: TrackedPoses, frames: Int, context: Context
+) -> None:
+    """Report an encoder that is not used, with the longest run of ``frames`` (N,) in which it differs."""
+    differs, judged = _differing_steps(encoder, tracked)
+    longest = max(runs_of(differs & judged), key=lambda run: run.stop - run.start)
+    first, last = frames[tracked.frames[[longest.start, longest.stop]]]
+    context.report("encoder left out", "the wall's texture contradicts it")
+    context.warn(
+        f"the encoder is not used: in {int(differs[judged].sum())} of {int(judged.sum())} steps, the longest "
+        f"run of them in frames {first} to {last}, the wall's texture shows another motion, so that distance "
+        "depends on the laser's baseline alone. What to do: check the encoder's scale and clock, and whether "
+        "its wheel slipped"
+    )
+
+
+def _differing_steps(encoder: EncoderReadings, tracked: TrackedPoses) -> tuple[Bool, Bool]:
+    """Return in which steps (L - 1,) between lit frames encoder and texture differ, and which are judged."""
     found = ~tracked.lost[1:] & ~tracked.lost[:-1]
     by_wall = np.diff(tracked.T_pc[:, 2, 3])
     by_encoder = np.diff(encoder.distance_mm[tracked.frames])
     least_mm = max(_DIFFERENCE_MM, _COARSE * encoder.sigma_mm)
     differs = np.abs(by_encoder - by_wall) > np.maximum(least_mm, _CONTRADICTED * np.abs(by_wall))
-    judged = found & encoder.known[tracked.frames][1:]
-    if judged.sum() < _LEAST_STEPS or differs[judged].mean() < _CONTRADICTED:
-        return False
-    context.report("encoder left out", "the wall's texture contradicts it")
-    context.warn(
-        f"the encoder is not used: in {int(differs[judged].sum())} of {int(judged.sum())} steps the wall's "
-        "texture shows another motion, so that distance depends on the laser's baseline alone. What to do: "
-        "check the encoder's scale and clock, and whether its wheel slipped"
-    )
-    return True
+    return differs, found & encoder.known[tracked.frames][1:]
 
 
 def _without_held(time_s: Float, distance_mm: Float) -> tuple[Float, Float]:

@@ -13,6 +13,7 @@ from pipeline.instrument.probe import Probe
 from pipeline.machine.stage import Context
 from pipeline.recording.base import Recording
 from stages.motion.bore import Bore, warn_of_steps
+from stages.motion.bundle_adjustment.encoder_delay import in_step_with_wall
 from stages.motion.bundle_adjustment.laser_knock import find_jump, texture_breaks
 from stages.motion.encoder import (
     EncoderReadings,
@@ -104,9 +105,9 @@ def _tracked(
     if encoder is not None and times is not recording.frames.time_s:
         recording = replace(recording, frames=replace(recording.frames, time_s=times))
         encoder = encoder_at_frames(recording, parameters.encoder_sigma_mm, far_mm, context)
-    if encoder is not None and contradicted(encoder, texture.poses, context):
-        encoder = None
-        texture, predictor = _track(view, circles, None, parameters, context)
+    if encoder is not None and contradicted(encoder, texture.poses):
+        encoder = in_step_with_wall(encoder, texture.poses, recording.frames, context)
+        texture, predictor = _track(view, circles, encoder, parameters, context)
     if encoder is not None:
         warn_of_unread(encoder, texture.poses, recording.frames.frame, context)
     _require_distance(texture.poses, encoder)

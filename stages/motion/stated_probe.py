@@ -23,9 +23,11 @@ TOO_FAR = 5.0
 """σ of a contradiction that is warned of. By independent Gaussian errors a correct probe is contradicted as
 much along one of its ten or so directions once in 10⁵ recordings; by errors that matches share, more
 often: how often is not known."""
-_NO_EVIDENCE = 1e-6
-"""Share of a direction's stated variance below which its reduction is rounding: there a move counts in stated
-σ."""
+_NO_EVIDENCE = 1e-4
+"""Share of a direction's stated variance below which its reduction is no evidence, and a move counts in
+stated σ: there 5 σ would be a change of 500 stated σ that moves the probe by .05 of one, about what the
+adjustment's end leaves undone (`solver.CLOSELY`). A move by .011 σ, at a share of 5e-6, contradicted a
+correct probe by 5.3 σ."""
 _RING = 72
 """Points around the pipe at which its radius is computed, 5° apart, as for a calibration's errors
 elsewhere."""

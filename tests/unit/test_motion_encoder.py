@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from pipeline.recording.base import Encoder, FrameTable
+from stages.motion.bundle_adjustment.encoder_delay import in_step_with_wall
 from stages.motion.encoder import EncoderReadings, contradicted, encoder_at_frames, warn_of_unread
 from stages.motion.tracking.landmarks import TrackedPoses
 from tests.quiet import quiet_context
@@ -158,17 +159,47 @@ def test_texture_contradicts_a_reversed_or_stuck_encoder_but_not_a_true_one() ->
     true = EncoderReadings(z / 1.002, 0.015, np.ones(FRAMES, bool))
     for distance, expected in ((true.distance_mm, False), (-true.distance_mm, True), (0 * z, True)):
         said = EncoderReadings(distance, 0.015, true.known)
-        assert contradicted(said, tracked(z), quiet_context()) is expected
+        assert contradicted(said, tracked(z)) is expected
 
 
 def test_a_coarse_counter_does_not_contradict_the_wall() -> None:
     z = SPEED * np.arange(FRAMES) / RATE
     coarse = EncoderReadings(5 * np.round(z / 5), 5 / np.sqrt(12), np.ones(FRAMES, bool))
-    assert not contradicted(coarse, tracked(z), quiet_context())
+    assert not contradicted(coarse, tracked(z))
 
 
 def test_texture_lost_in_most_frames_does_not_contradict_the_encoder() -> None:
     z = SPEED * np.arange(FRAMES) / RATE
     tracks = tracked(0 * z)
     tracks.lost[2:] = True
-    assert not contradicted(EncoderReadings(z, 0.015, np.ones(FRAMES, bool)), tracks, quiet_context())
+    assert not contradicted(EncoderReadings(z, 0.015, np.ones(FRAMES, bool)), tracks)
+
+
+def in_step(distance_mm: np.ndarray, z: np.ndarray) -> tuple[EncoderReadings | None, list[str]]:
+    """Return the readings that agree with a wall seen at z (N,), and the warnings."""
+    words: list[str] = []
+    said = EncoderReadings(distance_mm - distance_mm[0], 0.1, np.ones(FRAMES, bool))
+    frames, context = recorded(*clean()).frames, replace(quiet_context(), warn=words.append)
+    assert contradicted(said, tracked(z))
+    return in_step_with_wall(said, tracked(z), frames, context), words
+
+
+def test_an_encoder_of_a_hand_pulled_probe_is_used_though_its_clock_is_late() -> None:
+    """It was thrown away, since stops of texture and encoder did not coincide; only its clock was wrong."""
+    time_s = np.arange(FRAMES) / RATE
+    way = lambda t: 20 * (t - np.sin(2 * np.pi * 1.3 * t + 0.4) / (2 * np.pi * 1.3))  # noqa: E731
+    found, words = in_step(way(time_s - 0.3), way(time_s))
+    assert found is not None
+    assert len(words) == 1
+    assert "0.30" in words[0]
+    assert "late" in words[0]
+    inside = found.known
+    off = found.distance_mm[inside] - way(time_s)[inside]
+    assert np.ptp(off) < 0.3
+
+
+def test_an_encoder_that_stands_is_not_used_and_its_frames_are_named() -> None:
+    way = SPEED * np.arange(FRAMES) / RATE
+    found, words = in_step(np.where(np.arange(FRAMES) < 20, way, np.maximum(way[20], way - 12.0)), way)
+    assert found is None
+    assert "in frames 20 to" in words[0]

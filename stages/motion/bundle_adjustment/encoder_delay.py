@@ -16,10 +16,12 @@ from pipeline.adjustment.robust import Cauchy, GemanMcClure
 from pipeline.arrays import Float
 from pipeline.geometry.axis import distance_along
 from pipeline.machine.stage import Context
+from pipeline.recording.base import FrameTable
 from stages.motion.bundle_adjustment.equations import Measurements
 from stages.motion.bundle_adjustment.solver import Estimate
 from stages.motion.bundle_adjustment.unknowns import ENCODER_SCALE
-from stages.motion.encoder import EncoderReadings
+from stages.motion.encoder import EncoderReadings, contradicted, warn_of_contradiction
+from stages.motion.tracking.landmarks import TrackedPoses
 
 _LONGEST_S = 1.0
 """Longest delay tried: an encoder that is off by more than a second shows another motion and is left out
@@ -83,6 +85,25 @@ class EncoderDelay:
             "the motion in the pictures; this is corrected. What to do: synchronise the clocks, or correct "
             "time_s"
         )
+
+
+def in_step_with_wall(
+    encoder: EncoderReadings, tracked: TrackedPoses, frames: FrameTable, context: Context
+) -> EncoderReadings | None:
+    """Return readings that agree with the wall's motion once their clock is corrected, or None; warn of both.
+
+    A clock that is late by more than the time in which the probe starts and stops shows another motion in
+    most steps, though nothing else is wrong with the encoder.
+    """
+    at_mm = np.interp(np.arange(len(frames.time_s)), tracked.frames, tracked.T_pc[:, 2, 3])
+    delay = find_delay(frames.time_s, at_mm, encoder)
+    if delay is not None and delay.matters:
+        corrected = delay.corrected(encoder, frames.time_s)
+        if not contradicted(corrected, tracked):
+            delay.warn(context)
+            return corrected
+    warn_of_contradiction(encoder, tracked, frames.frame, context)
+    return None
 
 
 def delay_of_encoder(estimate: Estimate, measured: Measurements) -> EncoderDelay | None:
