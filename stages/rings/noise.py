@@ -43,7 +43,7 @@ def noise_response(image: Image, sectors: Sectors, fit: ProfileFit, guess: Respo
     if not used.any():
         return guess
     level = (np.arange(_BINS) + 0.5)[used] * _BIN_LEVELS
-    variance = (_ABSOLUTE_TO_SIGMA * total[used] / count[used]) ** 2
+    variance = np.maximum((_ABSOLUTE_TO_SIGMA * total[used] / count[used]) ** 2, QUANTISATION_VARIANCE)
     design = np.stack([np.ones_like(level), level], 1) / variance[:, None]
     dark, per_level = nnls(design, np.ones_like(level))[0]
     return guess._replace(

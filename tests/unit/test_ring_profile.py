@@ -6,9 +6,9 @@ from scipy.optimize import least_squares
 
 from pipeline.recording.one_field import even_rows
 from stages.rings.kernels import bell
-from stages.rings.noise import noise_response
+from stages.rings.noise import QUANTISATION_VARIANCE, noise_response
 from stages.rings.picture import Mixture
-from stages.rings.profile import WINDOW_WIDTHS, Response, fit_line
+from stages.rings.profile import WINDOW_WIDTHS, ProfileFit, Response, fit_line
 from stages.rings.sectors import cut_sectors
 from stages.rings.sectors import with_even_rows_taken as one_field
 from tests.ring_images import exposed, off_centre, ring_light
@@ -176,3 +176,12 @@ def test_sectors_that_are_left_out_do_not_change_the_fit_of_the_others(sectors):
     every, few = (fit_line(image, sectors, seed_px, WIDTH, response, n).radius_px for n in (1, 5))
     assert np.array_equal(few[::5], every[::5])
     assert np.isfinite(few).sum() == np.isfinite(every[::5]).sum() > 100
+
+
+def test_a_picture_that_a_codec_left_without_noise_has_that_of_rounding(sectors):
+    """Where the laser was off for a while, the stage ended with "array must not contain infs or NaNs"."""
+    dark = np.full(SIZE[::-1], 3, np.uint8)
+    radius, width, none, level = (np.full(AZIMUTHS, v) for v in (100.0, WIDTH, 0.0, 3.0))
+    fit = ProfileFit(radius, width, none, level, *(none,) * 6)
+    found = noise_response(dark, sectors, fit, Response(0.0, 1.0, 0.0, np.inf))
+    assert 1 <= (found.variance + 4 * found.variance_per_level) / QUANTISATION_VARIANCE < 2.1
