@@ -33,10 +33,11 @@ from stages.diagnose.drill.score import Trial, figures, shuffled
 from stages.diagnose.effects.base import EffectModel
 from stages.diagnose.effects.courses import Coursed, with_courses
 from stages.diagnose.effects.library import LIBRARY, without
-from stages.diagnose.gauge.examine import Examined, examine
+from stages.diagnose.gauge.examine import OF_A_PIPE, Examined, examine
 from stages.diagnose.gauge.scan import scan
 from stages.diagnose.inference import stated_belief
 from stages.diagnose.travel.evidence import TravelEvidence
+from tests.benchmarks.identifiable import ideal_chances
 from tests.benchmarks.ring_level import ring_level_run
 from tests.benchmarks.ring_level_cases import Drawn, Mode, drawn
 from tests.benchmarks.ring_level_figures import more_figures
@@ -74,8 +75,13 @@ def diagnosed(case: Drawn, left_out: Sequence[str]) -> dict[str, Any]:
     if left_out and geometry is not None:
         # The oracle knows the name and fits only its effect.
         travel = gauge_travel(simulated.recording, simulated.measured, geometry.searched.found.state)
-    snr = [oracle_snr(s, geometry, travel, stated) for s in case.switches]
-    return {"answer": answer, "snr": snr, "expected": geometry.expected if geometry is not None else None}
+    told = {"answer": answer, "snr": [oracle_snr(s, geometry, travel, stated) for s in case.switches]}
+    if geometry is None:
+        return told | {"expected": None}
+    if len(case.switches) > 1 and not left_out:
+        straight = {n: m for n, m in of_positions(LIBRARY).items() if n not in OF_A_PIPE}
+        told["ideal"] = ideal_chances(case.switches, geometry.searched, straight, stated_belief(stated))
+    return told | {"expected": geometry.expected}
 
 
 def oracle_snr(

@@ -16,6 +16,7 @@ from pipeline.physics.effect import CourseKind
 from stages.diagnose.channels import TRAVEL_EFFECTS
 from stages.diagnose.drill.score import SNR, Rate, Trial, rate
 from stages.diagnose.effects.library import LIBRARY
+from stages.diagnose.inference import SURE
 
 Line = dict[str, Any]
 # Largest error of a step's time that counts as found.
@@ -85,14 +86,20 @@ def _of_each(cases: Sequence[tuple[Line, Trial]]) -> Iterator[str]:
     """Yield precision and recall of single names where several effects are concealed."""
     right, said = sum(len(t.right) for _, t in cases), sum(len(t.given) for _, t in cases)
     recalled = [
-        any(found is c for _, found in t.right)
+        (any(found is c for _, found in t.right), ideal)
         for line, t in cases
-        for c, snr in zip(t.concealed, line["snr"], strict=True)
+        for c, snr, ideal in zip(
+            t.concealed, line["snr"], line.get("ideal", [None] * len(t.concealed)), strict=True
+        )
         if snr is not None and snr >= SNR
     ]
     if cases:
         yield f"several effects, {len(cases)} cases: names that are right {_words(Rate(right, said))}"
-        yield f"several effects: of those at SNR ≥ {SNR:g} named {_words(rate(recalled))}"
+        yield f"several effects: of those at SNR ≥ {SNR:g} named {_words(rate(hit for hit, _ in recalled))}"
+        at_best = [(hit, p > SURE) for hit, p in recalled if p is not None]
+        yield f"of these, could be named (rings, fiducials) {_words(rate(able for _, able in at_best))}"
+        yield f"of those that could be named, named {_words(rate(hit for hit, able in at_best if able))}"
+        yield f"of those that could not, named {_words(rate(hit for hit, able in at_best if not able))}"
 
 
 def _law(name: str) -> str:
