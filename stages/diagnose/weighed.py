@@ -11,13 +11,12 @@ from math import prod
 from stages.diagnose.causes import NONE, Cause, Causes, CourseShare
 from stages.diagnose.claims import Claim
 from stages.diagnose.effects.nameless import Nameless
-from stages.diagnose.gauge.doubts import Doubt, doubts
+from stages.diagnose.gauge.doubts import doubts
 from stages.diagnose.gauge.examine import OF_A_PIPE, Examined
 from stages.diagnose.gauge.judge import Verdicts
 from stages.diagnose.gauge.run import Term
 from stages.diagnose.gauge.sets import LawAndOrder, cause_of
 
-_CERTAIN = Doubt({})
 # In place of a law's name: a cause that the library does not have, or measurements that do not agree.
 _OUTSIDE = ""
 # Sets of a smaller share are left out: nothing that is shown depends on them.
@@ -48,7 +47,7 @@ def _of_rings(examined: Examined) -> Causes:
     each = zip(best.library_terms, doubts(examined), strict=False)
     doubt = {cause_of(t.model, t.shape): one for t, one in each}
     table = _table(verdicts, doubt)
-    chance, courses = defaultdict[str, float](float), _courses(table, doubt)
+    chance, courses = defaultdict[str, float](float), _courses(table)
     for one in table:
         for name, share in one.names.items():
             chance[name] += one.probability * share
@@ -75,40 +74,35 @@ class _Weighed:
     names: dict[str, float]
 
 
-def _table(verdicts: Verdicts, doubt: Mapping[LawAndOrder, Doubt]) -> list[_Weighed]:
+def _table(verdicts: Verdicts, doubt: Mapping[LawAndOrder, float]) -> list[_Weighed]:
     """Return all sets, each likelier by the odds of what may be in its effects' places."""
     sets = []
     for p, every in verdicts.sets:
         terms = tuple(t for t in every if not isinstance(t.model, Nameless))
-        each = {cause: doubt.get(cause, _CERTAIN) for cause in (cause_of(t.model, t.shape) for t in terms)}
-        weight = p * prod(1 + d.odds for d in each.values())
+        each = {cause: doubt.get(cause, 0.0) for cause in (cause_of(t.model, t.shape) for t in terms)}
+        weight = p * prod(1 + odds for odds in each.values())
         sets.append(_Weighed(weight, terms, _names(each, patterned=len(terms) < len(every))))
     total = sum(s.probability for s in sets)
     return [replace(s, probability=s.probability / total) for s in sets if s.probability > _LEAST * total]
 
 
-def _names(each: Mapping[LawAndOrder, Doubt], patterned: bool) -> dict[str, float]:
+def _names(each: Mapping[LawAndOrder, float], patterned: bool) -> dict[str, float]:
     """Return the names that may be in a set's places, which are independent, with their probabilities."""
     missing = {_OUTSIDE: 0.0 if patterned else 1.0}
-    for (law, _), doubt in each.items():
-        for name, odds in {law: 1.0, _OUTSIDE: doubt.outside, **doubt.alike}.items():
-            missing[name] = missing.get(name, 1.0) * (1 - odds / (1 + doubt.odds))
+    for (law, _), odds in each.items():
+        for name, share in ((law, 1.0), (_OUTSIDE, odds)):
+            missing[name] = missing.get(name, 1.0) * (1 - share / (1 + odds))
     return {name: 1 - p for name, p in missing.items()}
 
 
-def _courses(
-    table: Sequence[_Weighed], doubt: Mapping[LawAndOrder, Doubt]
-) -> dict[str, tuple[CourseShare, ...]]:
+def _courses(table: Sequence[_Weighed]) -> dict[str, tuple[CourseShare, ...]]:
     """Return each law's courses, or sets of courses and orders, the likeliest first.
 
-    The words are those of the likeliest set with them. Those of a law that looks like another effect are of
-    sets without that effect: beside it, the law has the size of what is left over.
+    The words are those of the likeliest set with them.
     """
     found = dict[str, dict[object, list[tuple[float, CourseShare]]]]()
     for one in table:
-        causes = {cause_of(t.model, t.shape) for t in one.terms}
-        left_over = {name for cause in causes & doubt.keys() for name in doubt[cause].alike}
-        for law in {t.model.law for t in one.terms} - left_over:
+        for law in {t.model.law for t in one.terms}:
             same = [t for t in one.terms if t.model.law == law]
             kinds = " and ".join(sorted({str(t.model.kind) for t in same}))
             words = " ".join(t.model.statement(t.shape, t.amplitude) for t in same)

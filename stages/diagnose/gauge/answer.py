@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from itertools import chain
 
 import numpy as np
 
@@ -13,7 +12,7 @@ from stages.diagnose.agreement import TELLING
 from stages.diagnose.effects.courses import Coursed, Drifting
 from stages.diagnose.effects.library import LIBRARY, ring_shift_px
 from stages.diagnose.gauge.confirm import Sized, course_of, quantities
-from stages.diagnose.gauge.doubts import better_held_out, chances, fits, sure
+from stages.diagnose.gauge.doubts import chances, fits, sure
 from stages.diagnose.gauge.examine import Examined
 from stages.diagnose.gauge.formula import ADEQUATE
 from stages.diagnose.gauge.judge import Verdicts
@@ -167,13 +166,12 @@ def candidates(examined: Examined) -> tuple[Candidate, ...]:
 
 
 def members(examined: Examined) -> tuple[str, ...]:
-    """Return the names that cannot be excluded, by these measurements or by what they are able to show."""
+    """Return the names that cannot be excluded."""
     verdicts, best = examined.verdicts, examined.best
     if verdicts is None or best is None:
         return ()
     certain = {t.model.law for t, is_sure in zip(best.library_terms, sure(examined), strict=False) if is_sure}
-    names = (*verdicts.likely_laws(SURE), *chain(*(j.laws for j in better_held_out(verdicts))))
-    return tuple(n for n in dict.fromkeys(names) if n not in certain)
+    return tuple(n for n in verdicts.likely_laws(SURE) if n not in certain)
 
 
 def formula(examined: Examined) -> str:

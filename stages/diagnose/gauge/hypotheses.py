@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -37,14 +37,11 @@ class Instead:
         probability of all sets that contain it.
     nameless, named : float
         Probability of all sets of patterns alone, each counted once, and of all with other names.
-    laws : dict of str to float
-        Probability of all sets with each other law.
     """
 
     patterns: dict[str, float]
     nameless: float
     named: float
-    laws: dict[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -76,11 +73,6 @@ class Judged:
     def names(self) -> tuple[str, ...]:
         """Names of the effects, in order."""
         return tuple(sorted(t.model.name for t in self.fit.terms))
-
-    @property
-    def laws(self) -> tuple[str, ...]:
-        """Names of the effects' laws, in order."""
-        return tuple(sorted({t.model.law for t in self.fit.terms}))
 
     @property
     def library_terms(self) -> tuple[Term, ...]:

@@ -133,7 +133,7 @@ class Verdicts:
 
     def instead_of(self, term: Term) -> Instead:
         """Return the hypotheses without a term's law that explain the run otherwise."""
-        cause, found, laws = cause_of(term.model, term.shape), Counter[str](), Counter[str]()
+        cause, found = cause_of(term.model, term.shape), Counter[str]()
         of_patterns, of_names = 0.0, 0.0
         for p, causes, _, patterns in self._each():
             if cause in causes:
@@ -141,8 +141,7 @@ class Verdicts:
             of_names += p if causes else 0.0
             of_patterns += p if patterns and not causes else 0.0
             found.update(dict.fromkeys(() if causes else patterns, p))
-            laws.update(dict.fromkeys((law for law, _ in causes), p))
-        return Instead(dict(found.most_common()), of_patterns, of_names, dict(laws))
+        return Instead(dict(found.most_common()), of_patterns, of_names)
 
     def _each(self) -> Iterator[tuple[float, set[LawAndOrder], set[str], set[str]]]:
         """Yield every hypothesis' probability, its causes, its effects' names, and its patterns' formulas."""
