@@ -35,7 +35,7 @@ from stages.premises.labels import (
 from stages.premises.light import Light, rhythm_of
 from stages.premises.losses import Steps, row_times, rows_by_motion, steps_of_wall, sway_of_line
 from stages.premises.order import behind_the_end, off_the_pipe, out_of_order
-from stages.premises.pictures import Pictures, examine_pictures
+from stages.premises.pictures import CLOSED, Pictures, examine_pictures
 from stages.premises.repeats import best_followed, copies, rows_that_follow_encoder
 from stages.premises.scale import (
     check_diameter,
@@ -142,7 +142,9 @@ def _seen(recording: Recording, probe: Probe, pictures: Pictures, context: Conte
     astray = out_of_order(pictures, np.where(outside, Light.UNKNOWN, light))
     in_order = np.where(astray | outside, Light.UNKNOWN, light)
     shown = in_order if np.any(in_order == Light.WALL) else stated
-    stays = find_static_places(recording, probe, frames.frame[shown == Light.WALL], context)
+    closed = pictures.line_px[pictures.closed > CLOSED]
+    line_px = np.median(closed, axis=0).astype(float) if len(closed) else None
+    stays = find_static_places(recording, probe, frames.frame[shown == Light.WALL], context, line_px)
     if stays is not None:
         pictures = examine_pictures(recording, probe, context, stays)
     return _Seen(pictures, light, in_order, shown, outside, astray, stays)
@@ -218,6 +220,6 @@ def _report(pictures: Pictures, radius_mm: float, changes: Changes, context: Con
 
 
 PREMISES = Stage(
-    "premises", "41", PremisesParameters, check_premises,
+    "premises", "42", PremisesParameters, check_premises,
     "stated lights, times, encoder and diameter compared with the pictures and corrected",
 )  # fmt: skip

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from pipeline.arrays import Bool, Byte, Float32, Image, Int
+from pipeline.arrays import Bool, Byte, Float, Float32, Image, Int
 from pipeline.instrument.camera import Camera
 from pipeline.instrument.laser import LaserSheet
 from pipeline.instrument.probe import Probe
@@ -54,20 +54,26 @@ _WORTH_A_WORD = 0.01
 """Least share of the wall's picture that is reported: no open recording has any."""
 
 
-def find_static_places(recording: Recording, probe: Probe, lit: Int, context: Context) -> Bool | None:
+def find_static_places(
+    recording: Recording, probe: Probe, lit: Int, context: Context, line_px: Float | None = None
+) -> Bool | None:
     """Return where something stays (h, w), on the picture reduced by a whole factor, or None; warn of it.
 
     Parameters
     ----------
     lit : (N,) int
         Frames that show the wall; with the laser on, the colour channel that its light reaches least is used.
+    line_px : (R,) float
+        Usual radius of the laser line on rays of equal spacing from -π on. The line stays too where the laser
+        is on in lit pictures: it is left out of the warning.
     """
     both = bool(np.any(recording.frames.illumination == Illumination.BOTH.value))
     wall, channel = _wall_in(probe.camera), darkest_channel(probe.laser)
     few = recording.read(lit[:: max(-(-len(lit) // _LOOKED_AT), 1)], "bgr" if both else "grey")
     seen = (image for _, image in few if image is not None)
     places = static_places((np.ascontiguousarray(i[..., channel]) for i in seen) if both else seen, wall)
-    share = float(places.sum() / max(wall.sum(), 1))
+    told = places & ~_on_line(probe.camera, line_px, wall) if both and line_px is not None else places
+    share = float(told.sum() / max(wall.sum(), 1))
     context.report("picture that stays while the wall moves", 100 * share, "%")
     if share > _WORTH_A_WORD:
         context.warn(
@@ -76,6 +82,16 @@ def find_static_places(recording: Recording, probe: Probe, lit: Int, context: Co
             "not use it, but it hides the wall. What to do: switch the text off, clean the window"
         )
     return places if places.any() else None
+
+
+def _on_line(camera: Camera, line_px: Float, wall: Bool) -> Bool:
+    """Return where (h, w) a laser line of radius (R,) may be taken for something that stays."""
+    by = camera.image_size[1] // wall.shape[0]
+    v, u = np.mgrid[: wall.shape[0], : wall.shape[1]]
+    x, y = (u + 0.5) * by - 0.5 - camera.centre_px[0], (v + 0.5) * by - 0.5 - camera.centre_px[1]
+    rays = np.linspace(-np.pi, np.pi, len(line_px), endpoint=False)
+    line = np.interp(np.arctan2(y, x), rays, line_px, period=2 * np.pi)
+    return np.asarray(np.abs(np.hypot(x, y) - line) < (_BOX + _GAP) * min(wall.shape) * by)
 
 
 def in_full(stays: Bool | None, image_size: tuple[int, int]) -> Byte | None:

@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import cv2
 import numpy as np
 import pytest
 
 from pipeline.arrays import Float32, Image
-from stages.premises.stays import static_places
+from pipeline.instrument.camera.fisheye import KannalaBrandt
+from pipeline.instrument.laser import LaserSheet
+from pipeline.instrument.probe import Probe
+from stages.premises.stays import find_static_places, static_places
+from tests.quiet import quiet_context
+from tests.ring_images import memory_recording
 
 WALL = np.hypot(*(np.mgrid[:150, :200] - np.array([74.5, 99.5])[:, None, None])) < 70
 SIGN = (slice(30, 46), slice(60, 140))
@@ -62,3 +69,18 @@ def test_where_more_stays_than_moves_nothing_is_masked() -> None:
     still = passing(step_px=0, noise=0.0)[0]
     pictures = [np.where(np.arange(200) < 140, still, p).astype(np.uint8) for p in passing(step_px=9)]
     assert not static_places(pictures, WALL).any()
+
+
+def test_the_line_of_a_laser_that_is_on_in_lit_pictures_is_no_dirt() -> None:
+    """The line of a run with both lights was called burnt-in text, a logo or dirt: 9.6 % of the wall."""
+    pictures = [cv2.circle(p, (100, 75), 60, 250, 2) for p in passing()]
+    recording = memory_recording(dict(enumerate(pictures)), ["both"] * len(pictures), (200, 150))
+    camera = KannalaBrandt((200, 150), (60.0, 60.0), (100.0, 75.0))
+    probe, told = Probe(camera, LaserSheet(22.0), np.zeros((20, 20))), list[str]()
+    context = replace(quiet_context(), warn=told.append)
+    for line_px, warned in ((None, True), (np.full(72, 60.0), False)):
+        told.clear()
+        places = find_static_places(recording, probe, recording.frames.frame, context, line_px)
+        assert places is not None
+        assert places[75 + 60, 100], "motion does not use it"
+        assert bool(told) is warned
