@@ -70,6 +70,26 @@ def third_difference_sigma(T_pc: Float, time_s: Float, known: Int) -> Float:
     )
 
 
+def local_third_difference_sigma(T_pc: Float, time_s: Float, known: Int) -> Float:
+    """Return the 1 σ (N − 3, 6) of each third difference, mm and rad: as a rule, or as the poses around show.
+
+    It is that of `third_difference_sigma`, or what the known frames whose span covers a part of the
+    difference show, if that is larger. A probe that is pulled faster, stops, or turns back jerks a hundred
+    times as much as in steady motion: with one 1 σ for the whole run, the prior outweighs the measurements
+    of these frames, which then count as outliers.
+    """
+    as_a_rule = third_difference_sigma(T_pc, time_s, known)
+    out = np.tile(as_a_rule, (max(len(T_pc) - 3, 0), 1))
+    if len(known) < _FEWEST_FRAMES:
+        return out
+    growth = third_difference_growth(float(np.median(np.diff(known))))
+    shown = np.abs(_third_difference_of_poses(T_pc, time_s, known, 1)) / growth
+    for first, last, own in zip(known[:-3], known[3:], shown, strict=True):
+        covered = slice(max(first - 2, 0), last)
+        out[covered] = np.maximum(out[covered], own)
+    return out
+
+
 def trembling(T_pc: Float, time_s: Float, known: Int) -> Float:
     """Return the 1 σ (6,) of position, mm, and turn, rad, that changes independently from frame to frame.
 

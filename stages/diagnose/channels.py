@@ -25,7 +25,7 @@ from stages.diagnose.field.run import Adjusted, FieldRun, field_run
 from stages.diagnose.gauge.examine import Examined, examine
 from stages.diagnose.profile.evidence import ProfileEvidence, profile_evidence
 from stages.diagnose.travel.evidence import TravelEvidence, travel_evidence
-from stages.diagnose.travel.sight import PLACED_SIGMA_MM, sight_of_poses
+from stages.diagnose.travel.sight import PLACED_SIGMA_MM, place_sigma_mm, sight_of_poses
 from stages.motion import MotionParameters
 
 _MOST_OF_RING = 0.5
@@ -40,8 +40,8 @@ def gauge_travel(
 ) -> TravelEvidence:
     """Return what the motion and the encoder of a gauge run show.
 
-    Only frames with fiducials count: these determine the camera's pose to a few µm, so that the encoder, of
-    low weight in the adjustment, has no influence. The scale is that of the fiducials' stated places.
+    Only frames whose own fiducials determine the camera's place count: the encoder, of low weight in the
+    adjustment, has no influence on them. The scale is that of the fiducials' stated places.
 
     Parameters
     ----------
@@ -54,8 +54,10 @@ def gauge_travel(
     # Markers of one row were placed together and share an error: rows count as independent, not markers.
     places = np.unique([round(m.distance_mm, 1) for m in fiducials.markers]) if fiducials else np.zeros(1)
     spread = float(np.sqrt(np.sum((places - places.mean()) ** 2)))
-    sight = sight_of_poses(recording, state.T_pc, run.posed, PLACED_SIGMA_MM / max(spread, 1.0))
-    span = slice(int(run.posed[0]), int(run.posed[-1]) + 1)
+    placed = run.posed[place_sigma_mm(state, run.measured.edges)[run.posed] < PLACED_SIGMA_MM]
+    sight = sight_of_poses(recording, state.T_pc, placed, PLACED_SIGMA_MM / max(spread, 1.0))
+    ends = placed if len(placed) else np.array([0, len(state.T_pc) - 1])
+    span = slice(int(ends[0]), int(ends[-1]) + 1)
     return travel_evidence(
         "gauge", recording, sight, state.T_pc[span], state.stated.encoder_scale_sigma, _shown(run)[span],
         without,

@@ -17,7 +17,7 @@ import numpy as np
 from pydantic import Field
 from threadpoolctl import threadpool_limits
 
-from pipeline.adjustment.motion_priors import third_difference_sigma
+from pipeline.adjustment.motion_priors import local_third_difference_sigma
 from pipeline.arrays import Float, Int
 from pipeline.artefacts.measured import RingSamples
 from pipeline.artefacts.twin import GaugeTwin
@@ -175,7 +175,7 @@ def scene_with(
     # One unknown without effect: the adjustment may move poses and fiducials, but not the instrument.
     state = replace(start, instrument=np.zeros(1), unsure=np.zeros((len(start.stated.parameters), 1)))
     no_rings = run.measured.rings.select(np.zeros(len(run.measured.rings.frame), bool))
-    smooth = third_difference_sigma(start.T_pc, run.measured.time_s, run.posed)
+    smooth = local_third_difference_sigma(start.T_pc, run.measured.time_s, run.posed)
     measured = replace(run.measured, rings=no_rings, smooth_sigma=smooth)
     edges = run.measured.edges
     for _ in range(_PLACE_ROUNDS):
@@ -239,7 +239,7 @@ def _rms(displacement_px: Float) -> float:
 
 GAUGE_LINE = Stage(
     "gauge_line",
-    "2",
+    "3",
     GaugeLineParameters,
     compare_gauge_line,
     "the line of a gauge run beside the same line, re-rendered with what was diagnosed",

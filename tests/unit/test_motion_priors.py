@@ -8,6 +8,7 @@ import pytest
 from pipeline.adjustment.motion_priors import (
     LOOSE,
     jerking_sigma,
+    local_third_difference_sigma,
     slip_drift_rows,
     smooth_motion_rows,
     third_difference_growth,
@@ -162,3 +163,20 @@ def test_drift_is_the_change_of_slip_and_jumps_have_little_weight() -> None:
     np.testing.assert_allclose(rows.residual, np.diff(slip))
     np.testing.assert_allclose(np.einsum("mfi,mf->m", rows.by_frame, slip[rows.frame]), np.diff(slip))
     assert rows.weight[2] < 1e-3 * rows.weight[0]
+
+
+def test_a_jerk_is_allowed_for_where_known_frames_show_it_and_nowhere_else() -> None:
+    third = np.zeros((120, 6))
+    third[:, :3] = np.random.default_rng(2).standard_normal((120, 3)) * 1e-3
+    third[60, 2] = 0.3
+    T_pc, time_s, known = (
+        poses(np.cumsum(np.cumsum(np.cumsum(third, 0), 0), 0)),
+        TIME_S[:120],
+        np.arange(3, 120, 4),
+    )
+    sigma = local_third_difference_sigma(T_pc, time_s, known)
+    as_a_rule = third_difference_sigma(T_pc, time_s, known)
+    assert 0.1 < sigma[57, 2] < 0.3
+    assert np.all(sigma[57, :2] < 4 * as_a_rule[:2])
+    assert np.all(sigma[:40] < 4 * as_a_rule)
+    assert np.all(sigma >= as_a_rule)

@@ -53,8 +53,8 @@ class Measurements:
     encoder : Encoder or None
     bore_sigma_mm : float
         1 σ of each bore's radius.
-    smooth_sigma : (6,)
-        1 σ of the pose's third difference from frame to frame, mm and rad.
+    smooth_sigma : (6,) or (N − 3, 6)
+        1 σ of the pose's third differences from frame to frame, mm and rad; of all, or of each.
     """
 
     edges: Edges

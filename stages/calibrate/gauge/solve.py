@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipeline.adjustment.levenberg_marquardt import Watch, unwatched
-from pipeline.adjustment.motion_priors import third_difference_sigma
+from pipeline.adjustment.motion_priors import local_third_difference_sigma
 from pipeline.arrays import Float, Int
 from pipeline.artefacts.measured import RingSamples
 from pipeline.instrument.probe import Probe
@@ -102,7 +102,7 @@ def solve(
     """
     state = adjust(start, measured, parameters, watch, enough=NEAR_SIGMA).state
     on_bore = source.on_bore(state.T_pc, state.probe, parameters)
-    sigma = third_difference_sigma(state.T_pc, measured.time_s, posed)
+    sigma = local_third_difference_sigma(state.T_pc, measured.time_s, posed)
     measured = replace(measured, rings=on_bore, smooth_sigma=sigma)
     smooth = adjust(state, measured, parameters, watch)
     rings, fiducials = wrong_rings(smooth, measured), wrong_fiducials(smooth)

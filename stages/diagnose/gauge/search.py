@@ -8,7 +8,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipeline.adjustment.levenberg_marquardt import Watch, unwatched
-from pipeline.adjustment.motion_priors import jerking_sigma, third_difference_sigma
+from pipeline.adjustment.motion_priors import (
+    jerking_sigma,
+    local_third_difference_sigma,
+    third_difference_sigma,
+)
 from pipeline.arrays import Float, Int
 from stages.calibrate.gauge import MeasuredRun
 from stages.calibrate.gauge.adjust import NEAR_SIGMA, adjust
@@ -67,7 +71,8 @@ def prepare(measured_run: MeasuredRun, watch: Watch = unwatched) -> tuple[GaugeR
     loose = adjust(_freed(measured_run.start), measured, _FREE, watch, enough=NEAR_SIGMA).state
     rings = _between(source.on_bore(loose.T_pc, loose.probe, _FREE), posed)
     sigma = third_difference_sigma(loose.T_pc, measured.time_s, posed)
-    held = replace(measured, rings=rings, smooth_sigma=sigma)
+    local = local_third_difference_sigma(loose.T_pc, measured.time_s, posed)
+    held = replace(measured, rings=rings, smooth_sigma=local)
     smooth = adjust(loose, held, _FREE, watch, enough=NEAR_SIGMA).state
     rings = _between(source.on_bore(smooth.T_pc, smooth.probe, _FREE), posed)
     run = GaugeRun(

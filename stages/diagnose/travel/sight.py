@@ -10,12 +10,17 @@ import numpy as np
 from pipeline.arrays import Bool, Float, Int
 from pipeline.artefacts.measured import Trajectory
 from pipeline.recording.base import Encoder, Illumination, Recording
+from stages.calibrate.gauge.edges import Edges
+from stages.calibrate.gauge.state import Unknowns
+from stages.calibrate.gauge.terms import edge_equations
 from stages.diagnose.effects.base import Travel
 from stages.diagnose.effects.library import LIBRARY
 
 # 1 σ of a picture's position from fiducials, which may be misplaced. Debt: data/debts.md.
 PLACED_SIGMA_MM = 0.05
 _END_READINGS = 20
+# Unknowns of a pose, and 1 σ of each, mm and rad, before anything is measured: any so large a number does.
+_POSE, _NOTHING_KNOWN = 6, 1000.0
 _ROUNDING_MM, _WHOLE = 2e-4, 0.02
 
 
@@ -89,6 +94,20 @@ def sight_of_poses(recording: Recording, T_pc: Float, index: Int, scale_sigma: f
     posed = np.zeros(len(T_pc), bool)
     posed[index] = True
     return replace(_sight(recording, recording.frames.frame, T_pc[:, 2, 3], posed, scale_sigma), placed=True)
+
+
+def place_sigma_mm(state: Unknowns, edges: Edges) -> Float:
+    """Return the 1 σ (N,), mm, of each frame's place along the pipe by its own edges of fiducials alone.
+
+    Where borders across the pipe are too narrow to be measured, or no border is, the place is not determined
+    by the picture but by the frames around it, and σ is large.
+    """
+    rows = edge_equations(state, edges).rows
+    by_pose = rows.by_frame[:, 0, :_POSE]
+    information = np.tile(np.eye(_POSE) * _NOTHING_KNOWN**-2, (len(state.T_pc), 1, 1))
+    each = rows.weight[:, None, None] * by_pose[:, :, None] * by_pose[:, None]
+    np.add.at(information, rows.frame[:, 0], each)
+    return np.asarray(np.sqrt(np.linalg.inv(information)[:, 2, 2]))
 
 
 def readings_at(encoder: Encoder, time_s: Float) -> Float:
