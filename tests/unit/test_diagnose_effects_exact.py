@@ -15,6 +15,7 @@ from pipeline.instrument.laser import LaserSheet
 from pipeline.simulator.instrument import TrueCamera
 from pipeline.simulator.rays import focal_px, viewing_rays
 from stages.diagnose.effects.library import LIBRARY, ring_shift_px, texture_shift_px
+from stages.diagnose.effects.window import refracted
 from tests.unit.refraction import through_cylinder, through_sphere
 from tests.unit.wall_points import (
     BASELINE_MM,
@@ -235,6 +236,21 @@ def test_a_tilted_tube_displaces_the_laser_as_predicted():
     predicted = LIBRARY["tube_tilt"].sheet_shift_mm(points, (1.0,), np.array(xy(1.0, 40.0)))
     assert predicted == pytest.approx(met_mm, abs=2e-5)
     assert predicted[np.argmin(np.abs(points.azimuth_rad - np.radians(40)))] > 0.01
+
+
+def test_rays_are_refracted_by_leaning_and_decentred_faces_as_the_plain_reference_says():
+    angle = np.linspace(0.3, 1.5, 40)
+    ray = np.column_stack(
+        [np.sin(angle) * np.cos(9 * angle), np.sin(angle) * np.sin(9 * angle), np.cos(angle)]
+    )
+    centre, lean = (0.3, -0.2), np.radians(xy(3.0, 70))
+    faces = np.array([[13.0, GLASS, 0.0, 0.0, *lean], [15.0, 1.0, *centre, 0.0, 0.0]])
+    axis = np.array([-lean[0], -lean[1], 1.0]) / np.sqrt(1 + lean @ lean)
+    source = np.array([0.0, 0.0, 22.0])
+    place, beyond = through_cylinder(np.broadcast_to(source, ray.shape), ray, axis, 13.0, 1 / GLASS)
+    place, beyond = through_cylinder(place, beyond, AXIS, 15.0, GLASS, (*centre, 0.0))
+    found = np.array([refracted(22.0, *one, faces) for one in ray])
+    assert found == pytest.approx(np.hstack([place, beyond]), abs=1e-12)
 
 
 def test_a_tilted_sensor_acts_on_the_angle_whatever_the_projection_of_the_lens():

@@ -7,9 +7,7 @@ axis by b tan i′, sin i′ = sin i / n, instead of by b tan i.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-
+import numba
 import numpy as np
 
 from pipeline.arrays import Float
@@ -23,6 +21,8 @@ from stages.diagnose.effects.kinds import Directed, Scalar, along_x_and_y, one
 # error of dn / (n (n − 1)).
 _BY_INDEX = 0.1 / np.sqrt(12) / (GLASS_INDEX * (GLASS_INDEX - 1))
 _STEPS = 6
+# Rounds of a fixed point: each leaves a hundredth, the tube's displacement over the distance of the wall.
+_ROUNDS = 3
 _NONE = np.zeros(2)
 
 
@@ -155,77 +155,86 @@ def _seen_under(points: ImagePoints, azimuth_rad: Float, steep: Float) -> Float:
     return image_shift(points, np.column_stack([q * np.cos(azimuth_rad), q * np.sin(azimuth_rad), q * steep]))
 
 
-@dataclass(frozen=True)
-class _Face:
-    """A cylindrical face of a tube.
+def _tube(wedge_mm: Float = _NONE, lean: Float = _NONE) -> Float:
+    """Return both faces of a tube of 2 mm thickness whose outer face is decentred, or that leans.
 
-    Attributes
-    ----------
-    radius_mm, index : float
-        Its radius, and the index of refraction beyond it.
-    centre_mm, lean : (2,)
-        The point of its axis beside the viewpoint, and by how much the axis leans toward −x and −y, rad.
+    A face is a row: its radius, mm, the index beyond it, the point of its axis beside the viewpoint along x
+    and y, mm, and by how much the axis leans toward −x and −y, rad.
     """
-
-    radius_mm: float
-    index: float
-    centre_mm: Float
-    lean: Float
+    inner = [TUBE_OUTER_RADIUS_MM - TUBE_THICKNESS_MM, GLASS_INDEX, 0.0, 0.0, *lean]
+    return np.array([inner, [TUBE_OUTER_RADIUS_MM, 1.0, *wedge_mm, *lean]])
 
 
-def _tube(wedge_mm: Float = _NONE, lean: Float = _NONE) -> tuple[_Face, _Face]:
-    """Return both faces of a tube of 2 mm thickness whose outer face is decentred, or that leans."""
-    inner = _Face(TUBE_OUTER_RADIUS_MM - TUBE_THICKNESS_MM, GLASS_INDEX, _NONE, lean)
-    return inner, _Face(TUBE_OUTER_RADIUS_MM, 1.0, wedge_mm, lean)
-
-
-def _seen_through(points: ImagePoints, faulty: Sequence[_Face]) -> Float:
-    """Return the image shift (M, 2), px, of points through a faulty tube in place of the straight one.
-
-    The lens was calibrated together with the straight tube, which displaces rays parallel to themselves.
-    """
-    seen = points.xyz_c
-    for _ in range(_STEPS):
-        ray = _unit(seen)
-        straight, _same = _refracted(np.zeros(3), ray, _tube())
-        place, beyond = _refracted(np.zeros(3), ray, faulty)
-        missed = points.xyz_c + straight - _along(ray, straight) * ray - place
-        seen = seen + missed - _along(beyond, missed) * beyond
+def _seen_through(points: ImagePoints, faulty: Float) -> Float:
+    """Return the image shift (M, 2), px, of points through a faulty tube in place of the straight one."""
+    seen = np.empty_like(points.xyz_c)
+    see_through(points.xyz_c, faulty, _tube(), _ROUNDS, seen)
     return image_shift(points, seen)
 
 
-def _height_mm(points: ImagePoints, faces: Sequence[_Face]) -> Float:
+def _height_mm(points: ImagePoints, faces: Float) -> Float:
     """Return the height (M,), mm, at which the laser's sheet meets the wall after passing faces."""
     laser, psi = points.probe.laser, points.azimuth_rad
     sent = np.column_stack([np.cos(psi), np.sin(psi), laser.slope(psi)])
-    place, ray = _refracted(np.array([0.0, 0.0, laser.baseline_mm]), _unit(sent), faces)
-    beyond = points.radius_mm - np.hypot(place[:, 0], place[:, 1])
-    return np.asarray(place[:, 2] + beyond * ray[:, 2] / np.hypot(ray[:, 0], ray[:, 1]))
+    height = np.empty(len(psi))
+    meet_wall(laser.baseline_mm, sent, points.radius_mm, faces, height)
+    return height
 
 
-def _refracted(source: Float, ray: Float, faces: Sequence[_Face]) -> tuple[Float, Float]:
-    """Return points (M, 3) on the last face and directions (M, 3) beyond it of rays from a point (3,)."""
-    place, before = np.broadcast_to(source, ray.shape), 1.0
-    for face in faces:
-        axis = np.array([-face.lean[0], -face.lean[1], 1.0]) / np.sqrt(1 + face.lean @ face.lean)
-        from_axis = _across(place - np.append(face.centre_mm, 0.0), axis)
-        away = _across(ray, axis)
-        square, half = _along(away, away), _along(away, from_axis)
-        inside = _along(from_axis, from_axis) - face.radius_mm**2
-        step = (np.sqrt(half**2 - square * inside) - half) / square
-        place, normal = place + step * ray, (from_axis + step * away) / face.radius_mm
-        ratio, cosine_in = before / face.index, _along(ray, normal)
-        cosine_out = np.sqrt(1 - ratio**2 * (1 - cosine_in**2))
-        ray, before = ratio * ray + (cosine_out - ratio * cosine_in) * normal, face.index
-    return place, ray
+@numba.njit(cache=True, nogil=True)
+def see_through(point, faulty, straight, rounds, seen):  # type: ignore[no-untyped-def]
+    """Write where (M, 3) points (M, 3) appear through a faulty tube in place of the straight one.
+
+    The lens was calibrated together with the straight tube, which displaces rays parallel to themselves.
+    """
+    for m in range(len(point)):
+        x, y, z = point[m]
+        for _ in range(rounds):
+            size = np.sqrt(x * x + y * y + z * z)
+            a, b, c = x / size, y / size, z / size
+            e, f, g, _a, _b, _c = refracted(0.0, a, b, c, straight)
+            ahead = e * a + f * b + g * c
+            u, v, w, p, q, r = refracted(0.0, a, b, c, faulty)
+            u = point[m, 0] + e - ahead * a - u
+            v = point[m, 1] + f - ahead * b - v
+            w = point[m, 2] + g - ahead * c - w
+            ahead = u * p + v * q + w * r
+            x, y, z = x + u - ahead * p, y + v - ahead * q, z + w - ahead * r
+        seen[m] = x, y, z
+
+
+@numba.njit(cache=True, nogil=True)
+def meet_wall(start, way, radius, faces, height):  # type: ignore[no-untyped-def]
+    """Write the heights (M,) at which rays from a place on the axis along (M, 3) reach radii (M,)."""
+    for m in range(len(way)):
+        size = np.sqrt(way[m] @ way[m])
+        u, v, w, p, q, r = refracted(start, way[m, 0] / size, way[m, 1] / size, way[m, 2] / size, faces)
+        height[m] = w + (radius[m] - np.hypot(u, v)) * r / np.hypot(p, q)
+
+
+@numba.njit(cache=True, nogil=True)
+def refracted(start, p, q, r, faces):  # type: ignore[no-untyped-def]
+    """Return place and direction of a ray beyond cylindrical faces (F, 6), from a place on the axis."""
+    x, y, z, before = 0.0, 0.0, start, 1.0
+    for n in range(len(faces)):
+        radius, beyond, x0, y0, lean_x, lean_y = faces[n]
+        size = np.sqrt(1 + lean_x * lean_x + lean_y * lean_y)
+        a, b, c = -lean_x / size, -lean_y / size, 1 / size
+        along, ahead = (x - x0) * a + (y - y0) * b + z * c, p * a + q * b + r * c
+        u, v, w = x - x0 - along * a, y - y0 - along * b, z - along * c
+        e, f, g = p - ahead * a, q - ahead * b, r - ahead * c
+        square, half = e * e + f * f + g * g, e * u + f * v + g * w
+        step = (np.sqrt(half * half - square * (u * u + v * v + w * w - radius * radius)) - half) / square
+        x, y, z = x + step * p, y + step * q, z + step * r
+        e, f, g = (u + step * e) / radius, (v + step * f) / radius, (w + step * g) / radius
+        ratio, inside = before / beyond, p * e + q * f + r * g
+        turn = np.sqrt(1 - ratio * ratio * (1 - inside * inside)) - ratio * inside
+        p, q, r, before = ratio * p + turn * e, ratio * q + turn * f, ratio * r + turn * g, beyond
+    return x, y, z, p, q, r
 
 
 def _unit(vector: Float) -> Float:
     return np.asarray(vector / np.linalg.norm(vector, axis=1)[:, None])
-
-
-def _across(vector: Float, axis: Float) -> Float:
-    return np.asarray(vector - (vector @ axis)[:, None] * axis)
 
 
 def _through_dome(points: ImagePoints, centre_c: Float) -> Float:
