@@ -279,7 +279,7 @@ def _of_geometry(
     }
 
 
-LINE_PROFILE = Stage("line_profile", "6", Parameters, examine_line, "effects that the line's profile shows")
+LINE_PROFILE = Stage("line_profile", "7", Parameters, examine_line, "effects that the line's profile shows")
 FIDUCIALS = Stage(
     "fiducials", "9", GaugeParameters, measure_fiducials, "a gauge run's rings and fiducials", "gauge"
 )

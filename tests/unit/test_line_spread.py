@@ -79,6 +79,37 @@ def test_an_unknown_shape_gets_no_name() -> None:
     assert explanations(line_spread(cells(shelf))) == ()
 
 
+def uneven(x: Float, scale: float) -> Float:
+    """Return a sheet whose sides are Gaussians of .13 and .17 mm, blurred by the lens."""
+    fine = np.arange(-12, 12, 0.05)
+    sheet = bell(fine, 1.0 * scale * np.where(fine < 0, 0.17, 0.13))
+    seen = np.convolve(sheet, bell(np.arange(-4, 4.01, 0.05), 0.65), "same")
+    return np.asarray(np.interp(x, fine, seen / seen.max(), left=0, right=0))
+
+
+def many(light: Callable[[Float, float], Float], runs: int = 4) -> Cells:
+    """Return blocks enough for the scatter between them to be known."""
+    each = [cells(light, seed=k) for k in range(runs)]
+    joined = {
+        name: np.concatenate([getattr(of, name) for of in each])
+        for name, value in vars(each[0]).items()
+        if isinstance(value, np.ndarray) and name != "offset_px"
+    }
+    joined["block"] = np.concatenate([of.block + 3 * k for k, of in enumerate(each)])
+    return replace(each[0], **joined, frames=each[0].frames * runs)
+
+
+def test_a_second_line_that_overlaps_the_first_may_also_be_a_skewed_sheet() -> None:
+    """A skewed sheet was named for a copy of the line, with the place of another one of .01 ± .05 %."""
+    of = many(uneven)
+    assert explanations(line_spread(of))[0].shape is Shape.COPY
+    stated = probe()
+    found = {f.effect: f for f in shape_findings(of, geometry_of(cells(uneven)), stated) if f.found}
+    assert set(found) == {"tube_ghost", "line_skew", "subsurface"}
+    assert found["tube_ghost"].sizes == ()
+    assert "as sharp as the line" in found["tube_ghost"].statement
+
+
 SHEET_MM, BLUR_PX = 0.2, 0.65
 
 

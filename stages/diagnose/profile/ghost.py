@@ -23,7 +23,7 @@ from stages.diagnose.profile.matched_filter import STEP_PX, Responses
 
 _LARGEST_RAD, _TILT_STEP_RAD, _CONE_STEP_RAD = np.radians(1.2), np.radians(0.08), np.radians(0.16)
 _LARGEST_MM, _COPY_STEP_MM = 5.0, 0.04
-_CLEAR_WIDTHS = 2.5
+CLEAR_WIDTHS = 2.5
 # Seen through a filter as wide as the line, a copy of it is 10 % high this many widths from its middle.
 _OWN_WIDTHS = 3.0
 # 30° of the ring: several of the codec's blocks of 16 px, within which its errors are correlated.
@@ -107,7 +107,7 @@ def _best(
     """Search the grid of parameters, then refine with decreasing steps; σ by leaving out blocks."""
     block, sector = cells.block[cells.whole], cells.sector[cells.whole]
     width_px = float(np.median(cells.width_px[cells.whole])) if len(block) else 0.0
-    clear = _CLEAR_WIDTHS * width_px
+    clear = CLEAR_WIDTHS * width_px
 
     def rated(parameters: Float) -> Float:
         return np.asarray(_rate(found.score, found.information, design, parameters, block, clear))
@@ -205,7 +205,7 @@ def _skirt(found: Responses, line: SecondLine, width_px: float, sector: Int) -> 
     four codecs, the best second line found was 0.3 to 1.4 times as high.
     """
     apart = np.abs(line.distance_px)
-    clear = apart > _CLEAR_WIDTHS * width_px
+    clear = apart > CLEAR_WIDTHS * width_px
     if not clear.any():
         return 0.0
     off = np.abs(found.distance_px) - apart[:, None]

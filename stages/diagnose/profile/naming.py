@@ -10,7 +10,7 @@ import numpy as np
 from pipeline.instrument.probe import Probe
 from stages.diagnose.profile.cells import Cells, LineGeometry
 from stages.diagnose.profile.finding import Finding, Regression, Size, finding, untestable, withdrawn
-from stages.diagnose.profile.ghost import SecondLine, bounced, copied
+from stages.diagnose.profile.ghost import CLEAR_WIDTHS, SecondLine, bounced, copied
 from stages.diagnose.profile.line_spread import Fitted, Shape, explanations, line_spread, without_mean_shape
 from stages.diagnose.profile.matched_filter import responses
 from stages.diagnose.profile.shape import OF_A_TAIL, skew_findings
@@ -110,7 +110,10 @@ def _names(
     law, named = scale_law(cells, geometry, probe), dict[str, Fitted]()
     for fitted in fitting:
         if fitted.shape is Shape.COPY:
-            named.setdefault("tube_ghost", fitted)
+            # A second line that overlaps the first is no more than a line of another shape.
+            apart = abs(fitted.way_mm) > CLEAR_WIDTHS * fitted.width_mm
+            for name in ("tube_ghost",) if apart else ("tube_ghost", *OF_A_TAIL):
+                named.setdefault(name, fitted)
             continue
         blur_px2 = max(fitted.core * float(law.coefficient[1]), _SMALLEST_BLUR_PX2)
         edge = scale_by_edge_blur(blur_px2, geometry, probe)
@@ -162,7 +165,7 @@ def _renamed(found: Finding, names: Mapping[str, Fitted], clearest: Finding, sta
     if found.effect not in names:
         return withdrawn(found)
     shape, rivals = names[found.effect], tuple(n for n in names if n != found.effect)
-    if shape.shape is Shape.COPY:
+    if shape.shape is Shape.COPY and found.found:
         return replace(found, z=clearest.z, p_value=clearest.p_value, alike=rivals)
     size = _size(found, shape, stated_mm)
     sizes = (size,) if size is not None and _is_clear(size.value, size.sigma) else ()
@@ -171,6 +174,8 @@ def _renamed(found: Finding, names: Mapping[str, Fitted], clearest: Finding, sta
 
 def _size(found: Finding, shape: Fitted, stated_mm: float) -> Size | None:
     """Return the size of light on one side; the skewness of a sheet only from a tail, forward positive."""
+    if shape.shape is Shape.COPY:
+        return None
     way, sigma = abs(shape.way_mm), shape.way_sigma_mm
     if found.effect == "subsurface":
         return Size("transport_mm", "mm", way, sigma)
@@ -186,9 +191,10 @@ def _in_words(shape: Fitted) -> str:
         # Forward along the axis is inward in the image.
         side = "inside" if shape.way_mm > 0 else "outside"
         return f"The line has an exponential tail of {abs(shape.way_mm):.3f} mm on its {side}. {left}"
+    wider = f"wider than the line by {shape.spread_mm:.2f} mm (1 σ)"
     return (
         f"Beside the line there is light of {100 * shape.relative:.0f} % of its height, {shape.way_mm:+.2f} "
-        f"mm from it along the axis and wider than the line by {shape.spread_mm:.2f} mm (1 σ). {left}"
+        f"mm from it along the axis and {wider if shape.spread_mm else 'as sharp as the line'}. {left}"
     )
 
 
