@@ -33,8 +33,8 @@ _STAYS, _LEAST_WAY_MM, _FARTHEST_MM, _ASIDE_MM = 0.25, 0.5, 2.5, 1.0
 # A sample departs by a quarter of the finding's depth and by half of its ring's largest departure there.
 # Three samples of a ring make a spot.
 _DEPARTS, _TOP, _LEAST_SAMPLES = 0.25, 0.5, 3
-# A spot is twice as bright as the line beside it. Paint and rust vary by less over so few degrees (chosen);
-# the line is no brighter on the flank of a defect.
+# A spot is twice as bright as the line beside it, in as many samples as the spot itself has. Paint and rust
+# vary by less over so few degrees (chosen); the line is no brighter on the flank of a defect.
 _BRIGHTER = 2.0
 
 
@@ -136,15 +136,19 @@ class _Looked:
         off = away > max(self.departs_mm, _TOP * away.max())
         if off.sum() < _LEAST_SAMPLES:
             return None
-        valid = self.rings.validity[ring] == RingValidity.VALID
-        beside = (np.abs(off_middle) > half) & (np.abs(off_middle) <= 2 * half) & valid
-        line = np.median(amplitude[beside]) if beside.any() else np.nan
+        spot, other = seen[off], self.rings.validity[ring] == RingValidity.VALID
+        other[spot] = False
+        other &= np.abs(off_middle) <= 2 * half
+        middle = float(np.median(off_middle[spot]))
+        beside = np.argsort(np.where(other, np.abs(off_middle - middle), np.inf), kind="stable")
+        beside = beside[: min(len(spot), other.sum())]
+        line = np.median(amplitude[beside]) if len(beside) else np.nan
         return _Light(
             frame=int(motion.frame[k]),
             line_mm=line_mm,
             place_mm=float(np.median(place[off])),
-            around_mm=float(wall * np.median(off_middle[seen][off])),
-            brightness=float(np.median(amplitude[seen][off]) / line),
+            around_mm=wall * middle,
+            brightness=float(np.median(amplitude[spot]) / line),
         )
 
     def _around(self, azimuth_rad: Float) -> tuple[Float, float]:

@@ -110,6 +110,16 @@ def test_a_flank_as_steep_as_the_line_of_sight_is_no_spot_unless_it_is_brighter_
     assert spots(spot_depths(10, 11), 1.0) == []
 
 
+def test_a_spot_on_a_dark_patch_is_compared_with_the_line_beside_the_spot() -> None:
+    """Beside the patch the line was brighter than the spot on it: corrosion of 9.0 mm, probability .98."""
+    shown = rings(spot_depths(10, 11, 12), 4.0)
+    shown.amplitude[:, COLUMNS.start - 15 : COLUMNS.stop + 15] /= 5
+    row = int(LINE_MM[10] / 0.5)
+    wide = Region(row, 2 * COLUMNS.start - 31, np.ones((6, 74), bool), 1.0)
+    depth = max(spot_depths(10, 11, 12).values(), key=abs)
+    assert frames_with_spots(wide, depth, relief(), shown, pictures()) == [10, 11, 12]
+
+
 def test_a_spot_is_found_in_a_long_finding_of_a_pipe_that_grows_wider() -> None:
     """The wall of each ring is that at its line: in the middle of the finding it was 1.1 mm wider."""
     wider = 0.2 * (np.array(LINE_MM) - LINE_MM[10])
