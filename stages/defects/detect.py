@@ -140,7 +140,7 @@ def detect(relief: WallRelief, false_alarms: float, scratch: Scratch, progress: 
     overlap = max(map(len, kernels)) // 2
     parts = stretches(relief.shape[0], overlap)
     fitted_to_all = [part.own for part in parts] == list(relief.sampled)
-    for used, score in _fitted(relief, kernels, overlap):
+    for used, score in _fitted(relief, kernels, overlap, threshold):
         filters.append(used)
         if fitted_to_all:
             note(parts[0].own, score)
@@ -180,11 +180,14 @@ def _threshold(area_mm2: float, bank: tuple[Template, ...], false_alarms: float)
     return float(brentq(excess, 1.0, 40.0)) if excess(1.0) > 0 else 1.0
 
 
-def _fitted(relief: WallRelief, kernels: list[Float], overlap: int) -> Iterator[tuple[Filter, Float]]:
+def _fitted(
+    relief: WallRelief, kernels: list[Float], overlap: int, threshold: float
+) -> Iterator[tuple[Filter, Float]]:
     """Yield the filters for this wall, each with its response to the sampled rows, σ.
 
     A filter's response to white noise is known. This wall's noise and roughness are correlated, so that the
-    robust scatter of the response itself is its unit.
+    robust scatter of the response itself is its unit. What exceeds the ``threshold`` by that unit is no noise
+    but what is searched: standing water on a fifth of the wall hid all defects elsewhere.
     """
     parts = [widened(rows, relief.shape[0], overlap) for rows in relief.sampled]
     walls = [weighed(relief.rows(part.wide), overlap) for part in parts]
@@ -195,8 +198,10 @@ def _fitted(relief: WallRelief, kernels: list[Float], overlap: int) -> Iterator[
         response, power, seen = (np.concatenate(f) for f in zip(*found, strict=True))
         least = _LEAST_SEEN * float(np.median(seen[measured]))
         enough = seen > least
-        size = np.abs(response[enough])
-        scale = max(robust_spread(size), float(np.quantile(size, 0.9)) / 1.645, 1e-9)
+        size = np.abs(response)
+        middle = robust_spread(size[enough])
+        enough &= size <= threshold * middle
+        scale = max(middle, float(np.quantile(size[enough], 0.9)) / 1.645, 1e-9)
         usual = float(np.median(power[enough]))
         noise = np.quantile(np.outer([-1, 1], response[enough][::_EVERY] / scale), _QUANTILES)
         gain = np.quantile(np.sqrt(power[enough][::_EVERY] / usual), _QUANTILES)

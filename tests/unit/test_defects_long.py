@@ -57,6 +57,15 @@ def test_the_findings_do_not_depend_on_the_cuts(monkeypatch):
         assert cut.detectable == whole.detectable
 
 
+def test_water_along_a_fifth_of_the_wall_does_not_hide_what_is_elsewhere():
+    """Its scores made the unit of all scores ten times as large: three of three defects were missed."""
+    wall = long_wall((DrawnDefect("pit", 50.0, -1.5, 6.0, 6.0, 0.9),), 100.0)
+    wet = np.abs(AZIMUTH - np.pi / 2) < 0.2 * np.pi
+    wall.radius_map.radius_mm[:, wet] -= 9 * (1 - ((AZIMUTH[wet] - np.pi / 2) / (0.2 * np.pi)) ** 2)
+    found = search(wall).items
+    assert [d.kind for d in found if d.depth_mm > 0] == ["pit"]
+
+
 def test_without_overlap_of_stretches_the_findings_change(monkeypatch):
     drawn = DrawnDefect("dent", 50.0, 1.0, 30.0, 25.0, -0.3)
     wall = smooth_shape_removed(long_wall((drawn,), 100.0).radius_map, PARAMETERS)
