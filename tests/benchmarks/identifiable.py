@@ -35,7 +35,7 @@ def ideal_chances(
 ) -> list[float | None]:
     """Return the probability of each concealed name; None for what rings and fiducials do not show."""
     run = searched.run
-    each = [_term(run, s, library) for s in switches]
+    each = [concealed_term(run, s, library) for s in switches]
     terms = [t for t in each if t is not None]
     if not terms:
         return [None] * len(each)
@@ -48,12 +48,15 @@ def ideal_chances(
     return [None if t is None else next(told) for t in each]
 
 
-def _term(run: GaugeRun, switch: Switch, library: Mapping[str, EffectModel]) -> Term | None:
+def concealed_term(run: GaugeRun, switch: Switch, library: Mapping[str, EffectModel]) -> Term | None:
     """Return a concealed effect at the searched shape nearest to its own, with size zero."""
     model = library.get(switch.name)
     if model is None or switch.course.kind is not CourseKind.CONSTANT:
         return None
-    size, true = np.ones(len(model.amplitudes)), switch.quantities
+    size, true, (_, rate_hz) = np.ones(len(model.amplitudes)), dict(switch.quantities), span(run)
+    if "frequency_hz" in true:
+        # Frames show the lowest alias.
+        true["frequency_hz"] = abs(true["frequency_hz"] - rate_hz * round(true["frequency_hz"] / rate_hz))
 
     def apart(shape: tuple[float, ...]) -> float:
         given = model.quantities(shape, size)

@@ -1,19 +1,24 @@
 """Gauge runs at ring level: exact by the simulator's own root finding, and repeatable with the same seed."""
 
+from types import SimpleNamespace
+from typing import Any, cast
+
 import numpy as np
 import pytest
 
 from pipeline.geometry.rigid import inverse, transform
 from pipeline.physics.catalogue import effect
+from pipeline.physics.effect import Course, CourseKind
 from pipeline.simulator.build import plain_truth
 from pipeline.simulator.effects import switch_on
-from pipeline.simulator.effects.switch import parse_switch
+from pipeline.simulator.effects.switch import Switch, parse_switch
 from pipeline.simulator.prior import read_prior
 from stages.calibrate.gauge.geometry import gauge_of
 from stages.diagnose.effects.courses import Coursed, with_courses
 from stages.diagnose.effects.library import LIBRARY, without
 from tests.benchmarks import ring_level
 from tests.benchmarks.bench_diagnosis import of_positions, trial_from
+from tests.benchmarks.identifiable import concealed_term
 from tests.benchmarks.ring_level import Eye, Noise, ring_level_run, seen_at, traced_ring
 from tests.benchmarks.ring_level_cases import PRIOR, Mode, drawn, with_a_course
 from tests.benchmarks.ring_level_figures import more_figures
@@ -125,16 +130,35 @@ def test_several_effects_are_scored_name_by_name_and_a_wrong_answer_scores_badly
         answer = {"verdict": "named", "effects": effects, "candidates": sets}
         concealed = [["laser_tilt", [0.3, 20.0]], ["baseline", [0.2]]]
         return {"mode": "several", "seed": 1, "concealed": concealed, "left_out": [], "snr": [20.0, 30.0],
-                "cpu_s": 1.0, "answer": answer}  # fmt: skip
+                "ideal": [0.999, 0.9], "cpu_s": 1.0, "answer": answer}  # fmt: skip
 
     cases = [[line("laser_tilt", "baseline")], [line("laser_cone")]]
     right, wrong = ("\n".join(more_figures(c, [trial_from(one) for one in c])) for c in cases)
     assert "names that are right 2 of 2" in right
+    assert "could be named (rings, fiducials) 1 of 2" in right
+    assert "that could be named, named 1 of 1" in right
+    assert "that could not, named 1 of 1" in right
     assert "hold the truth: 1 of 1" in right
     assert "Brier score a case: 0.0000" in right
     assert "names that are right 0 of 1" in wrong
+    assert "that could be named, named 0 of 1" in wrong
     assert "hold the truth: 0 of 1" in wrong
     assert "Brier score a case: 3.0000" in wrong
+
+
+def test_a_concealed_swing_is_sought_at_the_frequency_that_its_frames_show():
+    """At 5.73 Hz, in 10 frames a second, the truth was fitted as a swing of 5 Hz."""
+    run = SimpleNamespace(time_s=np.arange(61) / 10)
+    switch = Switch("laser_rocking", (0.5, 5.73, 20.0))
+    term = concealed_term(cast(Any, run), switch, LIBRARY)
+    assert term is not None
+    assert term.shape[0] == pytest.approx(4.27, abs=0.05)
+    order = concealed_term(cast(Any, run), Switch("sheet_waviness", (0.5, 3.0, 20.0)), LIBRARY)
+    assert order is not None
+    assert order.shape == (3.0,)
+    stepping = Switch("laser_tilt", (0.5, 20.0), Course(CourseKind.STEP, (3.0,)))
+    assert concealed_term(cast(Any, run), stepping, LIBRARY) is None
+    assert concealed_term(cast(Any, run), switch, without(["laser_rocking"])) is None
 
 
 def test_effects_that_rings_cannot_show_do_not_count_as_excluded():
