@@ -136,4 +136,6 @@ def sine_and_cosine(name: str, plausible: float) -> tuple[Amplitude, ...]:
 
 def cosine(azimuth_rad: Float, amplitude: Float, order: int = 1) -> Float:
     """Return (M,) a cos m(ψ − ψ₀) with (a cos mψ₀, a sin mψ₀) = ``amplitude`` (2,)."""
-    return np.asarray(amplitude[0] * np.cos(order * azimuth_rad) + amplitude[1] * np.sin(order * azimuth_rad))
+    # Columns are asked for one amplitude at a time, and sines are slow.
+    waves = ((a, f) for a, f in zip(amplitude, (np.cos, np.sin), strict=True) if a)
+    return np.asarray(sum((a * f(order * azimuth_rad) for a, f in waves), np.zeros_like(azimuth_rad)))
