@@ -91,12 +91,15 @@ def estimate_motion(
     recording = without_pictures_behind(looking_at_wall(recording, rings, points), last)
     run = measure_run(recording, probe, rings, points, parameters, context, last=last)
     check = partial(_require_convergence, run.texture.grid.radius_mm)
-    estimate = adjust_run(run, parameters, check, context.progress)
+    adjusted = run.with_probe_held() if run.bore.reduces else run
+    estimate = adjust_run(adjusted, parameters, check, context.progress)
     joined, loops = _with_loops_closed(estimate.joined, run, recording, probe, parameters, context)
     wider = 2 * joined.radius_mm / recording.pipe.nominal_diameter_mm - 1
     doubt, has_encoder = estimate.encoder.doubt_of_probe(wider), run.encoder is not None
     joined = joined.with_scale_sigma(doubt)
-    trajectory = trajectory_of(joined, recording.frames, probe, has_encoder)
+    trajectory = trajectory_of(joined, recording.frames, adjusted.probe, has_encoder)
+    if run.bore.reduces:
+        trajectory = replace(trajectory, instrument_covariance=probe.covariance)
     trajectory = lay_route(trajectory, joined.turn_variance, recording, probe, context)
     trajectory = beyond_cuts(trajectory, cut, run.texture.grid.length_mm)
     events = _events_of(run, joined, trajectory, recording, context)
@@ -105,7 +108,7 @@ def estimate_motion(
     doubted = shakes or run.texture.poses.much_lost
     trajectory = _beside_other_probes(trajectory, run, recording, parameters, context)
     steady, believed = estimate.steady, with_doubtful_instrument(trajectory, probe, estimate.lasting, doubted)
-    report_motion(context, estimate, run.texture, believed, shakes, wider)
+    report_motion(context, estimate, run, believed, shakes, wider)
     require_along_pipe(trajectory)
     loops.report(context)
     report_instrument(probe, trajectory, context)
@@ -264,7 +267,7 @@ def _motion_of_run(
 
 MOTION = Stage(
     "motion",
-    "75",
+    "76",
     MotionParameters,
     _motion_of_run,
     "camera pose in every frame and the pipe's axis, from texture, rings and encoder together",

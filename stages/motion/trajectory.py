@@ -21,7 +21,7 @@ from stages.motion.bundle_adjustment.shared_difference import WallTwice
 from stages.motion.bundle_adjustment.solver import trembles
 from stages.motion.stated_probe import MOST_LASTING
 from stages.motion.tracking.landmarks import TrackedPoses
-from stages.motion.tracking.tracker import TrackedTexture
+from stages.motion.windows.measured_run import MeasuredRun
 from stages.motion.windows.sliding_window import RunEstimate
 from stages.motion.windows.submap_joining import JoinedRun
 
@@ -104,7 +104,7 @@ def displaced_in(twice: WallTwice, frame: Int) -> tuple[Displaced, ...]:
 def report_motion(
     context: Context,
     estimate: RunEstimate,
-    texture: TrackedTexture,
+    run: MeasuredRun,
     trajectory: Trajectory,
     shakes: bool,
     wider: float,
@@ -114,6 +114,7 @@ def report_motion(
     ``shakes`` is the result of `camera_trembles`; ``wider`` is the pipe's diameter over the nominal one,
     minus 1.
     """
+    texture = run.texture
     report_steps(context, estimate.trials, estimate.unsettled)
     context.report("landmarks", texture.store.landmarks, "")
     context.report("texture observations", texture.store.spool.count, "")
@@ -128,7 +129,8 @@ def report_motion(
         context.report("stretches of the run that differ in it", len(trajectory.displaced), "")
     encoder = bool(np.isfinite(trajectory.encoder_scale))
     warn_of_lost_texture(texture.poses, texture.store.spool.count, encoder, context)
-    _warn_of_contradictions(estimate.lasting, context)
+    if not run.bore.reduces:  # there texture is known to be matched less well
+        _warn_of_contradictions(estimate.lasting, context)
     _warn_of_trembling(trajectory, texture.poses, shakes, context)
     context.report("pipe radius", trajectory.radius_mm, "mm")
     context.report("encoder scale", trajectory.encoder_scale, "")

@@ -99,6 +99,9 @@ def test_a_reducer_is_reported_and_nothing_else_is_blamed(reduced: DrawnRun, enc
     assert abs(roll[-1]) < 3 * sigma[-1, 1] + 1e-3
     assert len(told) == 1
     assert "width changes by 15.0 mm" in told[0]
+    moved = np.linalg.pinv(run.probe.principal_uncertainties()) @ (got.instrument - run.probe.parameters)
+    assert np.abs(moved).max() < 0.03, "texture on a slope does not change the probe: it had, by 8 σ"
+    np.testing.assert_array_equal(got.instrument_covariance, run.probe.covariance)
 
 
 @pytest.mark.parametrize("wrong", [1.0, 1.05])
