@@ -81,7 +81,7 @@ class MotionParameters(Parameters):
     turn_sigma_rad: float = Field(
         0.1, gt=0, le=1, description="1 σ, rad, of a rotation from frame to frame where no texture shows it"
     )
-    iterations: int = Field(60, ge=2, le=1000, description="most steps of the adjustment of a window")
+    iterations: int = Field(200, ge=2, le=1000, description="most steps of the adjustment of a window")
     max_track_frames: int = Field(
         240, ge=20, le=2000, description="largest number of frames through which one landmark is followed"
     )

@@ -106,9 +106,9 @@ def _warn_of_sectors(missing: Float, azimuth_rad: Float, context: Context) -> No
         context.warn(
             f"the line is missing between {notation.clock(float(ends[0]))} and "
             f"{notation.clock(float(ends[1]))} in the picture{_in_parts(float(part))} in most rings: the "
-            "laser is hidden or weak there, something is on the window, or text is burnt into the picture. "
-            "The wall there is not inspected. What to do: clean window and laser, switch off the text; "
-            "record once more with the probe rolled"
+            "laser is hidden or weak there, something is on the window, text is burnt into the picture, or "
+            "a branch of the pipe opens there. The wall there is not inspected. What to do: look at the lit "
+            "pictures; clean window and laser, switch off the text; record once more with the probe rolled"
         )
 
 
