@@ -22,6 +22,8 @@ _OF_LIGHT = 0.005
 _LEAST_WIDTH_PX, _MIDDLE = 2.0, 0.25
 """Width of the narrowest spot, 1 σ, px; the middle of a spot extends to where a quarter of its depth is
 lost."""
+_PATTERN = 4
+"""Side of the cells in which brightness may stay in the image, pixels: half a block. Chosen."""
 _SETTLED = 1e-6
 """A fit has converged when χ² changes by less than this share: of ten thousand pixels it is .01, where 1 is 1
 σ. Without a real spot, a fit that continues wanders off for hundreds of steps."""
@@ -86,6 +88,22 @@ def fall_of_spot(sums: Float32, start: Float, beyond: float) -> FittedLaw:
     off = float((middle * (whole[0] - shape * whole[1])).sum()) / weight
     sd = float(np.hypot(np.hypot(spread, off), _OF_LIGHT))
     return FittedLaw(fall, NamedFigure("share", float(best[0] / (1 - best[5])), sd), shown)
+
+
+def fall_of_pattern(dirt: Float32) -> float:
+    """Return the fall of χ² by any brightness that stays in the image, from the other half of the frames.
+
+    ``dirt`` is (F, 2, h, w). Where wall mirrors the lamps, or the photo has a stain, texture seems displaced;
+    but a drop shows other texture in every frame, and no brightness that stays.
+    """
+    rows, columns = (n // _PATTERN * _PATTERN for n in dirt.shape[2:])
+    cells = dirt[:, :, :rows, :columns].reshape(*dirt.shape[:2], rows // _PATTERN, _PATTERN, -1, _PATTERN)
+    (cross, own), fall = cells.sum((3, 5), dtype=float).swapaxes(0, 1), 0.0
+    for half in (slice(0, None, 2), slice(1, None, 2)):
+        other = slice(1 - (half.start or 0), None, 2)
+        change = cross[other].sum(0) / np.maximum(own[other].sum(0), 1e-9)
+        fall += float((2 * change * cross[half] - change**2 * own[half]).sum())
+    return fall
 
 
 def _spot(place: Float, shape: tuple[int, ...]) -> Float:

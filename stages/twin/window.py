@@ -19,7 +19,7 @@ from stages.twin.cells import sigmas
 from stages.twin.locate import FALSE_ALARM, LEAST_CHANGE, ImagePlace
 from stages.twin.render import Region, TwinFrame
 from stages.twin.significance import ratio_over_frames
-from stages.twin.spot import PARTS, WIDEST_PX, FittedLaw, fall_of_spot
+from stages.twin.spot import PARTS, WIDEST_PX, FittedLaw, fall_of_pattern, fall_of_spot
 
 _POWER_STEP, _ASIDE_PX = 0.4, 0.5
 """Steps of bending that are tried; 1 σ of a displacement, px, since blocks of 24 px flatten its peak.
@@ -156,7 +156,12 @@ class WindowPlace:
             "window_scatter": fall_of_spot(spots[:, 1], start, _OF_CONTRAST),
             "droplet": _fall_of_drop(np.stack(self.drops), self.aside_px),
         }
-        name, rivals = self._likeliest({n: law for n, law in tried.items() if n == "droplet" or law.is_share})
+        possible = {n: law for n, law in tried.items() if n == "droplet" or law.is_share}
+        name, rivals = self._likeliest(possible)
+        if name == "droplet" and fall_of_pattern(spots[:, 0]) > possible.pop(name).fall.sum():
+            if not possible:
+                return None
+            name, rivals = self._likeliest(possible)
         alone = self.bends and name == "droplet" and not rivals
         chance = max(self.place.probability, tried[name].chance)
         if chance > FALSE_ALARM or ("wall" in fixed_to and not alone):
@@ -187,12 +192,12 @@ class WindowPlace:
         better at all. Something dark may predict a little of a drop's change, and its rim seems to displace
         texture.
         """
-        best, drop = max(tried, key=lambda n: tried[n].fall.sum()), tried["droplet"]
-        bends = self.bends and drop.chance < FALSE_ALARM
-        if bends and best == "droplet":
-            return best, []
-        beaten = any(sigmas(fit.fall - drop.fall) >= _SURE for fit in tried.values())
-        name = "droplet" if bends and not beaten else best
+        name, drop = max(tried, key=lambda n: tried[n].fall.sum()), tried.get("droplet")
+        if drop is not None and self.bends and drop.chance < FALSE_ALARM:
+            if name == "droplet":
+                return name, []
+            beaten = any(sigmas(fit.fall - drop.fall) >= _SURE for fit in tried.values())
+            name = name if beaten else "droplet"
         others = [n for n in tried if n != name]
         return name, [n for n in others if sigmas(tried[name].fall - tried[n].fall) < _SURE]
 

@@ -1,13 +1,15 @@
 """Places in the image that dirt on the window darkens, and what is not taken for dirt."""
 
+import cv2
 import numpy as np
 import pytest
 
 from stages.twin.compare import BLOCK_PX
 from stages.twin.locate import ImagePlace, full_size, places_in_image
 from stages.twin.reference import BlockSamples, in_image
+from stages.twin.render import Region, TwinFrame
 from stages.twin.unexplained import unexplained
-from stages.twin.window import _fall_of_drop
+from stages.twin.window import WindowPlace, _fall_of_drop
 
 
 def _ratios(random, spot=None, frames=8):
@@ -115,3 +117,31 @@ def test_a_place_that_no_effect_on_the_window_explains_is_reported_without_a_nam
     assert unexplained(place, None) is None
     by_wall = _blocks(lambda r, c, s: 0.3 * (np.abs(s - 22) < 2))
     assert in_image(by_wall, (place,)) != ("image",)
+
+
+@pytest.mark.parametrize("shines", [True, False])
+def test_light_that_stays_in_the_image_is_no_drop(shines):
+    """In wet steel, three places that mirrored the lamps were drops: their light seemed displaced."""
+    random, made = np.random.default_rng(3), []
+    place = WindowPlace(ImagePlace(120.0, 100.0, 14.0, 0.3, 0.02, 1e-6), aside_px=3.0)
+    v, u = np.mgrid[0:200, 0:240].astype(np.float32)
+
+    def streak(at):
+        return np.exp(-0.5 * ((u - at) / 3) ** 2 - 0.5 * ((v - 100) / 9) ** 2)
+
+    for frame in range(8):
+        fine = cv2.GaussianBlur(random.standard_normal(u.shape).astype(np.float32), (0, 0), 2.0)
+        wall = 90 + 10 * fine / fine.std()
+        moved = cv2.remap(wall, u + 3, v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REFLECT)
+        twin = wall + 20 * (streak(115) - streak(129)) * shines
+        drawn = wall + 20 * (streak(112) - streak(126)) if shines else moved
+        recorded = wall + 50 * (streak(110) - streak(124)) if shines else moved
+        recorded = (recorded + random.standard_normal(u.shape)).astype(np.float32)
+        nowhere, even = np.full_like(u, np.nan), np.full_like(u, 4.0)
+        region = np.full(u.shape, Region.WALL, np.uint8)
+        shown = TwinFrame(twin.astype(np.float32), even, region, nowhere, nowhere)
+        place.add(frame, recorded, shown, np.ones(u.shape, bool), drawn.astype(np.float32))
+        made.append(place.drops[-1])
+    assert _fall_of_drop(np.stack(made), 3.0).chance < 0.01
+    told = place.judged("image")
+    assert (told is not None and "droplet" in told.names) == (not shines)
