@@ -177,11 +177,11 @@ def _warn_of_contradictions(lasting: float, context: Context) -> None:
         context.warn(
             f"matches of texture contradict the motion by {lasting:.1f} times their σ, in the same way in "
             "neighbouring pictures (good recordings: 0.5 at most): reflections, compression or lights that "
-            "move with the probe are taken for the wall, or water or glass distorts the picture. Distance "
-            "and roll may err by more than their σ. σ of radii includes the correction of the probe and "
-            "what photo and laser line differ by smoothly, but no error that both share. What to do: "
-            "clean and dry the window, compare distance and diameter with known ones, record with less "
-            "compression"
+            "move with the probe are taken for the wall, water or glass distorts the picture, or the pipe "
+            "bends sharply (an elbow). Distance and roll may err by more than their σ. σ of radii includes "
+            "the correction of the probe and what photo and laser line differ by smoothly, but no error that "
+            "both share. What to do: clean and dry the window, compare distance and diameter with known "
+            "ones, record with less compression"
         )
 
 
