@@ -10,7 +10,7 @@ from pydantic import Field, field_validator
 from pipeline.arrays import Bool, Float, Int
 from pipeline.instrument.probe import Probe
 from pipeline.machine.stage import Context, Parameters, Stage
-from pipeline.recording.base import FrameTable, Recording
+from pipeline.recording.base import FrameTable, Illumination, Recording
 from pipeline.recording.checks import CheckedFrames, withheld_frames
 from pipeline.recording.one_field import OneField
 from stages.premises.backwards import runs_forwards
@@ -162,8 +162,10 @@ def _matched(recording: Recording, probe: Probe, seen: _Seen) -> _Matched:
     sway = sway_of_line(pictures, light)
     again = copy | (np.diff(alignment.row, prepend=-1) < 1)
     first = rows_that_follow_encoder(alignment.row, again, table, steps, encoder)
-    rings_mm = rings_seen_mm(pictures, probe)
-    along_mm, radius_mm = radius_along_mm(pictures, rings_mm), radius_seen_mm(rings_mm)
+    # With the laser off, a closed line is a joint or a weld.
+    lines = replace(pictures, closed=np.where(label == Illumination.LED.value, 0.0, pictures.closed))
+    rings_mm = rings_seen_mm(lines, probe)
+    along_mm, radius_mm = radius_along_mm(lines, rings_mm), radius_seen_mm(rings_mm)
     forwards = runs_forwards(encoder, time_s := row_times(table, first), steps)
     one_bore, read = recording.kind != "gauge", in_mm(encoder, time_s, steps, radius_mm)
     row = rows_by_motion(first, steps, rhythm_of(light), table, read, sway, along_mm, one_bore)
@@ -220,6 +222,6 @@ def _report(pictures: Pictures, radius_mm: float, changes: Changes, context: Con
 
 
 PREMISES = Stage(
-    "premises", "42", PremisesParameters, check_premises,
+    "premises", "43", PremisesParameters, check_premises,
     "stated lights, times, encoder and diameter compared with the pictures and corrected",
 )  # fmt: skip

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 from pipeline.errors import UnusableError
-from pipeline.recording.base import BoreSection, Encoder, FrameTable, PipeFacts
+from pipeline.recording.base import BoreSection, Encoder, FrameTable, Illumination, PipeFacts
 from stages.premises.backwards import runs_forwards
 from stages.premises.losses import Steps
 from stages.premises.scale import check_diameter, encoder_factor, in_mm, warn_of_oval
 from tests.drawn_run import BASELINE, RADIUS
 from tests.hand_pulled import pulled
-from tests.premises_run import COUNT, STEP_MM, checked
+from tests.premises_run import COUNT, STEP_MM, checked, ring_image
 from tests.quiet import quiet_context
 from tests.ring_images import MemorySource
 from tests.spoiled_recordings import KeptFrames
@@ -45,6 +45,20 @@ def test_encoder_readings_are_converted_to_mm_and_to_the_direction_of_motion(fac
 def test_a_diameter_that_the_ring_contradicts_ends_the_run(diameter_mm, message, good, run):
     with pytest.raises(UnusableError, match=message):
         checked(replace(good, pipe=PipeFacts(diameter_mm)), run.probe)
+
+
+def test_a_joint_in_lit_pictures_is_not_taken_for_the_laser_ring(good, run):
+    """Where pictures were cropped to less than the ring, a weld made the pipe's diameter 46.2 mm of 60.3."""
+    joint = np.uint8(0.6 * ring_image(run.probe))
+    size, (u, v) = good.source.image_size, run.probe.camera.centre_px
+    nearer = cv2.warpAffine(joint, np.float32([[0.75, 0, u / 4], [0, 0.75, v / 4]]), size)
+    lit = dict(zip(good.frames.frame, good.frames.illumination == Illumination.LED.value, strict=True))
+    images = {
+        k: cv2.add(image, nearer) if lit[k] else np.full_like(image, 4)
+        for k, image in good.source.images.items()
+    }
+    _, told = checked(replace(good, source=MemorySource(images, size)), run.probe)
+    assert not [t for t in told if "diameter" in t]
 
 
 @pytest.mark.parametrize(("stretch", "told_of"), [(1.0, False), (1.03, True)])
