@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from pipeline.adjustment.robust import basis_of, ring_harmonics, row_median
 from pipeline.arrays import Bool, Byte, Float, runs_of
 from pipeline.artefacts.findings import clock_of_azimuth
 from pipeline.artefacts.measured import RingSamples, RingValidity
@@ -26,12 +27,25 @@ _ONE_SECTOR_RAD = np.radians(30.0)
 # middle of both.
 _MOST_WANDER = 0.12
 _NAMED_FRAMES = 8
+# Rings, spread evenly over the run, from which the usual ring is known (chosen).
+_ENOUGH_RINGS = 512
+_OBSCURED = (
+    "the laser is hidden or weak there, something is on the window, text is burnt into the picture, or a "
+    "branch of the pipe opens there. The wall there is not inspected. What to do: look at the lit pictures; "
+    "clean window and laser, switch off the text; record once more with the probe rolled"
+)
+_CUT_OFF = (
+    "the ring leaves the picture there. The wall there is not inspected. What to do: record the whole ring, "
+    "with a wider view or without cropping; or record once more with the probe rolled"
+)
 # A bell sampled at pixels: what folds over is 0.3 of its height at Nyquist with 0.5 px, more below it. Good
 # recordings have 0.63 px (open-1 at half its size) or more, at 480 x 360 0.53, at 320 x 240 0.43.
 _NARROWEST_PX = 0.5
 
 
-def warn_of_rings(samples: RingSamples, wander_px: float, stepped: bool, context: Context) -> None:
+def warn_of_rings(
+    samples: RingSamples, image_size: tuple[int, int], wander_px: float, stepped: bool, context: Context
+) -> None:
     """Warn of frames without a ring, sectors without a line, and a line of poor quality.
 
     ``stepped`` says that the wall is a gauge's: its steps and fiducials break the line by design (0.7 to 2.4
@@ -53,7 +67,7 @@ def warn_of_rings(samples: RingSamples, wander_px: float, stepped: bool, context
     if width < _NARROWEST_PX:
         _warn_of_coarse_pictures(width, float((validity != RingValidity.VALID).mean()), context)
     else:
-        _warn_of_sectors(missing, samples.azimuth_rad, context)
+        _warn_of_sectors(missing, samples.azimuth_rad, _leaves_picture(samples, image_size), context)
         if not stepped:
             _warn_of_shares(validity[:, missing <= _HIDDEN], context)
     if wander_px > _MOST_WANDER * width:
@@ -93,22 +107,35 @@ def _warn_of_shares(validity: Byte, context: Context) -> None:
         )
 
 
-def _warn_of_sectors(missing: Float, azimuth_rad: Float, context: Context) -> None:
-    """Name the sectors in which most rings show no line: ``missing`` is the share of rings (A,)."""
+def _leaves_picture(samples: RingSamples, image_size: tuple[int, int]) -> Bool:
+    """Return at which azimuths (A,) the smooth ring through the median radii lies outside the picture."""
+    samples = samples.some(slice(None, None, max(len(samples.frame) // _ENOUGH_RINGS, 1)))
+    basis = basis_of(samples.azimuth_rad)
+    middle = row_median(np.where(samples.valid, samples.radius_px, np.nan).T.astype(float))
+    ring = (ring_harmonics(middle[None], basis) @ basis.T)[0]
+    direction = np.stack([np.cos(samples.azimuth_rad), np.sin(samples.azimuth_rad)], -1)
+    uv = samples.centre_px + ring[:, None] * direction
+    return np.asarray(((uv < 0) | (uv > np.array(image_size) - 1)).any(1))
+
+
+def _warn_of_sectors(missing: Float, azimuth_rad: Float, leaves: Bool, context: Context) -> None:
+    """Name the sectors in which most rings show no line: ``missing`` is the share of rings (A,).
+
+    ``leaves`` (A,) is where the ring lies outside the picture.
+    """
     step = 2 * np.pi / len(azimuth_rad)
     hidden = np.zeros(len(missing), bool)
     for first, count in _runs_around(missing > _HIDDEN):
         if count * step >= _HIDDEN_RAD:
             hidden[(first + np.arange(count)) % len(missing)] = True
     for first, count in _runs_around(_without_gaps(hidden, round(_ONE_SECTOR_RAD / step))):
-        part = hidden[(first + np.arange(count)) % len(missing)].mean()
+        sector = (first + np.arange(count)) % len(missing)
+        part, cut = hidden[sector].mean(), leaves[sector].mean() > _HIDDEN
         ends = clock_of_azimuth(azimuth_rad[first] + step * np.array([0, count]))
         context.warn(
             f"the line is missing between {notation.clock(float(ends[0]))} and "
-            f"{notation.clock(float(ends[1]))} in the picture{_in_parts(float(part))} in most rings: the "
-            "laser is hidden or weak there, something is on the window, text is burnt into the picture, or "
-            "a branch of the pipe opens there. The wall there is not inspected. What to do: look at the lit "
-            "pictures; clean window and laser, switch off the text; record once more with the probe rolled"
+            f"{notation.clock(float(ends[1]))} in the picture{_in_parts(float(part))} in most rings: "
+            f"{_CUT_OFF if cut else _OBSCURED}"
         )
 
 

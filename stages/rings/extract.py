@@ -90,7 +90,8 @@ def extract_rings(
     wander = wander_of(_some(samples))
     typical = _typical(samples, wander)
     _report(context, samples, typical)
-    warn_of_rings(samples, typical, recording.kind == "gauge", context)
+    size, is_gauge = recording.source.image_size, recording.kind == "gauge"
+    warn_of_rings(samples, size, typical, is_gauge, context)
     warn_of_seam(seam_of(_some(samples)), context)
     np.hypot(samples.sigma_px, wander.at(samples.amplitude), out=samples.sigma_px, casting="same_kind")
     return samples

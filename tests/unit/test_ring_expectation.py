@@ -14,7 +14,7 @@ from pipeline.artefacts.measured import RingSamples, RingValidity
 from stages.rings.expectation import warn_of_rings
 from tests.quiet import quiet_context
 
-RINGS, AZIMUTHS = 40, 360
+RINGS, AZIMUTHS, SIZE = 40, 360, (640, 480)
 SOUND_WANDER_PX, WIDTH_PX = 0.1, 1.2
 
 
@@ -27,7 +27,7 @@ def sound() -> RingSamples:
 
 def told(rings: RingSamples, wander_px: float = SOUND_WANDER_PX, stepped: bool = False) -> str:
     warnings: list[str] = []
-    warn_of_rings(rings, wander_px, stepped, replace(quiet_context(), warn=warnings.append))
+    warn_of_rings(rings, SIZE, wander_px, stepped, replace(quiet_context(), warn=warnings.append))
     return "\n".join(warnings)
 
 
@@ -40,6 +40,15 @@ def spoilt(rows: slice, columns: slice, reason: RingValidity) -> RingSamples:
 def test_sound_rings_and_a_few_bad_samples_give_no_warning() -> None:
     assert told(sound()) == ""
     assert told(spoilt(slice(3, 5), slice(10, 20), RingValidity.GLINT)) == ""
+
+
+def test_a_ring_that_leaves_the_picture_is_not_called_hidden() -> None:
+    """The window was to be cleaned and text switched off, where the picture had been cropped."""
+    radius_px = np.full((RINGS, AZIMUTHS), 250, np.float32)
+    rings = replace(sound(), radius_px=radius_px, centre_px=np.array([320.0, 240.0]))
+    for middle in (90, 270):
+        rings.validity[:, middle - 16 : middle + 17] = RingValidity.NO_LINE
+    assert told(rings).count("the ring leaves the picture there") == 2
 
 
 @pytest.mark.parametrize(
