@@ -210,7 +210,8 @@ def _warn_of_trembling(trajectory: Trajectory, texture: TrackedPoses, shakes: bo
         context.warn(
             f"the texture suggests a trembling camera: {moves} (1 σ). The laser's ring does not tremble, so "
             "the camera is steady and texture is matched wrongly: glints, reflections, blur or compression. "
-            "Radii are right; distance and roll may be wrong by more than their σ. What to do: shade "
+            "The shape of each ring is right; its distance, roll and tilt may be wrong by more than their σ, "
+            "and so are radii where the wall changes along the pipe, as ribs do. What to do: shade "
             "reflections, record with less compression"
         )
     else:
