@@ -269,5 +269,5 @@ def _defects_of_run(
 
 
 DEFECTS = Stage(
-    "defects", "75", DefectParameters, _defects_of_run, "defects as instances with depth, clock and kind"
+    "defects", "76", DefectParameters, _defects_of_run, "defects as instances with depth, clock and kind"
 )

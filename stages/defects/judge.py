@@ -75,6 +75,14 @@ class Found:
         return self.bead < COUNTED
 
     @property
+    def uncontradicted(self) -> Evidence:
+        """The evidence without the strength that single rings add which their neighbours contradict."""
+        if self.contradicted_mm is None:
+            return self.evidence
+        by_others = abs(self.by_noise.depth_mm) / self.by_noise.depth_sigma_mm
+        return replace(self.evidence, score=min(self.evidence.score, by_others))
+
+    @property
     def flattened(self) -> bool:
         """Whether its depth is significant against noise, but not with what flattening may have taken off."""
         if self.contradicted_mm is not None:
@@ -108,7 +116,7 @@ def credibility_on(found: Sequence[Found], tail: NoiseTail, wall: MeasuredWall) 
     column = 2 * np.pi / wall.relief.shape[1]
     widths = [f.region.mask.shape[1] * column for f in used]
     rings = len(np.unique(wall.cloud.cloud.frame))
-    return credibility_of([f.evidence for f in used], widths, rings, tail)
+    return credibility_of([f.uncontradicted for f in used], widths, rings, tail)
 
 
 def judged(
@@ -123,7 +131,7 @@ def judged(
     unconfirmed: list[Defect] = []
     for f in found:
         deep = chance_of_depth(f.by_noise, min_depth_mm)
-        real = deep if f.region.all_round else deep * credibility.chance_against_clutter(f.evidence)
+        real = deep if f.region.all_round else deep * credibility.chance_against_clutter(f.uncontradicted)
         real = min(real, MOST_SURE) * (1.0 if f.evidence.on_wall else _WALL_OR_NOT)
         unsure, real = real >= COUNTED > real * f.bead, real * f.bead
         counts = f.evidence.corroborated and real >= COUNTED and is_depth_known(f.by_noise) and not f.vague

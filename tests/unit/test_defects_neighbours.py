@@ -7,7 +7,7 @@ import pytest
 from scipy.ndimage import uniform_filter
 
 from stages.defects import DefectParameters, find_defects
-from stages.defects.corroborate import Witnesses
+from stages.defects.corroborate import Evidence, Witnesses
 from stages.defects.depth import Depth
 from stages.defects.grow import millimetre_mean
 from stages.defects.judge import Found
@@ -118,3 +118,12 @@ def test_a_glint_on_one_ring_neither_widens_a_depth_nor_confirms_an_uncertain_on
     defect = SimpleNamespace(depth_mm=0.6, depth_sigma_mm=float(np.hypot(sigma_mm, 2.6)))
     found = Found(None, defect, None, None, 1.0, contradicted_mm=3.2, sigma_without_them_mm=sigma_mm)
     assert found.vague is vague
+
+
+@pytest.mark.parametrize(("contradicted_mm", "score"), [(16.6, 3.5), (None, 37.9)])
+def test_a_single_ring_that_others_contradict_does_not_make_a_finding_strong(contradicted_mm, score):
+    """Beside a strut one wild ring gave .23 mm a score of 37.9: "corrosion", confirmed with .98."""
+    by_others = SimpleNamespace(depth_mm=0.234, depth_sigma_mm=0.067)
+    evidence = Evidence(5, False, 37.9)
+    found = Found(None, None, by_others, evidence, 1.0, contradicted_mm=contradicted_mm)
+    assert found.uncontradicted.score == pytest.approx(score, abs=0.05)
