@@ -140,8 +140,8 @@ def _fixed_in_words(place: FixedPlace) -> str:
             "do: clean the window, look for scratches and reflections, record again"
         )
     return (
-        f"something on the window or fixed to the probe, or a groove or ridge along the pipe: {seen}. The "
-        "probe does not roll enough to decide. The departure is added to σ there, and "
+        "something on the window or fixed to the probe, or a groove, ridge or standing water along the pipe: "
+        f"{seen}. The probe does not roll enough to decide. The departure is added to σ there, and "
         "findings there are not counted. What to do: clean the window and record again with the probe "
         "rolled by 30° or more"
     )
@@ -201,7 +201,7 @@ def _wall_of_run(
 
 ACCUMULATE = Stage(
     "accumulate",
-    "29",
+    "30",
     AccumulateParameters,
     _wall_of_run,
     "point cloud and radius map around the pipe's own axis, with σ",

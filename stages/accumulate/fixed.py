@@ -13,7 +13,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.ndimage import label
+from scipy.ndimage import label, maximum_filter1d
 
 from pipeline.adjustment.robust import robust_spread, row_median
 from pipeline.arrays import Float, Int
@@ -144,14 +144,31 @@ def _where_it_shows(row: Int, sector: Int, steady: Float, blocks: _Blocks) -> tu
 
 
 def _is_on_probe(row: Int, sector: Int, steady: Float, blocks: _Blocks) -> bool | None:
-    """Return whether a place stays in the image while the probe rolls; None if this is unknown."""
+    """Return whether a place stays in the image while the probe rolls; None if this is unknown.
+
+    In a pass no longer than the medians' length, these are at one place whatever rolls: only if the blocks'
+    own departures stay in the image as well, the place is on the probe.
+    """
     each, index = np.unique(row, return_inverse=True)
-    weight = np.abs(steady[row, sector])
-    step = 2 * np.pi / steady.shape[1]
-    middle = np.angle(np.bincount(index, weight * np.cos(step * sector), len(each))
-                      + 1j * np.bincount(index, weight * np.sin(step * sector), len(each)))  # fmt: skip
+    weight = np.zeros((len(each), steady.shape[1]))
+    weight[index, sector] = np.abs(steady[row, sector])
+    roll = blocks.roll_rad[each]
+    stays = _stays_in_image(weight, roll)
+    if not stays:
+        return stays
+    own = np.nan_to_num(blocks.departure_mm[each] * np.sign(steady[row[0], sector[0]]))
+    reach = int(np.ceil(np.ptp(np.unwrap(roll)) / (2 * np.pi) * steady.shape[1]))
+    near = maximum_filter1d((weight > 0).any(0), 2 * reach + 1, mode="wrap")
+    own = np.where(near & (own > _SHOWN * weight.max()), own, 0.0)
+    return True if _stays_in_image(own[own.any(1)], roll[own.any(1)]) else None
+
+
+def _stays_in_image(weight: Float, roll_rad: Float) -> bool | None:
+    """Return whether the middle of weights (n, K) around the image stays there as the probe rolls (n,)."""
+    step = 2 * np.pi / weight.shape[1]
+    middle = np.angle(weight @ np.exp(1j * step * np.arange(weight.shape[1])))
     in_image = np.hypot(_circular_spread(middle), step / 4)
-    on_wall = np.hypot(_circular_spread(middle + blocks.roll_rad[each]), step / 4)
+    on_wall = np.hypot(_circular_spread(middle + roll_rad), step / 4)
     if on_wall > _CLEARLY * in_image:
         return True
     return False if in_image > _CLEARLY * on_wall else None

@@ -134,6 +134,15 @@ def test_a_droplet_is_found_even_in_a_pass_of_less_than_half_a_diameter(roll_rad
     assert measured(roll_rad, step_mm=step_mm).fixed is None
 
 
+def test_in_a_short_pass_a_seam_that_follows_the_wall_is_not_said_to_be_on_the_window() -> None:
+    """Medians over the whole pass stay in place whatever the probe does; so did standing water."""
+    step_mm = 0.8 * RADIUS / RINGS
+    for wall, droplet_px, on_probe in ((seam, 0.0, False), (round_wall, DROPLET_PX, True)):
+        fixed = measured(ROLL / 2, wall, droplet_px, step_mm=step_mm).fixed
+        assert fixed is not None
+        assert [place.on_probe for place in fixed.places] == [on_probe]
+
+
 @pytest.mark.parametrize("wall", [round_wall, gouge])
 def test_short_departures_and_none_belong_to_the_wall(wall) -> None:
     assert measured(0.0, wall).fixed is None
