@@ -284,11 +284,11 @@ FIDUCIALS = Stage(
     "fiducials", "9", GaugeParameters, measure_fiducials, "a gauge run's rings and fiducials", "gauge"
 )
 FREE_MOTION = Stage(
-    "free_motion", "5", MotionParameters, adjust_freely, "an inspection's motion without encoder", "motion"
+    "free_motion", "6", MotionParameters, adjust_freely, "an inspection's motion without encoder", "motion"
 )
 GAUGE_EVIDENCE = Stage(
     "evidence", "64", DiagnosisParameters, examine_gauge, "what a gauge run shows of effects", "diagnosis"
 )
 FIELD_EVIDENCE = Stage(
-    "evidence", "29", DiagnosisParameters, examine_field, "what an inspection shows of effects", "diagnosis"
+    "evidence", "30", DiagnosisParameters, examine_field, "what an inspection shows of effects", "diagnosis"
 )

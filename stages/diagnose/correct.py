@@ -217,7 +217,7 @@ def adjust_corrected(
 
 CORRECTION = Stage("correction", "1", Parameters, correct, "the stated probe with the effects found")
 CORRECTED_MOTION = Stage(
-    "corrected_motion", "4", Parameters, adjust_corrected, "an inspection's motion with the corrected probe"
+    "corrected_motion", "5", Parameters, adjust_corrected, "an inspection's motion with the corrected probe"
 )
 
 

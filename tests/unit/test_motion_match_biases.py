@@ -36,6 +36,21 @@ def test_match_biases_are_the_last_parameters() -> None:
 
 
 @pytest.mark.parametrize("seed", [1, 2])
+def test_noise_of_matches_alone_does_not_lengthen_the_distance(seed: int) -> None:
+    """Noise and its opposite err oppositely, but for a bias: 1.2 σ with the direction of the match."""
+    given = scene(FRAMES, 400, encoder=False, seed=seed)
+    tracks, truth = given.measured.tracks, given.truth
+    noise = tracks.sigma_px[:, None] * np.random.default_rng(seed).standard_normal(tracks.uv.shape)
+    in_sigma = []
+    for uv in (tracks.uv + noise, tracks.uv - noise):
+        measured = replace(given.measured, tracks=replace(tracks, uv=uv))
+        found = adjust(truth, measured, MotionParameters(alike=1.0), 1e-5)
+        sigma = np.sqrt(last_frame_covariance(found.equations.factor())[2, 2])
+        in_sigma.append((found.state.T_pc[-1, 2, 3] - truth.T_pc[-1, 2, 3]) / sigma)
+    assert abs(np.mean(in_sigma)) < 0.3, in_sigma
+
+
+@pytest.mark.parametrize("seed", [1, 2])
 def test_a_bias_of_distant_matches_is_not_taken_for_distance(seed: int) -> None:
     """Compression removes texture far ahead: matches at less than 0.85 rad lag by up to 0.25 px."""
     given = scene(FRAMES, 90, encoder=False, seed=seed)

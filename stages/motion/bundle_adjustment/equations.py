@@ -254,7 +254,6 @@ def landmark_rows(state: State, measured: Measurements, parameters: MotionParame
     unsure = measured.unsure.shape[1]
     residual, by_point = np.empty((count, 2)), np.empty((count, 2, 3))
     by_pose, by_instrument = np.empty((count, 2, 6)), np.empty((count, 2, unsure + MATCH_BIASES))
-
     arrays = residual, by_point, by_pose, by_instrument
 
     def fill(part: slice) -> None:
@@ -277,16 +276,19 @@ def landmark_rows(state: State, measured: Measurements, parameters: MotionParame
 def _observe(
     state: State, T_cp: Float, measured: Measurements, bias_px: float, part: slice, out: tuple[Float, ...]
 ) -> None:
-    """Write residuals of some observations and their derivatives by point, pose and instrument."""
+    """Write residuals of some observations and their derivatives by point, pose and instrument.
+
+    Shared errors point outward at the projected place: at the matched one, its noise lengthened distances.
+    """
     tracks, camera = measured.tracks, measured.camera_at(state)
     frame, uv = tracks.frame[part], tracks.uv[part]
     xyz_c = transform(T_cp[frame], state.xyz_p[tracks.landmark[part]])
     by_c, by_parameters = camera.project_jacobian(xyz_c)
     unsure = measured.unsure[: by_parameters.shape[2]]
-    off, biases = camera.project(xyz_c).uv - uv, state.instrument[-MATCH_BIASES:]
+    seen, biases = camera.project(xyz_c).uv, state.instrument[-MATCH_BIASES:]
     observe(
-        off, by_c, by_parameters, unsure, xyz_c, state.T_pc[frame], uv - camera.centre_px, bias_px, biases,
-        *out,
+        seen - uv, by_c, by_parameters, unsure, xyz_c, state.T_pc[frame], seen - camera.centre_px, bias_px,
+        biases, *out,
     )  # fmt: skip
 
 

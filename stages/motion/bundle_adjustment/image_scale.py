@@ -217,7 +217,8 @@ def _widths_and_scales(estimate: Estimate, measured: Measurements, course: Float
     span = np.concatenate([rings.span_mm, to_pipe(state.axis, state.xyz_p)[0]])
     width, count = _widths(span, state.bore), len(rings.span_mm)
     in_rings = np.concatenate([-width[:count], by_ring[:, None] * course[measured.rings.frame]], 1)
-    away_px = measured.tracks.uv - measured.camera_at(state).centre_px
+    projected = measured.tracks.uv + texture.residual  # the match's own noise would bias the scale
+    away_px = projected - measured.camera_at(state).centre_px
     away_px = away_px * np.asarray(texture.by_pose.any((1, 2)))[:, None]
     by_scale = away_px[:, :, None] * course[measured.tracks.frame][:, None, :]
     widths, landmarks = width.shape[1], width[count:]
