@@ -106,7 +106,8 @@ class Stop:
     trials : int
         Largest number of steps tried.
     enough : float
-        The search ends when a step of slight damping is predicted to gain less than this share of the cost.
+        The search ends when a step of slight damping is predicted to gain less than this share of the cost,
+        even if it fails: shorter steps would gain less still.
     doubtful : float
         The search ends when a failed step had a predicted decrease below this, which may be an artefact of
         approximate derivatives.
@@ -120,8 +121,8 @@ class Stop:
         """Return whether a step with this ratio of actual to ``promised`` gain is the last."""
         if damping.is_exhausted:
             return True
-        least = self.doubtful if gain <= 0 else self.enough * cost * damping.is_slight
-        return promised < least
+        doubtful = self.doubtful if gain <= 0 else 0.0
+        return promised < max(doubtful, self.enough * cost * damping.is_slight)
 
 
 def minimise(

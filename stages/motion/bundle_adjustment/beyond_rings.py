@@ -10,7 +10,7 @@ from pipeline.adjustment.levenberg_marquardt import Watch
 from pipeline.geometry.axis import to_pipe
 from stages.motion.bore import Bore
 from stages.motion.bundle_adjustment.equations import Measurements
-from stages.motion.bundle_adjustment.solver import Estimate, estimate_state
+from stages.motion.bundle_adjustment.solver import Estimate, estimate_again
 from stages.motion.parameters import MotionParameters
 
 
@@ -40,4 +40,6 @@ def held_beyond_rings(
     at_mm, _, _ = to_pipe(state.axis, state.xyz_p)
     if state.bore.steps_beyond(at_mm, free.adjusted.equations.texture.surface_residual):
         return free
-    return estimate_state(replace(state, bore=known_everywhere(state.bore)), measured, parameters, watch)
+    held = replace(state, bore=known_everywhere(state.bore))
+    before = replace(free, adjusted=replace(free.adjusted, state=held))
+    return estimate_again(before, measured, parameters, watch)

@@ -81,11 +81,16 @@ class Estimate:
 
 
 def estimate_state(
-    start: State, measured: Measurements, parameters: MotionParameters, watch: Watch = unwatched
+    start: State,
+    measured: Measurements,
+    parameters: MotionParameters,
+    watch: Watch = unwatched,
+    enough: float = CLOSELY,
 ) -> Estimate:
     """Adjust with a loose motion prior, estimate the smoothness of the motion, then adjust again.
 
-    ``watch`` is called before every step.
+    The second adjustment ends when a step promises less than the share ``enough`` of the cost. ``watch`` is
+    called before every step.
 
     Raises
     ------
@@ -98,7 +103,7 @@ def estimate_state(
         loose = _loosely(start, measured, parameters, watch)
         loose = loose.with_bore_in_place(measured.probe.laser.baseline_mm)
         sigma = np.hypot(_smoothness(loose.T_pc, measured.time_s, measured.tracks.poses.known), uneven)
-        return _smoothly(loose, measured, sigma, parameters, watch)
+        return _smoothly(loose, replace(measured, smooth_sigma=sigma), parameters, watch, enough)
 
 
 def estimate_again(
@@ -114,21 +119,22 @@ def estimate_again(
         When the motion is not determined.
     """
     with _refusing_undetermined():
-        return _smoothly(before.state, measured, before.smooth_sigma, parameters, watch)
+        measured = replace(measured, smooth_sigma=before.smooth_sigma)
+        return _smoothly(before.state, measured, parameters, watch, CLOSELY)
 
 
 def _smoothly(
-    start: State, measured: Measurements, sigma: Float, parameters: MotionParameters, watch: Watch
+    start: State, measured: Measurements, parameters: MotionParameters, watch: Watch, enough: float
 ) -> Estimate:
-    """Adjust with the smoothness (6,) of the motion, and again while the poses tremble more than that."""
-    known = measured.tracks.poses.known
-    smooth = adjust(start, replace(measured, smooth_sigma=sigma), parameters, CLOSELY, watch)
+    """Adjust with the measured smoothness of the motion, and again while the poses tremble more than that."""
+    known, sigma = measured.tracks.poses.known, measured.smooth_sigma
+    smooth = adjust(start, measured, parameters, enough, watch)
     for _ in range(_ROUNDS):
         looser = _looser(sigma, smooth.state.T_pc, measured.time_s, known)
         if np.all(looser < _MORE * sigma):
             break
         sigma = looser
-        smooth = adjust(smooth.state, replace(measured, smooth_sigma=sigma), parameters, CLOSELY, watch)
+        smooth = adjust(smooth.state, replace(measured, smooth_sigma=sigma), parameters, enough, watch)
     return Estimate(smooth, smooth.equations.factor(), sigma)
 
 

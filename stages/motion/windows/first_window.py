@@ -15,6 +15,7 @@ from stages.motion.bundle_adjustment.equations import Measurements
 from stages.motion.bundle_adjustment.laser_knock import KnockTest
 from stages.motion.bundle_adjustment.match_errors import lasting_excess
 from stages.motion.bundle_adjustment.solver import (
+    ROUGHLY,
     Estimate,
     estimate_again,
     estimate_state,
@@ -157,7 +158,7 @@ def adjust_first(run: MeasuredRun, window: Window, parameters: MotionParameters,
     """
     run, knock = with_steady_laser(run, parameters, watch)
     measured = run.measured(window, parameters)
-    estimate = estimate_state(run.start(window, measured, parameters), measured, parameters, watch)
+    estimate = estimate_state(run.start(window, measured, parameters), measured, parameters, watch, ROUGHLY)
     first = _held_beyond_rings(_Adjusted(run, window, parameters, measured, estimate, watch))
     first, unsure = _with_shared_error(first)
     first, delay = _without_delay(first)
@@ -170,10 +171,13 @@ def adjust_first(run: MeasuredRun, window: Window, parameters: MotionParameters,
 
 
 def _held_beyond_rings(first: _Adjusted) -> _Adjusted:
-    """Hold texture beyond the rings to their radius, here and in later windows, unless it shows a step."""
+    """Adjust again, with texture beyond the rings held to their radius unless it shows a step.
+
+    Later windows hold it, too. The first adjustment, in which it is free, need not be exact.
+    """
     held = held_beyond_rings(first.estimate, first.measured, first.parameters, first.watch)
     if held is first.estimate:
-        return first
+        return first.resumed()
     return replace(first, estimate=held, run=replace(first.run, bore=known_everywhere(first.run.bore)))
 
 
