@@ -80,6 +80,8 @@ def other_light(radius_px: Float, width_px: float, noise: float, image: Image, s
         The image cut into A sectors.
     """
     basis = basis_of(sectors.azimuth_rad)
+    if _surely_on_course(radius_px, basis, BAND_WIDTHS * width_px):
+        return np.zeros(len(radius_px), bool)
     course = ring_harmonics(radius_px[None], basis)[0] @ basis.T
     rays = _rays(radius_px, course, width_px, noise, image, sectors)
     if rays is None:
@@ -90,6 +92,17 @@ def other_light(radius_px: Float, width_px: float, noise: float, image: Image, s
         if not _continues(arc, smooth, rays):
             rejected[arc] &= np.abs(radius_px - smooth)[arc] > _STEP_WIDTHS * width_px
     return np.asarray(rejected)
+
+
+def _surely_on_course(radius_px: Float, basis: Float, band_px: float) -> bool:
+    """Return whether all samples (A,) lie within a quarter of the band of their plain mean course.
+
+    Then none lies outside of the band around a course that follows most of them, which takes ten times as
+    long to find.
+    """
+    seen = np.isfinite(radius_px)
+    mean = np.linalg.lstsq(basis[seen], radius_px[seen])[0]
+    return bool(np.abs(radius_px[seen] - basis[seen] @ mean).max(initial=0.0) <= band_px / 4)
 
 
 def _rays(

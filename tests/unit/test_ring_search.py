@@ -6,6 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
+from pipeline.adjustment.robust import basis_of, ring_harmonics
 from pipeline.artefacts.measured import RingValidity
 from stages.rings.sectors import cut_sectors
 from stages.rings.trace import trace_ring
@@ -228,3 +229,19 @@ def test_light_that_continues_where_the_line_is_missing_is_not_the_line(sectors,
     trace = trace_ring(image_of(line + mirrored(), 1), sectors, 255.0)
     error = errors(trace, off_centre(150.0, 6.0)(sectors.azimuth_rad))
     assert not (np.abs(error) > 15.0).any()
+
+
+def test_samples_within_a_quarter_of_a_band_of_the_mean_course_are_within_a_band_of_the_robust_one():
+    """Rings of which `other_light` finds no robust course: arcs and gaps pull both, but never so far."""
+    random, psi = np.random.default_rng(8), np.linspace(-np.pi, np.pi, AZIMUTHS, endpoint=False)
+    basis, apart = basis_of(psi), []
+    for _ in range(200):
+        middle, half, step = random.uniform(-3, 3), random.uniform(0.05, 1.5), random.uniform(-1, 1)
+        radius = 150 + step * (np.abs(psi - middle) < half) + random.normal(0, 0.02, AZIMUTHS)
+        radius[np.abs(psi - random.uniform(-3, 3)) < random.uniform(0, 1.4)] = np.nan
+        seen = np.isfinite(radius)
+        mean = np.linalg.lstsq(basis[seen], radius[seen])[0]
+        far = [np.nanmax(np.abs(radius - basis @ c)) for c in (mean, ring_harmonics(radius[None], basis)[0])]
+        apart.append(far[1] / far[0])
+    assert max(apart) < 4
+    assert max(apart) > 1.2, "control: the courses differ"
