@@ -134,6 +134,7 @@ def test_texture_beyond_the_rings_is_held_to_their_radius_unless_it_shows_a_step
     held = held_beyond_rings(free, measured, parameters, watch)
     assert (held is free) == (step_mm != 0)
     assert np.isinf(held.state.bore.measured_mm).all() == (step_mm == 0)
+    assert np.array_equal(held.smooth_sigma, free.smooth_sigma), "it continues as the same motion"
 
 
 def test_texture_has_no_known_radius_where_no_ring_was() -> None:
