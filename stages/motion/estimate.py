@@ -21,9 +21,9 @@ from pipeline.instrument.probe import Probe
 from pipeline.machine.stage import Context, Stage
 from pipeline.recording.base import FrameTable, Recording
 from pipeline.recording.checks import CheckedFrames
-from stages.motion.bundle_adjustment.beyond_rings import held_beyond_rings
+from stages.motion.bundle_adjustment.beyond_rings import estimate_with_wall_beyond
 from stages.motion.bundle_adjustment.equations import Equations, Measurements
-from stages.motion.bundle_adjustment.solver import Estimate, estimate_state
+from stages.motion.bundle_adjustment.solver import Estimate
 from stages.motion.bundle_adjustment.unknowns import State
 from stages.motion.cuts import beyond_cuts
 from stages.motion.events import find_events, warn_of_slips
@@ -226,8 +226,7 @@ def adjust_at_once(
         When rings and texture do not determine the motion.
     """
     watch = partial(context.progress, 0, 1)
-    free = estimate_state(start, measured, parameters, watch)
-    estimate = held_beyond_rings(free, measured, parameters, watch)
+    estimate = estimate_with_wall_beyond(start, measured, parameters, watch)
     report_steps(context, estimate.adjusted.trials, int(not estimate.adjusted.settled))
     _require_convergence(radius_mm, estimate)
     joined, has_encoder = joined_at_once(estimate), measured.encoder is not None

@@ -10,13 +10,36 @@ from pipeline.adjustment.levenberg_marquardt import Watch
 from pipeline.geometry.axis import to_pipe
 from stages.motion.bore import Bore
 from stages.motion.bundle_adjustment.equations import Measurements
-from stages.motion.bundle_adjustment.solver import Estimate, estimate_again
+from stages.motion.bundle_adjustment.solver import ROUGHLY, Estimate, estimate_again, estimate_state
+from stages.motion.bundle_adjustment.unknowns import State
 from stages.motion.parameters import MotionParameters
 
 
 def known_everywhere(bore: Bore) -> Bore:
     """Return the bore with the width of its first and last ring also before and beyond these."""
     return replace(bore, measured_mm=(-np.inf, np.inf))
+
+
+def is_known_everywhere(bore: Bore) -> bool:
+    """Return whether the bore's width is known before and beyond the rings, too."""
+    return bool(np.isinf(bore.measured_mm).all())
+
+
+def estimate_with_wall_beyond(
+    start: State, measured: Measurements, parameters: MotionParameters, watch: Watch
+) -> Estimate:
+    """Adjust with texture beyond the rings held to their radius, unless it shows a step of the bore.
+
+    An adjustment in which it is free tells which, and need not be exact for that.
+
+    Raises
+    ------
+    UnusableError
+        When rings and texture do not determine the motion.
+    """
+    free = estimate_state(start, measured, parameters, watch, ROUGHLY)
+    held = held_beyond_rings(free, measured, parameters, watch)
+    return estimate_again(free, measured, parameters, watch) if held is free else held
 
 
 def held_beyond_rings(

@@ -8,14 +8,17 @@ import numpy as np
 
 from pipeline.adjustment.levenberg_marquardt import Watch
 from pipeline.machine.stage import Context
-from stages.motion.bundle_adjustment.beyond_rings import held_beyond_rings, known_everywhere
+from stages.motion.bundle_adjustment.beyond_rings import (
+    estimate_with_wall_beyond,
+    is_known_everywhere,
+    known_everywhere,
+)
 from stages.motion.bundle_adjustment.encoder_delay import EncoderDelay, delay_of_encoder
 from stages.motion.bundle_adjustment.encoder_scale import EncoderScale, noise_of_encoder, scale_of_encoder
 from stages.motion.bundle_adjustment.equations import Measurements
 from stages.motion.bundle_adjustment.laser_knock import KnockTest
 from stages.motion.bundle_adjustment.match_errors import lasting_excess
 from stages.motion.bundle_adjustment.solver import (
-    ROUGHLY,
     Estimate,
     estimate_again,
     estimate_state,
@@ -158,8 +161,10 @@ def adjust_first(run: MeasuredRun, window: Window, parameters: MotionParameters,
     """
     run, knock = with_steady_laser(run, parameters, watch)
     measured = run.measured(window, parameters)
-    estimate = estimate_state(run.start(window, measured, parameters), measured, parameters, watch, ROUGHLY)
-    first = _held_beyond_rings(_Adjusted(run, window, parameters, measured, estimate, watch))
+    estimate = estimate_with_wall_beyond(run.start(window, measured, parameters), measured, parameters, watch)
+    if is_known_everywhere(estimate.state.bore):
+        run = replace(run, bore=known_everywhere(run.bore))
+    first = _Adjusted(run, window, parameters, measured, estimate, watch)
     first, unsure = _with_shared_error(first)
     first, delay = _without_delay(first)
     first, scale, unsure = with_scale(_with_noise(first), unsure)
@@ -168,17 +173,6 @@ def adjust_first(run: MeasuredRun, window: Window, parameters: MotionParameters,
     return FirstWindow(
         steady.run, first.parameters, steady.estimate, steady.measured, unsure, check, steady, knock
     )
-
-
-def _held_beyond_rings(first: _Adjusted) -> _Adjusted:
-    """Adjust again, with texture beyond the rings held to their radius unless it shows a step.
-
-    Later windows hold it, too. The first adjustment, in which it is free, need not be exact.
-    """
-    held = held_beyond_rings(first.estimate, first.measured, first.parameters, first.watch)
-    if held is first.estimate:
-        return first.resumed()
-    return replace(first, estimate=held, run=replace(first.run, bore=known_everywhere(first.run.bore)))
 
 
 def _with_shared_error(first: _Adjusted) -> tuple[_Adjusted, float]:
