@@ -131,7 +131,8 @@ class LampSamples:
         """Return the light that fits the samples; None without samples.
 
         The pattern's σ comes from leaving out parts of the frames in turn: pixels side by side err alike, by
-        the same poses and the same photo. As independent ones they made it a fifth to a thirtieth of that.
+        the same poses and the same photo. As independent ones they made it a fifth to a thirtieth of that. A
+        single frame does not show it, and it is infinite.
         """
         if not self._parts:
             return None
@@ -139,9 +140,9 @@ class LampSamples:
         every = np.concatenate([p[0] for p in self._parts])
         knots = np.linspace(float(every.min()), float(every.max()), _THETA_KNOTS)
         light = self._fitted(frames, knots)
+        if len(frames) < 2:
+            return replace(light, pattern_sd=np.full(2 * _HARMONICS, np.inf))
         parts = np.array_split(frames, min(_LEFT_OUT, len(frames)))
-        if len(parts) < 2:
-            return light
         without = [self._fitted(np.setdiff1d(frames, p), knots).pattern for p in parts]
         return replace(light, pattern_sd=np.hypot(light.pattern_sd, left_out_sd(np.array(without))))
 

@@ -55,7 +55,8 @@ def _in_frame(line: LineSight, image: Byte, reach_px: float) -> Float | None:
     main = int(light.sum(1).argmax()) if light.size else 0
     if light.shape[1] < _FEWEST_DEGREES or light[main].sum() <= 0:
         return None
-    # The main channel shows how much of the line's light each degree holds, where pixels clip, too.
-    made = wall * light[main] / np.maximum(wall[main], 1e-6)
-    grey = LUMA_BGR * np.maximum((light * made).sum(1) / (made**2).sum(1), 0.0)
-    return np.asarray(grey / grey.sum())
+    # The main channel shows how much of the line's light each degree holds, where pixels clip, too: light is
+    # to wall as there. Both sides are multiplied out, since wall may be black in that channel.
+    shown, made = light * wall[main], wall * light[main]
+    grey = LUMA_BGR * np.maximum((shown * made).sum(1) / np.maximum((made**2).sum(1), 1e-9), 0.0)
+    return np.asarray(grey / grey.sum()) if grey.any() else None

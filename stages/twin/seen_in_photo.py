@@ -31,9 +31,10 @@ def separated_from_photo(
     """Return what is on the window, and places that dim ones may have left in the photo.
 
     The latter are brighter, by no more than a photo so dim would make them, and at its image azimuth. That
-    other light is mixed in, as by scatter, makes a dark stain of the photo brighter, too.
+    other light is mixed in, as by scatter, makes a dark stain of the photo brighter, too. What is itself
+    brighter did not dim the photo: two such places would explain each other.
     """
-    dim = [m for m in found if set(m.names) & set(_DIMS)]
+    dim = [m for m in found if set(m.names) & set(_DIMS) and not _is_brighter(*_of(m, "brighter"))]
     left = [m for m in found if any(_may_be_left_by(m, d, ring) for d in dim if d is not m)]
     said = "{} But the photo may be darker there, as it was made through what lies at the same azimuth."
     withdrawn = tuple(replace(m, statement=said.format(m.statement)) for m in left)
@@ -101,11 +102,15 @@ def _may_be_left_by(bright: Mismatch, dim: Mismatch, ring: Ring) -> bool:
     if not bright.name:
         more, sd = -_of(bright, "share")[0], _of(bright, "share")[1]
     most = min(taken[0] + _SURELY * taken[1], _NEARLY_ALL)
-    if not 0 < more - _SURELY * sd < most / (1 - most):
+    if not _is_brighter(more, sd) or more - _SURELY * sd >= most / (1 - most):
         return False
     discs = [d for d in map(disc_of, (bright, dim)) if d is not None]
     (one, wide), (other, reach) = (d.around(ring.centre_px) for d in discs)
     return abs(half_turn(one - other)) < wide + reach
+
+
+def _is_brighter(more: float, sd: float) -> bool:
+    return more > _SURELY * sd
 
 
 def _of(found: Mismatch, name: str) -> tuple[float, float]:

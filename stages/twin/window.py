@@ -158,7 +158,8 @@ class WindowPlace:
         }
         possible = {n: law for n, law in tried.items() if n == "droplet" or law.is_share}
         name, rivals = self._likeliest(possible)
-        if name == "droplet" and fall_of_pattern(spots[:, 0]) > possible.pop(name).fall.sum():
+        if name == "droplet" and fall_of_pattern(spots[:, 0]) > tried[name].fall.sum():
+            del possible[name]
             if not possible:
                 return None
             name, rivals = self._likeliest(possible)

@@ -16,21 +16,26 @@ SCENE = SimpleNamespace(
 )
 
 
-def _off(seed):
-    """Return how many σ the pattern is off where each frame's photo errs on one side by 3 %."""
+def _light(seed, frames=12):
+    """Return the light measured where each frame's photo errs on one side by 3 %."""
     random, samples = np.random.default_rng(seed), LampSamples(SCENE, 16.0, 250.0)
     nowhere = np.full(THETA.shape, np.nan, np.float32)
-    for frame in range(12):
+    for frame in range(frames):
         wave = sum(0.03 * random.standard_normal() * f(m * PHI) for m in (1, 2) for f in (np.cos, np.sin))
         noise = 0.02 * random.standard_normal(THETA.shape)
         even = LitSight(np.full(THETA.shape, 80.0, np.float32), np.ones_like(THETA), nowhere, nowhere)
         samples.add(frame, (16 + 80 * np.exp(wave + noise)).astype(np.float32), even, random)
-    light = samples.solve()
-    return light.pattern / light.pattern_sd
+    return samples.solve()
 
 
 def test_the_uncertainty_of_the_lamps_pattern_allows_for_errors_that_pixels_share(monkeypatch):
     """A blurred run's pattern of .016 had a σ of .0004, and was an LED dim by a fifth."""
     monkeypatch.setattr("stages.twin.lamp_light._SAMPLES", 100)
-    off = np.array([_off(seed) for seed in range(12)])
+    lights = [_light(seed) for seed in range(12)]
+    off = np.array([light.pattern / light.pattern_sd for light in lights])
     assert 0.6 < np.sqrt(np.mean(off**2)) < 1.5
+
+
+def test_a_single_frame_does_not_show_how_uncertain_the_lamps_pattern_is():
+    """By its pixels, even lamps were uneven by 110 σ: what the frame's photo errs by."""
+    assert np.isinf(_light(3, frames=1).pattern_sd).all()

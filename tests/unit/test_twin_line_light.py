@@ -1,5 +1,6 @@
 """The light of the laser's line, estimated from the pixels along it, on synthetic lines."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -52,6 +53,21 @@ def test_the_weights_of_the_walls_colours_in_the_line_are_those_of_the_laser(lig
     for frame, one in enumerate(grey):
         samples.add(frame, one.astype(np.float32)[None], sights[frame])
     np.testing.assert_array_equal(samples.solve().colour, colour)
+
+
+@pytest.mark.parametrize("absent", [(0, 1), (1,), (0,)])
+@pytest.mark.parametrize("part", [0.1, 1.0])
+def test_wall_that_is_black_in_a_channel_does_not_change_the_weights_of_the_others(absent, part):
+    """Red paint on a tenth of the wall made weights of .01, .87, .11 ones of .02, .98, 0 ± .0001."""
+    random, light = np.random.default_rng(7), np.array([0.1, 1.2, 0.3])
+    black = np.isin(np.arange(3), absent)[:, None]
+    sight = _sight(random, False)
+    painted = black & (np.abs(sight.phi_rad) <= part * np.pi)
+    sight = replace(sight, reflectance=np.where(painted, np.float32(0), sight.reflectance))
+    scene = SimpleNamespace(pose=lambda frame: frame, line=lambda _: sight)
+    colour, _ = line_colour(scene, [(k, _recorded(light, sight, random)) for k in range(6)], 1.1)
+    true = LUMA_BGR * light * (1 - black[:, 0] * (part == 1))
+    np.testing.assert_allclose(colour, true / true.sum(), atol=0.03)
 
 
 def test_without_colour_frames_the_weights_are_not_known():

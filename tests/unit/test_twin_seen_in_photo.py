@@ -46,6 +46,14 @@ def test_a_dark_stain_of_the_photo_is_no_scatter(brighter, left):
     assert len(separated_from_photo((dust, stain), _RING)[1]) == left
 
 
+def test_two_places_that_are_both_brighter_do_not_explain_each_other():
+    """Each was withdrawn because the other might have dimmed its photo, and nothing was left."""
+    places = [_place("window_scatter", u, v, 0.4) for u, v in ((497.0, 468.0), (530.0, 513.0))]
+    more = NamedFigure("brighter", 0.1, 0.01)
+    both = tuple(replace(p, parameters=(*p.parameters, more)) for p in places)
+    assert separated_from_photo(both, _RING) == (both, ())
+
+
 @pytest.mark.parametrize(
     ("name", "at_deg", "left"), [("", -97.0, True), ("", -60.0, False), ("glint", -97.0, False)]
 )

@@ -18,14 +18,8 @@ from stages.twin.window import WindowPlace, _fall_of_drop, _with_photo, or_on_wi
 
 
 def _frame(level):
-    unknown = np.full(level.shape, np.nan, np.float32)
-    return TwinFrame(
-        level,
-        np.full(level.shape, 4.0, np.float32),
-        np.full(level.shape, Region.WALL, np.uint8),
-        unknown,
-        unknown,
-    )
+    unknown, even = (np.full(level.shape, x, np.float32) for x in (np.nan, 4.0))
+    return TwinFrame(level, even, np.full(level.shape, Region.WALL, np.uint8), unknown, unknown)
 
 
 def _textured(random):
@@ -243,12 +237,8 @@ def test_one_spot_is_reported_once_and_two_are_reported_twice():
         )
         return Mismatch("window_scatter", "intensity", "image", place, (), 0.0, 5.0, 5.0 - fall, "")
 
-    assert [
-        m.place[0].value for m in without_duplicates([spot(100, 1.0), spot(112, 3.0), spot(300, 2.0)])
-    ] == [
-        112,
-        300,
-    ]
+    told = without_duplicates([spot(100, 1.0), spot(112, 3.0), spot(300, 2.0)])
+    assert [m.place[0].value for m in told] == [112, 300]
 
 
 @pytest.mark.parametrize("flatness", [1.0, 2.0])
