@@ -41,9 +41,9 @@ TREMBLING_GROWTH = np.sqrt(20.0)
 """1 σ of third differences of independent values over that of the values: the root of 1 + 9 + 9 + 1."""
 
 
-def third_difference_growth(stride: float) -> float:
-    """Return the ratio of the 1 σ of third differences over ``stride`` frames to that over one frame."""
-    return float(np.sqrt((11 * stride**5 + 5 * stride**3 + 4 * stride) / 20))
+def third_difference_growth(stride: Float | float) -> Float:
+    """Return the ratio (...) of the 1 σ of third differences over ``stride`` (...) frames to that over 1."""
+    return np.asarray(np.sqrt((11 * stride**5 + 5 * stride**3 + 4 * stride) / 20))
 
 
 def third_difference_sigma(T_pc: Float, time_s: Float, known: Int) -> Float:
@@ -77,13 +77,18 @@ def local_third_difference_sigma(T_pc: Float, time_s: Float, known: Int) -> Floa
     difference show, if that is larger. A probe that is pulled faster, stops, or turns back jerks a hundred
     times as much as in steady motion: with one 1 σ for the whole run, the prior outweighs the measurements
     of these frames, which then count as outliers.
+
+    A third of its span counts as the stride of a difference across frames of unknown pose, where jerk grows
+    for longer (after three frames in a row, exact to 5 %); at least the usual stride does, since in a shorter
+    one noise of the poses would count as jerk.
     """
     as_a_rule = third_difference_sigma(T_pc, time_s, known)
     out = np.tile(as_a_rule, (max(len(T_pc) - 3, 0), 1))
     if len(known) < _FEWEST_FRAMES:
         return out
-    growth = third_difference_growth(float(np.median(np.diff(known))))
-    shown = np.abs(_third_difference_of_poses(T_pc, time_s, known, 1)) / growth
+    stride = np.maximum((known[3:] - known[:-3]) / 3, np.median(np.diff(known)))
+    third = _third_difference_of_poses(T_pc, time_s, known, 1)
+    shown = np.abs(third) / third_difference_growth(stride)[:, None]
     for first, last, own in zip(known[:-3], known[3:], shown, strict=True):
         covered = slice(max(first - 2, 0), last)
         out[covered] = np.maximum(out[covered], own)

@@ -239,7 +239,7 @@ def _rms(displacement_px: Float) -> float:
 
 GAUGE_LINE = Stage(
     "gauge_line",
-    "3",
+    "4",
     GaugeLineParameters,
     compare_gauge_line,
     "the line of a gauge run beside the same line, re-rendered with what was diagnosed",

@@ -180,3 +180,13 @@ def test_a_jerk_is_allowed_for_where_known_frames_show_it_and_nowhere_else() -> 
     assert np.all(sigma[57, :2] < 4 * as_a_rule[:2])
     assert np.all(sigma[:40] < 4 * as_a_rule)
     assert np.all(sigma >= as_a_rule)
+
+
+def test_frames_of_unknown_pose_show_no_jerk() -> None:
+    """Across 100 frames without fiducials a steady motion was allowed six thousand times its jerks."""
+    third = np.zeros((300, 6))
+    third[:, :3] = np.random.default_rng(0).standard_normal((300, 3)) * 1e-3
+    T_pc = poses(np.cumsum(np.cumsum(np.cumsum(third, 0), 0), 0))
+    time_s, known = 0.04 * np.arange(300), np.r_[0:100, 200:300]
+    sigma = local_third_difference_sigma(T_pc, time_s, known)
+    assert np.all(sigma[:, :3] < 5e-3)

@@ -212,5 +212,5 @@ def _calibrate_run(
 
 
 GAUGE = Stage(
-    "gauge", "13", GaugeParameters, _calibrate_run, "fiducials and rings on known bore to camera and sheet"
+    "gauge", "14", GaugeParameters, _calibrate_run, "fiducials and rings on known bore to camera and sheet"
 )
