@@ -24,8 +24,8 @@ def changes_over_time(
     """
     cells = sums.cells()
     found, slow = causes(*cells, scene.probe.lighting, scene.ring, samples)
-    found = beside_measured(or_on_window(found), state)
-    found = (*found, *flicker_of_measured(state, found, scene.ring, cells))
+    found = or_on_window(found)
+    found = (*beside_measured(found, state), *flicker_of_measured(state, found, scene.ring, cells))
     found = (*found, *faded(state, found, scene.ring))
     coding = sums.fine.step(scene.ring)
     found, beside = beside_coding(found, coding)

@@ -10,7 +10,7 @@ from scipy.optimize import least_squares
 from pipeline.adjustment.robust import left_out_sd
 from pipeline.arrays import Float, Float32, Int
 from pipeline.artefacts.twin import NamedFigure
-from stages.twin.significance import significance_over_frames
+from stages.twin.significance import ratio_over_frames, significance_over_frames
 
 WIDEST_PX = 48.0
 """Half width of the window about a place, px: at least this much, else two radii but at most this much beyond
@@ -104,6 +104,15 @@ def fall_of_pattern(dirt: Float32) -> float:
         change = cross[other].sum(0) / np.maximum(own[other].sum(0), 1e-9)
         fall += float((2 * change * cross[half] - change**2 * own[half]).sum())
     return fall
+
+
+def brighter_within(dirt: Float32, place: Float) -> NamedFigure:
+    """Return by how much a place (column, row, radius) is brighter than its twin; dirt is (F, 2, h, w)."""
+    row, column = np.mgrid[: dirt.shape[2], : dirt.shape[3]]
+    inside = np.hypot(column - place[0], row - place[1]) < place[2]
+    cross, own = dirt[:, :, inside].sum(2, dtype=float).T
+    change, sd = ratio_over_frames(np.stack([-cross, own], 1), PARTS)
+    return NamedFigure("brighter", change, sd, "relative")
 
 
 def _spot(place: Float, shape: tuple[int, ...]) -> Float:

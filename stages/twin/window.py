@@ -18,8 +18,7 @@ from pipeline.artefacts.twin import Look, Mismatch, NamedFigure
 from stages.twin.cells import sigmas
 from stages.twin.locate import FALSE_ALARM, LEAST_CHANGE, ImagePlace
 from stages.twin.render import Region, TwinFrame
-from stages.twin.significance import ratio_over_frames
-from stages.twin.spot import PARTS, WIDEST_PX, FittedLaw, fall_of_pattern, fall_of_spot
+from stages.twin.spot import PARTS, WIDEST_PX, FittedLaw, brighter_within, fall_of_pattern, fall_of_spot
 
 _POWER_STEP, _ASIDE_PX = 0.4, 0.5
 """Steps of bending that are tried; 1 σ of a displacement, px, since blocks of 24 px flatten its peak.
@@ -149,41 +148,39 @@ class WindowPlace:
             return None
         spots = np.stack(self.spots)
         place = np.array([self.place.u_px, self.place.v_px, self.place.radius_px]) - (*self.corner, 0.0)
-        u, v, radius = place / self._step
-        start = np.array([[0.3, u, v, f * radius, 1.0, 0.0] for f in (0.5, 1.5)])
-        tried = {
-            "window_dirt": fall_of_spot(spots[:, 0], start, 0.0),
-            "window_scatter": fall_of_spot(spots[:, 1], start, _OF_CONTRAST),
-            "droplet": _fall_of_drop(np.stack(self.drops), self.aside_px),
-        }
-        possible = {n: law for n, law in tried.items() if n == "droplet" or law.is_share}
-        name, rivals = self._likeliest(possible)
-        if name == "droplet" and fall_of_pattern(spots[:, 0]) > tried[name].fall.sum():
-            del possible[name]
-            if not possible:
-                return None
-            name, rivals = self._likeliest(possible)
-        alone = self.bends and name == "droplet" and not rivals
-        chance = max(self.place.probability, tried[name].chance)
-        if chance > FALSE_ALARM or ("wall" in fixed_to and not alone):
+        tried = self._tried(spots, place / self._step)
+        name, rivals = self._named(tried, spots[:, 0])
+        if not name:
             return None
-        law = tried[name]
-        if abs(law.size.value) < self._least(name, law.size.sd):
+        law, chance = tried[name], max(self.place.probability, tried[name].chance)
+        alone = self.bends and name == "droplet" and not rivals
+        small = abs(law.size.value) < self._least(name, law.size.sd)
+        if chance > FALSE_ALARM or small or ("wall" in fixed_to and not alone):
             return None
         if name == "window_dirt":
             law = replace(law, size=_with_photo(law.size))
         found = self._mismatch([name, *rivals], law, chance)
         if name != "window_scatter":
             return found
-        return replace(found, parameters=(*found.parameters, self._brighter(spots[:, 0], (u, v, radius))))
+        return replace(found, parameters=(law.size, brighter_within(spots[:, 0], place / self._step)))
 
-    def _brighter(self, dirt: Float32, place: tuple[float, float, float]) -> NamedFigure:
-        """Return by how much all of the place is brighter than its twin; ``dirt`` is (F, 2, h, w)."""
-        row, column = np.mgrid[: dirt.shape[2], : dirt.shape[3]]
-        inside = np.hypot(column - place[0], row - place[1]) < place[2]
-        cross, own = dirt[:, :, inside].sum(2, dtype=float).T
-        change, sd = ratio_over_frames(np.stack([-cross, own], 1), PARTS)
-        return NamedFigure("brighter", change, sd, "relative")
+    def _tried(self, spots: Float32, place: Float) -> dict[str, FittedLaw]:
+        u, v, radius = place
+        start = np.array([[0.3, u, v, f * radius, 1.0, 0.0] for f in (0.5, 1.5)])
+        return {
+            "window_dirt": fall_of_spot(spots[:, 0], start, 0.0),
+            "window_scatter": fall_of_spot(spots[:, 1], start, _OF_CONTRAST),
+            "droplet": _fall_of_drop(np.stack(self.drops), self.aside_px),
+        }
+
+    def _named(self, tried: Mapping[str, FittedLaw], dirt: Float32) -> tuple[str, list[str]]:
+        """Return the likeliest possible effect, or "", and its rivals: light that stays is no drop."""
+        possible = {n: law for n, law in tried.items() if n == "droplet" or law.is_share}
+        name, rivals = self._likeliest(possible)
+        if name != "droplet" or fall_of_pattern(dirt) <= tried[name].fall.sum():
+            return name, rivals
+        del possible[name]
+        return self._likeliest(possible) if possible else ("", [])
 
     def _likeliest(self, tried: Mapping[str, FittedLaw]) -> tuple[str, list[str]]:
         """Return the likeliest effect, and those that frames do not distinguish from it.

@@ -18,6 +18,7 @@ from stages.twin.lamps import (
     uneven_lamps,
 )
 from stages.twin.laws import dim_share
+from stages.twin.over_time import changes_over_time
 from stages.twin.reference import BlockSamples
 from stages.twin.scene import Ring
 from stages.twin.switched import share_at
@@ -160,6 +161,20 @@ def test_flicker_that_measured_frames_do_not_show_has_no_name(spread, name):
     made = beside_measured((told, other), state)
     assert [m.name for m in made] == [name, "lamp_step"]
     assert made[1] == other
+
+
+def test_flicker_that_the_photo_may_explain_is_told_once(monkeypatch):
+    """Measured frames that varied less than half as much were flicker that compared ones do not show."""
+    size = (NamedFigure("exposure", 0.25, 0.02, "relative"),)
+    told = Mismatch("flicker", "intensity", "time", (), size, 1e-4, 2.0, 1.0, "Frames vary.", None)
+    log = 0.08 * np.random.default_rng(2).standard_normal(12)
+    lamp = replace(_lamp(np.zeros(36)), gain=Course(np.arange(12), log, np.full(12, 1e-3)))
+    state = SimpleNamespace(lamp=lamp, line=None, line_is_clipped=False)
+    monkeypatch.setattr("stages.twin.over_time.causes", lambda *_: ((told,), ()))
+    monkeypatch.setattr("stages.twin.over_time.colour_over_run", lambda *_: ())
+    sums = SimpleNamespace(cells=lambda: (None, None), fine=SimpleNamespace(step=lambda _: ()))
+    (one,), _ = changes_over_time(sums, None, SCENE, state, ())
+    assert one == beside_measured((told,), state)[0] != told
 
 
 @pytest.mark.parametrize("clipped", [False, True])
