@@ -209,14 +209,15 @@ def _location(shown: Shown, asked: Sequence[str]) -> Location | None:
         nameless: Location | None = _IN_PROFILE
     else:
         nameless = shown.of_travel[0].location if shown.of_travel else None
-    return _location_of(shown.examined, shown.every, asked) or nameless
+    of_rings = of_gauge.location(shown.examined, shown.rings) if shown.examined is not None else None
+    return _location_of(of_rings, shown.every, asked) or nameless
 
 
-def _location_of(examined: Examined | None, claims: Sequence[Claim], asked: Sequence[str]) -> Location | None:
+def _location_of(of_rings: Location | None, claims: Sequence[Claim], asked: Sequence[str]) -> Location | None:
     """Return the location as far as it was measured, and otherwise what all candidate causes share."""
     of_claims = bool(asked) and set(asked) <= {c.name for c in claims}
-    if examined is not None and examined.location is not None and not of_claims:
-        return examined.location
+    if of_rings is not None and not of_claims:
+        return of_rings
     if not claims:
         return None
     measured, known = claims[0].location, [effect(name) for name in asked]

@@ -16,6 +16,11 @@ _BY_LIGHT = (
     "The uncertain size of {} can explain all deviations of the rings of the gauge run: whether anything "
     "else, such as {}, moves them was not decided."
 )
+_PLACES = (
+    "Whether the mismatch in the gauge run is fixed to the {} was not decided: the known effects that fit it "
+    "best and the simplest pattern without a cause do not agree. What the laser does moves no fiducials: "
+    "more of them near the line's place in the image help to tell."
+)
 
 
 @dataclass(frozen=True)
@@ -79,7 +84,8 @@ def shown_by(field: Seen | None, gauge: Seen | None, exposure_s: float, without:
     missing = [s for seen in (field, gauge) if seen is not None for s in seen.shortcomings]
     return Shown(
         examined, Verdict.CONSISTENT if of_light else rings, every, known,
-        _unexplained_profile(field, gauge), _unexplained_travel(field, gauge), (*missing, *of_light),
+        _unexplained_profile(field, gauge), _unexplained_travel(field, gauge),
+        (*missing, *of_light, *undecided_place(examined, rings)),
         gauge is not None and gauge.misdrawn,
     )  # fmt: skip
 
@@ -115,6 +121,12 @@ def _by_light(examined: Examined | None, rings: Verdict, certain: Sequence[Claim
         return ()
     names = ", ".join(of_gauge.members(examined))
     return tuple(_BY_LIGHT.format(light, names) for light in _lights(examined, certain))[:1]
+
+
+def undecided_place(examined: Examined | None, rings: Verdict) -> tuple[str, ...]:
+    """Return in words between which places it was not decided what the mismatch is fixed to."""
+    places = of_gauge.places(examined, rings) if examined is not None else ()
+    return (_PLACES.format(" or the ".join(places)),) if len(places) > 1 else ()
 
 
 def _lights(examined: Examined, claims: Sequence[Claim]) -> list[str]:

@@ -6,7 +6,9 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
+from stages.diagnose import shown
 from stages.diagnose.effects.library import LIBRARY
+from stages.diagnose.effects.vocabulary import VOCABULARY
 from stages.diagnose.gauge import answer, doubts
 from stages.diagnose.gauge.confirm import passes_again
 from stages.diagnose.gauge.examine import Examined, chance_of
@@ -265,3 +267,19 @@ def test_a_run_in_which_nothing_is_rarer_than_expected_has_a_probability_of_one(
     assert chance_of(1e-4) == pytest.approx(0.265e-4, rel=1e-3)
     # Between these, the counts of sound runs are uniform.
     assert p[expected > 2] == pytest.approx(expected[expected > 2] / 8, abs=0.01)
+
+
+@pytest.mark.parametrize(("pattern", "told"), [("generic_outward_2_0", None), ("generic_line_2_1", "laser")])
+def test_what_has_no_name_is_fixed_to_a_place_only_if_effects_and_pattern_agree(pattern, told):
+    """A window that shifted the line in one sector was unexplained, but "fixed to the laser"."""
+    waves = Term(LIBRARY["sheet_waviness"], (2.0,), np.ones(2))
+    model = next(m for m, _ in VOCABULARY if m.name == pattern)
+    fits = (SimpleNamespace(fit=SimpleNamespace(terms=(t,))) for t in (waves, Term(model, (), np.ones(2))))
+    best, formula = cast(Any, tuple(fits))
+    where = Location("ring", "laser", "static", 2)
+    seen = cast(Any, SimpleNamespace(best=best, verdicts=SimpleNamespace(formula=formula), location=where))
+    found = answer.location(seen, Verdict.UNEXPLAINED)
+    assert (found.fixed_to, found.harmonic, found.time) == (told, told and 2, "static")
+    assert bool(shown.undecided_place(seen, Verdict.UNEXPLAINED)) is (told is None)
+    assert answer.location(seen, Verdict.NAMED) == where
+    assert shown.undecided_place(seen, Verdict.NAMED) == ()

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from pipeline.physics.catalogue import effect
-from pipeline.physics.effect import CourseKind
+from pipeline.physics.effect import CourseKind, FixedTo
 from stages.diagnose.agreement import TELLING
 from stages.diagnose.effects.courses import Coursed, Drifting
 from stages.diagnose.effects.library import LIBRARY, ring_shift_px
@@ -16,11 +16,11 @@ from stages.diagnose.gauge.doubts import chances, fits, sure
 from stages.diagnose.gauge.examine import Examined
 from stages.diagnose.gauge.formula import ADEQUATE
 from stages.diagnose.gauge.judge import Verdicts
-from stages.diagnose.gauge.run import Term
+from stages.diagnose.gauge.run import Term, pattern_of
 from stages.diagnose.gauge.search import ring_shift_alone_px, shift_px
 from stages.diagnose.gauge.unknown_laws import Unknown
 from stages.diagnose.inference import SURE
-from stages.diagnose.result import Candidate, Confirmation, EffectFound, Value, Verdict
+from stages.diagnose.result import Candidate, Confirmation, EffectFound, Location, Value, Verdict
 
 # Explanations that were weighed but not fitted are listed above this probability: all others together change
 # no answer.
@@ -183,6 +183,29 @@ def formula(examined: Examined) -> str:
     patterns = best.fit.terms[len(best.library_terms) :] if best is not None and best.library_terms else ()
     terms = patterns or examined.verdicts.formula.fit.terms
     return "; ".join(t.model.equation(t.shape, t.amplitude) for t in terms)
+
+
+def places(examined: Examined, verdict: Verdict) -> tuple[str, ...]:
+    """Return what the mismatch may be fixed to, likeliest first, where rings and fiducials found one.
+
+    What has no name is described by known effects and by the formula. Neither is accepted, so that both
+    count. A drift without a cause tells no place.
+    """
+    best, verdicts, measured = examined.best, examined.verdicts, examined.location
+    if measured is None or measured.fixed_to is None:
+        return ()
+    if verdict is not Verdict.UNEXPLAINED or best is None or verdicts is None:
+        return (measured.fixed_to,)
+    fits = (best.fit, verdicts.formula.fit)
+    each = [measured.fixed_to, *(pattern_of(fit.terms[0])[0] for fit in fits if fit.terms)]
+    return tuple(p for p in dict.fromkeys(each) if p != FixedTo.TIME) or (measured.fixed_to,)
+
+
+def location(examined: Examined, verdict: Verdict) -> Location | None:
+    """Return where rings and fiducials show the mismatch, and what it is fixed to where that can be told."""
+    if examined.location is None or len(places(examined, verdict)) < 2:
+        return examined.location
+    return replace(examined.location, fixed_to=None, harmonic=None, radial_exponent=None)
 
 
 def explains(examined: Examined) -> bool:
