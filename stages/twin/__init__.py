@@ -273,14 +273,14 @@ def _report(comparison: Comparison, found: tuple[Mismatch, ...], context: Contex
 
 PHOTOMETRY = Stage(
     "photometry",
-    "29",
+    "30",
     PhotometryParameters,
     measure_photometry,
     "camera noise, lamps, laser line, blur and dirt on the window, from the frames of a run",
 )
 TWIN = Stage(
     "twin",
-    "86",
+    "87",
     TwinParameters,
     compare_with_twin,
     "recorded frames beside the same frames, re-rendered from what the run has measured",

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.ndimage import map_coordinates
 
-from pipeline.adjustment.robust import left_out_sd, robust_spread, spread_about_median
+from pipeline.adjustment.robust import left_out_sd, robust_spread
 from pipeline.arrays import Float, Float32, Int
 from stages.twin.scene import LitSight, Scene
 
@@ -57,8 +57,14 @@ class Course:
 
     @property
     def spread(self) -> float:
-        """Robust 1 σ of steps between samples about their median, over √2: a steady drift does not count."""
-        return spread_about_median(np.diff(self.log_value)) / np.sqrt(2) if len(self.frame) > 2 else 0.0
+        """Robust 1 σ of steps between samples about their mean, over √2: a steady drift does not count.
+
+        Where brightness alternates, one of two sizes of steps is the median of an odd number of them.
+        """
+        if len(self.frame) < 3:
+            return 0.0
+        step = np.diff(self.log_value)
+        return robust_spread(step - step.mean()) / float(np.sqrt(2))
 
 
 @dataclass(frozen=True)

@@ -177,6 +177,19 @@ def test_flicker_that_the_photo_may_explain_is_told_once(monkeypatch):
     assert one == beside_measured((told,), state)[0] != told
 
 
+@pytest.mark.parametrize("frames", [12, 13])
+def test_lights_that_alternate_between_measured_frames_flicker(frames):
+    """Of 11 steps 6 were alike: about their median they did not vary, and "by .0 % only" was told."""
+    log = 0.1 * (-1.0) ** np.arange(frames) + 0.005 * np.random.default_rng(2).standard_normal(frames)
+    course = Course(6 * np.arange(frames), log, np.full(frames, 1e-3))
+    state = SimpleNamespace(lamp=replace(_lamp(np.zeros(36)), gain=course), line=None, line_is_clipped=False)
+    (told,) = flicker_of_measured(state, (), RING)
+    assert told.name == "flicker"
+    assert beside_measured((told,), state) == (told,)
+    drifting = replace(course, log_value=np.linspace(0, 2, frames))
+    assert drifting.spread == pytest.approx(0, abs=1e-9)
+
+
 @pytest.mark.parametrize("clipped", [False, True])
 def test_a_clipped_line_shows_no_flicker_of_the_laser(clipped):
     log = 0.2 * np.random.default_rng(2).standard_normal(12)
