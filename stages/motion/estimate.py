@@ -99,7 +99,8 @@ def estimate_motion(
     joined = joined.with_scale_sigma(doubt)
     trajectory = trajectory_of(joined, recording.frames, adjusted.probe, has_encoder)
     if run.bore.reduces:
-        trajectory = replace(trajectory, instrument_covariance=probe.covariance)
+        scale_sigma = float(np.hypot(trajectory.scale_sigma, adjusted.held_sigma))
+        trajectory = replace(trajectory, instrument_covariance=probe.covariance, scale_sigma=scale_sigma)
     trajectory = lay_route(trajectory, joined.turn_variance, recording, probe, context)
     trajectory = beyond_cuts(trajectory, cut, run.texture.grid.length_mm)
     events = _events_of(run, joined, trajectory, recording, context)
@@ -266,7 +267,7 @@ def _motion_of_run(
 
 MOTION = Stage(
     "motion",
-    "77",
+    "78",
     MotionParameters,
     _motion_of_run,
     "camera pose in every frame and the pipe's axis, from texture, rings and encoder together",

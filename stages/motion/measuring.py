@@ -209,7 +209,8 @@ def _in_reducer(
 
 
 def _warn_of_reducer(bore: Bore, encoder: EncoderReadings | None, context: Context) -> None:
-    by = "errors as in other reducers" if encoder is None else "the difference of texture and encoder"
+    by = "errors as in other reducers and the σ of the stated probe"
+    by = by if encoder is None else "the difference of texture and encoder"
     context.warn(
         f"the pipe's width changes by {2 * np.ptp(bore.rings_wider_mm):.1f} mm over a length (a reducer or "
         "taper): texture is matched less well there, so that it is not used to check or refine the stated "

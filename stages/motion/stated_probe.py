@@ -155,6 +155,11 @@ def with_doubtful_instrument(
     )
 
 
+def scale_sigma_of(probe: Probe, radius_mm: float) -> float:
+    """Return the relative 1 σ of radii and distances by the σ of a probe, which scales both alike."""
+    return float(np.linalg.norm([_wider_by(u, probe, radius_mm) for u in probe.principal_uncertainties().T]))
+
+
 def _wider_by(moved: Float, probe: Probe, radius_mm: float) -> float:
     """Return the relative change of the pipe's measured radius if a probe's parameters are ``moved`` (P,)."""
     psi = np.linspace(-np.pi, np.pi, _RING, endpoint=False)

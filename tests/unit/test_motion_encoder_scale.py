@@ -70,6 +70,7 @@ class Held:
     texture: SimpleNamespace
     bore: Bore = ONE_BORE
     probe: Probe = field(default_factory=probe)
+    held_sigma: float = 0.0
 
 
 @dataclass(frozen=True)

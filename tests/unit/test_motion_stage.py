@@ -21,7 +21,7 @@ from stages.motion.tracking.patches import cut
 from stages.motion.tracking.strips import Hidden, Strip, StripGrid
 from stages.motion.tracking.tracker import TextureTracker
 from stages.premises.stays import find_static_places
-from tests.drawn_run import RADIUS, DrawnRun, drawn_run, small_probe, without_encoder
+from tests.drawn_run import BASELINE, RADIUS, DrawnRun, drawn_run, small_probe, without_encoder
 from tests.quiet import quiet_context
 from tests.ring_images import MemorySource
 
@@ -102,6 +102,18 @@ def test_a_reducer_is_reported_and_nothing_else_is_blamed(reduced: DrawnRun, enc
     moved = np.linalg.pinv(run.probe.principal_uncertainties()) @ (got.instrument - run.probe.parameters)
     assert np.abs(moved).max() < 0.03, "texture on a slope does not change the probe: it had, by 8 σ"
     np.testing.assert_array_equal(got.instrument_covariance, run.probe.covariance)
+
+
+def test_distances_through_a_reducer_include_the_sigma_of_the_stated_probe(reduced: DrawnRun) -> None:
+    """The probe is held there: with a baseline of 2 σ too long, distance was wrong by 8 of its σ."""
+    run, sigma_mm = without_encoder(reduced), 0.02 * BASELINE
+    stated, covariance = run.probe.parameters.copy(), run.probe.covariance.copy()
+    stated[8] += 2 * sigma_mm
+    covariance[8, 8] = sigma_mm**2
+    got = estimated(replace(run, probe=run.probe.with_parameters(stated, covariance)))
+    z, _, sigma = errors(got, run)
+    assert abs(z[-1]) < 3 * sigma[-1, 0]
+    assert got.scale_sigma == pytest.approx(0.02, rel=0.3)
 
 
 @pytest.mark.parametrize("wrong", [1.0, 1.05])

@@ -226,6 +226,7 @@ def _with_noise(first: _Adjusted) -> _Adjusted:
 def with_scale(first: _Adjusted, unsure: float) -> tuple[_Adjusted, EncoderScale | None, float]:
     """Widen the encoder scale's σ by its contradiction to the pictures; return it and texture's 1 σ."""
     creep_mm = first.parameters.encoder_slip_sigma_mm
+    unsure = float(np.hypot(unsure, first.run.held_sigma))
     scale = scale_of_encoder(first.estimate, first.measured, unsure, creep_mm)
     if scale is None:
         return first, None, float(np.hypot(unsure, _unseen_error(first.run)))

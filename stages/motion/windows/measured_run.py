@@ -17,6 +17,7 @@ from stages.motion.bundle_adjustment.unknowns import State, straight_start
 from stages.motion.encoder import EncoderReadings
 from stages.motion.parameters import MotionParameters
 from stages.motion.rings import RingBins, RingCircles, ring_bins
+from stages.motion.stated_probe import scale_sigma_of
 from stages.motion.tracking.landmarks import Tracks
 from stages.motion.tracking.tracker import TrackedTexture
 from stages.motion.windows.submaps import Window
@@ -56,6 +57,8 @@ class MeasuredRun:
         Change of the laser there.
     farthest_rad : float
         Smallest polar angle of matches of texture that are used: the wall farthest ahead.
+    held_sigma : float
+        Relative 1 σ of lengths by the stated σ of a probe that is held; 0 if the adjustment knows it.
     """
 
     texture: TrackedTexture
@@ -71,6 +74,7 @@ class MeasuredRun:
     jump: RingJump | None = None
     knock: LaserKnock | None = None
     farthest_rad: float = 0.0
+    held_sigma: float = 0.0
 
     @property
     def whole(self) -> Window:
@@ -79,7 +83,8 @@ class MeasuredRun:
 
     def with_probe_held(self) -> MeasuredRun:
         """Return the run with a probe that texture cannot change."""
-        return replace(self, probe=replace(self.probe, covariance=_HELD**2 * self.probe.covariance))
+        held = replace(self.probe, covariance=_HELD**2 * self.probe.covariance)
+        return replace(self, probe=held, held_sigma=scale_sigma_of(self.probe, self.texture.grid.radius_mm))
 
     def measured(self, window: Window, parameters: MotionParameters) -> Measurements:
         """Return the measurements of a window, with frames and distance counted from its first."""
