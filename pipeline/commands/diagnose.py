@@ -55,6 +55,8 @@ def diagnose(
 def _show(answer: Answer, output: Path, console: Console) -> None:
     chance = "not known" if answer.global_p is None else f"{answer.global_p:.2g}"
     console.print(f"Verdict: {answer.verdict} (probability of such a result by chance alone: {chance})")
+    if answer.unexamined:
+        console.print(f"Not examined: {', '.join(answer.unexamined)}")
     for e in answer.effects:
         console.print(f"  {e.name} ({e.probability:.1%}): {e.statement}")
     console.print(f"Report: {output / 'diagnosis.html'}")

@@ -68,8 +68,16 @@ def composed(
         candidates=of_gauge.candidates(shown.examined) if shown.examined is not None else (),
         shortcomings=shown.shortcomings,
         remainder=_remainder(said, shown, identifiable) if partly else None,
+        unexamined=tuple(w for seen in (field, gauge) if seen is not None for w in unexamined(seen)),
     )
     return found.not_knowing(without)
+
+
+def unexamined(seen: Seen) -> tuple[str, ...]:
+    """Return in words what of a recording is not known: the line's profile, a gauge run's rings."""
+    rings = seen.field is not None or seen.geometry is not None or seen.misdrawn
+    each = ("the line's profile", seen.profile is not None), ("rings and fiducials", rings)
+    return tuple(f"{what} of {seen.name}" for what, known in each if not known)
 
 
 @dataclass(frozen=True)

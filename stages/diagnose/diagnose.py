@@ -109,9 +109,10 @@ def diagnose(
     context.report("verdict", str(found.verdict))
     found = replace(found, shortcomings=(*noticed.sentences, *found.shortcomings))
     image = image_of(seen, field, gauge) if found.ring_picture is not None else None
-    if correction is None or not (correction.applied or correction.inexpressible) or not _worse(found.fit):
-        return Diagnosed(found, correction.probe if correction is not None else probe, image)
-    return Diagnosed(replace(found, notes=(*found.notes, _NOT_CORRECTED)), probe, image)
+    changed = correction is not None and bool(correction.applied or correction.inexpressible)
+    notes = _not_corrected(found.fit) if changed else ()
+    corrected_probe = correction.probe if correction is not None and not notes else probe
+    return Diagnosed(replace(found, notes=(*found.notes, *notes)), corrected_probe, image)
 
 
 def _by_correction(
@@ -135,14 +136,18 @@ def _by_correction(
 
 
 _NOT_CORRECTED = (
-    "The probe file is written as it was stated: with the effects that were found, held-out rings would lie "
-    "farther from their expected places."
+    "The probe file is written as it was stated: held-out measurements would lie {:.3g} {} from their "
+    "expected values with the likeliest explanation of the gauge run, and lie {:.3g} without. This alone "
+    "refutes no effect: both contain the poses' errors, which neighbouring frames share, and the σ of the "
+    "difference is not known."
 )
 
 
-def _worse(fit: FitQuality | None) -> bool:
-    """Return whether held-out measurements fit worse after the correction than before."""
-    return fit is not None and fit.heldout_after > fit.heldout_before
+def _not_corrected(fit: FitQuality | None) -> tuple[str, ...]:
+    """Return in words why the probe is not corrected, where held-out measurements fit worse afterwards."""
+    if fit is None or not fit.heldout_after > fit.heldout_before:
+        return ()
+    return (_NOT_CORRECTED.format(fit.heldout_after, fit.unit, fit.heldout_before),)
 
 
 def _with_travel(seen: Seen, travel: TravelEvidence | None) -> Seen:
@@ -166,7 +171,7 @@ def _without_scale(seen: Seen, beyond_probe: str) -> Seen:
 
 
 DIAGNOSIS = Stage(
-    "diagnosis", "58", DiagnosisParameters, diagnose,
+    "diagnosis", "59", DiagnosisParameters, diagnose,
     "what physics was left out, where it shows, and what confirms it",
 )  # fmt: skip
 _OF_FIELD = (PREMISES, RINGS, TRIANGULATE, LINE_PROFILE, FREE_MOTION, FIELD_EVIDENCE)

@@ -227,6 +227,8 @@ class Diagnosis:
         The combination that is determined, or the empirical formula.
     feasibility, candidates, shortcomings, pictures
         For the report.
+    unexamined : tuple of str
+        Parts of the recordings of which nothing is known, since they could not be examined, in words.
     causes : Causes
         How likely each cause of the class is, by rings and fiducials of the gauge run; for the report.
     """
@@ -250,6 +252,7 @@ class Diagnosis:
     remainder: Remainder | None = None
     reading_picture: ReadingPicture | None = None
     causes: Causes = NONE
+    unexamined: tuple[str, ...] = ()
 
     def not_knowing(self, names: Collection[str]) -> Diagnosis:
         """Return the diagnosis with some effects treated as unknown: without them in any class."""

@@ -9,7 +9,9 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
+from pipeline.api.diagnosis.report import headline
 from pipeline.instrument.probe import Probe
+from stages.diagnose.compose import unexamined
 from stages.diagnose.correct import encoder_effects
 from stages.diagnose.gauge.examine import Examined
 from stages.diagnose.result import FitQuality, Location, Verdict
@@ -258,3 +260,15 @@ def test_a_repeated_residual_in_the_gauge_run_is_reported_beside_a_slip_in_eithe
     assert answer(
         real_probe, replace(field, travel=None), replace(gauge, geometry=rings, travel=None)
     ).verdict is (Verdict.UNEXPLAINED)
+
+
+def test_what_was_not_examined_is_said_beside_the_name(real_probe: Probe) -> None:
+    """A tilt was "named" without a word in the verdict that the line's profile had not been examined."""
+    found = of_gauge(real_probe, estimates=(replace(SCALE, agreements=(AGREES,)),))
+    assert found.verdict is Verdict.NAMED
+    assert found.unexamined == ("the line's profile of toy", "rings and fiducials of toy")
+    assert headline(found) == (
+        "Left out: encoder scale (not examined: the line's profile of toy, rings and fiducials of toy)"
+    )
+    known = replace(seen("gauge"), misdrawn=True, profile=cast(Any, SimpleNamespace(unexplained=None)))
+    assert unexamined(known) == ()

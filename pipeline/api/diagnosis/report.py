@@ -70,7 +70,12 @@ def write_page(found: Diagnosis, shown: Shown, folder: Path) -> None:
 
 
 def headline(found: Diagnosis) -> str:
-    """Return the answer in one line."""
+    """Return the answer in one line, with what could not be examined."""
+    unexamined = f" (not examined: {', '.join(found.unexamined)})" if found.unexamined else ""
+    return _headline(found) + unexamined
+
+
+def _headline(found: Diagnosis) -> str:
     if found.verdict is Verdict.NAMED:
         return "Left out: " + " and ".join(e.name.replace("_", " ") for e in found.effects)
     if found.verdict is Verdict.PARTLY:

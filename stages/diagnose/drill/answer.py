@@ -96,6 +96,8 @@ class Answer(_Read):
     feasibility : tuple of Feasibility
     record_next : str
         What to record to learn more; empty where nothing is needed.
+    unexamined : tuple of str
+        Parts of the recordings that could not be examined.
     """
 
     verdict: Verdict
@@ -107,6 +109,7 @@ class Answer(_Read):
     fit: Fit | None = None
     feasibility: tuple[Feasibility, ...] = ()
     record_next: str = ""
+    unexamined: tuple[str, ...] = ()
 
 
 class Concealed(_Read):
