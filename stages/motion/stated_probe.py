@@ -72,8 +72,7 @@ def contradiction(trajectory: Trajectory, probe: Probe) -> Contradiction:
     1 + e, so that x has the variance g: the reduction of the stated variance. Where pictures show little, x
     is small however wrong the statement is (A. H. Jazwinski, "Stochastic Processes and Filtering Theory",
     1970, on predicted residuals). The variance e is that of independent errors; errors that matches share
-    make d larger. Without an encoder, what moves the scale of all lengths is no
-    evidence.
+    make d larger. Without an encoder, what moves the scale of all lengths is no evidence.
     """
     unsure = probe.principal_uncertainties()
     if trajectory.instrument is None or not unsure.size:
@@ -93,7 +92,7 @@ def moved_by_pictures(trajectory: Trajectory, probe: Probe) -> tuple[Float, Floa
 
     Without an encoder pictures do not show the scale of all lengths: what the adjustment says of it comes
     from the motion that it expects, smooth by so many mm, and is left out. It demanded a baseline of 8
-    instead of 22 mm, by 8 σ, of a correct probe.
+    instead of 22 mm, by 8 σ, of a correct probe. A baseline that is stated as exact gives the scale.
     """
     assert trajectory.instrument is not None
     inverse = np.linalg.pinv(probe.principal_uncertainties())
@@ -101,7 +100,8 @@ def moved_by_pictures(trajectory: Trajectory, probe: Probe) -> tuple[Float, Floa
     if (own := trajectory.instrument_covariance) is None:
         return moved, np.zeros((len(moved), len(moved)))
     left = inverse @ own @ inverse.T
-    if np.isfinite(trajectory.encoder_scale):
+    baseline = probe.parameter_names.index("baseline_mm")
+    if np.isfinite(trajectory.encoder_scale) or probe.covariance[baseline, baseline] == 0:
         return moved, left
     length = np.array([name.endswith("_mm") for name in probe.parameter_names])
     larger = inverse @ np.where(length, probe.parameters, 0.0)

@@ -73,6 +73,21 @@ def test_sigma_of_distances_includes_the_wider_pipe_of_a_doubtful_probe() -> Non
     assert np.sqrt(doubted.covariance[:, 2, 2]) == pytest.approx(0.01 * 0.9 * np.arange(4), abs=1e-4)
 
 
+def test_an_exact_baseline_gives_the_scale_without_an_encoder() -> None:
+    """All that pictures said of the other lengths was taken for their unknown scale, and left out."""
+    run = drawn_run(0.9 * np.arange(4), np.zeros(4))
+    names = run.probe.parameter_names
+    parameters, sigma, left = run.probe.parameters.copy(), np.zeros(len(names)), np.zeros(len(names))
+    aside = names.index("decentre_x_mm")
+    parameters[aside], sigma[aside], left[aside] = 0.5, 0.02, 0.001
+    probe = run.probe.with_parameters(parameters, np.diag(sigma**2))
+    got = Trajectory(
+        np.arange(4), np.arange(4) / 30, run.T_pc, np.zeros((4, 6, 6)), straight_axis(-50.0, 150.0), RADIUS,
+        np.nan, np.nan, 0, (), parameters + 10 * sigma, np.diag(left**2),
+    )  # fmt: skip
+    assert stated_probe.contradiction(got, probe).sigmas == pytest.approx(10, rel=0.01)
+
+
 def test_pictures_name_the_wrong_parameters_or_those_that_they_cannot_tell_apart() -> None:
     """A direction of many parameters made the pipe 2 % wider where the centre had been shifted."""
     run = drawn_run(0.9 * np.arange(4), np.zeros(4))
