@@ -9,8 +9,9 @@
 4. Measure each depth as the extreme of the wall averaged over 1 mm (`surface`), corrected for what noise adds
    to an extreme, with 1 σ (`depth`, `smear`).
 5. Set unconfirmed findings apart, with the reason: neither a second ring nor the photo shows it, it stays at
-   one place of the image, it lies where the line ends, or the recording itself shows that findings like it
-   are more often false than real (`corroborate`, `credibility`).
+   one place of the image or where something does while the wall moves, it lies where the line ends, or the
+   recording itself shows that findings like it are more often false than real (`corroborate`,
+   `static_places`, `credibility`).
 6. Give a probability to each kind of defect by named features, and write codes and a description
    (`describe`).
 7. List dark lines that only the photo shows, as cracks are, among the unconfirmed findings (`dark_lines`).
@@ -269,5 +270,5 @@ def _defects_of_run(
 
 
 DEFECTS = Stage(
-    "defects", "76", DefectParameters, _defects_of_run, "defects as instances with depth, clock and kind"
+    "defects", "77", DefectParameters, _defects_of_run, "defects as instances with depth, clock and kind"
 )

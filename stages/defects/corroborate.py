@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from scipy.ndimage import label
@@ -18,6 +19,7 @@ from scipy.ndimage import label
 from pipeline.adjustment.shared_light import NOTHING_HELD, HeldOver
 from pipeline.arrays import Bool, Float, Int
 from pipeline.artefacts.measured import PointCloud, RingSamples, RingValidity, WallTexture
+from stages.defects import reasons
 from stages.defects.behind_drop import shows_drop
 from stages.defects.depth import Depth
 from stages.defects.marred import without_glints
@@ -27,6 +29,7 @@ from stages.defects.photo import photo_stands_out
 from stages.defects.relief import Relief
 from stages.defects.segment import Region
 from stages.defects.shining_spot import frames_with_spots
+from stages.defects.static_places import StaticPlaces
 from stages.defects.surface import Surface, cells_of, of_usual_sigma
 
 LEAST_RINGS = 2
@@ -46,37 +49,6 @@ _FIXED_SHARE = 0.5
 # a depth is averaged. All rows of a finding that the edge causes are, few of one that only touches it: more
 # than half of the rows decides.
 _EDGE_MM, _EDGE_SHARE = 1.0, 0.5
-# Why a finding is not counted, as sentences without their full stop.
-_STAYS_IN_IMAGE = (
-    "It stays at one place of the image while the wall goes by, as something on the window or on the probe "
-    "does. To tell: clean the window, or roll the probe by 30°, and record again"
-)
-_BESIDE_LINE = (
-    "A bright spot of the wall beside the line was taken for it: the spot stays in place while the line "
-    "passes, and without the rings that show it there is no such depth"
-)
-_SHOWN_WITHOUT = (
-    "Lit pictures taken before and after, when the line was elsewhere, show the wall without it: a drop or "
-    "dirt on the window may have moved the line while it passed"
-)
-_SHOWN_DISPLACED = (
-    "Lit pictures show the wall displaced there, but only while the line passed it: a drop or dirt on the "
-    "window may have moved the line as well"
-)
-_DROVE_THROUGH = (
-    "The probe drove past it, and its lamps would have struck it there: a reflection or stray light was "
-    "taken for the line"
-)
-_AT_EDGE = (
-    "It is deepest where the wall ceases to be seen: the line ends there, and what hides the wall may have "
-    "drawn it aside"
-)
-_ALONE = "No second, independent ring shows it, nor do one ring and the photo together"
-_LIKE_GLINT = (
-    "The line is brighter there than at nine of ten places of its ring, as of a glint or a reflection, and "
-    "more findings of this recording are that bright than chance explains"
-)
-_WEAK = "In this recording, more findings of this strength are expected to be false than real"
 
 
 @dataclass(frozen=True)
@@ -105,6 +77,8 @@ class Evidence:
     in_probe_path, behind_drop : bool
         Whether the probe would have collided with it; whether lit pictures show the wall displaced there, but
         only while the line passed it.
+    behind_static : bool
+        Whether something stays in the picture there while the wall moves.
     """
 
     rings: int
@@ -117,11 +91,13 @@ class Evidence:
     in_probe_path: bool = False
     behind_drop: bool = False
     spot: bool = False
+    behind_static: bool = False
 
     @property
     def on_wall(self) -> bool:
         """Whether it belongs to the wall, and is not explained by the probe or by the end of the line."""
-        return not (self.fixed or self.edge or self.moved_over or self.in_probe_path or self.spot)
+        at_camera = self.fixed or self.behind_static or self.moved_over
+        return not (at_camera or self.edge or self.in_probe_path or self.spot)
 
     @property
     def moved_over(self) -> bool:
@@ -136,17 +112,18 @@ class Evidence:
     @property
     def doubt(self) -> str:
         """Why it is not counted, as a sentence without its full stop."""
-        reasons = (
-            (self.fixed, _STAYS_IN_IMAGE),
-            (self.spot, _BESIDE_LINE),
-            (self.contradicted, _SHOWN_WITHOUT),
-            (self.behind_drop, _SHOWN_DISPLACED),
-            (self.in_probe_path, _DROVE_THROUGH),
-            (self.edge, _AT_EDGE),
-            (not self.corroborated, _ALONE),
-            (self.bright, _LIKE_GLINT),
+        told = (
+            (self.fixed, reasons.STAYS_IN_IMAGE),
+            (self.spot, reasons.BESIDE_LINE),
+            (self.behind_static, reasons.BEHIND_STATIC),
+            (self.contradicted, reasons.SHOWN_WITHOUT),
+            (self.behind_drop, reasons.SHOWN_DISPLACED),
+            (self.in_probe_path, reasons.DROVE_THROUGH),
+            (self.edge, reasons.AT_EDGE),
+            (not self.corroborated, reasons.ALONE),
+            (self.bright, reasons.LIKE_GLINT),
         )
-        return next((why for holds, why in reasons if holds), _WEAK)
+        return next((why for holds, why in told if holds), reasons.WEAK)
 
 
 @dataclass(frozen=True)
@@ -160,6 +137,13 @@ class Witnesses:
     rings: RingSamples | None = None
     pictures: LitPictures | None = None
     held: HeldOver = NOTHING_HELD
+
+    @cached_property
+    def static(self) -> StaticPlaces | None:
+        """Where pictures show something that stays while the wall moves; None where that is not known."""
+        if self.rings is None or self.pictures is None:
+            return None
+        return StaticPlaces.of(self.pictures.recording, self.rings)
 
     def spots_in(self, region: Region, depth: Depth, surface: Surface) -> list[int]:
         """Return the frames whose rings show a spot beside the line; none without rings and poses."""
@@ -200,6 +184,7 @@ def evidence_for(
         lies_at_edge(region, relief),
         seen_by.rings is not None and line_is_bright(region, depth.depth_mm, surface, seen_by.rings),
         in_probe_path=pictures is not None and pictures.drove_through(region, depth, relief),
+        behind_static=bool(seen_by.static and seen_by.static.explain(region, depth.depth_mm, surface)),
     )
     # Pictures are read only for what would count without them: with glints there may be hundreds of others.
     if pictures is None or not evidence.corroborated:
