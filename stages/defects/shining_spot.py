@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.arrays import Float
+from pipeline.arrays import Bool, Float, Int
 from pipeline.artefacts.measured import RingSamples, RingValidity
 from pipeline.geometry.axis import roll_at, to_pipe
 from pipeline.geometry.rigid import transform
@@ -136,19 +136,18 @@ class _Looked:
         off = away > max(self.departs_mm, _TOP * away.max())
         if off.sum() < _LEAST_SAMPLES:
             return None
-        spot, other = seen[off], self.rings.validity[ring] == RingValidity.VALID
-        other[spot] = False
-        other &= np.abs(off_middle) <= 2 * half
+        spot, line = seen[off], self.rings.validity[ring] == RingValidity.VALID
         middle = float(np.median(off_middle[spot]))
-        beside = np.argsort(np.where(other, np.abs(off_middle - middle), np.inf), kind="stable")
-        beside = beside[: min(len(spot), other.sum())]
-        line = np.median(amplitude[beside]) if len(beside) else np.nan
+        line[seen[away > self.departs_mm]] = False  # the spot, and its edges, which depart less
+        line &= np.abs(off_middle) <= 2 * half
+        beside = _nearest(line, np.abs(off_middle - middle), len(spot))
+        own, usual = (np.median(amplitude[k]) if len(k) else np.nan for k in (spot, beside))
         return _Light(
             frame=int(motion.frame[k]),
             line_mm=line_mm,
             place_mm=float(np.median(place[off])),
             around_mm=wall * middle,
-            brightness=float(np.median(amplitude[spot]) / line),
+            brightness=float(own / usual),
         )
 
     def _around(self, azimuth_rad: Float) -> tuple[Float, float]:
@@ -163,3 +162,9 @@ class _Looked:
         row = (line_mm - self.relief.distance_mm[0]) / self.relief.cell_mm[0]
         column = float(self.region.column + self.region.mask.shape[1] // 2)
         return self.relief.shape_at(row, np.full_like(row, column))
+
+
+def _nearest(which: Bool, away: Float, most: int) -> Int:
+    """Return the indices of the nearest of some samples (n,), by how far ``away`` (n,) they are."""
+    order = np.argsort(np.where(which, away, np.inf), kind="stable")
+    return order[: min(most, int(which.sum()))]

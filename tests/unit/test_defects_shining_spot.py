@@ -120,6 +120,18 @@ def test_a_spot_on_a_dark_patch_is_compared_with_the_line_beside_the_spot() -> N
     assert frames_with_spots(wide, depth, relief(), shown, pictures()) == [10, 11, 12]
 
 
+def test_a_spot_whose_edges_shine_is_not_compared_with_them() -> None:
+    """The edges depart less than half as far as the spot; they counted as the line beside it."""
+    shown, depths = rings(spot_depths(10, 11, 12), 4.0), spot_depths(10, 11, 12)
+    for ring, depth in depths.items():
+        for edge in (slice(COLUMNS.start - 4, COLUMNS.start), slice(COLUMNS.stop, COLUMNS.stop + 4)):
+            shown.radius_px[ring, edge] = radius_px(BASELINE_MM, RADIUS + 0.4 * depth)
+            shown.amplitude[ring, edge] *= 4.0
+    wide = Region(int(LINE_MM[10] / 0.5), 2 * COLUMNS.start - 21, np.ones((6, 54), bool), 1.0)
+    depth = max(depths.values(), key=abs)
+    assert frames_with_spots(wide, depth, relief(), shown, pictures()) == [10, 11, 12]
+
+
 def test_a_spot_is_found_in_a_long_finding_of_a_pipe_that_grows_wider() -> None:
     """The wall of each ring is that at its line: in the middle of the finding it was 1.1 mm wider."""
     wider = 0.2 * (np.array(LINE_MM) - LINE_MM[10])
