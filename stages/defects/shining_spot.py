@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.arrays import Bool, Float, Int
+from pipeline.arrays import Bool, Float, Float32, Int
 from pipeline.artefacts.measured import RingSamples, RingValidity
 from pipeline.geometry.axis import roll_at, to_pipe
 from pipeline.geometry.rigid import transform
@@ -124,8 +124,8 @@ class _Looked:
         camera_mm = self.pictures.line_mm[k : k + 1] - probe.laser.baseline_mm
         off_middle, half = self._around(self.rings.azimuth_rad + roll_at(axis, camera_mm, T_pc[None])[0])
         seen = np.flatnonzero(np.isfinite(self.rings.radius_px[ring]) & (np.abs(off_middle) <= half))
-        uv, amplitude = self.rings.pixels_of(ring)[seen], self.rings.amplitude[ring]
-        s, _, radius = to_pipe(axis, transform(T_pc, probe.triangulate(uv)))
+        xyz_c = probe.triangulate(self.rings.pixels_of(ring)[seen])
+        s, _, radius = to_pipe(axis, transform(T_pc, xyz_c))
         meets = np.isfinite(s)  # beside the laser sheet, a rejected sample may be anything
         if meets.sum() < _LEAST_SAMPLES:
             return None
@@ -137,17 +137,14 @@ class _Looked:
         if off.sum() < _LEAST_SAMPLES:
             return None
         spot, line = seen[off], self.rings.validity[ring] == RingValidity.VALID
-        middle = float(np.median(off_middle[spot]))
         line[seen[away > self.departs_mm]] = False  # the spot, and its edges, which depart less
         line &= np.abs(off_middle) <= 2 * half
-        beside = _nearest(line, np.abs(off_middle - middle), len(spot))
-        own, usual = (np.median(amplitude[k]) if len(k) else np.nan for k in (spot, beside))
         return _Light(
             frame=int(motion.frame[k]),
             line_mm=line_mm,
             place_mm=float(np.median(place[off])),
-            around_mm=wall * middle,
-            brightness=float(own / usual),
+            around_mm=wall * float(np.median(off_middle[spot])),
+            brightness=_times_as_bright(self.rings.amplitude[ring], spot, line, off_middle),
         )
 
     def _around(self, azimuth_rad: Float) -> tuple[Float, float]:
@@ -164,7 +161,11 @@ class _Looked:
         return self.relief.shape_at(row, np.full_like(row, column))
 
 
-def _nearest(which: Bool, away: Float, most: int) -> Int:
-    """Return the indices of the nearest of some samples (n,), by how far ``away`` (n,) they are."""
-    order = np.argsort(np.where(which, away, np.inf), kind="stable")
-    return order[: min(most, int(which.sum()))]
+def _times_as_bright(amplitude: Float32, spot: Int, line: Bool, azimuth_rad: Float) -> float:
+    """Return a spot's brightness over that of the nearest samples of the ``line`` (A,), as many as it has.
+
+    NaN if no line is seen beside it.
+    """
+    away = np.abs(azimuth_rad - np.median(azimuth_rad[spot]))
+    beside = np.argsort(np.where(line, away, np.inf), kind="stable")[: min(len(spot), int(line.sum()))]
+    return float(np.median(amplitude[spot]) / np.median(amplitude[beside])) if len(beside) else np.nan

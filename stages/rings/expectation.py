@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.adjustment.robust import basis_of, ring_harmonics, row_median
-from pipeline.arrays import Bool, Byte, Float, runs_of
+from pipeline.arrays import Bool, Byte, Float, Int, runs_of
 from pipeline.artefacts.findings import clock_of_azimuth
 from pipeline.artefacts.measured import RingSamples, RingValidity
 from pipeline.machine.stage import Context
@@ -54,13 +54,7 @@ def warn_of_rings(
     rejected = samples.validity == RingValidity.FRAME_REJECTED
     ring = ~rejected.all(1)
     if not ring.all():
-        frames = samples.frame[~ring]
-        more = f" and {len(frames) - _NAMED_FRAMES} more" if len(frames) > _NAMED_FRAMES else ""
-        context.warn(
-            f"{len(frames)} of {len(ring)} laser frames show no ring: frame "
-            f"{', '.join(str(f) for f in frames[:_NAMED_FRAMES])}{more}. Their wall is not measured. What to "
-            "do: look at these pictures; the laser may have been off or blocked, or the pipe ends there"
-        )
+        _warn_of_no_ring(samples.frame[~ring], len(ring), context)
     validity = samples.validity[ring]
     missing = np.asarray((validity != RingValidity.VALID).mean(0))
     width = float(np.median(samples.width_px[samples.valid]))
@@ -76,6 +70,15 @@ def warn_of_rings(
             "(good recordings: 0.1 at most): strong compression, interlacing or coarse speckle. σ includes "
             "this; small defects may be missed. What to do: record with less compression"
         )
+
+
+def _warn_of_no_ring(frames: Int, looked_at: int, context: Context) -> None:
+    more = f" and {len(frames) - _NAMED_FRAMES} more" if len(frames) > _NAMED_FRAMES else ""
+    context.warn(
+        f"{len(frames)} of {looked_at} laser frames show no ring: frame "
+        f"{', '.join(str(f) for f in frames[:_NAMED_FRAMES])}{more}. Their wall is not measured. What to "
+        "do: look at these pictures; the laser may have been off or blocked, or the pipe ends there"
+    )
 
 
 def _warn_of_coarse_pictures(width_px: float, lost: float, context: Context) -> None:
