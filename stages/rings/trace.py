@@ -147,7 +147,8 @@ def fitted_in(image: Mixture, trace: RingTrace, sectors: Sectors) -> RingTrace |
     low, high = traced - _NEAR_WIDTHS * width, traced + _NEAR_WIDTHS * width
     response = trace.response._replace(black=float(np.median(image.everywhere(_BLACK_EVERY))))
     few = fit_line(image, sectors, traced, width, response, every=_WIDTH_EVERY).width_px / trace.fit.width_px
-    if not np.nanmedian(few[trace.validity == RingValidity.VALID]) < _NARROWER:
+    few = few[np.isfinite(few) & (trace.validity == RingValidity.VALID)]
+    if not len(few) or np.median(few) >= _NARROWER:
         return None
     peaks = search_band(image, sectors, low, high, width, response.dark_noise)
     choice = choose_line(peaks, traced, width)

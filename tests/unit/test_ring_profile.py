@@ -11,6 +11,7 @@ from stages.rings.picture import Mixture
 from stages.rings.profile import WINDOW_WIDTHS, ProfileFit, Response, fit_line
 from stages.rings.sectors import cut_sectors
 from stages.rings.sectors import with_even_rows_taken as one_field
+from stages.rings.trace import fitted_in, trace_ring
 from tests.ring_images import exposed, off_centre, ring_light
 
 SIZE, CENTRE, AZIMUTHS = (640, 480), (318.7, 241.3), 720
@@ -176,6 +177,15 @@ def test_sectors_that_are_left_out_do_not_change_the_fit_of_the_others(sectors):
     every, few = (fit_line(image, sectors, seed_px, WIDTH, response, n).radius_px for n in (1, 5))
     assert np.array_equal(few[::5], every[::5])
     assert np.isfinite(few).sum() == np.isfinite(every[::5]).sum() > 100
+
+
+def test_a_mixture_in_which_the_line_is_dark_is_not_used(sectors):
+    light = ring_light(SIZE, CENTRE, off_centre(150.0, 10.0), WIDTH, AMPLITUDE)
+    image = exposed(light, np.random.default_rng(7), read=1.0, shot=0.0)
+    trace = trace_ring(image, sectors, np.inf)
+    assert trace is not None
+    inverted = Mixture(np.repeat((255 - image)[..., None], 3, 2), np.array([0.0, 1.0, 0.0]))
+    assert fitted_in(inverted, trace, sectors) is None
 
 
 def test_a_picture_that_a_codec_left_without_noise_has_that_of_rounding(sectors):
