@@ -1,5 +1,6 @@
 """The diagnosis of gauge runs traced ray by ray by the simulator, which shares no forward model with it."""
 
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -22,7 +23,7 @@ from stages.diagnose.gauge.fit import evidence, fit
 from stages.diagnose.gauge.formula import describes_effects
 from stages.diagnose.gauge.hypotheses import judged_of
 from stages.diagnose.gauge.run import Term
-from stages.diagnose.gauge.scan import scan
+from stages.diagnose.gauge.scan import change_time, scan
 from stages.diagnose.gauge.search import prepare
 from stages.diagnose.gauge.sets import believed
 from stages.diagnose.gauge.unknown_laws import odds_of_unknown_laws
@@ -188,6 +189,18 @@ def test_a_knock_is_named_as_a_step_at_its_time():
     assert size.value == pytest.approx(0.3, abs=4 * size.sd)
     assert found.location is not None
     assert (found.location.fixed_to, found.location.time) == ("laser", "event")
+
+
+def test_the_time_of_a_step_is_found_though_the_search_was_cells_away():
+    """At a change of bore poses follow a tilt: a step .3 s early fitted nearly as well, 4 σ from its time."""
+    found = seen(
+        ("laser_tilt~step=0.3@-70/4.63s",), ("laser_tilt", "principal_point"), 66, (CourseKind.STEP,)
+    )
+    run, best = found.searched.run, found.searched.found
+    early = (replace(best.terms[0], shape=(3.2,)), *best.terms[1:])
+    told = change_time(run, replace(best, terms=early), 0, inflation=1.0)
+    assert abs(told.value - 4.63) < 2 * told.sd + run.time_s[1]
+    assert told.sd < 0.1
 
 
 def test_rings_beyond_the_last_fiducials_are_not_used():

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.ndimage import label
 
 from pipeline.arrays import Float
 from pipeline.physics.effect import CourseKind
@@ -25,8 +26,6 @@ _ITERATIONS = 3
 _AS_GOOD = 1.0
 # Small enough that no upper limit of the catalogue matters, only the allowed sign of a size.
 _LITTLE = 1e-6
-# The search of steps may be one cell off the best one.
-_CELLS = 2
 
 
 @dataclass(frozen=True)
@@ -165,7 +164,8 @@ def retimed(run: GaugeRun, found: Fit) -> Fit:
             continue
         time_s, gain = _gains(run, found, k)
         # Between two rings every moment fits equally well: the middle stands for all of them.
-        best = replace(term, shape=(float(np.median(time_s[gain > gain.max() - _AS_GOOD])),))
+        peaks, _ = label(gain > gain.max() - _AS_GOOD)
+        best = replace(term, shape=(float(np.median(time_s[peaks == peaks[gain.argmax()]])),))
         if best.shape == term.shape:
             continue
         moved = fit(run, found.state, (*found.terms[:k], best, *found.terms[k + 1 :]), _ITERATIONS)
@@ -193,7 +193,7 @@ def change_time(run: GaugeRun, found: Fit, place: int, inflation: float) -> Valu
 def _gains(run: GaugeRun, found: Fit, place: int) -> tuple[Float, Float]:
     """Return times (T,) midway between frames, and the drop of χ² with the step there."""
     term, others = found.terms[place], found.terms[:place] + found.terms[place + 1 :]
-    time_s = _times_near(run, term)
+    time_s = _times_between(run)
     reduced = fit(run, found.state, others, _ITERATIONS)
     asked: list[tuple[EffectModel, tuple[float, ...]]] = [(term.model, (float(t),)) for t in time_s]
     about = evidence(run, reduced, asked, with_spread=False)[0]
@@ -203,10 +203,9 @@ def _gains(run: GaugeRun, found: Fit, place: int) -> tuple[Float, Float]:
     return time_s, np.array([0.0 if one is None else one.gain for one in each])
 
 
-def _times_near(run: GaugeRun, term: Term) -> Float:
-    """Return the times midway between frames, within two cells of the search grid around the step."""
-    duration = float(run.time_s[-1] - run.time_s[0])
-    grid = [s[0] for s in term.model.shapes(duration, len(run.time_s) / duration)]
-    middle = run.time_s[:-1] + np.diff(run.time_s) / 2 - run.time_s[0]
-    near = middle[np.abs(middle - term.shape[0]) <= _CELLS * (grid[1] - grid[0])]
-    return near if len(near) else np.array(term.shape)
+def _times_between(run: GaugeRun) -> Float:
+    """Return the times midway between frames, from the first frame on.
+
+    All of the run: frames in which poses follow the effect, as at a change of bore, part two peaks.
+    """
+    return np.asarray(run.time_s[:-1] + np.diff(run.time_s) / 2 - run.time_s[0])
