@@ -94,6 +94,7 @@ class Made:
     bore: Bore = ONE_BORE
     jump: None = None
     much_lost: bool = False
+    held_sigma: float = 0.0
 
     @property
     def whole(self) -> Window:
