@@ -11,9 +11,10 @@ from pipeline.arrays import Float
 from stages.motion import MotionParameters
 from stages.motion.bore import ONE_BORE, Bore
 from stages.motion.bundle_adjustment.equations import Measurements
+from stages.motion.bundle_adjustment.unknowns import State
 from stages.motion.tracking.landmarks import TrackedPoses
 from stages.motion.windows.submaps import Window
-from tests.motion_scene import RING_PX, Scene
+from tests.motion_scene import RING_PX, Scene, displaced
 
 GROWS = 0.005
 
@@ -46,6 +47,10 @@ class WholeRun:
     def texture(self) -> SimpleNamespace:
         none_lost = np.zeros(FEW, bool)
         return textured(TrackedPoses(np.arange(FEW), self.made.truth.T_pc, none_lost))
+
+    def start(self, window: Window, measured: Measurements, parameters: MotionParameters) -> State:
+        """Return a first guess: the truth with errors of about those of tracking."""
+        return displaced(self.made.truth, np.random.default_rng(5))
 
     def measured(self, window: Window, parameters: MotionParameters) -> Measurements:
         """Return the same measurements with the scale as recorded."""

@@ -104,7 +104,8 @@ def with_steady_scale(
         correction = drift.at_frames
         run = replace(run, image_scale=1 + correction)
         measured = run.measured(window, parameters)
-        estimate = estimate_state(estimate.state, measured, parameters, watch)
+        # Not from the last estimate: its poses and landmarks follow the drift, and stay there.
+        estimate = estimate_state(run.start(window, measured, parameters), measured, parameters, watch)
         drift = drift_of_scale(estimate, measured, correction)
     if np.ptp(drift.at_frames - correction) > _FOUND_AGAIN * np.ptp(correction):
         return unchanged
