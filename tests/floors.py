@@ -35,7 +35,7 @@ FLOORS: tuple[tuple[str, tuple[str, ...]], ...] = (
     ("order of the steps", ("stages.catalogue",)),
     ("files for people", ("pipeline.export",)),
     ("review", ("pipeline.review",)),
-    ("many runs", ("pipeline.batch",)),
+    ("many runs", ("pipeline.batch", "pipeline.drill")),
     ("public face", ("pipeline.api",)),
     ("commands", ("pipeline.commands",)),
     ("command line", ("pipeline.cli",)),

@@ -10,13 +10,13 @@ from tempfile import TemporaryDirectory
 
 from pipeline.api.diagnosis.simulated import switches_of
 from pipeline.api.like import MEASURED, Changed, scene_like
+from pipeline.drill.cases import ANSWER
 from pipeline.files.installed import PRIORS, SCENES, file_or_shipped
 from pipeline.simulator.effects.switch import Switch, parse_switches
 from pipeline.simulator.premises import Premise
 from pipeline.simulator.prior import draw_pair, read_prior
 from pipeline.simulator.produce import Order, Places, beside, produce
 from pipeline.simulator.scene import Scene, read_scene
-from stages.diagnose.drill.cases import ANSWER
 
 # Receives the name of a scene, the number of rendered frames, and the number of all.
 Progress = Callable[[str, int, int], None]

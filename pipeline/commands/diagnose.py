@@ -10,8 +10,8 @@ from rich.console import Console
 
 from pipeline.api.diagnosis import diagnose as diagnosis
 from pipeline.commands import Assignments, ConfigFile, ResultFolder, StatedProbe
+from pipeline.drill.answer import Answer
 from pipeline.machine.display import ProgressDisplay, print_warnings
-from stages.diagnose.drill.answer import Answer
 
 
 def diagnose(

@@ -15,13 +15,13 @@ from rich.table import Table
 
 from pipeline.commands import PriorFile, ResultFolder
 from pipeline.commands.prove_cases import Drawing, NotRenderedError, Worked, draw_case, require_seal, worked
+from pipeline.drill.cases import find_cases
+from pipeline.drill.score import Figure, Trial, calibration, confusion, figures, shuffled
 from pipeline.errors import InputError
 from pipeline.files.disk import require_writable, written_together
 from pipeline.files.installed import PRIORS, file_or_shipped
 from pipeline.files.provenance import MadeBy
 from pipeline.pages import page_template
-from stages.diagnose.drill.cases import find_cases
-from stages.diagnose.drill.score import Figure, Trial, calibration, confusion, figures, shuffled
 
 
 def write_report(done: Sequence[Worked], folder: Path) -> None:

@@ -19,6 +19,15 @@ from pipeline.adjustment.robust import root_mean_square, spread_about_median
 from pipeline.api.job import Job, probe_source, recording_source, result_of, run_job
 from pipeline.arrays import Float, Int
 from pipeline.artefacts.measured import RingSamples
+from pipeline.drill.cases import (
+    TIMING,
+    Case,
+    DiagnosisFailedError,
+    concealed_in,
+    diagnose_apart,
+    trial_of,
+)
+from pipeline.drill.score import Trial
 from pipeline.errors import BoresightError, InputError
 from pipeline.files.disk import remove, replace_json
 from pipeline.files.json_yaml import read_json
@@ -38,15 +47,6 @@ from pipeline.simulator.sheet import room_mm, wall_radius
 from pipeline.simulator.truth import SceneTruth
 from pipeline.simulator.truth_files import SEAL_FILE, open_seal
 from pipeline.system.parallel import end_with_parent
-from stages.diagnose.drill.cases import (
-    TIMING,
-    Case,
-    DiagnosisFailedError,
-    concealed_in,
-    diagnose_apart,
-    trial_of,
-)
-from stages.diagnose.drill.score import Trial
 from stages.premises import PREMISES
 from stages.rings import RINGS
 

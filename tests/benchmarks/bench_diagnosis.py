@@ -20,6 +20,8 @@ from typing import Annotated, Any
 import numpy as np
 import typer
 
+from pipeline.drill.answer import Answer, Concealed
+from pipeline.drill.score import Trial, figures, shuffled
 from pipeline.errors import BoresightError, UnusableError
 from pipeline.instrument.probe import Probe
 from pipeline.physics.catalogue import effect
@@ -28,8 +30,6 @@ from pipeline.simulator.effects.switch import Switch
 from stages.diagnose.as_json import to_json
 from stages.diagnose.channels import TRAVEL_EFFECTS, Seen, gauge_travel
 from stages.diagnose.compose import composed
-from stages.diagnose.drill.answer import Answer, Concealed
-from stages.diagnose.drill.score import Trial, figures, shuffled
 from stages.diagnose.effects.base import EffectModel
 from stages.diagnose.effects.courses import Coursed, with_courses
 from stages.diagnose.effects.library import LIBRARY, without

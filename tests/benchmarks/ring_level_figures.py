@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 from scipy.stats import kstest
 
+from pipeline.drill.score import SNR, Rate, Trial, rate
 from pipeline.physics.effect import CourseKind
 from stages.diagnose.channels import TRAVEL_EFFECTS
-from stages.diagnose.drill.score import SNR, Rate, Trial, rate
 from stages.diagnose.effects.library import LIBRARY
 from stages.diagnose.inference import SURE
 

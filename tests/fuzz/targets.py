@@ -12,6 +12,7 @@ from functools import cache
 from pathlib import Path
 
 from pipeline.batch.cluster import read_cluster
+from pipeline.drill.answer import read_answer, read_concealed
 from pipeline.errors import InputError
 from pipeline.export.run_record import read_run_record
 from pipeline.instrument.camera.formats import read_camera, write_camera
@@ -29,7 +30,6 @@ from pipeline.simulator.prior import read_prior
 from pipeline.simulator.scene import read_scene
 from stages.catalogue import PIPELINE
 from stages.compare.reference import read_wall_map, read_wall_points
-from stages.diagnose.drill.answer import read_answer, read_concealed
 from tests.made_recording import write_folder, write_mcap, write_ros1, write_ros2
 from tests.shared_data import PROJECT_ROOT
 from tests.truth_run import true_axis

@@ -9,9 +9,9 @@ from typer.testing import CliRunner
 
 from pipeline.cli import app
 from pipeline.commands.prove_cases import NotRenderedError, require_seal
+from pipeline.drill.cases import Case, DiagnosisFailedError, diagnose_apart, find_cases
 from pipeline.errors import InputError
 from pipeline.simulator.truth_files import seal_truth
-from stages.diagnose.drill.cases import Case, DiagnosisFailedError, diagnose_apart, find_cases
 
 TILT = {"name": "laser_tilt", "probability": 0.99, "parameters": {"tilt_deg": {"value": 0.61, "sd": 0.01}}}
 
@@ -84,7 +84,7 @@ def test_the_diagnosing_process_is_given_the_recordings_without_truth_beside_the
         (answer / "diagnosis.json").write_text('{"verdict": "consistent"}')
         return subprocess.CompletedProcess(command, 0)
 
-    monkeypatch.setattr("stages.diagnose.drill.cases.subprocess.run", process)
+    monkeypatch.setattr("pipeline.drill.cases.subprocess.run", process)
     diagnose_apart(Case("a", recording, None), tmp_path / "out" / "a")
     assert (seen["beside"], seen["inside"]) == (["a-gauge"], ["recording.yaml"])
     assert str(tmp_path / "truth") not in " ".join(map(str, seen["given"]))
@@ -92,9 +92,7 @@ def test_the_diagnosing_process_is_given_the_recordings_without_truth_beside_the
 
 
 def test_an_existing_answer_is_not_computed_again(drill, monkeypatch):
-    monkeypatch.setattr(
-        "stages.diagnose.drill.cases.subprocess.run", lambda *_, **__: pytest.fail("made again")
-    )
+    monkeypatch.setattr("pipeline.drill.cases.subprocess.run", lambda *_, **__: pytest.fail("made again"))
     for case in find_cases(drill / "recordings"):
         diagnose_apart(case, drill / "out" / "answers" / case.name)
 

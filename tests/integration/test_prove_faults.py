@@ -17,9 +17,9 @@ from typer.testing import CliRunner
 
 from pipeline.cli import app
 from pipeline.commands.prove_cases import wall_errors
+from pipeline.drill.cases import Case
 from pipeline.errors import InputError
 from pipeline.simulator.truth_files import seal_truth
-from stages.diagnose.drill.cases import Case
 from tests.faults import obeying_permissions
 from tests.patience import patience
 from tests.shared_data import PROJECT_ROOT
@@ -106,7 +106,7 @@ def test_a_killed_diagnosis_does_not_count_as_a_failed_one(
     drill: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     killed = [sys.executable, "-c", "import os; os.kill(os.getpid(), 9)"]
-    monkeypatch.setattr("stages.diagnose.drill.cases._command", lambda *_: killed)
+    monkeypatch.setattr("pipeline.drill.cases._command", lambda *_: killed)
     done = CliRunner().invoke(app, proof(drill))
     assert isinstance(done.exception, InputError), done.output
     assert "b: the diagnosis ended with -9" in str(done.exception)
@@ -135,7 +135,7 @@ def test_a_stopped_diagnosis_continues_after_its_completed_stages(
 ) -> None:
     script = _KILLED_ONCE.format(signal=int(ended_by))
     monkeypatch.setattr(
-        "stages.diagnose.drill.cases._command",
+        "pipeline.drill.cases._command",
         lambda case, output, without: [sys.executable, "-c", script, str(output)],
     )
     assert isinstance(CliRunner().invoke(app, proof(drill)).exception, InputError)
@@ -159,7 +159,7 @@ def test_wall_errors_written_in_part_are_computed_again(tmp_path: Path) -> None:
 # Stands in for a slow diagnosis; the proof is killed while it works.
 _SLOW_PROOF = """
 import sys
-from stages.diagnose.drill import cases
+from pipeline.drill import cases
 cases._command = lambda case, output, without: [sys.executable, "-c", "import time; time.sleep(600)"]
 sys.argv[1:] = {words!r}
 from pipeline.cli import main

@@ -7,8 +7,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from pipeline.errors import InputError
-from stages.diagnose.drill.answer import (
+from pipeline.drill.answer import (
     Answer,
     Concealed,
     Feasibility,
@@ -19,7 +18,7 @@ from stages.diagnose.drill.answer import (
     read_answer,
     read_concealed,
 )
-from stages.diagnose.drill.score import (
+from pipeline.drill.score import (
     Rate,
     Trial,
     calibration,
@@ -29,6 +28,7 @@ from stages.diagnose.drill.score import (
     shuffled,
     size_errors,
 )
+from pipeline.errors import InputError
 
 
 def score(trials: Iterable[Trial]) -> SimpleNamespace:

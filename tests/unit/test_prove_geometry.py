@@ -9,11 +9,11 @@ import pytest
 from pipeline.artefacts.measured import RingSamples, RingValidity
 from pipeline.commands import prove_cases
 from pipeline.commands.prove_cases import wall_errors
+from pipeline.drill.cases import Case
 from pipeline.files.json_yaml import Section
 from pipeline.instrument.probe_file import probe_from, write_probe
 from pipeline.simulator.build import build_truth
 from pipeline.simulator.scene import read_scene, write_scene
-from stages.diagnose.drill.cases import Case
 from tests.exact_rings import exact_rings
 
 SMALL = Path(__file__).resolve().parents[2] / "configs" / "priors" / "small" / "straight-4-inch.yaml"

@@ -29,9 +29,9 @@ from pipeline.api.diagnosis.diagnose import DiagnosisFolder, diagnose, open_diag
 from pipeline.api.run import run
 from pipeline.api.simulate import Simulated, simulate, simulate_like, simulate_pairs
 from pipeline.api.twin import twin
+from pipeline.drill.answer import Answer
 from pipeline.errors import BoresightError, Cancelled, InputError, UnusableError
 from pipeline.files.installed import PARAMETERS, PRIORS, SCENES, shipped_names
-from stages.diagnose.drill.answer import Answer
 
 __all__ = [
     "PARAMETERS",

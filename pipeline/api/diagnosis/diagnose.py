@@ -14,6 +14,8 @@ from numpy.typing import NDArray
 from pipeline.api.diagnosis.apply import GeometryChange, Uncorrected, apply_correction, consequence
 from pipeline.api.diagnosis.inputs import DiagnosisInputs, open_inputs
 from pipeline.api.job import Job, probe_source, result_of, run_job
+from pipeline.drill.answer import Answer, read_answer
+from pipeline.drill.cases import ANSWER
 from pipeline.errors import InputError
 from pipeline.export.run_record import RunRecord, check_inputs_unchanged, read_run_record
 from pipeline.files.disk import disk_errors_named, require_writable
@@ -29,8 +31,6 @@ from pipeline.review.run_files import RunFiles
 from stages.catalogue import PIPELINE
 from stages.diagnose.as_json import to_json
 from stages.diagnose.diagnose import Diagnosed, diagnosis_stages
-from stages.diagnose.drill.answer import Answer, read_answer
-from stages.diagnose.drill.cases import ANSWER
 from stages.diagnose.result import Diagnosis
 
 

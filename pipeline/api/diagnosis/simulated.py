@@ -14,6 +14,8 @@ from typing import Any
 from pipeline.api.diagnosis.inputs import open_inputs
 from pipeline.api.job import Job, result_of, run_job
 from pipeline.artefacts.twin import GaugeTwin, Mismatch, NamedFigure
+from pipeline.drill.answer import NamedEffect, Value, read_answer
+from pipeline.drill.cases import ANSWER
 from pipeline.errors import InputError
 from pipeline.files.json_yaml import read_json
 from pipeline.machine.configuration import resolve
@@ -23,8 +25,6 @@ from pipeline.physics.catalogue import ALL_EFFECTS, effect
 from pipeline.physics.effect import CONSTANTLY, COURSES, Channel, Course, CourseKind
 from pipeline.simulator.effects.switch import Switch
 from stages.diagnose.channels import FIDUCIALS
-from stages.diagnose.drill.answer import NamedEffect, Value, read_answer
-from stages.diagnose.drill.cases import ANSWER
 from stages.premises import PREMISES
 from stages.rings import RINGS
 from stages.twin.gauge_line import GAUGE_LINE

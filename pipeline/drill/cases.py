@@ -13,11 +13,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pipeline
+from pipeline.drill.answer import Answer, Concealed, read_answer, read_concealed
+from pipeline.drill.score import Trial
 from pipeline.errors import BoresightError, InputError
 from pipeline.files.disk import disk_errors_named, remove, sync_tree
 from pipeline.system.parallel import end_with_parent
-from stages.diagnose.drill.answer import Answer, Concealed, read_answer, read_concealed
-from stages.diagnose.drill.score import Trial
 
 ANSWER, TIMING = "diagnosis.json", "timing.json"
 _APART = ".apart-"

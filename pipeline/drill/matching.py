@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
+from pipeline.drill.answer import Concealed, NamedEffect
 from pipeline.physics.catalogue import EFFECTS
-from stages.diagnose.drill.answer import Concealed, NamedEffect
 
 # Distance between different laws: more than the numbers of one law can differ, each by its whole range.
 _STRANGERS = 1e3

@@ -10,9 +10,9 @@ from itertools import pairwise
 import numpy as np
 from scipy.stats import binomtest
 
+from pipeline.drill.answer import Answer, Concealed, NamedEffect
+from pipeline.drill.matching import matched
 from pipeline.physics.catalogue import EFFECTS
-from stages.diagnose.drill.answer import Answer, Concealed, NamedEffect
-from stages.diagnose.drill.matching import matched
 
 _95 = 1.959964
 _STANDS_OUT = 5.0

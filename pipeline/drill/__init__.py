@@ -1,0 +1,1 @@
+"""Diagnose recordings with concealed effects, and compare the answers with what was concealed."""

@@ -1,1 +1,0 @@
-"""Drill: diagnose recordings with concealed effects, and compare the answers with what was concealed."""
