@@ -287,8 +287,8 @@ FREE_MOTION = Stage(
     "free_motion", "6", MotionParameters, adjust_freely, "an inspection's motion without encoder", "motion"
 )
 GAUGE_EVIDENCE = Stage(
-    "evidence", "66", DiagnosisParameters, examine_gauge, "what a gauge run shows of effects", "diagnosis"
+    "evidence", "67", DiagnosisParameters, examine_gauge, "what a gauge run shows of effects", "diagnosis"
 )
 FIELD_EVIDENCE = Stage(
-    "evidence", "30", DiagnosisParameters, examine_field, "what an inspection shows of effects", "diagnosis"
+    "evidence", "31", DiagnosisParameters, examine_field, "what an inspection shows of effects", "diagnosis"
 )

@@ -48,6 +48,19 @@ def test_a_vibration_is_found_with_its_aliases_size_and_direction(
     assert line.explained_by == ("probe_vibration",)
 
 
+@pytest.mark.parametrize("seed", [0, 3, 9])
+def test_frequency_and_size_of_a_swing_just_above_the_drift_are_within_their_sigma(seed: int) -> None:
+    """One of .15 mm at 1.785 Hz beside a drift at .61 Hz was told as .095 ± .0015 mm at 1.896 ± .010 Hz."""
+    time_s, random = np.arange(80) / RATE, np.random.default_rng(seed)
+    noise, phase = random.standard_normal((80, 2)), random.uniform(0, 6)
+    drift = 0.5 * np.sin(2 * np.pi * 0.61 * time_s[:, None] + np.array([0.3, 2.0]))
+    swung = 0.15 * np.sin(2 * np.pi * 1.785 * time_s + phase)[:, None] * np.array([1.0, 0.0])
+    (line,) = find_lines(time_s, drift + swung + 0.003 * noise, np.arange(80) % 2 == 1)
+    assert line.frequency_hz == pytest.approx(1.785, abs=2.5 * line.frequency_sigma_hz)
+    assert line.amplitude_mm == pytest.approx(0.15, abs=2.5 * line.sigma_mm)
+    assert max(line.frequency_sigma_hz / 1.785, line.sigma_mm / 0.15) < 0.15
+
+
 def test_a_line_in_laser_pictures_only_is_the_sheets() -> None:
     lines = find_lines(TIME_S, wander(2) + swing(5.3, 0.2) * ~LIT[:, None], LIT)
     assert lines

@@ -47,19 +47,26 @@ def amplitudes(
     Phases count from ``start_s``, or else from the first picture. σ is that of the less certain phase: it is
     huge where the slow changes can take the oscillation's place.
     """
+    solution, rest, strength, free = _fitted(time_s, xy_mm, lit, frequency, start_s)
+    # Chosen: with fewer pictures, too few degrees of freedom are left for a σ.
+    if free < 0.3 * (len(time_s) - free):
+        return np.full((2, 2), np.nan), float("nan")
+    noise = float(np.sqrt(np.sum(rest**2) / (xy_mm.shape[1] * free)))
+    return np.asarray(solution.T), noise / max(strength, 1e-9)
+
+
+def _fitted(
+    time_s: Float, xy_mm: Float, lit: Bool, frequency: float, start_s: float | None = None
+) -> tuple[Float, Float, float, int]:
+    """Return sine and cosine (2, 2), the residual (N, 2), the less certain phase's strength, and freedom."""
     t = time_s - (time_s[0] if start_s is None else start_s)
     line = np.stack([np.sin(2 * np.pi * frequency * t), np.cos(2 * np.pi * frequency * t)], 1)
     slow = _slow(time_s, lit)
-    free = len(t) - slow.shape[1] - line.shape[1]
-    # Chosen: with fewer pictures, too few degrees of freedom are left for a σ.
-    if free < 0.3 * (len(t) - free):
-        return np.full((2, 2), np.nan), float("nan")
     both = np.concatenate([line, xy_mm], 1)
     both = both - slow @ np.linalg.lstsq(slow, both, rcond=1e-6)[0]
     line, xy_mm = both[:, :2], both[:, 2:]
     solution, _, _, strength = np.linalg.lstsq(line, xy_mm, rcond=1e-6)
-    noise = float(np.sqrt(np.sum((xy_mm - line @ solution) ** 2) / (xy_mm.shape[1] * free)))
-    return np.asarray(solution.T), noise / max(float(strength[-1]), 1e-9)
+    return solution, xy_mm - line @ solution, float(strength[-1]), len(t) - slow.shape[1] - line.shape[1]
 
 
 def _slow(time_s: Float, lit: Bool) -> Float:
@@ -220,22 +227,40 @@ def _measured(time_s: Float, xy_mm: Float, lit: Bool, frequency: float, p_value:
         else:
             shares.append((both * np.nan, np.nan))
     size, span = float(np.linalg.norm(direction @ both)), float(time_s[-1] - time_s[0])
-    # Error of one line in white noise, and of the search grid.
-    turning = np.hypot(np.sqrt(3) / np.pi * sigma / max(size, 1e-9), 1 / _TRIALS) / span
+    turning = float(np.hypot(_frequency_sigma(time_s, xy_mm, lit, frequency), 1 / _TRIALS / span))
     in_lit, in_laser = (float(np.linalg.norm(direction @ s[0])) for s in shares)
+    # Close to the drift, the size depends on the frequency.
+    around = [amplitudes(time_s, xy_mm, lit, frequency + k * turning)[0] for k in (-1, 1)]
+    below, above = (float(np.linalg.norm(direction @ swing)) for swing in around)
     return Line(
-        frequency, size, sigma,
+        frequency, size, float(np.hypot(sigma, (above - below) / 2)),
         float(np.degrees(np.arctan2(direction[1], direction[0]))) % 180.0, p_value, in_lit, in_laser,
-        float(np.hypot(shares[0][1], shares[1][1])), float(turning),
+        float(np.hypot(shares[0][1], shares[1][1])), turning,
     )  # fmt: skip
 
 
 def _refined(time_s: Float, xy_mm: Float, lit: Bool, frequency: float) -> float:
-    """Return the frequency near ``frequency`` at which a sinusoid is clearest."""
+    """Return the frequency at which a sinusoid is clearest, reached from ``frequency`` uphill.
+
+    Beside a probe's drift the spectrum is largest up to a whole width of a line away from it.
+    """
     width = 1 / (time_s[-1] - time_s[0])
-    trial = frequency + width * np.linspace(-0.5, 0.5, _TRIALS + 1)
-    each = (amplitudes(time_s, xy_mm, lit, f) for f in trial)
-    return float(trial[np.argmax([np.linalg.norm(both) / sigma for both, sigma in each])])
+    most = 0.5 / float(np.median(np.diff(time_s)))
+    while True:
+        trial = np.clip(frequency + width * np.linspace(-0.5, 0.5, _TRIALS + 1), SLOWEST_HZ, most)
+        best = int(np.argmin([np.linalg.norm(_fitted(time_s, xy_mm, lit, f)[1]) for f in trial]))
+        if trial[best] == frequency or 0 < best < _TRIALS:
+            return float(trial[best])
+        frequency = float(trial[best])
+
+
+def _frequency_sigma(time_s: Float, xy_mm: Float, lit: Bool, frequency: float) -> float:
+    """Return the 1 σ, Hz, by which noise and the probe's drift displace the clearest sinusoid."""
+    step = 1 / _TRIALS / float(time_s[-1] - time_s[0])
+    fitted = [_fitted(time_s, xy_mm, lit, frequency + k * step) for k in (-1, 0, 1)]
+    below, here, above = (float(np.sum(rest**2)) for _, rest, _, _ in fitted)
+    variance = here / (xy_mm.shape[1] * max(fitted[1][3], 1))
+    return float(step * np.sqrt(2 * variance / max(below + above - 2 * here, 1e-30)))
 
 
 def _without(time_s: Float, xy_mm: Float, lit: Bool, line: Line) -> Float:
