@@ -171,7 +171,7 @@ def _without_scale(seen: Seen, beyond_probe: str) -> Seen:
 
 
 DIAGNOSIS = Stage(
-    "diagnosis", "59", DiagnosisParameters, diagnose,
+    "diagnosis", "60", DiagnosisParameters, diagnose,
     "what physics was left out, where it shows, and what confirms it",
 )  # fmt: skip
 _OF_FIELD = (PREMISES, RINGS, TRIANGULATE, LINE_PROFILE, FREE_MOTION, FIELD_EVIDENCE)

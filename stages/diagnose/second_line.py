@@ -13,6 +13,7 @@ from stages.diagnose.channels import Seen
 from stages.diagnose.correct import Correction
 from stages.diagnose.gauge.answer import verdict_of
 from stages.diagnose.profile.finding import Finding
+from stages.diagnose.profile.ghost import LARGEST_RAD
 from stages.diagnose.result import Verdict
 
 _NAME = "ghost_ring"
@@ -44,6 +45,21 @@ def against_rings(found: Finding, sheet: Part) -> Agreement | None:
     return agreement(sheet, Part("place of the second line", _words(value), value, covariance))
 
 
+def chance_of_place(found: Finding, sheet: Part) -> float:
+    """Return the p-value of a second line of this height so close to the place where the rings expect it.
+
+    By chance it would lie anywhere in the range searched, wherever the sheet is: height and place are
+    independent, so that their p-values are combined as by R. A. Fisher, "Statistical Methods for Research
+    Workers", 4th ed., 1932, § 21.1.
+    """
+    apart = np.array([size.value for size in found.confirms]) - sheet.value
+    gap = sheet.covariance + np.diag([size.sigma**2 for size in found.confirms])
+    nearer = 4 / 3 * np.pi * (apart @ np.linalg.solve(gap, apart)) ** 1.5 * np.sqrt(np.linalg.det(gap))
+    place = min(float(nearer) / float(np.degrees(2 * LARGEST_RAD)) ** len(apart), 1.0)
+    both = max(found.p_value * place, 1e-300)
+    return float(min(both * (1 - np.log(both)), 1.0))
+
+
 def compared_with_rings(seen: Seen, sheet: Part) -> Seen:
     """Return a recording's evidence with its second line confirmed by the rings, or withdrawn.
 
@@ -52,13 +68,16 @@ def compared_with_rings(seen: Seen, sheet: Part) -> Seen:
     """
     if seen.profile is None:
         return seen
-    second = next((f for f in seen.profile.found if f.effect == _NAME and f.confirms), None)
+    second = next((f for f in seen.profile.findings if f.effect == _NAME and f.confirms), None)
     match = against_rings(second, sheet) if second is not None else None
     if second is None or match is None:
         return seen
     if match.confirmation.agrees:
-        kept = replace(second, agreements=(*second.agreements, match))
+        chance = chance_of_place(second, sheet)
+        kept = replace(second, p_value=chance, agreements=(*second.agreements, match))
         return replace(seen, profile=seen.profile.with_finding(kept))
+    if not second.found:
+        return seen
     withdrawn = replace(second, p_value=1.0, confirms=(), agreements=())
     words = (
         f"The line's profile of {seen.name} shows faint light beside the line. It is not light "

@@ -21,7 +21,7 @@ from stages.diagnose.profile.cells import Cells
 from stages.diagnose.profile.finding import Tested, tested
 from stages.diagnose.profile.matched_filter import STEP_PX, Responses
 
-_LARGEST_RAD, _TILT_STEP_RAD, _CONE_STEP_RAD = np.radians(1.2), np.radians(0.08), np.radians(0.16)
+LARGEST_RAD, _TILT_STEP_RAD, _CONE_STEP_RAD = np.radians(1.2), np.radians(0.08), np.radians(0.16)
 _LARGEST_MM, _COPY_STEP_MM = 5.0, 0.04
 CLEAR_WIDTHS = 2.5
 # Seen through a filter as wide as the line, a copy of it is 10 % high this many widths from its middle.
@@ -86,8 +86,8 @@ def bounced(found: Responses, cells: Cells, floor: float) -> SecondLine:
     scale = cells.px_per_mm[w] * cells.radius_mm[w]
     psi = cells.azimuth_rad[w]
     design = np.stack([4 * scale * np.cos(psi), 4 * scale * np.sin(psi), -2 * scale], axis=1)
-    tilt = np.arange(-_LARGEST_RAD, _LARGEST_RAD + 1e-9, _TILT_STEP_RAD)
-    cone = np.arange(-_LARGEST_RAD, _LARGEST_RAD + 1e-9, _CONE_STEP_RAD)
+    tilt = np.arange(-LARGEST_RAD, LARGEST_RAD + 1e-9, _TILT_STEP_RAD)
+    cone = np.arange(-LARGEST_RAD, LARGEST_RAD + 1e-9, _CONE_STEP_RAD)
     grid = np.stack(np.meshgrid(tilt, tilt, cone, indexing="ij"), -1).reshape(-1, 3)
     steps = np.array([_TILT_STEP_RAD, _TILT_STEP_RAD, _CONE_STEP_RAD])
     return _best(found, design, grid, steps, cells, floor)
