@@ -8,18 +8,16 @@ from pipeline.arrays import Float
 from pipeline.instrument.camera import Camera
 from stages.diagnose.effects.base import EffectModel, ImagePoints, Shape
 from stages.diagnose.effects.courses import Drifting
-from stages.diagnose.effects.kinds import Directed, Scalar, along_x_and_y, one
+from stages.diagnose.effects.kinds import Directed, Scalar
 from stages.diagnose.effects.laser import Baseline
 
 _NEAR_AXIS = 1e-4
 _STEPS = 6
 
 
-class PrincipalPoint(Directed):
+class PrincipalPoint(Directed, name="principal_point", plausible=0.5):
     """The optical axis meets the image at another point than stated."""
 
-    name = "principal_point"
-    amplitudes = along_x_and_y(name, 0.5)
     words = (
         "The optical axis meets the image {shift_px:.3f} px off the stated place, at {direction_deg:.1f}°."
     )
@@ -29,11 +27,9 @@ class PrincipalPoint(Directed):
         return np.tile(np.asarray(amplitude, float), (len(points.uv), 1))
 
 
-class FocalScale(Scalar):
+class FocalScale(Scalar, name="focal_scale", plausible=1e-3):
     """The whole image is larger than stated."""
 
-    name = "focal_scale"
-    amplitudes = one(name, 1e-3)
     words = (
         "The focal length is {relative:.3%} [longer|shorter] than stated, and the image that much "
         "[larger|smaller]."
@@ -44,11 +40,9 @@ class FocalScale(Scalar):
         return np.asarray(amplitude[0] * (points.uv - points.probe.camera.centre_px))
 
 
-class RadialDistortion(Scalar):
+class RadialDistortion(Scalar, name="radial_distortion", plausible=1e-3):
     """The image radius is larger by k f θ³."""
 
-    name = "radial_distortion"
-    amplitudes = one(name, 1e-3)
     words = (
         "The lens shows everything farther [out|in] than stated: by {k:.2e} θ³ focal lengths at an angle θ."
     )
@@ -59,11 +53,9 @@ class RadialDistortion(Scalar):
         return np.asarray(amplitude[0] * (points.theta**3)[:, None] * focal * _heading(points))
 
 
-class SensorTilt(Directed):
+class SensorTilt(Directed, name="sensor_tilt", plausible=5e-4):
     """Brown's decentring by the angle: a sensor not perpendicular to the axis, or decentred lenses."""
 
-    name = "sensor_tilt"
-    amplitudes = along_x_and_y(name, 5e-4)
     words = (
         "The sensor is tilted or the lenses are decentred: p = {p:.2e} beyond the stated, toward "
         "{direction_deg:.1f}°."
@@ -76,11 +68,9 @@ class SensorTilt(Directed):
         return np.asarray((points.theta**2)[:, None] * focal_px(points.probe.camera) * pull)
 
 
-class PixelAspect(Scalar):
+class PixelAspect(Scalar, name="pixel_aspect", plausible=1e-3):
     """Pixels are not square as stated: the image is wider by √(1 + a) and lower by the same factor."""
 
-    name = "pixel_aspect"
-    amplitudes = one(name, 1e-3)
     words = "The image is {relative:.3%} [wider|narrower] against its height than stated."
 
     def image_shift_px(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
@@ -90,11 +80,9 @@ class PixelAspect(Scalar):
         return np.asarray(stretch * (points.uv - points.probe.camera.centre_px))
 
 
-class PupilShift(Scalar):
+class PupilShift(Scalar, name="pupil_shift", plausible=0.3):
     """The entrance pupil moves forward along the axis with the field angle, by E = ε (θ/sin θ − 1)."""
 
-    name = "pupil_shift"
-    amplitudes = one(name, 0.3)
     words = (
         "The lens's entrance pupil moves [forward|back] with the angle, by {shift_mm:.3f} mm × (θ/sin θ − 1) "
         "beyond the stated."
@@ -109,11 +97,9 @@ class PupilShift(Scalar):
         return image_shift(points, seen)
 
 
-class RollingShutter(Scalar):
+class RollingShutter(Scalar, name="rolling_shutter", plausible=0.01):
     """Rows are exposed one after another; the time of a row counts from that of the middle row."""
 
-    name = "rolling_shutter"
-    amplitudes = one(name, 0.01)
     # The rates of the motion are those of the fitted poses: where these err, as those of pictures without
     # fiducials do near a turn of the travel, the size comes out too small. Nine simulated cases (ring level,
     # .018 to .030 s) came out between 9 % too small and 1 % too large; rms beyond noise 3 %.
@@ -127,47 +113,39 @@ class RollingShutter(Scalar):
         return np.asarray(row_s[:, None] * points.velocity_px)
 
 
-class BaselineDrift(Drifting):
+class BaselineDrift(Drifting, name="baseline_drift", plausible=0.05):
     """The baseline grows while the probe warms up."""
 
-    name = "baseline_drift"
     static = Baseline()
-    amplitudes = one(name, 0.05)
     words = (
         "The baseline gets [longer|shorter], by {at_first:#.3g} mm in the first {first}, with a time "
         "constant of {time_s:.1f} s."
     )
 
 
-class FocalDrift(Drifting):
+class FocalDrift(Drifting, name="focal_drift", plausible=1e-3):
     """The focal length grows while the probe warms up."""
 
-    name = "focal_drift"
     static = FocalScale()
-    amplitudes = one(name, 1e-3)
     words = (
         "The focal length gets [longer|shorter], by {at_first:.4%} in the first {first}, with a time "
         "constant of {time_s:.1f} s."
     )
 
 
-class CentreDrift(Drifting):
+class CentreDrift(Drifting, name="centre_drift", plausible=0.5):
     """The optical axis wanders while the probe warms up."""
 
-    name = "centre_drift"
-    static = PrincipalPoint()
-    amplitudes = along_x_and_y(name, 0.5)
+    static, parts = PrincipalPoint(), Directed.parts
     words = (
         "The optical axis drifts toward {direction_deg:.1f}°, by {at_first:#.3g} px in the first {first}, "
         "with a time constant of {time_s:.1f} s."
     )
 
 
-class PixelLocking(Scalar):
+class PixelLocking(Scalar, name="pixel_locking", plausible=0.02):
     """The measured line is displaced by a sine of its position within a pixel."""
 
-    name = "pixel_locking"
-    amplitudes = one(name, 0.02)
     # It is computed with the stated centre: a centre wrong by σ px leaves J₀(2πσ) of the wave, .90 at .1 px.
     # Simulated cases came out 1, 17 and 17 % too small (ring level, .085, .06 and .03 px).
     law_sigma = 0.17
@@ -195,15 +173,6 @@ def _heading(points: ImagePoints) -> Float:
 
 
 CAMERA_MODELS: tuple[EffectModel, ...] = (
-    PrincipalPoint(),
-    FocalScale(),
-    RadialDistortion(),
-    SensorTilt(),
-    PixelAspect(),
-    PupilShift(),
-    RollingShutter(),
-    BaselineDrift(),
-    FocalDrift(),
-    CentreDrift(),
-    PixelLocking(),
-)
+    PrincipalPoint(), FocalScale(), RadialDistortion(), SensorTilt(), PixelAspect(), PupilShift(),
+    RollingShutter(), BaselineDrift(), FocalDrift(), CentreDrift(), PixelLocking(),
+)  # fmt: skip

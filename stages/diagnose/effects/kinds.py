@@ -23,10 +23,18 @@ class Worded(EffectModel):
     """An effect whose statement is a sentence template filled with its quantities.
 
     In ``[farther|nearer]`` the second word is used where the first quantity is negative, which is then
-    written without its sign.
+    written without its sign. A subclass states its name in the catalogue and the plausible size of its
+    amplitudes, which are the ``parts`` of the catalogue's first quantity.
     """
 
     words: ClassVar[str]
+    parts: ClassVar[tuple[str, ...]] = ("",)
+
+    def __init_subclass__(cls, name: str = "", plausible: float = 0.0) -> None:
+        if name:
+            cls.name, size = name, effect(name).quantities[0]
+        if name and "amplitudes" not in vars(cls):
+            cls.amplitudes = tuple(Amplitude(size.name + part, size.unit, plausible) for part in cls.parts)
 
     def statement(self, shape: Shape, amplitude: Float) -> str:
         """Return a sentence that states the effect with its size."""
@@ -55,6 +63,7 @@ class Directed(Worded):
     """An effect with a size and an azimuth ψ₀; the amplitudes are its components along x and y."""
 
     order: int = 1
+    parts = (" along x", " along y")
 
     def quantities(self, shape: Shape, amplitude: Float) -> dict[str, float]:
         """Return size and direction of the crest by their names in the catalogue."""
@@ -72,6 +81,7 @@ class Periodic(Worded):
     """
 
     kind = CourseKind.SINUSOID
+    parts = tuple(f", {wave} along {axis}" for wave in ("sine", "cosine") for axis in "xy")
 
     def course(self, shape: Shape, amplitude: Float) -> dict[str, float]:
         """Return the frequency."""
@@ -106,32 +116,10 @@ def within(quantity: Quantity, grid: Float) -> tuple[Shape, ...]:
     return tuple((float(x),) for x in grid if quantity.low <= x <= quantity.high)
 
 
-def one(name: str, plausible: float) -> tuple[Amplitude]:
-    """Return the amplitude of a `Scalar` effect: the catalogue's first quantity."""
-    size = effect(name).quantities[0]
-    return (Amplitude(size.name, size.unit, plausible),)
-
-
-def along_x_and_y(name: str, plausible: float) -> tuple[Amplitude, Amplitude]:
-    """Return the amplitudes of a `Directed` effect: the catalogue's first quantity along x and along y."""
-    size = effect(name).quantities[0]
-    return (
-        Amplitude(f"{size.name} along x", size.unit, plausible),
-        Amplitude(f"{size.name} along y", size.unit, plausible),
-    )
-
-
 def sine_and_cosine_at(time_s: Float, frequency_hz: float) -> tuple[Float, Float]:
     """Return sine and cosine (M,) at times (M,)."""
     phase = 2 * np.pi * frequency_hz * time_s
     return np.sin(phase), np.cos(phase)
-
-
-def sine_and_cosine(name: str, plausible: float) -> tuple[Amplitude, ...]:
-    """Return the amplitudes of a `Periodic` effect: size along x and y of its sine, then of its cosine."""
-    size = effect(name).quantities[0]
-    parts = [f"{wave} along {axis}" for wave in ("sine", "cosine") for axis in "xy"]
-    return tuple(Amplitude(f"{size.name}, {part}", size.unit, plausible) for part in parts)
 
 
 def cosine(azimuth_rad: Float, amplitude: Float, order: int = 1) -> Float:

@@ -6,26 +6,15 @@ import numpy as np
 
 from pipeline.arrays import Float
 from stages.diagnose.effects.base import Amplitude, EffectModel, Factored, ImagePoints, Product, Shape
-from stages.diagnose.effects.kinds import (
-    Directed,
-    Periodic,
-    Scalar,
-    Worded,
-    along_x_and_y,
-    cosine,
-    one,
-    sine_and_cosine,
-    sine_and_cosine_at,
-)
+from stages.diagnose.effects.kinds import Directed, Periodic, Scalar, Worded, cosine, sine_and_cosine_at
 
 _ORDERS = (2, 3, 4, 5, 6)
 _DEG_PER_MRAD = float(np.degrees(0.001))  # a unit
 
 
-class AlbedoBias(Worded):
+class AlbedoBias(Worded, name="albedo_bias"):
     """The line's centroid is displaced toward brighter wall; the amplitude is the line's variance, mm²."""
 
-    name = "albedo_bias"
     amplitudes = (Amplitude("line_sigma_mm squared", "mm²", 0.05),)
     words = (
         "The line, {line_sigma_mm:.3f} mm wide (1 σ) on the wall, is drawn toward brighter wall by σ² times "
@@ -42,14 +31,12 @@ class AlbedoBias(Worded):
         return {"line_sigma_mm": float(np.sign(amplitude[0]) * np.sqrt(abs(amplitude[0])))}
 
 
-class Subsurface(Scalar):
+class Subsurface(Scalar, name="subsurface", plausible=0.2):
     """The line's light returns, on average, from one transport length away.
 
     The shape is 0 for deeper in the wall and 1 for farther along it: this depends on how the light enters.
     """
 
-    name = "subsurface"
-    amplitudes = one(name, 0.2)
     words = "The line's light travels {transport_mm:+.3f} mm within the wall before it returns."
 
     def shapes(self, duration_s: float, frame_rate: float) -> tuple[Shape, ...]:
@@ -65,11 +52,9 @@ class Subsurface(Scalar):
         return np.full(len(points.uv), float(amplitude[0]) * shape[0])
 
 
-class LineSkew(Scalar):
+class LineSkew(Scalar, name="line_skew", plausible=0.3):
     """The sheet's profile is asymmetric: its peak is before its mean."""
 
-    name = "line_skew"
-    amplitudes = one(name, 0.3)
     words = "The sheet's own profile is asymmetric, with a skewness of {skewness:+.3f}."
 
     def sheet_shift_mm(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
@@ -77,11 +62,9 @@ class LineSkew(Scalar):
         return np.full(len(points.uv), -float(amplitude[0]) * points.probe.laser.line_sigma_mm)
 
 
-class Vignetting(Scalar):
+class Vignetting(Scalar, name="vignetting", plausible=0.5):
     """Light falls off as cos^k θ and displaces the line's centroid inward."""
 
-    name = "vignetting"
-    amplitudes = one(name, 0.5)
     words = (
         "Light falls off as cos^k θ, k {falloff:.3f} [above|below] the stated: the line is drawn "
         "[inward|outward]."
@@ -104,11 +87,9 @@ def _px_per_rad(points: ImagePoints) -> Float:
 PHOTOMETRIC_MODELS: tuple[EffectModel, ...] = (AlbedoBias(), Subsurface(), LineSkew(), Vignetting())
 
 
-class LaserTilt(Directed):
+class LaserTilt(Directed, name="laser_tilt", plausible=0.1):
     """The sheet is tilted forward by tan φ per mm toward ψ₀."""
 
-    name = "laser_tilt"
-    amplitudes = along_x_and_y(name, 0.1)
     words = (
         "The laser sheet is tilted by {tilt_deg:.3f}° more than stated, leaning forward toward azimuth "
         "{direction_deg:.1f}°."
@@ -121,11 +102,9 @@ class LaserTilt(Directed):
         return np.asarray(points.radius_mm * cosine(points.azimuth_rad, tilt * stretch))
 
 
-class LaserCone(Scalar):
+class LaserCone(Scalar, name="laser_cone", plausible=0.1):
     """The sheet is a cone: its rays are inclined by ε₀."""
 
-    name = "laser_cone"
-    amplitudes = one(name, 0.1)
     words = (
         "The laser's rays lean {cone_deg:.3f}° more [forward|back] than stated, all round: the sheet "
         "is a cone."
@@ -138,11 +117,9 @@ class LaserCone(Scalar):
         return np.asarray(points.radius_mm * steeper)
 
 
-class Baseline(Scalar):
+class Baseline(Scalar, name="baseline", plausible=0.1):
     """The sheet is farther from the camera."""
 
-    name = "baseline"
-    amplitudes = one(name, 0.1)
     words = "The laser sheet stands {baseline_mm:.3f} mm [farther from|nearer to] the camera than stated."
 
     def sheet_shift_mm(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
@@ -150,11 +127,9 @@ class Baseline(Scalar):
         return np.full(len(points.uv), float(amplitude[0]))
 
 
-class BeamDecentre(Directed):
+class BeamDecentre(Directed, name="beam_decentre", plausible=0.05):
     """The sheet's rays leave the axis at heights that vary once around."""
 
-    name = "beam_decentre"
-    amplitudes = along_x_and_y(name, 0.05)
     words = (
         "The laser's beam is decentred: its rays start {height_mm:.3f} mm farther forward toward azimuth "
         "{direction_deg:.1f}° and as much back on the other side."
@@ -165,10 +140,9 @@ class BeamDecentre(Directed):
         return cosine(points.azimuth_rad, amplitude)
 
 
-class SheetWaviness(Directed):
+class SheetWaviness(Directed, name="sheet_waviness"):
     """The inclination of the sheet's rays varies m times around the ring; the shape is m."""
 
-    name = "sheet_waviness"
     repeats = True
     amplitudes = (Amplitude("cosine", "mrad", 0.3), Amplitude("sine", "mrad", 0.3))
     words = (
@@ -192,11 +166,9 @@ class SheetWaviness(Directed):
         return {**size, "order": shape[0], "direction_deg": direction}
 
 
-class LaserRocking(Periodic, Product):
+class LaserRocking(Periodic, Product, name="laser_rocking", plausible=1.0):
     """The sheet's tilt oscillates at one frequency."""
 
-    name = "laser_rocking"
-    amplitudes = sine_and_cosine(name, 1.0)
     words = (
         "The laser sheet rocks by ±{amplitude_mrad:.2f} mrad at {frequency_hz:.2f} Hz (or an alias of it) "
         "toward azimuth {direction_deg:.1f}°."
@@ -209,10 +181,5 @@ class LaserRocking(Periodic, Product):
 
 
 LASER_MODELS: tuple[EffectModel, ...] = (
-    LaserTilt(),
-    LaserCone(),
-    Baseline(),
-    BeamDecentre(),
-    SheetWaviness(),
-    LaserRocking(),
-)
+    LaserTilt(), LaserCone(), Baseline(), BeamDecentre(), SheetWaviness(), LaserRocking(),
+)  # fmt: skip

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import replace
+from functools import partial
 from types import MappingProxyType
 
 import numpy as np
@@ -107,7 +108,7 @@ def _line_columns(model: EffectModel, points: ImagePoints, shape: Shape) -> Floa
             + model.line_shift_px(points, shape, amplitude)
         )
 
-    return np.stack([_slope(small, model, k) for k in range(len(model.amplitudes))], axis=-1)
+    return _slopes(small, model)
 
 
 def _texture_columns(model: EffectModel, points: ImagePoints, shape: Shape) -> Float:
@@ -117,25 +118,21 @@ def _texture_columns(model: EffectModel, points: ImagePoints, shape: Shape) -> F
         wall = model.wall_shift_mm(points, shape, amplitude)
         return np.asarray(model.image_shift_px(points, shape, amplitude) + wall[:, None] * per_wall)
 
-    return np.stack([_slope(small, model, k) for k in range(len(model.amplitudes))], axis=-1)
+    return _slopes(small, model)
 
 
 def reading_columns(model: EffectModel, travel: Travel, shape: Shape) -> Float:
     """Return derivatives (N, Q) of the encoder's reading, mm, with respect to the amplitudes, at zero."""
-
-    def small(amplitude: Float) -> Float:
-        return model.reading_shift_mm(travel, shape, amplitude)
-
-    return np.stack([_slope(small, model, k) for k in range(len(model.amplitudes))], axis=-1)
+    return _slopes(partial(model.reading_shift_mm, travel, shape), model)
 
 
-def _slope(prediction: Callable[[Float], Float], model: EffectModel, k: int) -> Float:
-    """Return the central difference over ± the plausible size of one amplitude."""
-    step = np.zeros(len(model.amplitudes))
-    step[k] = model.amplitudes[k].plausible
-    if model.linear:
-        return np.asarray(prediction(step) / step[k])
-    return np.asarray((prediction(step) - prediction(-step)) / (2 * step[k]))
+def _slopes(prediction: Callable[[Float], Float], model: EffectModel) -> Float:
+    """Return the central differences (..., Q) over ± the plausible size of each amplitude."""
+    each = []
+    for step in np.diag([a.plausible for a in model.amplitudes]):
+        back = 0.0 if model.linear else prediction(-step)
+        each.append((prediction(step) - back) / (step.sum() * (1 if model.linear else 2)))
+    return np.stack(each, axis=-1)
 
 
 def _moved(points: ImagePoints, xyz_c: Float) -> ImagePoints:

@@ -8,26 +8,14 @@ import numpy as np
 from pipeline.arrays import Float
 from stages.diagnose.effects.base import EffectModel, ImagePoints, Shape, Travel
 from stages.diagnose.effects.camera import image_shift
-from stages.diagnose.effects.kinds import (
-    Directed,
-    Periodic,
-    Scalar,
-    Worded,
-    along_x_and_y,
-    cosine,
-    one,
-    sine_and_cosine,
-    sine_and_cosine_at,
-)
+from stages.diagnose.effects.kinds import Directed, Periodic, Scalar, Worded, cosine, sine_and_cosine_at
 
 _SLIP_TIMES = 64
 
 
-class PipeBend(Directed):
+class PipeBend(Directed, name="pipe_bend", plausible=4e-4):
     """The pipe's axis is curved: wall ahead is displaced sideways by the sagitta."""
 
-    name = "pipe_bend"
-    amplitudes = along_x_and_y(name, 4e-4)
     words = (
         "The pipe bends with a curvature of {curvature_per_mm:.2e} per mm toward azimuth "
         "{direction_deg:.1f}° of P."
@@ -39,12 +27,10 @@ class PipeBend(Directed):
         return np.asarray(ahead**2 / 2 * cosine(points.azimuth_p_rad, amplitude))
 
 
-class Ovality(Directed):
+class Ovality(Directed, name="ovality", plausible=0.1):
     """The pipe's section is an oval at a constant azimuth in P."""
 
-    name = "ovality"
     order = 2
-    amplitudes = along_x_and_y(name, 0.1)
     words = (
         "The pipe is oval: its radius varies by ±{amplitude_mm:.3f} mm, longest at azimuth "
         "{direction_deg:.1f}° of P."
@@ -55,11 +41,9 @@ class Ovality(Directed):
         return cosine(points.azimuth_p_rad, amplitude, self.order)
 
 
-class ProbeVibration(Periodic):
+class ProbeVibration(Periodic, name="probe_vibration", plausible=0.2):
     """The camera oscillates across the pipe at one frequency; free poses absorb nearly all of it."""
 
-    name = "probe_vibration"
-    amplitudes = sine_and_cosine(name, 0.2)
     words = (
         "The probe vibrates across the pipe by ±{amplitude_mm:.3f} mm at {frequency_hz:.2f} Hz (or an alias "
         "of it) toward azimuth {direction_deg:.1f}°."
@@ -72,11 +56,9 @@ class ProbeVibration(Periodic):
         return image_shift(points, seen)
 
 
-class EncoderScale(Scalar):
+class EncoderScale(Scalar, name="encoder_scale", plausible=0.005):
     """The encoder's wheel is smaller than stated."""
 
-    name = "encoder_scale"
-    amplitudes = one(name, 0.005)
     words = "The encoder reads {relative:.3%} too [much|little] of every distance."
 
     def reading_shift_mm(self, travel: Travel, shape: Shape, amplitude: Float) -> Float:
@@ -84,11 +66,9 @@ class EncoderScale(Scalar):
         return np.asarray(amplitude[0] * travel.distance_mm)
 
 
-class EncoderSlip(Worded):
+class EncoderSlip(Worded, name="encoder_slip", plausible=2.0):
     """The encoder's wheel slips once; the shape is the slip's middle and, if it lasts, duration, s."""
 
-    name = "encoder_slip"
-    amplitudes = one(name, 2.0)
     words = "The encoder's wheel slips after {time_s:.2f} s and its reading [gains|loses] {slip_mm:.2f} mm."
 
     def shapes(self, duration_s: float, frame_rate: float) -> tuple[Shape, ...]:
@@ -108,11 +88,9 @@ class EncoderSlip(Worded):
         return {"slip_mm": float(amplitude[0]), "time_s": shape[0]}
 
 
-class EncoderBacklash(Scalar):
+class EncoderBacklash(Scalar, name="encoder_backlash", plausible=0.3):
     """The wheel has play: after a reversal the reading waits until the play is taken up."""
 
-    name = "encoder_backlash"
-    amplitudes = one(name, 0.3)
     words = "The encoder has {backlash_mm:.2f} mm of play at a reversal."
 
     def reading_shift_mm(self, travel: Travel, shape: Shape, amplitude: Float) -> Float:
@@ -134,11 +112,9 @@ def _lag(steps, half):  # type: ignore[no-untyped-def]
     return lag
 
 
-class TimeOffset(Scalar):
+class TimeOffset(Scalar, name="time_offset", plausible=0.02):
     """The encoder's readings are late: they give the distance at a slightly earlier time."""
 
-    name = "time_offset"
-    amplitudes = one(name, 0.02)
     words = "The encoder's readings come {delay_s:.4f} s [late|early] against the pictures."
 
     def reading_shift_mm(self, travel: Travel, shape: Shape, amplitude: Float) -> Float:
@@ -149,15 +125,13 @@ class TimeOffset(Scalar):
         return np.asarray(np.interp(held, travel.time_s, travel.distance_mm) + beyond - travel.distance_mm)
 
 
-class MotionBlur(TimeOffset):
+class MotionBlur(TimeOffset, name="motion_blur", plausible=0.005):
     """A longer exposure with the same start: all pictures are late by half of the excess.
 
     The free pose of every picture follows, so that rings and fiducials show nothing of it; only the encoder,
     whose readings then seem late, and the line's width do.
     """
 
-    name = "motion_blur"
-    amplitudes = one(name, 0.005)
     words = (
         "The exposure is {exposure_s:.4f} s [longer|shorter] than stated, and so is the blur of what moves."
     )
@@ -168,12 +142,6 @@ class MotionBlur(TimeOffset):
 
 
 POSE_MODELS: tuple[EffectModel, ...] = (
-    PipeBend(),
-    Ovality(),
-    ProbeVibration(),
-    EncoderScale(),
-    EncoderSlip(),
-    EncoderBacklash(),
-    TimeOffset(),
+    PipeBend(), Ovality(), ProbeVibration(), EncoderScale(), EncoderSlip(), EncoderBacklash(), TimeOffset(),
     MotionBlur(),
-)
+)  # fmt: skip

@@ -14,7 +14,7 @@ from pipeline.arrays import Float
 from pipeline.physics.instrument import DOME_POWER, GLASS_INDEX, TUBE_OUTER_RADIUS_MM, TUBE_THICKNESS_MM
 from stages.diagnose.effects.base import EffectModel, ImagePoints, Shape
 from stages.diagnose.effects.camera import image_shift
-from stages.diagnose.effects.kinds import Directed, Scalar, along_x_and_y, one
+from stages.diagnose.effects.kinds import Directed, Scalar
 
 # Glasses and clear plastics of windows have an index of 1.45 to 1.55 (fused silica 1.458, PMMA 1.491, BK7
 # 1.517), taken as uniform. The shift grows as 1 − 1/n, so that a size computed with n = 1.5 has a relative
@@ -26,25 +26,21 @@ _ROUNDS = 3
 _NONE = np.zeros(2)
 
 
-class HousingGlass(Scalar):
+class HousingGlass(Scalar, name="housing_glass", plausible=1.0):
     """A coaxial glass tube around the probe; the laser crosses it at normal incidence."""
 
-    name = "housing_glass"
-    amplitudes = one(name, 1.0)
     law_sigma = float(_BY_INDEX)
     words = "A coaxial glass tube {thickness_mm:.3f} mm [thicker|thinner] than stated stands before the wall."
 
     def image_shift_px(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
         """Return the image through the tube minus that without it, px."""
-        layers = _layers(points, np.full(len(points.uv), float(amplitude[0])))
-        return _seen_under(points, points.azimuth_rad, _steepness(points, *layers, GLASS_INDEX))
+        glass_mm = np.full(len(points.uv), float(amplitude[0]))
+        return _seen_through_layer(points, glass_mm, GLASS_INDEX)
 
 
-class TubeWedge(Directed):
+class TubeWedge(Directed, name="tube_wedge", plausible=0.1):
     """The tube's outer face is decentred: the glass is thicker on one side, and a prism on the flanks."""
 
-    name = "tube_wedge"
-    amplitudes = along_x_and_y(name, 0.1)
     law_sigma = float(_BY_INDEX)
     words = (
         "The glass tube is {wedge_mm:.3f} mm thicker toward azimuth {direction_deg:.1f}°, thinner opposite."
@@ -55,14 +51,12 @@ class TubeWedge(Directed):
         return _seen_through(points, _tube(wedge_mm=amplitude))
 
 
-class TubeTilt(Directed):
+class TubeTilt(Directed, name="tube_tilt", plausible=1.0):
     """A glass tube of 2 mm thickness is tilted; the crest is where its outward normal leans forward.
 
     The shape is 1 where the laser also passes through the tube, 0 where only the camera looks through it.
     """
 
-    name = "tube_tilt"
-    amplitudes = along_x_and_y(name, 1.0)
     words = (
         "The glass tube before the wall is tilted by {tilt_deg:.3f}°, its normal leaning forward at azimuth "
         "{direction_deg:.1f}°."
@@ -88,11 +82,9 @@ class TubeTilt(Directed):
         return np.asarray(shape[0] * (faulty - straight))
 
 
-class DomeAxial(Scalar):
+class DomeAxial(Scalar, name="dome_axial", plausible=0.3):
     """The viewpoint is ahead of the centre of a concentric glass dome, or behind it."""
 
-    name = "dome_axial"
-    amplitudes = one(name, 0.3)
     words = (
         "The glass dome's centre is {offset_mm:.3f} mm [behind|before] the lens's viewpoint along the axis."
     )
@@ -102,11 +94,9 @@ class DomeAxial(Scalar):
         return _through_dome(points, np.array([0.0, 0.0, -amplitude[0]]))
 
 
-class DomeLateral(Directed):
+class DomeLateral(Directed, name="dome_lateral", plausible=0.2):
     """The centre of a concentric glass dome is beside the viewpoint."""
 
-    name = "dome_lateral"
-    amplitudes = along_x_and_y(name, 0.2)
     words = (
         "The glass dome's centre is {offset_mm:.3f} mm beside the axis, toward azimuth {direction_deg:.1f}°."
     )
@@ -116,11 +106,9 @@ class DomeLateral(Directed):
         return _through_dome(points, np.array([amplitude[0], amplitude[1], 0.0]))
 
 
-class OutsideIndex(Scalar):
+class OutsideIndex(Scalar, name="outside_index", plausible=2e-3):
     """The medium outside a sealed tube of 15 mm radius refracts rays where they leave the tube."""
 
-    name = "outside_index"
-    amplitudes = one(name, 2e-3)
     words = (
         "The medium outside the sealed probe has an index of refraction {index_excess:.2e} "
         "[above|below] the stated."
@@ -128,31 +116,21 @@ class OutsideIndex(Scalar):
 
     def image_shift_px(self, points: ImagePoints, shape: Shape, amplitude: Float) -> Float:
         """Return the image through the medium minus that without it, px."""
-        plain, dense = _layers(points, points.radius_mm - TUBE_OUTER_RADIUS_MM)
-        steep = _steepness(points, plain, dense, 1 + float(amplitude[0]))
-        return _seen_under(points, points.azimuth_rad, steep)
+        return _seen_through_layer(points, points.radius_mm - TUBE_OUTER_RADIUS_MM, 1 + float(amplitude[0]))
 
 
-def _layers(points: ImagePoints, dense_mm: Float) -> tuple[Float, Float]:
-    """Return the path (M,), mm, across layers without the index, and that in layers with it."""
-    return points.radius_mm - dense_mm, dense_mm
+def _seen_through_layer(points: ImagePoints, layer_mm: Float, index: float) -> Float:
+    """Return the image shift (M, 2), px, by layers (M,), mm, of a relative index on the way to the wall.
 
-
-def _steepness(points: ImagePoints, plain_mm: Float, dense_mm: Float, index: float) -> Float:
-    """Return tan i (M,) at the lens, by Newton's method on z = plain · tan i + dense · tan i′."""
-    z = points.xyz_c[:, 2]
-    steep = z / points.radius_mm
+    tan i at the lens solves z = plain · tan i + layer · tan i′, by Newton's method.
+    """
+    z, q, psi = points.xyz_c[:, 2], points.radius_mm, points.azimuth_rad
+    plain_mm, steep = q - layer_mm, z / q
     for _ in range(_STEPS):
         inside = index**2 * (1 + steep**2) - steep**2
-        excess = plain_mm * steep + dense_mm * steep / np.sqrt(inside) - z
-        steep = steep - excess / (plain_mm + dense_mm * index**2 / inside**1.5)
-    return np.asarray(steep)
-
-
-def _seen_under(points: ImagePoints, azimuth_rad: Float, steep: Float) -> Float:
-    """Return the image shift (M, 2), px, where rays leave the lens at azimuths and with tan i (M,)."""
-    q = points.radius_mm
-    return image_shift(points, np.column_stack([q * np.cos(azimuth_rad), q * np.sin(azimuth_rad), q * steep]))
+        excess = plain_mm * steep + layer_mm * steep / np.sqrt(inside) - z
+        steep = steep - excess / (plain_mm + layer_mm * index**2 / inside**1.5)
+    return image_shift(points, np.column_stack([q * np.cos(psi), q * np.sin(psi), q * steep]))
 
 
 def _tube(wedge_mm: Float = _NONE, lean: Float = _NONE) -> Float:
@@ -233,10 +211,6 @@ def refracted(start, p, q, r, faces):  # type: ignore[no-untyped-def]
     return x, y, z, p, q, r
 
 
-def _unit(vector: Float) -> Float:
-    return np.asarray(vector / np.linalg.norm(vector, axis=1)[:, None])
-
-
 def _through_dome(points: ImagePoints, centre_c: Float) -> Float:
     """Return the image shift (M, 2), px, through a thin concentric dome about ``centre_c`` (3,).
 
@@ -246,7 +220,7 @@ def _through_dome(points: ImagePoints, centre_c: Float) -> Float:
     from_centre = points.xyz_c - centre_c
     seen = points.xyz_c
     for _ in range(3):
-        ray = _unit(seen)
+        ray = seen / np.linalg.norm(seen, axis=1)[:, None]
         aside = -centre_c + (ray @ centre_c)[:, None] * ray
         turned = _along(ray, from_centre) * aside - _along(aside, from_centre) * ray
         seen = points.xyz_c - DOME_POWER * turned
@@ -258,10 +232,5 @@ def _along(direction: Float, vector: Float) -> Float:
 
 
 WINDOW_MODELS: tuple[EffectModel, ...] = (
-    HousingGlass(),
-    TubeWedge(),
-    TubeTilt(),
-    DomeAxial(),
-    DomeLateral(),
-    OutsideIndex(),
-)
+    HousingGlass(), TubeWedge(), TubeTilt(), DomeAxial(), DomeLateral(), OutsideIndex(),
+)  # fmt: skip
