@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 
@@ -24,6 +24,8 @@ _LAW = 0.05
 # A measurement is used only if its 1 σ is at most this fraction of the effect.
 TELLING = 0.25
 _DRAWS = 400
+# Another recording has its own events and aliases, and its frame P has another roll.
+_OF_ONE_RECORDING = frozenset({"time_s", "duration_s", "slip_mm", "frequency_hz", "direction_deg"})
 
 
 @dataclass(frozen=True)
@@ -54,7 +56,6 @@ class Agreement:
 
     Attributes
     ----------
-    confirmation : Confirmation
     ratio : float
         Likelihood of the second measurement if the cause of the first one made both, over its likelihood if
         it had a similar size but, including its sign, nothing to do with the first.
@@ -113,6 +114,27 @@ def same(first: Float, second: Float, gap: Float, size: float, rarest: float = A
 
 def _spread(gap: Float, size: float) -> Float:
     return np.asarray(gap + (_LAW * size) ** 2 * np.eye(len(gap)))
+
+
+def agreements(
+    where: str, sizes: Mapping[str, Value], elsewhere: str, others: Mapping[str, Value], of: str = ""
+) -> Iterable[Agreement]:
+    """Return whether two recordings agree on each quantity that they share; ``of`` names its owner."""
+    for name, value in sizes.items():
+        if name not in others or name in _OF_ONE_RECORDING:
+            continue
+        found = agreement(_part(where, name, value, of), _part(elsewhere, name, others[name], of))
+        if found is not None:
+            yield found
+
+
+def _part(where: str, name: str, value: Value, of: str) -> Part:
+    """Return a quantity as measured in a recording; an azimuth is given as a unit vector."""
+    words = f"{of}{name} {value.value:.4g} (± {value.sd:.2g})"
+    if not name.endswith("azimuth_deg"):
+        return Part.of(where, words, value.value, value.sd)
+    angle = np.radians(value.value)
+    return Part(where, words, np.array([np.cos(angle), np.sin(angle)]), np.radians(value.sd) ** 2 * np.eye(2))
 
 
 def chance_of_name(

@@ -33,7 +33,6 @@ class Cause:
 
     Attributes
     ----------
-    name : str
     probability : float
         That it is the cause or one of several.
     courses : tuple of CourseShare

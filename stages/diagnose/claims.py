@@ -9,15 +9,14 @@ import numpy as np
 
 from pipeline.physics.catalogue import effect
 from pipeline.physics.effect import Channel, FixedTo
-from stages.diagnose.agreement import Agreement, chance_of_name
-from stages.diagnose.both_recordings import agreements
+from stages.diagnose.agreement import Agreement, agreements, chance_of_name
 from stages.diagnose.channels import Seen
+from stages.diagnose.gauge.answer import rocking_excluded
 from stages.diagnose.inference import SURE
 from stages.diagnose.late_pictures import Exposure, how_late, own_size, whole_size
 from stages.diagnose.profile.evidence import ProfileEvidence
 from stages.diagnose.profile.finding import Finding
 from stages.diagnose.result import CourseFound, EffectFound, Location, Value
-from stages.diagnose.rocking import rocking_excluded
 from stages.diagnose.travel.events import is_found
 from stages.diagnose.travel.evidence import TravelEstimate, TravelEvidence
 from stages.diagnose.travel.lines import Line
@@ -44,10 +43,6 @@ class Claim:
 
     Attributes
     ----------
-    name : str
-    parameters : dict of str to Value
-    statement : str
-    p_value : float
     alike : tuple of str
         Effects that would look the same and that nothing excludes.
     where : str
@@ -236,7 +231,8 @@ def _of_swing(line: Line, seen: Seen, travel: TravelEvidence) -> Claim:
         "frequency_hz": Value(line.frequency_hz, line.frequency_sigma_hz),
         "direction_deg": Value(line.direction_deg, turn),
     }
-    excluded = ("probe_vibration", "laser_rocking") if rocking_excluded(line, seen) else ("probe_vibration",)
+    at_rest = rocking_excluded(seen.geometry, line.amplitude_mm)
+    excluded = ("probe_vibration", "laser_rocking") if at_rest else ("probe_vibration",)
     others = tuple(n for n in line.explained_by if n not in excluded)
     words = (
         f"The camera swings across the pipe by {line.amplitude_mm:.3f} mm at {line.frequency_hz:.2f} Hz "

@@ -42,7 +42,6 @@ class Compared:
 
     Attributes
     ----------
-    before, after : RingResidual
     fit : FitQuality or None
         None where the gauge run does not determine it.
     """
@@ -156,7 +155,6 @@ class OnImage:
 
     Attributes
     ----------
-    frame : int
     grey : (H, W) uint8
     uv_before, uv_after : (M, 2), (K, 2)
         Ring samples, px, before and after the correction.

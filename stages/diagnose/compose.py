@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 from pipeline.instrument.probe import Probe
 from pipeline.physics.catalogue import effect
 from pipeline.physics.effect import Channel
-from stages.diagnose.both_recordings import global_p
 from stages.diagnose.causes import NONE, Causes
 from stages.diagnose.channels import Seen
 from stages.diagnose.claims import Claim
@@ -56,7 +55,7 @@ def composed(
         recording=field.name if field is not None else "",
         gauge=gauge.name if gauge is not None else "",
         verdict=said.verdict,
-        global_p=global_p(field, gauge),
+        global_p=_global_p(field, gauge),
         location=_location(shown, asked),
         effects=said.effects,
         members=() if partly else said.members,
@@ -71,6 +70,26 @@ def composed(
         unexamined=tuple(w for seen in (field, gauge) if seen is not None for w in unexamined(seen)),
     )
     return found.not_knowing(without)
+
+
+def _global_p(field: Seen | None, gauge: Seen | None) -> float:
+    """Return the smallest p-value of all channels, times the number of channels that show anything.
+
+    The p-values of the line's profile leave out errors of image formation, so that only those count which
+    exceed these, too.
+    """
+    each = []
+    for seen in (field, gauge):
+        if seen is None:
+            continue
+        if seen.geometry is not None:
+            each.append(seen.geometry.global_p)
+        if seen.travel is not None:
+            each.append(seen.travel.least_p)
+        if seen.profile is not None:
+            each.append(min((f.p_value for f in seen.profile.findings if f.found), default=1.0))
+    showing = [p for p in each if p < 1]
+    return float(min(min(showing) * len(showing), 1.0)) if showing else 1.0
 
 
 def unexamined(seen: Seen) -> tuple[str, ...]:

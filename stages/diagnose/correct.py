@@ -134,7 +134,6 @@ class Correction:
 
     Attributes
     ----------
-    probe : Probe
     applied, inexpressible : tuple of str
         Effects that the probe now contains, and those that a probe file cannot express.
     """

@@ -51,7 +51,6 @@ class Diagnosed:
 
     Attributes
     ----------
-    found : Diagnosis
     probe : Probe
         Corrected; as stated without a gauge run that determines the instrument.
     image : OnImage or None

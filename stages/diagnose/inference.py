@@ -49,7 +49,6 @@ class Column:
         ``encoder_scale``, whose amplitude is true minus stated in the parameter's own unit.
     amplitude : str
         As the effect's model names it.
-    shape : tuple of float
     """
 
     effect: str
@@ -63,7 +62,6 @@ class Evidence:
 
     Attributes
     ----------
-    columns : tuple of K Column
     information : (K, K)
         A: the recording's own unknowns (poses, wall, landmarks) eliminated with their priors.
     right : (K,)
@@ -168,7 +166,6 @@ class Score:
         Estimate and its true covariance, including the stated instrument's uncertainty.
     statistic : float
         χ² with Q degrees of freedom when nothing is hidden.
-    p_value : float
     gain : float
         Drop of χ² that the effect promises.
     """
@@ -186,7 +183,6 @@ class Around:
 
     Attributes
     ----------
-    evidence : Evidence
     information, right : (K, K), (K,)
         The rest of it with the free columns eliminated; zero in those.
     from_stated : (K, K)

@@ -36,7 +36,6 @@ class Exposure:
 
     Attributes
     ----------
-    stated_s : float
     widths : tuple of Finding
         The exposure according to the line's width, in each recording of the probe.
     """

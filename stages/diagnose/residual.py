@@ -17,11 +17,11 @@ from stages.diagnose.field.run import ring_points as field_points
 from stages.diagnose.field.system import ENCODER_SCALE, field_system
 from stages.diagnose.gauge.equations import RING
 from stages.diagnose.gauge.fit import Fit, fit
+from stages.diagnose.gauge.heldout import at_one_azimuth, turns_apart
 from stages.diagnose.gauge.linearise import ring_mm_per_px
 from stages.diagnose.gauge.points import Moving
 from stages.diagnose.gauge.points import ring_points as gauge_points
 from stages.diagnose.gauge.run import GaugeRun, Term
-from stages.diagnose.unrepeated import unrepeated
 
 AZIMUTHS = 72
 WALL_STEP_MM = 2.0
@@ -33,6 +33,10 @@ _OUTLIER = 0.1
 _NEAR = 2
 # Factor on the rings' σ, so large that texture alone determines poses and wall.
 _FIELD_RELAXED = 1e3
+
+# Weight of a pair of an end with what is beyond it, negligible unless its rings have no other pair.
+_ELSE = 1e-6
+_SINKHORN_ROUNDS = 100
 
 
 @dataclass(frozen=True)
@@ -80,7 +84,7 @@ class RingResidual:
         """
         own = self.usable
         azimuth, frame, along = self.azimuth_c_rad[own], self.frame[own], self.distance_mm[own]
-        return float(np.sqrt(unrepeated(self.residual_px[own], azimuth, frame, along)))
+        return float(np.sqrt(_unrepeated(self.residual_px[own], azimuth, frame, along)))
 
     def over_frames(self, frames: Int) -> Float:
         """Return the mean residual, mm, over (F, `AZIMUTHS`) frames and azimuth in C; NaN where none is."""
@@ -113,6 +117,38 @@ def _mean(row: Int, azimuth_rad: Float, values: Float, rows: int) -> Float:
     count, total = (np.bincount(cell, w, rows * AZIMUTHS) for w in (None, values))
     mean: Float = np.divide(total, count, out=np.full(len(total), np.nan), where=count > 0)
     return mean.reshape(rows, AZIMUTHS)
+
+
+def _unrepeated(value: Float, azimuth_rad: Float, frame: Int, along_mm: Float) -> float:
+    """Return the variance of the part of ring bins (M,) that does not repeat at one azimuth on other wall.
+
+    Bins near an end have a partner on one side only. Pairs are weighted so that all bins count equally, since
+    noise may be larger at the ends. An effect that begins near an end would be in every pair of that end with
+    the rest of the run: bins there are compared with one another, half as far apart. NaN without pairs.
+    """
+    turn, apart = turns_apart(frame, along_mm)
+    half, last = max(apart // 2, 1), int(turn.max(initial=0))
+    end = np.where(turn < 2 * half, 1, np.where(turn > last - 2 * half, 2, 0))
+    near = at_one_azimuth(azimuth_rad, turn, half, 2 * half)
+    far = [at_one_azimuth(azimuth_rad, turn, places, 2 * apart) for places in (apart, 2 * apart)]
+    first, second = (np.concatenate(each) for each in zip(near, *far, strict=True))
+    is_near = np.arange(len(first)) < len(near[0])
+    wanted = (end[first] == end[second]) & ((end[first] > 0) == is_near)
+    weight = np.where(wanted, 1.0, np.where(is_near, 0.0, _ELSE))
+    if not weight.any():
+        return float("nan")
+    weight = _each_once(first, second, weight, len(value))
+    return float(np.average((value[second] - value[first]) ** 2, weights=weight)) / 2
+
+
+def _each_once(first: Int, second: Int, weight: Float, count: int) -> Float:
+    """Return weights (P,) of pairs such that all bins in any pair count equally (Sinkhorn & Knopp 1967)."""
+    each = np.ones(count)
+    for _ in range(_SINKHORN_ROUNDS):
+        both = weight * each[first] * each[second]
+        total = np.bincount(first, both, count) + np.bincount(second, both, count)
+        each /= np.sqrt(np.where(total > 0, total, 1.0))
+    return np.asarray(weight * each[first] * each[second])
 
 
 def rings_against_fiducials(

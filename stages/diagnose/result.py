@@ -125,10 +125,8 @@ class Feasible:
 
     Attributes
     ----------
-    name, quantity, unit : str
     detectable : float
         Least size that would stand out (5 σ), including the stated instrument's uncertainty.
-    typical : float
     rival : str
         The most similar effect here; empty when none is similar.
     left : float
@@ -150,12 +148,9 @@ class Candidate:
 
     Attributes
     ----------
-    names : tuple of str
-    probability : float
     gain, heldout_gain : float
         Drop of χ² against the stated instrument, corrected for correlated errors: on all measurements, and on
         regimes held out in turn.
-    statement : str
     """
 
     names: tuple[str, ...]
@@ -202,7 +197,6 @@ class Remainder:
     ----------
     verdict : Verdict
         ``class`` or ``unexplained``.
-    location : Location or None
     members : tuple of str
         The class.
     formula : str

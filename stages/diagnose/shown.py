@@ -46,8 +46,6 @@ class Shown:
         Claims of all channels, and those that the library may name.
     of_profile : tuple of str
         Sentences on the line's profile that no named shape fits.
-    of_travel : list of UnexplainedTravel
-    shortcomings : tuple of str
     misdrawn : bool
         Whether a bore that is not as drawn explains the gauge run as well.
     """

@@ -64,7 +64,6 @@ class _Weighed:
     ----------
     probability : float
         Those of all sets add up to 1.
-    terms : tuple of Term
     names : dict of str to float
         Each law that may be among its causes, and `_OUTSIDE`, with the probability in this set.
     """

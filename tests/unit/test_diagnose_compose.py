@@ -13,9 +13,9 @@ from pipeline.api.diagnosis.report import headline
 from pipeline.instrument.probe import Probe
 from stages.diagnose.compose import unexamined
 from stages.diagnose.correct import encoder_effects
+from stages.diagnose.gauge.answer import rocking_excluded
 from stages.diagnose.gauge.examine import Examined
 from stages.diagnose.result import FitQuality, Location, Verdict
-from stages.diagnose.rocking import rocking_excluded
 from stages.diagnose.shown import verdict_of_rings
 from stages.diagnose.travel.events import with_events
 from tests.diagnosed import AGREES, DIFFERS, PLAY, SCALE, SLIP, SWING, answer, of_gauge, seen
@@ -208,7 +208,7 @@ def geometry(detectable_mrad: float, *suspected: str) -> Any:
     ],
 )
 def test_a_rocking_sheet_that_rings_would_show_is_excluded(of: Any, excluded: bool) -> None:
-    assert rocking_excluded(SWING, replace(seen("gauge"), geometry=cast(Any, of))) is excluded
+    assert rocking_excluded(cast(Any, of), SWING.amplitude_mm) is excluded
 
 
 def test_a_swing_that_a_rocking_sheet_may_also_cause_is_a_class(real_probe: Probe) -> None:

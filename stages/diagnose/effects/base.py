@@ -30,7 +30,6 @@ class ImagePoints:
 
     Attributes
     ----------
-    probe : Probe
     frame : (M,) int
     time_s : (M,)
         Since the first frame.

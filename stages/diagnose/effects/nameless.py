@@ -168,8 +168,6 @@ class PatternInCourse(Nameless, InCourse):
 
     Attributes
     ----------
-    static : Nameless
-    kind : CourseKind
     like : EffectModel or None
         The effect whose course it is.
     """

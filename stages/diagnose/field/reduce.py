@@ -24,7 +24,6 @@ class Reduced:
 
     Attributes
     ----------
-    factor : Factor
     information, right : (K, K), (K,)
         Normal equations over the named columns.
     follow : (B, K)

@@ -40,15 +40,12 @@ class Adjusted:
     ----------
     measured : Measurements
         Without encoder.
-    state : State
     equations : Equations
         At ``state``, with the final robust weights.
     trajectory : Trajectory
         In P.
-    encoder : EncoderReadings or None
     ring_frames : (F,) int
         Indices of the ring frames in the frame table.
-    parameters : MotionParameters
     """
 
     measured: Measurements

@@ -38,7 +38,6 @@ class FieldSystem:
     ----------
     rows : tuple of Rows
         Without landmarks: first the rings, then the rest.
-    texture : LandmarkRows
     names : tuple of Column
         The last columns of the border; those before are the recording's own unknowns.
     value : (K,)

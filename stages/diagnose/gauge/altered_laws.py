@@ -26,8 +26,6 @@ class AlteredLaw(SumOfLaws):
 
     Attributes
     ----------
-    name : str
-    law_of : EffectModel
     own, size
         Its shape and its amplitudes (Q,).
     """

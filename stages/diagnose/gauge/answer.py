@@ -28,6 +28,8 @@ _LISTED = 1e-3
 # Nothing predicts how far a second line pulls the first. Least squares with one line follow a second one of
 # height h at a distance d, both of width σ, by h d exp(−d² / 4σ²), which is largest, √(2/e) h σ, at d = √2 σ.
 _SECOND_LINES, _MOST_PULL = ("ghost_ring", "tube_ghost"), float(np.sqrt(2 / np.e))
+# Rings exclude a rocking sheet only if all sets of effects with one are less likely than this together.
+_ROCKING_P = 0.01
 _REPEATS = (
     "Rings and fiducials of the gauge run lie {:.2f} px from where its other parts predict them; noise makes "
     "{:.2f} px. The rest is the same at one place of the image on other wall, and no effect or simple "
@@ -110,6 +112,24 @@ def _unknown_shift_px(examined: Examined, name: str, size: Value) -> float:
     model, rings = LIBRARY[name], searched.nothing.linearised.rings
     each = (ring_shift_px(model, rings, shape, unknown) for shape in model.shapes(0.0, 1.0))
     return max(float(np.sqrt(np.nanmean(shift**2))) for shift in each)
+
+
+def rocking_excluded(examined: Examined | None, amplitude_mm: float) -> bool:
+    """Return whether a sheet that makes the ring oscillate so much would be visible, but rings show none.
+
+    If the sheet is assumed to be at rest, a tilt φ of it moves the ring like a camera that is r² φ / l off
+    the axis. But only a sheet moves rings relative to fiducials, the more the wider the bore.
+    """
+    if examined is None:
+        return False
+    rings, verdicts = examined.searched.nothing.linearised.rings, examined.verdicts
+    about = [f for f in examined.feasibility if f.name == "laser_rocking"]
+    sets = verdicts.sets if verdicts is not None else ()
+    suspected = sum(p for p, terms in sets if any(t.model.law == "laser_rocking" for t in terms))
+    if not about or suspected > _ROCKING_P:
+        return False
+    needed_mrad = 1e3 * amplitude_mm * rings.probe.laser.baseline_mm / float(np.max(rings.radius_mm)) ** 2
+    return bool(needed_mrad > about[0].detectable)
 
 
 def _found(

@@ -55,7 +55,6 @@ class OfKind:
 
     Attributes
     ----------
-    kind : int
     frame : (F,) int
     used : (U,) int
         The columns of `Equations.by_global` that they depend on; the residual follows them in what is below.
@@ -113,13 +112,7 @@ def _spread(products, factor, law, out):  # type: ignore[no-untyped-def]
 
 @dataclass(frozen=True)
 class FrameSums:
-    """Measurements summed over each frame: whatever whole frames and kinds are asked about later.
-
-    Attributes
-    ----------
-    equations : Equations
-    kinds : tuple of OfKind
-    """
+    """Measurements summed over each frame: whatever whole frames and kinds are asked about later."""
 
     equations: Equations
     kinds: tuple[OfKind, ...]

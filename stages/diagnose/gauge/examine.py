@@ -104,7 +104,6 @@ class Examined:
 
     Attributes
     ----------
-    searched : Search
     verdicts : Verdicts or None
         None when nothing beyond the stated instrument was found.
     confirmed : tuple of tuple of Confirmation
@@ -113,8 +112,6 @@ class Examined:
         The same terms' amplitudes with their covariances.
     feasibility : tuple of Feasible
         Detectable size of each effect, computed before any residual was used.
-    location : Location or None
-    quality : FitQuality or None
     unknown_laws : tuple of Unknown
         For each of the same terms, odds of unknown laws and courses relative to its name.
     patterns_by_chance : float

@@ -51,9 +51,6 @@ class Fit:
 
     Attributes
     ----------
-    run : GaugeRun
-    state : Unknowns
-    terms : tuple of Term
     cost : float
         Weighted sum of squares, including the priors of the stated instrument.
     """

@@ -50,7 +50,6 @@ class Judged:
 
     Attributes
     ----------
-    fit : Fit
     evidence : Evidence
         Of the whole run; the scatter of its scores is estimated only for the likeliest hypothesis.
     by_regime : tuple of Evidence

@@ -70,7 +70,6 @@ class Verdicts:
 
     Attributes
     ----------
-    regimes, judged
     probability : (H,)
     adequacy : float
         Probability that the likeliest hypothesis' residual is noise.

@@ -57,11 +57,9 @@ class GaugeRun:
 
     Attributes
     ----------
-    edges, rings
     width_px : (R,)
         Line width at the ring bins.
     time_s : (N,)
-    encoder : Encoder or None
     bore_sigma_mm : float or (B,)
         1 σ of the bores' radii; of all, or of each.
     motion_sigma : (N − 3, 6)

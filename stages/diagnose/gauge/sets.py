@@ -164,7 +164,6 @@ class Sets:
 
     Attributes
     ----------
-    members : tuple of Member
     place : tuple of (Q,) int
         The columns of each member.
     information, right : (K, K), (K,)

@@ -35,8 +35,8 @@ class LineGeometry:
     azimuth_rad : (S,)
     radius_px, width_px, height
         Medians of the ring samples; width and height of samples that did not clip.
-    radius_mm : distance from the optical axis.
-    theta_rad : polar angle.
+    radius_mm, theta_rad
+        Distance from the optical axis; polar angle.
     px_per_mm
         Outward shift of the image for a step of 1 mm back along the axis: positive.
     speed_px_s

@@ -101,7 +101,6 @@ class ProfileEvidence:
         Frames lit by the laser alone.
     findings : tuple of Finding
         One per effect, found or not.
-    conditions : tuple of Condition
     """
 
     source: str

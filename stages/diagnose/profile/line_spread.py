@@ -68,14 +68,12 @@ class Fitted:
 
     Attributes
     ----------
-    shape : Shape
     relative : float
         Height of the second line relative to the first; for a tail, its share of the light, 1.
     way_mm : float
         Distance of the second line, or mean length of the tail; forward positive.
     spread_mm : float
         1 σ by which the second line is wider than the first.
-    way_sigma_mm : float
     left : float
         Share of the misfit of an ordinary line that remains.
     core : float

@@ -97,12 +97,10 @@ class TravelEvidence:
     ----------
     source : str
         ``gauge`` or ``field``.
-    estimates : tuple of TravelEstimate
     slips : tuple of StepFound
         Steps that only a slip explains.
     doubtful : tuple of StepFound
         Steps that a stray picture or missing frames would also explain, as `StepFound.doubt` says.
-    lines : tuple of Line
     fit : TravelFit or None
         None without a usable encoder.
     shortcomings : tuple of str

@@ -130,7 +130,6 @@ class Line:
     lit_mm, laser_mm, share_sigma_mm : float
         The amplitudes in lit and in laser pictures alone, and their 1 σ; NaN where one kind is missing or its
         own rate aliases the frequency into the probe's slow drift.
-    frequency_sigma_hz : float
     agreements : tuple of Agreement
         Whether disjoint pictures show the same oscillation.
     """

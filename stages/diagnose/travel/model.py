@@ -64,14 +64,11 @@ class TravelFit:
 
     Attributes
     ----------
-    sight : Sight
-    events : tuple of Event
     values : (4 + E + D,)
         Offset in mm, scale, delay in s, play in mm; then gains in mm (for lost time: in s); then the offset
         of each picture taken during an event.
     covariance : (4 + E + D, 4 + E + D)
         Infinite variance where this motion does not determine a value.
-    noise : DriftNoise
     difference_mm : (N,)
         Reading − visual distance, minus only the offset.
     whitened : Whitened

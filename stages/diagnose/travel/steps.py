@@ -117,7 +117,6 @@ class StepFound:
         Index in the `Sight` of the first picture after it.
     time_s, time_sigma_s : float
         Its time, and 1 σ.
-    gain_mm, sigma_mm : float
     p_value : float
         Over all moments at which it might have happened.
     rivals : tuple of EventKind
