@@ -138,12 +138,9 @@ def _part(where: str, name: str, value: Value, of: str) -> Part:
 
 
 def chance_of_name(
-    p_value: float,
-    doubts: int,
-    agreements: Sequence[Agreement],
-    fits_p: float = 1.0,
+    p_value: float, doubts: int, agreements: Sequence[Agreement], fits_p: float = 1.0,
     other_courses: float = 0.0,
-) -> float:
+) -> float:  # fmt: skip
     """Return the probability that the named cause is right, and not chance, a rival, or something unknown.
 
     Chance has the weight −e p ln p, the most that a p-value can say for it (T. Sellke, M. J. Bayarri and J.

@@ -155,14 +155,9 @@ class FreeMotion:
 
 
 def examine_line(
-    recording: Recording,
-    frames: CheckedFrames,
-    rings: RingSamples,
-    probe: Probe,
-    *,
-    parameters: Parameters,
+    recording: Recording, frames: CheckedFrames, rings: RingSamples, probe: Probe, *, parameters: Parameters,
     context: Context,
-) -> LineProfile:
+) -> LineProfile:  # fmt: skip
     """Test every effect that the line's light can show; see `profile_evidence`."""
     try:
         return LineProfile(profile_evidence(frames.applied_to(recording), rings, probe, context))
@@ -171,14 +166,9 @@ def examine_line(
 
 
 def measure_fiducials(
-    recording: Recording,
-    frames: CheckedFrames,
-    rings: RingSamples,
-    probe: Probe,
-    *,
-    parameters: GaugeParameters,
-    context: Context,
-) -> GaugeMeasured:
+    recording: Recording, frames: CheckedFrames, rings: RingSamples, probe: Probe, *,
+    parameters: GaugeParameters, context: Context,
+) -> GaugeMeasured:  # fmt: skip
     """Measure rings and fiducials of a gauge run; see `measure_gauge`."""
     try:
         checked = frames.applied_to(recording)
@@ -188,15 +178,9 @@ def measure_fiducials(
 
 
 def adjust_freely(
-    recording: Recording,
-    frames: CheckedFrames,
-    probe: Probe,
-    rings: RingSamples,
-    points: RingPoints,
-    *,
-    parameters: MotionParameters,
-    context: Context,
-) -> FreeMotion:
+    recording: Recording, frames: CheckedFrames, probe: Probe, rings: RingSamples, points: RingPoints, *,
+    parameters: MotionParameters, context: Context,
+) -> FreeMotion:  # fmt: skip
     """Adjust a field recording without its encoder, so that its motion can be compared with the encoder."""
     try:
         run = field_run(frames.applied_to(recording), probe, rings, points, parameters, context)
@@ -206,15 +190,9 @@ def adjust_freely(
 
 
 def examine_gauge(
-    recording: Recording,
-    frames: CheckedFrames,
-    profile: LineProfile,
-    fiducials: GaugeMeasured,
-    probe: Probe,
-    *,
-    parameters: DiagnosisParameters,
-    context: Context,
-) -> Seen:
+    recording: Recording, frames: CheckedFrames, profile: LineProfile, fiducials: GaugeMeasured, probe: Probe,
+    *, parameters: DiagnosisParameters, context: Context,
+) -> Seen:  # fmt: skip
     """Return what a gauge run's rings, fiducials, motion and line profile show."""
     recording, run, without = frames.applied_to(recording), fiducials.run, parameters.without
     missing, problem = profile.limits, fiducials.problem
@@ -239,16 +217,9 @@ def examine_gauge(
 
 
 def examine_field(
-    recording: Recording,
-    frames: CheckedFrames,
-    rings: RingSamples,
-    profile: LineProfile,
-    motion: FreeMotion,
-    probe: Probe,
-    *,
-    parameters: DiagnosisParameters,
-    context: Context,
-) -> Seen:
+    recording: Recording, frames: CheckedFrames, rings: RingSamples, profile: LineProfile, motion: FreeMotion,
+    probe: Probe, *, parameters: DiagnosisParameters, context: Context,
+) -> Seen:  # fmt: skip
     """Return what an inspection's rings, texture, motion and line profile show."""
     recording = frames.applied_to(recording)
     run, light = motion.run(recording, probe, rings), profile.known_light(parameters.without)

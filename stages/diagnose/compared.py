@@ -52,13 +52,9 @@ class Compared:
 
 
 def compared(
-    field: FieldRun | None,
-    corrected: FieldRun | None,
-    examined: Examined | None,
-    gauge: Recording | None,
-    correction: Correction | None,
-    encoder_share: float = 0.0,
-) -> Compared | None:
+    field: FieldRun | None, corrected: FieldRun | None, examined: Examined | None, gauge: Recording | None,
+    correction: Correction | None, encoder_share: float = 0.0,
+) -> Compared | None:  # fmt: skip
     """Return the residuals of the inspection, or else of the gauge run; None where neither has any.
 
     Parameters

@@ -194,16 +194,9 @@ class CorrectedMotion:
 
 
 def adjust_corrected(
-    recording: Recording,
-    frames: CheckedFrames,
-    rings: RingSamples,
-    motion: FreeMotion,
-    probe: Probe,
-    corrected: Annotated[Corrected, Of("gauge")],
-    *,
-    parameters: Parameters,
-    context: Context,
-) -> CorrectedMotion:
+    recording: Recording, frames: CheckedFrames, rings: RingSamples, motion: FreeMotion, probe: Probe,
+    corrected: Annotated[Corrected, Of("gauge")], *, parameters: Parameters, context: Context,
+) -> CorrectedMotion:  # fmt: skip
     """Adjust an inspection again with the probe that its gauge run corrects."""
     run = motion.run(frames.applied_to(recording), probe, rings)
     if run is None or corrected.correction is None:

@@ -63,22 +63,14 @@ class Diagnosed:
 
 
 def diagnose(
-    field: Annotated[Recording, Of("field")] | None,
-    frames: Annotated[CheckedFrames, Of("field")] | None,
-    rings: Annotated[RingSamples, Of("field")] | None,
-    motion: Annotated[FreeMotion, Of("field")] | None,
-    of_field: Annotated[Seen, Of("field")] | None,
-    gauge: Annotated[Recording, Of("gauge")] | None,
-    gauge_frames: Annotated[CheckedFrames, Of("gauge")] | None,
-    of_gauge: Annotated[Seen, Of("gauge")] | None,
+    field: Annotated[Recording, Of("field")] | None, frames: Annotated[CheckedFrames, Of("field")] | None,
+    rings: Annotated[RingSamples, Of("field")] | None, motion: Annotated[FreeMotion, Of("field")] | None,
+    of_field: Annotated[Seen, Of("field")] | None, gauge: Annotated[Recording, Of("gauge")] | None,
+    gauge_frames: Annotated[CheckedFrames, Of("gauge")] | None, of_gauge: Annotated[Seen, Of("gauge")] | None,
     corrected: Annotated[Corrected, Of("gauge")] | None,
-    corrected_motion: Annotated[CorrectedMotion, Of("field")] | None,
-    probe: Probe,
-    noticed: Noticed,
-    *,
-    parameters: DiagnosisParameters,
-    context: Context,
-) -> Diagnosed:
+    corrected_motion: Annotated[CorrectedMotion, Of("field")] | None, probe: Probe, noticed: Noticed, *,
+    parameters: DiagnosisParameters, context: Context,
+) -> Diagnosed:  # fmt: skip
     """Combine the evidence of an inspection and of a gauge run of one probe; either may be missing.
 
     Effects in ``parameters.without`` may be seen, but not named.
@@ -91,15 +83,10 @@ def diagnose(
         of_field = of_field.with_run(run)
     if run and correction and corrected_motion:
         run_corrected = corrected_motion.run(run, correction)
-    if gauge and gauge_frames:
-        gauge = gauge_frames.applied_to(gauge)
-    without = parameters.without
+    gauge, without = gauge_frames.applied_to(gauge) if gauge and gauge_frames else gauge, parameters.without
     of_field, of_gauge = _by_correction(of_field, of_gauge, run_corrected, correction, probe, without)
     context.progress(0, _STEPS)
-    met = field_confirmations(composed(of_field, of_gauge, probe, without), of_field, of_gauge, probe)
-    found = composed(of_field, borne_out(of_gauge, met), probe, without)
-    found = with_field(found, of_field, of_gauge, met, probe, library_without(without))
-    found = found.not_knowing(without)
+    found = _answered(of_field, of_gauge, probe, without)
     context.progress(1, _STEPS)
     examined = of_gauge.geometry if of_gauge is not None else None
     share = encoder_share(found, of_field, probe)
@@ -108,20 +95,25 @@ def diagnose(
     context.report("verdict", str(found.verdict))
     found = replace(found, shortcomings=(*noticed.sentences, *found.shortcomings))
     image = image_of(seen, field, gauge) if found.ring_picture is not None else None
-    changed = correction is not None and bool(correction.applied or correction.inexpressible)
-    notes = _not_corrected(found.fit) if changed else ()
+    notes = _not_corrected(correction, found.fit)
     corrected_probe = correction.probe if correction is not None and not notes else probe
     return Diagnosed(replace(found, notes=(*found.notes, *notes)), corrected_probe, image)
 
 
+def _answered(
+    of_field: Seen | None, of_gauge: Seen | None, probe: Probe, without: Sequence[str]
+) -> Diagnosis:
+    """Return the answer from all channels, and what the inspection's rings and texture say of it."""
+    met = field_confirmations(composed(of_field, of_gauge, probe, without), of_field, of_gauge, probe)
+    found = composed(of_field, borne_out(of_gauge, met), probe, without)
+    found = with_field(found, of_field, of_gauge, met, probe, library_without(without))
+    return found.not_knowing(without)
+
+
 def _by_correction(
-    field: Seen | None,
-    gauge: Seen | None,
-    corrected: FieldRun | None,
-    correction: Correction | None,
-    probe: Probe,
-    without: Sequence[str],
-) -> tuple[Seen | None, Seen | None]:
+    field: Seen | None, gauge: Seen | None, corrected: FieldRun | None, correction: Correction | None,
+    probe: Probe, without: Sequence[str],
+) -> tuple[Seen | None, Seen | None]:  # fmt: skip
     """Return the evidence of both recordings, without what the probe's correction explains or excludes."""
     if field is not None and corrected is not None:
         # The scale of the motion seen depends on the instrument: an error of that is not the encoder's.
@@ -142,9 +134,10 @@ _NOT_CORRECTED = (
 )
 
 
-def _not_corrected(fit: FitQuality | None) -> tuple[str, ...]:
+def _not_corrected(correction: Correction | None, fit: FitQuality | None) -> tuple[str, ...]:
     """Return in words why the probe is not corrected, where held-out measurements fit worse afterwards."""
-    if fit is None or not fit.heldout_after > fit.heldout_before:
+    changed = correction is not None and bool(correction.applied or correction.inexpressible)
+    if not changed or fit is None or not fit.heldout_after > fit.heldout_before:
         return ()
     return (_NOT_CORRECTED.format(fit.heldout_after, fit.unit, fit.heldout_before),)
 

@@ -72,13 +72,9 @@ class FieldRun(Adjusted):
 
 
 def field_run(
-    recording: Recording,
-    probe: Probe,
-    rings: RingSamples,
-    points: RingPoints,
-    parameters: MotionParameters,
+    recording: Recording, probe: Probe, rings: RingSamples, points: RingPoints, parameters: MotionParameters,
     context: Context,
-) -> FieldRun:
+) -> FieldRun:  # fmt: skip
     """Measure the texture of a recording and adjust poses, pipe and wall to rings and texture.
 
     The encoder is not used, so that it can be compared with the visual distance.

@@ -175,34 +175,39 @@ def examine(
     UnusableError
         When the run does not determine its own poses.
     """
-    stated = stated_belief(probe)
     library = {name: model for name, model in library.items() if name not in OF_A_PIPE}
     try:
         # More threads gain nothing on blocks this small, and stall on a busy machine.
         with threadpool_limits(1):
-            # The watch of the run, which all fits share, reports the parts that are done.
-            done = [0]
-            measurements, start = prepare(run, lambda: progress(done[0], _PARTS))
-            nothing = fit(measurements, start, ())
-            about, shapes = ability(measurements, nothing, library)
-            table = feasibility(about, shapes, library, stated)
-            coursed = with_courses(library, courses)
-            done[0] = 1
-            searched = search(measurements, nothing, coursed, stated)
-            done[0] = 2
-            # Effects that are not in the library also shift rings and fiducials.
-            swung = swings(searched.run, searched.nothing, stated)
-            beyond = patterns_by_chance(searched.nothing, stated, swung)
-            seen = Examined(searched, None, (), table, patterns_by_chance=beyond)
-            if seen.global_p > DETECTED:
-                seen = replace(seen, quality=_quality_of_stated(searched, stated))
-                return replace(seen, location=_OF_IMAGE if seen.repeats else None)
-            bore = misdrawn_bore(searched)
-            if bore is not None:
-                return replace(seen, misdrawn=bore)
-            return _judged(replace(seen, verdicts=judge(searched, coursed, stated, swung)), coursed, stated)
+            return _examined(run, library, stated_belief(probe), courses, progress)
     except np.linalg.LinAlgError as error:
         raise UnusableError("diagnose", f"the gauge run does not determine its poses ({error})") from error
+
+
+def _examined(
+    run: MeasuredRun, library: Mapping[str, EffectModel], stated: Stated, courses: tuple[CourseKind, ...],
+    progress: Progress,
+) -> Examined:  # fmt: skip
+    # The watch of the run, which all fits share, reports the parts that are done.
+    done = [0]
+    measurements, start = prepare(run, lambda: progress(done[0], _PARTS))
+    nothing = fit(measurements, start, ())
+    table = feasibility(*ability(measurements, nothing, library), library, stated)
+    coursed = with_courses(library, courses)
+    done[0] = 1
+    searched = search(measurements, nothing, coursed, stated)
+    done[0] = 2
+    # Effects that are not in the library also shift rings and fiducials.
+    swung = swings(searched.run, searched.nothing, stated)
+    beyond = patterns_by_chance(searched.nothing, stated, swung)
+    seen = Examined(searched, None, (), table, patterns_by_chance=beyond)
+    if seen.global_p > DETECTED:
+        seen = replace(seen, quality=_quality_of_stated(searched, stated))
+        return replace(seen, location=_OF_IMAGE if seen.repeats else None)
+    bore = misdrawn_bore(searched)
+    if bore is not None:
+        return replace(seen, misdrawn=bore)
+    return _judged(replace(seen, verdicts=judge(searched, coursed, stated, swung)), coursed, stated)
 
 
 def _quality_of_stated(searched: Search, stated: Stated) -> FitQuality:

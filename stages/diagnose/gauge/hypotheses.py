@@ -109,13 +109,9 @@ def regimes_of(run: GaugeRun) -> tuple[Regime, ...]:
 
 
 def judged_of(
-    run: GaugeRun,
-    found: Fit,
-    regimes: Sequence[Regime],
-    stated: Stated,
-    inflation: float,
+    run: GaugeRun, found: Fit, regimes: Sequence[Regime], stated: Stated, inflation: float,
     before: float = 0.0,
-) -> Judged:
+) -> Judged:  # fmt: skip
     """Return the hypothesis with its evidence and its deviance on all and on held-out regimes."""
     whole, *parts = evidence(run, found, (), [r.part for r in regimes], with_spread=False)
     sigma = prior_sigma(whole, found.terms)

@@ -187,14 +187,20 @@ def judge(
         if more is None:
             break
         judged.append(weighed(more))
+    chance, unfitted = _chances(ranked, allowed, near)
+    ranked = (replace(best, evidence=evidence(run, best.fit, ())[0]), *ranked[1:])
+    return Verdicts(regimes, ranked, chance, left, _of(judged, formula), unfitted, laws)
+
+
+def _chances(
+    ranked: Sequence[Judged], allowed: Bool, near: Sequence[Unfitted]
+) -> tuple[Float, tuple[Unfitted, ...]]:
+    """Return the probability (H,) of each fitted hypothesis, and the others with theirs, likeliest first."""
     deviance = np.array([*(j.deviance + j.prior_deviance for j in ranked), *(u.deviance for u in near)])
     weight = np.where([*allowed, *(True for _ in near)], np.exp(-0.5 * (deviance - deviance[0])), 0.0)
-    chance, count = weight / weight.sum(), len(ranked)
-    each = (replace(u, probability=float(p)) for u, p in zip(near, chance[count:], strict=True))
-    unfitted = tuple(sorted(each, key=lambda u: -u.probability))
-    of_formula = _of(judged, formula)
-    ranked = (replace(best, evidence=evidence(run, best.fit, ())[0]), *ranked[1:])
-    return Verdicts(regimes, ranked, chance[:count], left, of_formula, unfitted, laws)
+    chance = weight / weight.sum()
+    each = (replace(u, probability=float(p)) for u, p in zip(near, chance[len(ranked) :], strict=True))
+    return chance[: len(ranked)], tuple(sorted(each, key=lambda u: -u.probability))
 
 
 def _of(judged: Sequence[Judged], formula: Fit) -> Judged:

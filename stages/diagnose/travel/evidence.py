@@ -197,40 +197,35 @@ def _estimates(
 ) -> tuple[TravelEstimate, ...]:
     turning = _QUANTUM_SHARE * max(fit.noise.white_mm, count_mm)
     stated = {SCALE: scale_sigma_stated, DELAY: _STAMP_SIGMA_S, PLAY: turning}
-    smooth = np.arange(4)
-    usable = np.isfinite(fit.sigma[smooth])
-    scale = np.where(usable, fit.sigma[smooth], 1.0)
-    correlation = np.where(np.isfinite(fit.covariance[:4, :4]), fit.covariance[:4, :4], 0.0) / np.outer(
-        scale, scale
-    )
-    out = []
-    for k, allowed in stated.items():
-        name = SMOOTH[k]
-        quantity = effect(name).quantities[0]
-        sigma, value = float(fit.sigma[k]), float(fit.values[k])
-        total = float(np.hypot(sigma, allowed))
-        # A size that no encoder can have is not a finding: the speed was too uniform to determine it.
-        known = np.isfinite(total) and LIBRARY[name].possible((), np.array([value]))
-        p = float(2 * norm.sf(abs(value) / total)) if known else 1.0
-        alike = tuple(
-            (SMOOTH[j], float(correlation[k, j]))
-            for j in stated
-            if j != k and usable[j] and usable[k] and abs(correlation[k, j]) > _INSEPARABLE
-            if not (fit.told_apart and {j, k} == {DELAY, PLAY})
-        )
-        if k == SCALE and source == "field":
-            # In a pipe of unknown size, the pictures have the scale that the laser's baseline gives them.
-            alike = (*alike, ("baseline", 1.0))
-        # The counter has an independent error at each reversal; errors of wheel and time stamps are constant
-        # over the run.
-        again = second_predictions(fit, k, turning if k == PLAY else 0.0) if p < _REPORTED else ()
-        out.append(
-            TravelEstimate(
-                name, quantity.name, value, sigma, allowed, p, _DETECTED * total, alike, again,
-                _where(fit.columns[:, k]), _other_courses(fit, int(k)) if known and p < _REPORTED else 0.0,
-            )
-        )  # fmt: skip
-    return tuple(out)
+    # In a pipe of unknown size, the pictures have the scale that the laser's baseline gives them.
+    more = {SCALE: (("baseline", 1.0),)} if source == "field" else {}
+    return tuple(_estimate(fit, k, s, (*_alike(fit, k), *more.get(k, ()))) for k, s in stated.items())
+
+
+def _estimate(
+    fit: TravelFit, k: int, stated_sigma: float, alike: tuple[tuple[str, float], ...]
+) -> TravelEstimate:
+    """Return the estimate of one smooth effect."""
+    name, sigma, value = SMOOTH[k], float(fit.sigma[k]), float(fit.values[k])
+    total = float(np.hypot(sigma, stated_sigma))
+    # A size that no encoder can have is not a finding: the speed was too uniform to determine it.
+    known = np.isfinite(total) and LIBRARY[name].possible((), np.array([value]))
+    p = float(2 * norm.sf(abs(value) / total)) if known else 1.0
+    # The counter has an independent error at each reversal; errors of wheel and time stamps are constant
+    # over the run.
+    again = second_predictions(fit, k, stated_sigma if k == PLAY else 0.0) if p < _REPORTED else ()
+    return TravelEstimate(
+        name, effect(name).quantities[0].name, value, sigma, stated_sigma, p, _DETECTED * total, alike, again,
+        _where(fit.columns[:, k]), _other_courses(fit, k) if known and p < _REPORTED else 0.0,
+    )  # fmt: skip
+
+
+def _alike(fit: TravelFit, k: int) -> tuple[tuple[str, float], ...]:
+    """Return the smooth effects that this motion does not distinguish from one, with the correlations."""
+    others = (j for j in (SCALE, DELAY, PLAY) if j != k and not (fit.told_apart and {j, k} == {DELAY, PLAY}))
+    known = (j for j in others if np.isfinite(fit.sigma[[j, k]]).all())
+    each = ((SMOOTH[j], float(fit.covariance[k, j] / (fit.sigma[k] * fit.sigma[j]))) for j in known)
+    return tuple((name, correlation) for name, correlation in each if abs(correlation) > _INSEPARABLE)
 
 
 def _other_courses(fit: TravelFit, column: int) -> float:
