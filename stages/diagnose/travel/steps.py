@@ -158,46 +158,47 @@ def or_else(slip: str, instead: str) -> str:
 
 def steps_found(fit: TravelFit, encoder: Encoder) -> tuple[StepFound, ...]:
     """Return the steps among the fit's events, each judged with the others included."""
-    return tuple(
-        _judged(fit, k, encoder) for k, event in enumerate(fit.events) if event.kind is not EventKind.OUTLIER
-    )
+    steps = (k for k, event in enumerate(fit.events) if event.kind is not EventKind.OUTLIER)
+    return tuple(_judged(fit, k, encoder) for k in steps)
 
 
 def _judged(fit: TravelFit, place_in_list: int, encoder: Encoder) -> StepFound:
-    event, sight = fit.events[place_in_list], fit.sight
-    gain_mm = float(fit.values[4 + place_in_list])
+    event, time_s, own = fit.events[place_in_list], fit.sight.time_s, 4 + place_in_list
     # Where a uniform motion is rounded alike by the counts on one side, no mean helps.
     rounding = quantum_mm(encoder) * np.sqrt(2 / 12)
-    sigma = float(np.hypot(fit.sigma[4 + place_in_list], rounding))
-    rivals = _rivals(fit, place_in_list, encoder)
-    beyond = min(event.place - event.during, len(sight.time_s) - event.place)
-    if beyond <= SIDE and EventKind.OUTLIER not in rivals:
-        rivals = (EventKind.OUTLIER, *rivals)
+    gain_mm, sigma = float(fit.values[own]), float(np.hypot(fit.sigma[own], rounding))
+    at_s, lasting_s, again = _moment_and_duration(fit, place_in_list, encoder, sigma)
+    jumps = again is not None and again.confirmation.agrees
     # Somewhere between two pictures; where the reading itself jumps, for the duration of a short slip.
-    within_s = float(sight.time_s[event.place] - sight.time_s[event.place - 1])
-    if event.during:
-        time_s, lasting_s = _middle_and_duration(fit, place_in_list)
-        again, jumps_s = course_of_reading(fit, place_in_list, encoder), within_s
-    else:
-        k, lasting_s, jumps_s = moment(sight, encoder, event.place), SHORTEST_S, SHORTEST_S
-        time_s = float(encoder.time_s[k] + encoder.time_s[k + 1]) / 2
-        again = jump_of_reading(encoder, k, gain_mm, sigma)
-    if again is not None and again.confirmation.agrees:
-        # Errors of pictures cannot make the encoder's reading jump.
-        rivals, within_s = (), jumps_s
-    jumps = again is not None and again.confirmation.agrees and not event.during
-    if event.kind is EventKind.STEP and np.isfinite(sigma) and not jumps:
+    short = jumps and not event.during
+    within_s = SHORTEST_S if short else float(time_s[event.place] - time_s[event.place - 1])
+    beyond, count = min(event.place - event.during, len(time_s) - event.place), len(time_s)
+    z2 = float(fit.event_z2[place_in_list]) if np.isfinite(sigma) else 0.0
+    if event.kind is EventKind.STEP and np.isfinite(sigma) and not short:
         even = _over_durations(fit, place_in_list)
         if even is not None:
             gain_mm, sigma = even[0], float(np.hypot(even[1], rounding))
+    # Errors of pictures cannot make the encoder's reading jump.
+    rivals = () if jumps else _rivals(fit, place_in_list, encoder, at_end=beyond <= SIDE)
     # A lasting slip may be stray pictures throughout, one near an end stray pictures up to the end.
     stray = event.during + (beyond if beyond <= SIDE else 0)
-    count = len(sight.time_s)
-    z2 = float(fit.event_z2[place_in_list]) if np.isfinite(sigma) else 0.0
     return StepFound(
-        event.place, time_s, within_s / np.sqrt(12), gain_mm, sigma, chance(z2, 2 * count, count), rivals,
+        event.place, at_s, within_s / np.sqrt(12), gain_mm, sigma, chance(z2, 2 * count, count), rivals,
         lasting_s, () if again is None else (again,), max(stray, 1),
     )  # fmt: skip
+
+
+def _moment_and_duration(
+    fit: TravelFit, place_in_list: int, encoder: Encoder, sigma_mm: float
+) -> tuple[float, float, Agreement | None]:
+    """Return a step's time and duration, s, and whether the reading alone agrees."""
+    event = fit.events[place_in_list]
+    if event.during:
+        again = course_of_reading(fit, place_in_list, encoder)
+        return *_middle_and_duration(fit, place_in_list), again
+    k = moment(fit.sight, encoder, event.place)
+    again = jump_of_reading(encoder, k, float(fit.values[4 + place_in_list]), sigma_mm)
+    return float(encoder.time_s[k] + encoder.time_s[k + 1]) / 2, SHORTEST_S, again
 
 
 def _over_durations(fit: TravelFit, place_in_list: int) -> tuple[float, float] | None:
@@ -240,8 +241,17 @@ def _middle_and_duration(fit: TravelFit, place_in_list: int) -> tuple[float, flo
     return mean, float(np.clip(np.sqrt(12 * max(spread, 0.0)), SHORTEST_S, np.ptp(around)))
 
 
-def _rivals(fit: TravelFit, place_in_list: int, encoder: Encoder) -> tuple[EventKind, ...]:
-    """Return what else explains a step."""
+def _rivals(
+    fit: TravelFit, place_in_list: int, encoder: Encoder, at_end: bool
+) -> tuple[EventKind, ...]:  # fmt: skip
+    """Return what else explains a step; ``at_end`` of the run, where pictures beside it are few."""
+    found = _as_good(fit, place_in_list, encoder)
+    few = at_end and EventKind.OUTLIER not in found
+    return (EventKind.OUTLIER, *found) if few else found
+
+
+def _as_good(fit: TravelFit, place_in_list: int, encoder: Encoder) -> tuple[EventKind, ...]:
+    """Return the events of another kind that explain a step as well."""
     event, sight = fit.events[place_in_list], fit.sight
     if event.during:
         # Pictures that drift for a while look the same, except in the reading's own motion. Fiducials do not
