@@ -165,20 +165,11 @@ def evidence_for(
 
     ``fixed_mm`` (H, W) is the displacement that stays at one place of the image, ``score`` the largest
     matched-filter response, σ. Rings of the frames ``spots`` show a spot beside the line and do not count.
-    The photo is projected onto the measured wall: where the depth shifts the photo by more than the finding's
-    size, the photo differs there because of the depth and is no independent evidence.
     """
-    relief = surface.relief
-    size = min(n * c for n, c in zip(region.mask.shape, relief.cell_mm, strict=True))
-    shifted = abs(depth.depth_mm) > size
-    # A pit inside a wide patch covers less than a fifth of any ring's samples: its peak is examined, too.
-    frames = frames_behind(region, depth.depth_mm, surface), frames_at_peak(depth, region, surface)
-    clear = np.setdiff1d(np.union1d(*frames), np.asarray(spots, np.int64))
-    showing = without_glints(clear, region, surface, seen_by.rings)
-    pictures = seen_by.pictures
+    relief, pictures = surface.relief, seen_by.pictures
     evidence = Evidence(
-        seen_by.held.independent(shown_in_a_row(showing, region, surface, seen_by.rings)),
-        None if shifted else photo_stands_out(seen_by.texture, relief, region),
+        _independent_rings(region, depth, surface, seen_by, spots),
+        _by_photo(region, depth, relief, seen_by.texture),
         score,
         _is_fixed(region, surface, fixed_mm),
         lies_at_edge(region, relief),
@@ -192,6 +183,29 @@ def evidence_for(
     contradicted = pictures.contradict(region, relief)
     behind_drop = not contradicted and shows_drop(pictures, region, relief)
     return replace(evidence, contradicted=contradicted, behind_drop=behind_drop)
+
+
+def _independent_rings(
+    region: Region, depth: Depth, surface: Surface, seen_by: Witnesses, spots: Sequence[int]
+) -> int:
+    """Return how many independent rings in a row show a finding, without those with glints or spots.
+
+    A pit inside a wide patch covers less than a fifth of any ring's samples: its peak is examined, too.
+    """
+    frames = frames_behind(region, depth.depth_mm, surface), frames_at_peak(depth, region, surface)
+    clear = np.setdiff1d(np.union1d(*frames), np.asarray(spots, np.int64))
+    showing = without_glints(clear, region, surface, seen_by.rings)
+    return seen_by.held.independent(shown_in_a_row(showing, region, surface, seen_by.rings))
+
+
+def _by_photo(region: Region, depth: Depth, relief: Relief, texture: WallTexture) -> bool | None:
+    """Return whether the photo shows a finding; None where it is no independent evidence.
+
+    The photo is projected onto the measured wall: where the depth shifts it by more than the finding's size,
+    it differs there because of the depth.
+    """
+    size = min(n * c for n, c in zip(region.mask.shape, relief.cell_mm, strict=True))
+    return None if abs(depth.depth_mm) > size else photo_stands_out(texture, relief, region)
 
 
 def line_is_bright(region: Region, depth_mm: float, surface: Surface, rings: RingSamples) -> bool:

@@ -98,9 +98,7 @@ def estimate_motion(
     doubt, has_encoder = estimate.encoder.doubt_of_probe(wider), run.encoder is not None
     joined = joined.with_scale_sigma(doubt)
     trajectory = trajectory_of(joined, recording.frames, adjusted.probe, has_encoder)
-    if run.bore.reduces:
-        scale_sigma = float(np.hypot(trajectory.scale_sigma, adjusted.held_sigma))
-        trajectory = replace(trajectory, instrument_covariance=probe.covariance, scale_sigma=scale_sigma)
+    trajectory = _with_held_probe(trajectory, probe, adjusted) if run.bore.reduces else trajectory
     trajectory = lay_route(trajectory, joined.turn_variance, recording, probe, context)
     trajectory = beyond_cuts(trajectory, cut, run.texture.grid.length_mm)
     events = _events_of(run, joined, trajectory, recording, context)
@@ -118,6 +116,12 @@ def estimate_motion(
         radius_doubt=doubt, displaced=displaced_in(estimate.wall_twice, trajectory.frame),
         knock=steady.run.knock,
     )  # fmt: skip
+
+
+def _with_held_probe(trajectory: Trajectory, probe: Probe, adjusted: MeasuredRun) -> Trajectory:
+    """Return a trajectory for which the probe was held, with that probe's own uncertainty."""
+    scale_sigma = float(np.hypot(trajectory.scale_sigma, adjusted.held_sigma))
+    return replace(trajectory, instrument_covariance=probe.covariance, scale_sigma=scale_sigma)
 
 
 def _events_of(
@@ -150,11 +154,7 @@ def _beside_other_probes(
 
 
 def _with_probe(
-    run: MeasuredRun,
-    probe: Probe,
-    recording: Recording,
-    parameters: MotionParameters,
-    context: Context,
+    run: MeasuredRun, probe: Probe, recording: Recording, parameters: MotionParameters, context: Context
 ) -> Trajectory | None:
     """Return the motion with another stated probe, without loops; None if pictures do not determine it."""
     check = partial(_require_convergence, run.texture.grid.radius_mm)

@@ -115,18 +115,7 @@ def report_motion(
     minus 1.
     """
     texture = run.texture
-    report_steps(context, estimate.trials, estimate.unsettled)
-    context.report("landmarks", texture.store.landmarks, "")
-    context.report("texture observations", texture.store.spool.count, "")
-    context.report("lit frames without enough texture", int(texture.poses.lost[1:].sum()), "frames")
-    context.report("median reprojection error", estimate.reprojection_px, "px")
-    context.report("reprojection error against the σ of matching", estimate.excess, "times")
-    context.report("part of it that lasts from picture to picture", estimate.lasting, "times")
-    twice = estimate.wall_twice
-    if len(twice.frame):
-        context.report("difference of wall in photo and rings, shared", twice.size_mm, "mm")
-        context.report("such a difference that noise alone may show, 1 σ", twice.noise_mm, "mm")
-        context.report("stretches of the run that differ in it", len(trajectory.displaced), "")
+    _report_texture(context, estimate, run, len(trajectory.displaced))
     encoder = bool(np.isfinite(trajectory.encoder_scale))
     warn_of_lost_texture(texture.poses, texture.store.spool.count, encoder, context)
     if not run.bore.reduces:  # there texture is known to be matched less well
@@ -141,6 +130,22 @@ def report_motion(
     travelled = float(np.ptp(distance_along(trajectory.axis, trajectory.T_pc)))
     context.report("distance travelled", travelled, "mm")
     context.report("1 σ of distance at the end", trajectory.distance_sigma_mm, "mm")
+
+
+def _report_texture(context: Context, estimate: RunEstimate, run: MeasuredRun, differing: int) -> None:
+    """Report the figures of texture; ``differing`` stretches of the run show another wall in it."""
+    texture, twice = run.texture, estimate.wall_twice
+    report_steps(context, estimate.trials, estimate.unsettled)
+    context.report("landmarks", texture.store.landmarks, "")
+    context.report("texture observations", texture.store.spool.count, "")
+    context.report("lit frames without enough texture", int(texture.poses.lost[1:].sum()), "frames")
+    context.report("median reprojection error", estimate.reprojection_px, "px")
+    context.report("reprojection error against the σ of matching", estimate.excess, "times")
+    context.report("part of it that lasts from picture to picture", estimate.lasting, "times")
+    if len(twice.frame):
+        context.report("difference of wall in photo and rings, shared", twice.size_mm, "mm")
+        context.report("such a difference that noise alone may show, 1 σ", twice.noise_mm, "mm")
+        context.report("stretches of the run that differ in it", differing, "")
 
 
 def report_steps(context: Context, steps: int, unsettled: int) -> None:

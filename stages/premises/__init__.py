@@ -25,6 +25,7 @@ from stages.premises.changes import (
 from stages.premises.clock import ClockJump, clock_jumps, warn_of_clock, without_jumps, without_stretch
 from stages.premises.cuts import cuts, warn_of_cuts
 from stages.premises.labels import (
+    Labels,
     labels_shown,
     light_of_pictures,
     rows_by_light,
@@ -150,6 +151,15 @@ def _seen(recording: Recording, probe: Probe, pictures: Pictures, context: Conte
     return _Seen(pictures, light, in_order, shown, outside, astray, stays)
 
 
+def _rings_seen(pictures: Pictures, label: Labels, probe: Probe) -> tuple[Pictures, Float]:
+    """Return the pictures and rings' radii, mm, without lines that close where the laser is off.
+
+    Such a line is a joint or a weld.
+    """
+    lines = replace(pictures, closed=np.where(label == Illumination.LED.value, 0.0, pictures.closed))
+    return lines, rings_seen_mm(lines, probe)
+
+
 def _matched(recording: Recording, probe: Probe, seen: _Seen) -> _Matched:
     """Find the row of every picture by the lights, then by the motion of the wall, then the clock's jumps."""
     table, pictures, light, encoder = whole_table(recording), seen.pictures, seen.in_order, recording.encoder
@@ -162,16 +172,13 @@ def _matched(recording: Recording, probe: Probe, seen: _Seen) -> _Matched:
     sway = sway_of_line(pictures, light)
     again = copy | (np.diff(alignment.row, prepend=-1) < 1)
     first = rows_that_follow_encoder(alignment.row, again, table, steps, encoder)
-    # With the laser off, a closed line is a joint or a weld.
-    lines = replace(pictures, closed=np.where(label == Illumination.LED.value, 0.0, pictures.closed))
-    rings_mm = rings_seen_mm(lines, probe)
+    lines, rings_mm = _rings_seen(pictures, label, probe)
     along_mm, radius_mm = radius_along_mm(lines, rings_mm), radius_seen_mm(rings_mm)
     forwards = runs_forwards(encoder, time_s := row_times(table, first), steps)
     one_bore, read = recording.kind != "gauge", in_mm(encoder, time_s, steps, radius_mm)
     row = rows_by_motion(first, steps, rhythm_of(light), table, read, sway, along_mm, one_bore)
-    row = best_followed(
-        (row, first), table, steps, encoder
-    )  # a crawler that moves in steps loses no pictures
+    # A crawler that moves in steps loses no pictures.
+    row = best_followed((row, first), table, steps, encoder)
     stated_s = without_stretch(row_times(table, row), row, table, recording.frame_rate)
     jumps = clock_jumps(stated_s, steps, encoder)
     changes = Changes(recording.frames, label, row, without_jumps(stated_s, jumps))
