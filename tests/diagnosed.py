@@ -7,7 +7,7 @@ from dataclasses import replace
 from pipeline.instrument.probe import Probe
 from stages.diagnose.agreement import Agreement
 from stages.diagnose.channels import Seen
-from stages.diagnose.compose import composed
+from stages.diagnose.combine.compose import composed
 from stages.diagnose.result import Confirmation, Diagnosis
 from stages.diagnose.travel.evidence import TravelEstimate, TravelEvidence
 from stages.diagnose.travel.lines import Line

@@ -21,15 +21,15 @@ from stages.diagnose.channels import (
     FreeMotion,
     Seen,
 )
+from stages.diagnose.combine.compose import composed
+from stages.diagnose.combine.second_line import compared_with_rings, sheet_by_rings
 from stages.diagnose.compared import OnImage, compared, image_of, with_pictures, with_readings
-from stages.diagnose.compose import composed
 from stages.diagnose.correct import CORRECTED_MOTION, CORRECTION, Corrected, CorrectedMotion, Correction
 from stages.diagnose.effects.library import without as library_without
 from stages.diagnose.field.answer import borne_out, encoder_share, field_confirmations, with_field
 from stages.diagnose.field.evidence import travel_of_run
 from stages.diagnose.field.run import FieldRun
 from stages.diagnose.result import Diagnosis, FitQuality
-from stages.diagnose.second_line import compared_with_rings, sheet_by_rings
 from stages.diagnose.travel.evidence import TravelEvidence
 from stages.premises import PREMISES
 from stages.rings import RINGS

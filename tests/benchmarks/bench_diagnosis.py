@@ -29,7 +29,7 @@ from pipeline.physics.effect import CourseKind
 from pipeline.simulator.effects.switch import Switch
 from stages.diagnose.as_json import to_json
 from stages.diagnose.channels import TRAVEL_EFFECTS, Seen, gauge_travel
-from stages.diagnose.compose import composed
+from stages.diagnose.combine.compose import composed
 from stages.diagnose.effects.base import EffectModel
 from stages.diagnose.effects.courses import Coursed, with_courses
 from stages.diagnose.effects.library import LIBRARY, without

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from pipeline.api.diagnosis.causes import class_shown
-from stages.diagnose import weighed as by
 from stages.diagnose.causes import Cause, Causes, CourseShare
+from stages.diagnose.combine import weighed as by
 from stages.diagnose.effects.courses import with_courses
 from stages.diagnose.effects.library import LIBRARY
 from stages.diagnose.field.answer import _met

@@ -11,12 +11,12 @@ import pytest
 
 from pipeline.api.diagnosis.report import headline
 from pipeline.instrument.probe import Probe
-from stages.diagnose.compose import unexamined
+from stages.diagnose.combine.compose import unexamined
+from stages.diagnose.combine.shown import verdict_of_rings
 from stages.diagnose.correct import encoder_effects
 from stages.diagnose.gauge.answer import rocking_excluded
 from stages.diagnose.gauge.examine import Examined
 from stages.diagnose.result import FitQuality, Location, Verdict
-from stages.diagnose.shown import verdict_of_rings
 from stages.diagnose.travel.events import with_events
 from tests.diagnosed import AGREES, DIFFERS, PLAY, SCALE, SLIP, SWING, answer, of_gauge, seen
 from tests.travel_cases import read

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from pipeline.instrument.probe import Probe
-from stages.diagnose import compose
 from stages.diagnose.causes import NONE
+from stages.diagnose.combine import compose
 from stages.diagnose.gauge import answer as of_rings
 from stages.diagnose.gauge.examine import Examined
 from stages.diagnose.profile.evidence import Condition, ProfileEvidence

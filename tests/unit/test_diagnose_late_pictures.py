@@ -11,8 +11,8 @@ import pytest
 
 from pipeline.instrument.probe import Probe
 from pipeline.recording.base import Encoder, Recording
+from stages.diagnose.combine.late_pictures import Exposure, how_late
 from stages.diagnose.correct import with_true_readings
-from stages.diagnose.late_pictures import Exposure, how_late
 from stages.diagnose.result import Value, Verdict
 from stages.diagnose.travel.events import with_events
 from stages.diagnose.travel.evidence import TravelEstimate, _estimates

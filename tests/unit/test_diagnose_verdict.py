@@ -6,7 +6,8 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from stages.diagnose import shown
+from stages.diagnose.combine import shown
+from stages.diagnose.combine.shown import verdict_of_rings
 from stages.diagnose.effects.library import LIBRARY
 from stages.diagnose.effects.vocabulary import VOCABULARY
 from stages.diagnose.gauge import answer, doubts
@@ -18,7 +19,6 @@ from stages.diagnose.gauge.run import Term
 from stages.diagnose.gauge.sets import PATTERNS, Member
 from stages.diagnose.gauge.unknown_laws import Unknown
 from stages.diagnose.result import Confirmation, FitQuality, Location, Value, Verdict
-from stages.diagnose.shown import verdict_of_rings
 
 NAMES = "laser_cone", "baseline", "dome_axial", "principal_point", "housing_glass"
 AGREES, DIFFERS = Confirmation("1", "1", True), Confirmation("1", "2", False)

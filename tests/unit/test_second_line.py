@@ -9,11 +9,11 @@ import pytest
 
 from pipeline.adjustment.robust import robust_spreads
 from stages.diagnose.agreement import Part
+from stages.diagnose.combine.second_line import against_rings, chance_of_place
 from stages.diagnose.profile.cells import Cells
 from stages.diagnose.profile.finding import FOUND_P, FOUND_Z, Size, finding
 from stages.diagnose.profile.ghost import bounced
 from stages.diagnose.profile.matched_filter import NOISE_FLOOR, responses
-from stages.diagnose.second_line import against_rings, chance_of_place
 
 BLOCKS, SECTORS, WIDTH_PX = 10, 72, 1.4
 OFFSET = np.arange(-59.75, 60.0, 0.5)

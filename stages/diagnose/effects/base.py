@@ -164,7 +164,7 @@ class Travel:
 
 @dataclass(frozen=True)
 class Amplitude:
-    """One linear amplitude: its name, unit, and plausible size (1 σ of its prior)."""
+    """One linear amplitude: its name, unit, and plausible size; its prior is wider by a factor for all."""
 
     name: str
     unit: str

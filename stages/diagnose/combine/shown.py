@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from pipeline.physics.effect import Channel, FixedTo
 from stages.diagnose.channels import Seen
-from stages.diagnose.claims import Claim, claims_of, stretch
+from stages.diagnose.combine.claims import Claim, claims_of, stretch
 from stages.diagnose.gauge import answer as of_gauge
 from stages.diagnose.gauge.examine import Examined
 from stages.diagnose.result import Location, Verdict

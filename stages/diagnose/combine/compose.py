@@ -10,7 +10,9 @@ from pipeline.physics.catalogue import effect
 from pipeline.physics.effect import Channel
 from stages.diagnose.causes import NONE, Causes
 from stages.diagnose.channels import Seen
-from stages.diagnose.claims import Claim
+from stages.diagnose.combine.claims import Claim
+from stages.diagnose.combine.shown import Shown, shown_by
+from stages.diagnose.combine.weighed import weighed
 from stages.diagnose.gauge import answer as of_gauge
 from stages.diagnose.gauge.doubts import sure
 from stages.diagnose.gauge.examine import Examined
@@ -24,9 +26,7 @@ from stages.diagnose.result import (
     Verdict,
     classes_of,
 )
-from stages.diagnose.shown import Shown, shown_by
 from stages.diagnose.travel.events import SLIP
-from stages.diagnose.weighed import weighed
 
 _SAME_FREQUENCY_HZ = 0.15
 _WITH_NAMES = (Verdict.CLASS, Verdict.PARTLY, Verdict.NAMED)

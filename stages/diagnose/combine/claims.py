@@ -11,9 +11,9 @@ from pipeline.physics.catalogue import effect
 from pipeline.physics.effect import Channel, FixedTo
 from stages.diagnose.agreement import Agreement, agreements, chance_of_name
 from stages.diagnose.channels import Seen
+from stages.diagnose.combine.late_pictures import Exposure, how_late, own_size, whole_size
 from stages.diagnose.gauge.answer import rocking_excluded
 from stages.diagnose.inference import SURE
-from stages.diagnose.late_pictures import Exposure, how_late, own_size, whole_size
 from stages.diagnose.profile.evidence import ProfileEvidence
 from stages.diagnose.profile.finding import Finding
 from stages.diagnose.result import CourseFound, EffectFound, Location, Value

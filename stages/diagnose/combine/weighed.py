@@ -9,7 +9,7 @@ from itertools import chain
 from math import prod
 
 from stages.diagnose.causes import NONE, Cause, Causes, CourseShare
-from stages.diagnose.claims import Claim
+from stages.diagnose.combine.claims import Claim
 from stages.diagnose.effects.nameless import Nameless
 from stages.diagnose.gauge.doubts import doubts
 from stages.diagnose.gauge.examine import OF_A_PIPE, Examined

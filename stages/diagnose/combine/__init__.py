@@ -1,0 +1,1 @@
+"""Combine what all channels of both recordings show into one answer."""
