@@ -143,6 +143,11 @@ class Correction:
     inexpressible: tuple[str, ...]
 
     @property
+    def found(self) -> bool:
+        """Whether the gauge run found anything."""
+        return bool(self.applied or self.inexpressible)
+
+    @property
     def beyond_probe(self) -> str:
         """What a probe file cannot express, in words: effects by name, patterns without a cause once."""
         laws = (n if re.split("[ ,]", n)[0] in EFFECTS else _NO_CAUSE for n in self.inexpressible)

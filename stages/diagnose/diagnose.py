@@ -95,7 +95,7 @@ def diagnose(
     context.report("verdict", str(found.verdict))
     found = replace(found, shortcomings=(*noticed.sentences, *found.shortcomings))
     image = image_of(seen, field, gauge) if found.ring_picture is not None else None
-    notes = _not_corrected(correction, found.fit)
+    notes = _not_corrected(found.fit) if correction is not None and correction.found else ()
     corrected_probe = correction.probe if correction is not None and not notes else probe
     return Diagnosed(replace(found, notes=(*found.notes, *notes)), corrected_probe, image)
 
@@ -134,10 +134,9 @@ _NOT_CORRECTED = (
 )
 
 
-def _not_corrected(correction: Correction | None, fit: FitQuality | None) -> tuple[str, ...]:
+def _not_corrected(fit: FitQuality | None) -> tuple[str, ...]:
     """Return in words why the probe is not corrected, where held-out measurements fit worse afterwards."""
-    changed = correction is not None and bool(correction.applied or correction.inexpressible)
-    if not changed or fit is None or not fit.heldout_after > fit.heldout_before:
+    if fit is None or not fit.heldout_after > fit.heldout_before:
         return ()
     return (_NOT_CORRECTED.format(fit.heldout_after, fit.unit, fit.heldout_before),)
 
