@@ -90,8 +90,9 @@ def _regions_of_wall(
         )
         shines = sigma > _SURE and size > _LEAST_SHINE
         value, spread = (shine, shine_sd) if shines else (mean, sd)
-        by_slope = _shine_of_slope(samples, use, line_rad) if shines else 1.0
-        if _most(value, region) < tail * by_slope * slope_error(surface, samples, region, ring_step_mm):
+        error, steepest = slope_error(surface, samples, region, ring_step_mm)
+        by_slope = _shine_of_slope(samples, use, line_rad, steepest) if shines else 1.0
+        if _most(value, region) < tail * by_slope * error:
             continue
         if shines or samples.fixed_to(use) == "wall":
             gloss_sd = size / max(sigma, 1e-9) if shines else 0.0
@@ -121,8 +122,10 @@ def _most(values: Float, cells: Int) -> float:
     return float(np.nanmax(np.abs(values[tuple(cells.T)])))
 
 
-def slope_error(surface: WallSurface, samples: BlockSamples, cells: Int, ring_step_mm: float) -> float:
-    """Return the 1 σ of the relative brightness of cells (N, 2) of the wall from errors of its slope.
+def slope_error(
+    surface: WallSurface, samples: BlockSamples, cells: Int, ring_step_mm: float
+) -> tuple[float, float]:
+    """Return the 1 σ of the slope of cells (N, 2) of the wall, and its steepest slope away from the camera.
 
     What a second smoothing of the slopes removes is an estimate of what the first one removed (J. W. Tukey's
     twicing, 1977); light at 45°, as from lamps near the ring, changes by as much as the slope. Along the pipe
@@ -136,7 +139,7 @@ def slope_error(surface: WallSurface, samples: BlockSamples, cells: Int, ring_st
     more = samples.cell_mm + 4 * along_mm
     rows = np.flatnonzero((surface.distance_mm > first - more) & (surface.distance_mm < last + more))
     if not len(rows):
-        return 0.0
+        return 0.0, 0.0
     sigma = (along_mm / step, SHADING_MM / around_mm)
     lost = _smoothed_away(surface, rows, sigma)
     column = np.arange(lost.shape[1]) * WALL_COLUMNS // lost.shape[1] + WALL_COLUMNS // 2
@@ -146,7 +149,8 @@ def slope_error(surface: WallSurface, samples: BlockSamples, cells: Int, ring_st
     parts = np.array_split(np.arange(len(surface.distance_mm)), max(len(surface.distance_mm) // _PART, 1))
     some = [_smoothed_away(surface, part, sigma) for part in parts[:: max(len(parts) // _PARTS, 1)]]
     noise = _NOISY * float(np.median(np.concatenate(some)))
-    return float(np.sqrt(max(float(lost[:, near].max()) ** 2 - noise**2, 0.0)))
+    error = float(np.sqrt(max(float(lost[:, near].max()) ** 2 - noise**2, 0.0)))
+    return error, max(float(surface.along[np.ix_(rows, near)].max()), 0.0)
 
 
 def _smoothed_away(surface: WallSurface, rows: Int, sigma: tuple[float, float]) -> Float:
@@ -205,15 +209,17 @@ def _gloss_of(samples: BlockSamples, use: Bool) -> tuple[float, float]:
     return slope, sigma if sure else 0.0
 
 
-def _shine_of_slope(samples: BlockSamples, use: Bool, line_rad: float) -> float:
+def _shine_of_slope(samples: BlockSamples, use: Bool, line_rad: float, steepest: float) -> float:
     """Return by how much blocks in ``use`` (N,) seem to brighten over a line's radius, per error of a slope.
 
-    With lamps next to the camera, wall that leans toward them by a small angle e more than assumed is
-    brighter by e cot θ where it is seen at θ: much far ahead, and hardly beside the lamps. As in an
-    equidistant lens, θ is proportional to the distance from the image's middle.
+    Lamps next to the camera light wall that leans away from them by the slope s, seen at θ, in proportion to
+    sin θ − s cos θ. An error e of s changes that by e cos θ: relatively much far ahead and on wall that leans
+    away, hardly beside the lamps. As in an equidistant lens, θ is proportional to the distance from the
+    image's middle.
     """
     cell, theta = samples.orders["wall"][use], np.maximum(samples.away[use] * line_rad, _NEAREST_RAD)
-    lean, change = centred(samples.away[use], cell), centred(1 / np.tan(theta), cell)
+    light = np.maximum(np.sin(theta) - steepest * np.cos(theta), np.sin(_NEAREST_RAD))
+    lean, change = centred(samples.away[use], cell), centred(np.cos(theta) / light, cell)
     return abs(float(lean @ change)) / max(float(lean @ lean), 1e-12)
 
 
