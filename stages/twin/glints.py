@@ -69,6 +69,8 @@ class SpotsOfFrames:
     ----------
     light : Illumination
     ring : Ring
+    outside : (H, W) bool, optional
+        Pixels outside the camera's view, which show no wall, such as a margin with burnt-in text.
     frame, spots : list
     excess : list of (h, w) float32
         Recorded minus predicted brightness of the blocks of each frame, grey levels; NaN where a block is not
@@ -81,6 +83,7 @@ class SpotsOfFrames:
 
     light: Illumination
     ring: Ring
+    outside: Bool | None = None
     frame: list[int] = field(default_factory=list)
     spots: list[Spot] = field(default_factory=list)
     excess: list[Float32] = field(default_factory=list)
@@ -90,6 +93,7 @@ class SpotsOfFrames:
     def add(self, frame: int, above: Float32, twin: TwinFrame) -> None:
         """Add a frame (H, W) of grey levels above black; its twin has the frame's exposure."""
         known = twin.region == (Region.DARK if self.light == Illumination.LASER else Region.WALL)
+        known = known if self.outside is None else known & ~self.outside
         more = np.where(known, above - twin.level, np.float32(0))
         beyond = (more > _LEAST_GREY) & (more * more > np.float32(_LEAST_SIGMA**2) * twin.variance)
         self.frame.append(frame)

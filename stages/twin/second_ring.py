@@ -35,6 +35,8 @@ _WIDEST, _SMOOTH, _ALIKE, _OF_HEIGHT, _OF_NOISE = 65, 3, 2, 0.2, 8.0
 smoothed, bins by which the quadrants of one ring may differ, and share of a band's height from which a bin
 counts; all chosen. σ of one bin by which light must stand out: noise alone spans 5.5 σ from its lowest to its
 highest of two hundred bins, and 8 σ in 3 of 10 000 quadrants."""
+_ROUNDING = 1.0
+"""Grey levels by which rounding lifts one place over another in a picture without noise."""
 _EITHER = "ghost_ring or second_line"
 """Light apart from the line whose course is not known: the wall mirrors the line, or glass does."""
 _OF_QUADRANT = float(np.sinc(1 / _QUADRANTS))
@@ -182,8 +184,8 @@ def _band(stack: Float, mean: Float, use: Bool, line: float) -> _Band | None:
     inside *= (height / np.maximum((inside * more).sum(1), 1e-12))[:, None]
     each = ((stack - (mean - more)) * inside).sum(-1)
     sd = each.std(0) / np.sqrt(len(stack))
-    noise = _noise(stack[..., use], mean[:, use])
-    seen = (height > _SURE * sd) & (height > LEAST_SECOND * line) & (height > _OF_NOISE * noise)
+    noise = np.maximum(_OF_NOISE * _noise(stack[..., use], mean[:, use]), _ROUNDING)
+    seen = (height > _SURE * sd) & (height > LEAST_SECOND * line) & (height > noise)
     if seen.sum() < 3:  # a glint is in one quadrant, at most two
         return None
     return _Band(more, peak, seen, each[:, seen].mean(1) / line)

@@ -56,7 +56,9 @@ class Sums:
         self.blocks = BlocksOfFrames(scene.ring)
         self.lit, self.line = CellsOfFrames(), CellsOfFrames()
         self.whole, self.fine = WholePictures(scene), FineNoise()
-        self.spots = [SpotsOfFrames(kind, scene.ring) for kind in (Illumination.LED, Illumination.LASER)]
+        self.spots = [
+            SpotsOfFrames(kind, scene.ring, state.outside) for kind in (Illumination.LED, Illumination.LASER)
+        ]
         self._sector = sectors_of(scene.polar[1])
 
     def add(self, frame: int, kind: Illumination, image: Image) -> None:
@@ -103,7 +105,7 @@ class Sums:
         """Return what is on the window or the lens; places that other frames do not confirm are left out."""
         fixed_to = in_image(samples, tuple(w.place for w in self.window))
         judged = [
-            w.judged(to) or (unexplained(w.place, samples) if to == "image" else None)
+            w.judged(to, len(self.window)) or (unexplained(w.place, samples) if to == "image" else None)
             for w, to in zip(self.window, fixed_to, strict=True)
         ]
         return without_duplicates([m for m in judged if m is not None])

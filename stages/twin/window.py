@@ -21,8 +21,7 @@ from stages.twin.render import Region, TwinFrame
 from stages.twin.spot import PARTS, WIDEST_PX, FittedLaw, brighter_within, fall_of_pattern, fall_of_spot
 
 _POWER_STEP, _ASIDE_PX = 0.4, 0.5
-"""Steps of bending that are tried; 1 σ of a displacement, px, since blocks of 24 px flatten its peak.
-Chosen."""
+"""Steps of bending that are tried; 1 σ of a displacement, px: blocks of 24 px flatten its peak. Chosen."""
 _SURELY = 2.0
 """σ by which a drop's size must exceed 0, and by which texture must be displaced before that alone makes a
 drop: radius errors from an unstated tilt of the laser had made two drops of .4 ± .5 px."""
@@ -34,8 +33,7 @@ _AROUND_PX, _WHOLE, _SURE, _FEWEST_FRAMES = 25.0, 0.7, 3.0, 3
 """1 σ of the wide mean, px; share of a place that must be lit wall; σ by which effects are distinguished;
 fewest frames."""
 _OF_CONTRAST = 0.15
-"""Largest share by which the photo's texture may differ from the frames': half a pixel of blur makes as
-much."""
+"""Largest share by which the photo's texture may differ from the frames': half a pixel of blur makes that."""
 _BLURS, _AT_LINE = {"motion_blur", "defocus"}, ("window_dirt", "window_scatter")
 _STATED = {
     "window_dirt": "dust or dirt on the window or the lens, or what shades it, takes away {}",
@@ -142,8 +140,11 @@ class WindowPlace:
             made.append(np.asarray(drop, np.float32))
         return made
 
-    def judged(self, fixed_to: str) -> Mismatch | None:
-        """Return what is at the place; None where other frames fit no better with any effect."""
+    def judged(self, fixed_to: str, places: int = 1) -> Mismatch | None:
+        """Return what is at the place; None where other frames fit no better with any effect.
+
+        All effects are tried at each of ``places``: chance has as many opportunities (Bonferroni, 1936).
+        """
         if len(self.frame) < _FEWEST_FRAMES:
             return None
         spots = np.stack(self.spots)
@@ -152,7 +153,8 @@ class WindowPlace:
         name, rivals = self._named(tried, spots[:, 0])
         if not name:
             return None
-        law, chance = tried[name], max(self.place.probability, tried[name].chance)
+        law, tests = tried[name], len(tried) * places
+        chance = min(1.0, max(self.place.probability, tests * law.chance))
         alone = self.bends and name == "droplet" and not rivals
         small = abs(law.size.value) < self._least(name, law.size.sd)
         if chance > FALSE_ALARM or small or ("wall" in fixed_to and not alone):

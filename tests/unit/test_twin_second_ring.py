@@ -38,6 +38,13 @@ def test_noise_beside_a_faint_line_is_no_second_line(peak):
     assert named(laser=lambda p, r: p * peak / 150) == []
 
 
+@pytest.mark.parametrize(("higher", "told"), [(0.8, 0), (2, 1)])
+def test_rounding_beside_a_faint_line_is_no_second_line(higher, told):
+    """A margin that a codec leaves without noise was half a level above the view: 2 % of a faint line."""
+    step = higher * (abs(AWAY - 92) < 4)
+    assert len(named(laser=lambda p, r: np.where(AWAY > 80, step, p * 40 / 150))) == told
+
+
 @pytest.mark.parametrize("aside_px", [0, 4])
 def test_the_sentence_of_a_second_ring_gives_the_share_that_its_figure_gives(aside_px):
     """The figure was 7.9 %, from frames rendered again, and the sentence said 5 %, from means around it."""

@@ -81,6 +81,16 @@ def test_light_connected_to_the_line_is_not_a_glint(away_px, glints):
     assert len(spots.found()) == glints
 
 
+@pytest.mark.parametrize("in_view", [True, False])
+def test_burnt_in_text_beside_the_view_is_no_glint(in_view):
+    """Letters in a black margin were thirteen glints or drops."""
+    spots = SpotsOfFrames(Illumination.LASER, RING, outside=None if in_view else U < 150)
+    for number in range(FRAMES):
+        twin = _twin(number, Region.DARK)
+        spots.add(number, twin.level + _spot(100, 60), twin)
+    assert len(spots.found()) == in_view
+
+
 @pytest.mark.parametrize(("name", "glints"), [("ambient_light or interreflection", 0), ("bloom", 1)])
 def test_pale_wall_in_other_light_is_not_a_glint(name, glints):
     spots = [SpotsOfFrames(kind, RING) for kind in (Illumination.LED, Illumination.LASER)]
@@ -211,7 +221,9 @@ def test_a_region_of_a_long_wall_does_not_smooth_all_of_the_map(monkeypatch):
     monkeypatch.setattr(
         on_wall, "gaussian_filter", lambda a, *b, **c: smoothed.append(len(a)) or gaussian_filter(a, *b, **c)
     )
-    lost, _ = on_wall.slope_error(long, SimpleNamespace(first_mm=0.0, cell_mm=2.5), np.array([[100, 20]]), 1.2)
+    lost, _ = on_wall.slope_error(
+        long, SimpleNamespace(first_mm=0.0, cell_mm=2.5), np.array([[100, 20]]), 1.2
+    )
     assert sum(smoothed) < rows / 2
     assert lost < 0.03
 

@@ -4,10 +4,12 @@ import cv2
 import numpy as np
 import pytest
 
+from pipeline.artefacts.twin import NamedFigure
 from stages.twin.compare import BLOCK_PX
 from stages.twin.locate import ImagePlace, full_size, places_in_image
 from stages.twin.reference import BlockSamples, in_image
 from stages.twin.render import Region, TwinFrame
+from stages.twin.spot import FittedLaw
 from stages.twin.unexplained import unexplained
 from stages.twin.window import WindowPlace, _fall_of_drop
 
@@ -117,6 +119,20 @@ def test_a_place_that_no_effect_on_the_window_explains_is_reported_without_a_nam
     assert unexplained(place, None) is None
     by_wall = _blocks(lambda r, c, s: 0.3 * (np.abs(s - 22) < 2))
     assert in_image(by_wall, (place,)) != ("image",)
+
+
+@pytest.mark.parametrize(("places", "told"), [(1, True), (8, False)])
+def test_chance_has_as_many_opportunities_as_places_are_tried(places, told, monkeypatch):
+    """One of eight places of wet steel was a drop at a chance of .0007 for one effect at one place."""
+    law = FittedLaw(np.array([1.0, 5, 2, 4, 3, 6, 0.5, 7, 1.5]), NamedFigure("share", 0.3, 0.01))
+    assert 1e-4 < law.chance < 0.003
+    monkeypatch.setattr("stages.twin.window.fall_of_spot", lambda *_: law)
+    place, shape = WindowPlace(ImagePlace(120.0, 100.0, 18.0, -0.3, 0.02, 1e-6)), (200, 240)
+    level, nowhere = np.full(shape, 90, np.float32), np.full(shape, np.nan, np.float32)
+    even, region = np.full(shape, 4, np.float32), np.full(shape, Region.WALL, np.uint8)
+    for frame in range(9):
+        place.add(frame, level, TwinFrame(level, even, region, nowhere, nowhere), np.ones(shape, bool))
+    assert (place.judged("image", places) is not None) == told
 
 
 @pytest.mark.parametrize("shines", [True, False])
