@@ -12,6 +12,7 @@ from pipeline.arrays import Bool, Float, Float32, Int
 from pipeline.artefacts.measured import RingSamples
 from pipeline.machine.stage import Context
 from pipeline.recording.base import Illumination, Recording
+from stages.twin.burnt_in import burnt_in
 from stages.twin.fixed_pattern import FixedPattern, fixed_pattern
 from stages.twin.lamp_light import LampLight, LampSamples
 from stages.twin.line_colour import FULL_SCALE, Coloured, line_colour
@@ -55,7 +56,7 @@ class PhotometricState:
     place_px : (Z,)
         1 σ of the photo's displacement from the frames at those angles, from pixel to pixel, per direction.
     outside, edge : (H, W) bool
-        Pixels outside the camera's view, and next to its border.
+        Pixels outside the camera's view; next to its border, or of burnt-in text.
     line_clipped : float
         Share of the line's middle at which its strongest channel is at full scale.
     photo_black : float
@@ -155,6 +156,7 @@ def estimate_state(
         context.progress(done, 2 * len(sampled))
     lamp, line = lamps.solve(), lines.solve()
     outside, edge = _view([s.image for s, _ in lit], black.value, scene)
+    edge |= burnt_in(scene, sampled, black.value)
     at, sharpness, left = _sharpness(scene, lamp, lit, black.value, white, edge | outside)
     twice = [(f, f.again) for f in left if f.again is not None]
     windows = [windows_of(f.rest, again, f.level, f.use & np.isfinite(again)) for f, again in twice]
