@@ -29,8 +29,9 @@ from stages.diagnose.effects.library import without as library_without
 from stages.diagnose.field.answer import borne_out, encoder_share, field_confirmations, with_field
 from stages.diagnose.field.evidence import travel_of_run
 from stages.diagnose.field.run import FieldRun
-from stages.diagnose.result import Diagnosis, FitQuality
+from stages.diagnose.result import Diagnosis
 from stages.diagnose.travel.evidence import TravelEvidence
+from stages.diagnose.written_probe import not_written
 from stages.premises import PREMISES
 from stages.rings import RINGS
 from stages.triangulate import TRIANGULATE
@@ -95,7 +96,9 @@ def diagnose(
     context.report("verdict", str(found.verdict))
     found = replace(found, shortcomings=(*noticed.sentences, *found.shortcomings))
     image = image_of(seen, field, gauge) if found.ring_picture is not None else None
-    notes = _not_corrected(found.fit) if correction is not None and correction.found else ()
+    of_rings = of_field.field if of_field is not None else None
+    asked = correction is not None and correction.found
+    notes = not_written(found, of_rings, correction, probe) if correction and asked else ()
     corrected_probe = correction.probe if correction is not None and not notes else probe
     return Diagnosed(replace(found, notes=(*found.notes, *notes)), corrected_probe, image)
 
@@ -126,21 +129,6 @@ def _by_correction(
     return field, gauge
 
 
-_NOT_CORRECTED = (
-    "The probe file is written as it was stated: held-out measurements would lie {:.3g} {} from their "
-    "expected values with the likeliest explanation of the gauge run, and lie {:.3g} without. This alone "
-    "refutes no effect: both contain the poses' errors, which neighbouring frames share, and the σ of the "
-    "difference is not known."
-)
-
-
-def _not_corrected(fit: FitQuality | None) -> tuple[str, ...]:
-    """Return in words why the probe is not corrected, where held-out measurements fit worse afterwards."""
-    if fit is None or not fit.heldout_after > fit.heldout_before:
-        return ()
-    return (_NOT_CORRECTED.format(fit.heldout_after, fit.unit, fit.heldout_before),)
-
-
 def _with_travel(seen: Seen, travel: TravelEvidence | None) -> Seen:
     old = seen.travel.shortcomings if seen.travel is not None else ()
     new = travel.shortcomings if travel is not None else ()
@@ -162,7 +150,7 @@ def _without_scale(seen: Seen, beyond_probe: str) -> Seen:
 
 
 DIAGNOSIS = Stage(
-    "diagnosis", "60", DiagnosisParameters, diagnose,
+    "diagnosis", "61", DiagnosisParameters, diagnose,
     "what physics was left out, where it shows, and what confirms it",
 )  # fmt: skip
 _OF_FIELD = (PREMISES, RINGS, TRIANGULATE, LINE_PROFILE, FREE_MOTION, FIELD_EVIDENCE)

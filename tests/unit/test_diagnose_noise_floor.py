@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from stages.calibrate.gauge.edges import Edges
-from stages.diagnose.diagnose import _not_corrected
 from stages.diagnose.gauge.doubts import fits
 from stages.diagnose.gauge.equations import EDGE, RING
 from stages.diagnose.gauge.heldout import _in_other_pictures, repeatability_px
@@ -139,12 +138,3 @@ def test_few_rings_of_an_inspection_give_a_floor(frames: int) -> None:
 def test_one_ring_of_an_inspection_gives_no_floor() -> None:
     seen = of_rings(0.07, 0.0)
     assert np.isnan(replace(seen, usable=seen.frame == 7).floor_px)
-
-
-def test_a_correction_that_fits_worse_says_by_how_much_and_that_it_refutes_nothing() -> None:
-    """Beside a tilt of 13 σ, 2.78 px with an error of the poses became 2.86 px, without a figure or σ."""
-    (note,) = _not_corrected(FitQuality("px", 0.364, 0.064, 2.776, 2.862, 0.83))
-    assert "2.86 px" in note
-    assert "2.78 without" in note
-    assert "refutes no effect" in note
-    assert _not_corrected(FitQuality("px", 0.364, 0.064, 2.862, 2.776, 0.83)) == ()

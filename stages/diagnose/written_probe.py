@@ -1,0 +1,82 @@
+"""Whether the probe file gets the gauge run's correction: where an inspection does not speak against it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pipeline.instrument.probe import Probe
+from stages.diagnose.correct import Correction
+from stages.diagnose.field.evidence import FieldEvidence
+from stages.diagnose.field.system import ENCODER_SCALE
+from stages.diagnose.inference import INSTRUMENT, eliminated, stated_belief
+from stages.diagnose.result import Diagnosis, FitQuality
+
+# Probability of a correction without a name: as likely right as wrong before the inspection is asked.
+_NAMELESS = 0.5
+_BY_FIELD = (
+    "The probe file is written as it was stated: rings and texture of the inspection are {:.2g} times as "
+    "likely with it as with the likeliest explanation of the gauge run, which outweighs what that run says "
+    "for it. Unknown poses and wall, and errors that neighbours share, are taken into account."
+)
+_BY_GAUGE = (
+    "The probe file is written as it was stated: held-out measurements would lie {:.3g} {} from their "
+    "expected values with the likeliest explanation of the gauge run, and lie {:.3g} without. This alone "
+    "refutes no effect: both contain the poses' errors, which neighbouring frames share, and the σ of the "
+    "difference is not known."
+)
+
+
+def not_written(
+    found: Diagnosis, field: FieldEvidence | None, correction: Correction, probe: Probe
+) -> tuple[str, ...]:
+    """Return in words why the probe is not corrected; empty if it is.
+
+    An inspection decides by the odds of both probes, beginning with the gauge run's own probability. Without
+    one, held-out parts of the gauge run must not fit worse.
+    """
+    ratio = log_ratio(field, correction, probe) if field is not None else None
+    if ratio is None:
+        return _held_out(found.fit)
+    chance = _chance(found, correction)
+    if ratio + np.log(chance / (1 - chance)) >= 0:
+        return ()
+    return (_BY_FIELD.format(np.exp(min(-ratio, 50.0))),)
+
+
+def log_ratio(field: FieldEvidence, correction: Correction, probe: Probe) -> float | None:
+    """Return ln of the likelihood of an inspection with the corrected probe, over that with the stated one.
+
+    Scores have the expected value 0 with the stated one, and information times correction with the other, and
+    with both the same covariance, with correlated errors of neighbours. Poses, wall, matching errors and the
+    encoder's scale are unknown. None where the inspection shows nothing of what changes.
+    """
+    whole, moved = (
+        field.whole,
+        dict(zip(probe.parameter_names, correction.probe.parameters - probe.parameters, strict=True)),
+    )
+    changed = [k for k, c in enumerate(whole.columns) if c.effect == INSTRUMENT and c.amplitude in moved]
+    scale = [k for k, c in enumerate(whole.columns) if c == ENCODER_SCALE]
+    if not changed:
+        return None
+    at = np.array(changed)
+    own, right, _ = eliminated(whole, stated_belief(probe), at, np.array(scale, np.int64))
+    before = np.maximum(np.diag(whole.information)[at], 1e-300)
+    inflation = np.sqrt(np.diag(whole.score_covariance)[at] / before)
+    step = np.array([moved[whole.columns[k].amplitude] for k in changed])
+    expected, spread = step @ own @ step, step @ (own * np.outer(inflation, inflation)) @ step
+    if not spread > 0:
+        return None
+    return float((step @ right - expected / 2) * expected / spread)
+
+
+def _chance(found: Diagnosis, correction: Correction) -> float:
+    """Return the gauge run's probability of the least certain effect that the probe file would contain."""
+    told = {e.name: e.probability for e in found.effects}
+    each = (told.get(name.partition(",")[0], _NAMELESS) for name in correction.applied)
+    return min(each, default=_NAMELESS)
+
+
+def _held_out(fit: FitQuality | None) -> tuple[str, ...]:
+    if fit is None or not fit.heldout_after > fit.heldout_before:
+        return ()
+    return (_BY_GAUGE.format(fit.heldout_after, fit.unit, fit.heldout_before),)

@@ -1,0 +1,78 @@
+"""An inspection decides whether the probe file gets the correction that a gauge run suggests."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any, cast
+
+import numpy as np
+import pytest
+
+from stages.diagnose.inference import INSTRUMENT, Column, Evidence
+from stages.diagnose.result import FitQuality
+from stages.diagnose.written_probe import log_ratio, not_written
+
+NAMES = ("tilt_x", "tilt_y")
+PROBE = SimpleNamespace(
+    parameter_names=NAMES, parameters=np.zeros(2), covariance=np.eye(2), encoder_scale_sigma=1e-3
+)
+TILT = np.array([0.3, 0.0])
+WORSE = FitQuality("px", 0.364, 0.064, 2.776, 2.862, 0.83)
+
+
+def inspection(true: Any, information: float, alike: float = 1.0, noise: float = 0.0) -> Any:
+    """Return evidence of a probe whose parameters are off by ``true``; ``alike`` errors count as one."""
+    size = information * np.eye(2)
+    right = size @ np.asarray(true) + noise * np.sqrt(alike * information)
+    columns = tuple(Column(INSTRUMENT, n) for n in NAMES)
+    whole = Evidence(columns, size, right, alike * size, 0.0, np.full(2, np.inf))
+    return SimpleNamespace(whole=whole)
+
+
+def correction(step: Any) -> Any:
+    return SimpleNamespace(probe=SimpleNamespace(parameters=np.asarray(step)), applied=("laser_tilt",))
+
+
+def answer(probability: float) -> Any:
+    return cast(
+        Any,
+        SimpleNamespace(fit=WORSE, effects=(SimpleNamespace(name="laser_tilt", probability=probability),)),
+    )
+
+
+def test_the_likelihoods_of_both_probes_are_those_of_the_scores() -> None:
+    """Of independent errors, ln of the ratio is half the difference of the sums of squares."""
+    seen = inspection([0.25, 0.1], 400.0)
+    squares = [400 * np.sum((np.array([0.25, 0.1]) - at) ** 2) for at in (np.zeros(2), TILT)]
+    assert log_ratio(seen, correction(TILT), cast(Any, PROBE)) == pytest.approx((squares[0] - squares[1]) / 2)
+    four_alike = log_ratio(inspection([0.25, 0.1], 400.0, 4.0), correction(TILT), cast(Any, PROBE))
+    assert four_alike == pytest.approx((squares[0] - squares[1]) / 8)
+
+
+def test_a_right_correction_is_kept_although_rings_by_poses_of_bare_steel_lie_farther_off() -> None:
+    """Beside a tilt of 13 σ, 2.78 px with an error of the poses became 2.86 px: the right probe was withheld.
+
+    The inspection itself tells 1.7 σ apart, and says for the correction what it can.
+    """
+    seen = inspection(TILT, 32.0, noise=-0.6)
+    assert not_written(answer(0.997), seen, correction(TILT), cast(Any, PROBE)) == ()
+
+
+@pytest.mark.parametrize("probability", [0.5, 0.997])
+def test_a_correction_that_the_inspection_excludes_is_withheld(probability: float) -> None:
+    seen = inspection([0.0, 0.0], 400.0)
+    (note,) = not_written(answer(probability), seen, correction(TILT), cast(Any, PROBE))
+    assert "times as likely" in note
+
+
+def test_what_the_inspection_hardly_shows_is_decided_by_the_gauge_run() -> None:
+    seen = inspection([0.0, 0.0], 32.0)
+    assert not_written(answer(0.5), seen, correction(TILT), cast(Any, PROBE)) != ()
+    assert not_written(answer(0.997), seen, correction(TILT), cast(Any, PROBE)) == ()
+
+
+def test_without_an_inspection_held_out_parts_of_the_gauge_run_decide() -> None:
+    (note,) = not_written(answer(0.997), None, correction(TILT), cast(Any, PROBE))
+    assert "2.86 px" in note
+    assert "2.78 without" in note
+    assert "refutes no effect" in note
