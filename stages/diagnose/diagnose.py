@@ -31,7 +31,7 @@ from stages.diagnose.field.evidence import travel_of_run
 from stages.diagnose.field.run import FieldRun
 from stages.diagnose.result import Diagnosis
 from stages.diagnose.travel.evidence import TravelEvidence
-from stages.diagnose.written_probe import not_written
+from stages.diagnose.written_probe import Decision, decided
 from stages.premises import PREMISES
 from stages.rings import RINGS
 from stages.triangulate import TRIANGULATE
@@ -98,9 +98,9 @@ def diagnose(
     image = image_of(seen, field, gauge) if found.ring_picture is not None else None
     of_rings = of_field.field if of_field is not None else None
     asked = correction is not None and correction.found
-    notes = not_written(found, of_rings, correction, probe) if correction and asked else ()
-    corrected_probe = correction.probe if correction is not None and not notes else probe
-    return Diagnosed(replace(found, notes=(*found.notes, *notes)), corrected_probe, image)
+    decision = decided(found, of_rings, correction, probe) if correction and asked else Decision(True)
+    corrected_probe = correction.probe if correction is not None and decision.written else probe
+    return Diagnosed(replace(found, notes=(*found.notes, *decision.notes)), corrected_probe, image)
 
 
 def _answered(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from pipeline.instrument.probe import Probe
@@ -9,7 +11,7 @@ from stages.diagnose.correct import Correction
 from stages.diagnose.field.evidence import FieldEvidence
 from stages.diagnose.field.system import ENCODER_SCALE
 from stages.diagnose.inference import INSTRUMENT, eliminated, stated_belief
-from stages.diagnose.result import Diagnosis, FitQuality
+from stages.diagnose.result import Diagnosis
 
 # Probability of a correction without a name: as likely right as wrong before the inspection is asked.
 _NAMELESS = 0.5
@@ -17,6 +19,11 @@ _BY_FIELD = (
     "The probe file is written as it was stated: rings and texture of the inspection are {:.2g} times as "
     "likely with it as with the likeliest explanation of the gauge run, which outweighs what that run says "
     "for it. Unknown poses and wall, and errors that neighbours share, are taken into account."
+)
+_ALTHOUGH = (
+    "The probe file is corrected although rings of the inspection lie {:.3g} {} from their places by texture "
+    "with it, and {:.3g} without: these places have errors that many frames share. With poses and wall "
+    "unknown, rings and texture of the inspection are {:.2g} times as likely with the corrected probe."
 )
 _BY_GAUGE = (
     "The probe file is written as it was stated: held-out measurements would lie {:.3g} {} from their "
@@ -26,21 +33,32 @@ _BY_GAUGE = (
 )
 
 
-def not_written(
-    found: Diagnosis, field: FieldEvidence | None, correction: Correction, probe: Probe
-) -> tuple[str, ...]:
-    """Return in words why the probe is not corrected; empty if it is.
+@dataclass(frozen=True)
+class Decision:
+    """Whether the correction is written, and sentences on why, where that is not plain."""
+
+    written: bool
+    notes: tuple[str, ...] = ()
+
+
+def decided(found: Diagnosis, field: FieldEvidence | None, correction: Correction, probe: Probe) -> Decision:
+    """Return whether the probe is corrected.
 
     An inspection decides by the odds of both probes, beginning with the gauge run's own probability. Without
     one, held-out parts of the gauge run must not fit worse.
     """
     ratio = log_ratio(field, correction, probe) if field is not None else None
+    fit = found.fit
+    worse = fit is not None and fit.heldout_after > fit.heldout_before
     if ratio is None:
-        return _held_out(found.fit)
-    chance = _chance(found, correction)
-    if ratio + np.log(chance / (1 - chance)) >= 0:
-        return ()
-    return (_BY_FIELD.format(np.exp(min(-ratio, 50.0))),)
+        worse_by = (fit.heldout_after, fit.unit, fit.heldout_before) if fit is not None else ()
+        return Decision(not worse, (_BY_GAUGE.format(*worse_by),) if worse else ())
+    chance, likelier = _chance(found, correction), float(np.exp(np.clip(ratio, -50, 50)))
+    if ratio + np.log(chance / max(1 - chance, 1e-12)) < 0:
+        return Decision(False, (_BY_FIELD.format(1 / likelier),))
+    if fit is None or not worse:
+        return Decision(True)
+    return Decision(True, (_ALTHOUGH.format(fit.heldout_after, fit.unit, fit.heldout_before, likelier),))
 
 
 def log_ratio(field: FieldEvidence, correction: Correction, probe: Probe) -> float | None:
@@ -74,9 +92,3 @@ def _chance(found: Diagnosis, correction: Correction) -> float:
     told = {e.name: e.probability for e in found.effects}
     each = (told.get(name.partition(",")[0], _NAMELESS) for name in correction.applied)
     return min(each, default=_NAMELESS)
-
-
-def _held_out(fit: FitQuality | None) -> tuple[str, ...]:
-    if fit is None or not fit.heldout_after > fit.heldout_before:
-        return ()
-    return (_BY_GAUGE.format(fit.heldout_after, fit.unit, fit.heldout_before),)

@@ -10,7 +10,7 @@ import pytest
 
 from stages.diagnose.inference import INSTRUMENT, Column, Evidence
 from stages.diagnose.result import FitQuality
-from stages.diagnose.written_probe import log_ratio, not_written
+from stages.diagnose.written_probe import decided, log_ratio
 
 NAMES = ("tilt_x", "tilt_y")
 PROBE = SimpleNamespace(
@@ -55,24 +55,29 @@ def test_a_right_correction_is_kept_although_rings_by_poses_of_bare_steel_lie_fa
     The inspection itself tells 1.7 σ apart, and says for the correction what it can.
     """
     seen = inspection(TILT, 32.0, noise=-0.6)
-    assert not_written(answer(0.997), seen, correction(TILT), cast(Any, PROBE)) == ()
+    kept = decided(answer(0.997), seen, correction(TILT), cast(Any, PROBE))
+    assert kept.written
+    assert "although rings of the inspection lie 2.86 px" in kept.notes[0]
 
 
 @pytest.mark.parametrize("probability", [0.5, 0.997])
 def test_a_correction_that_the_inspection_excludes_is_withheld(probability: float) -> None:
     seen = inspection([0.0, 0.0], 400.0)
-    (note,) = not_written(answer(probability), seen, correction(TILT), cast(Any, PROBE))
-    assert "times as likely" in note
+    withheld = decided(answer(probability), seen, correction(TILT), cast(Any, PROBE))
+    assert not withheld.written
+    assert "times as likely" in withheld.notes[0]
 
 
 def test_what_the_inspection_hardly_shows_is_decided_by_the_gauge_run() -> None:
     seen = inspection([0.0, 0.0], 32.0)
-    assert not_written(answer(0.5), seen, correction(TILT), cast(Any, PROBE)) != ()
-    assert not_written(answer(0.997), seen, correction(TILT), cast(Any, PROBE)) == ()
+    assert not decided(answer(0.5), seen, correction(TILT), cast(Any, PROBE)).written
+    assert decided(answer(0.997), seen, correction(TILT), cast(Any, PROBE)).written
 
 
 def test_without_an_inspection_held_out_parts_of_the_gauge_run_decide() -> None:
-    (note,) = not_written(answer(0.997), None, correction(TILT), cast(Any, PROBE))
+    withheld = decided(answer(0.997), None, correction(TILT), cast(Any, PROBE))
+    assert not withheld.written
+    (note,) = withheld.notes
     assert "2.86 px" in note
     assert "2.78 without" in note
     assert "refutes no effect" in note
