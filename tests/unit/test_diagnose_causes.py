@@ -20,7 +20,7 @@ from stages.diagnose.gauge.run import Term
 from stages.diagnose.gauge.sets import PATTERNS, Member
 from stages.diagnose.gauge.unknown_laws import Unknown
 from stages.diagnose.record_next import record_next
-from stages.diagnose.result import Confirmation, Diagnosis, EffectFound, Remainder, Verdict
+from stages.diagnose.result import Confirmation, Diagnosis, EffectFound, Remainder, Value, Verdict
 
 MODELS = with_courses(LIBRARY)
 
@@ -42,7 +42,7 @@ def gauge_run(sets: list[tuple[tuple[Term, ...], float]], **given: Any) -> Any:
     count, chance = len(fitted[0].library_terms), [p for _, p in sets]
     verdicts = Verdicts((), fitted, np.array(chance), 1.0, cast(Any, None), (), 25)
     agrees = Confirmation("1", "1", True)
-    seen = {"best": fitted[0], "verdicts": verdicts, "feasibility": [], "quality": None} | {
+    seen = {"best": fitted[0], "verdicts": verdicts, "feasibility": [], "quality": None, "sizes": ()} | {
         "confirmed": ((agrees,),) * count, "unknown_laws": (Unknown(0.0, 0.0),) * count,
     }  # fmt: skip
     return SimpleNamespace(**seen | given)
@@ -96,6 +96,14 @@ def test_exclusive_causes_add_up_to_one_and_doubt_changes_no_order(same_shift):
     assert chances(unsure) == {"laser_tilt": 0.566, "laser_cone": 0.3774}
     assert sum(c.probability for c in unsure.laws) + unsure.outside == pytest.approx(1.0)
     assert unsure.outside == pytest.approx(0.06 / 1.06)
+
+
+def test_a_step_is_told_at_the_time_of_the_answer(same_shift):
+    """The page told 1.97 s, that of the best fit, and the answer its mean, 1.94 s."""
+    step = term("laser_tilt, step", (1.97,))
+    mean = SimpleNamespace(time_s=Value(1.94, 0.08))
+    (tilt, *_) = by.weighed(gauge_run([((step,), 1.0)], sizes=(mean,)), ()).laws
+    assert "1.94 s" in tilt.courses[0].statement
 
 
 def test_a_rival_far_less_likely_than_any_other_is_left_out(same_shift):

@@ -10,6 +10,7 @@ from math import prod
 
 from stages.diagnose.causes import NONE, Cause, Causes, CourseShare
 from stages.diagnose.combine.claims import Claim
+from stages.diagnose.effects.base import Shape
 from stages.diagnose.effects.nameless import Nameless
 from stages.diagnose.gauge.doubts import doubts
 from stages.diagnose.gauge.examine import OF_A_PIPE, Examined
@@ -47,7 +48,10 @@ def _of_rings(examined: Examined) -> Causes:
     each = zip(best.library_terms, doubts(examined), strict=False)
     doubt = {cause_of(t.model, t.shape): one for t, one in each}
     table = _table(verdicts, doubt)
-    chance, courses = defaultdict[str, float](float), _courses(table)
+    # The answer tells the mean time of a step, not that of the best fit.
+    steps = zip(best.library_terms, examined.sizes, strict=False)
+    mean_s = {id(t): (sized.time_s.value,) for t, sized in steps if sized.time_s is not None}
+    chance, courses = defaultdict[str, float](float), _courses(table, mean_s)
     for one in table:
         for name, share in one.names.items():
             chance[name] += one.probability * share
@@ -94,17 +98,17 @@ def _names(each: Mapping[LawAndOrder, float], patterned: bool) -> dict[str, floa
     return {name: 1 - p for name, p in missing.items()}
 
 
-def _courses(table: Sequence[_Weighed]) -> dict[str, tuple[CourseShare, ...]]:
+def _courses(table: Sequence[_Weighed], told: Mapping[int, Shape]) -> dict[str, tuple[CourseShare, ...]]:
     """Return each law's courses, or sets of courses and orders, the likeliest first.
 
-    The words are those of the likeliest set with them.
+    The words are those of the likeliest set with them; ``told`` has shapes to tell instead, by id of term.
     """
     found = dict[str, dict[object, list[tuple[float, CourseShare]]]]()
     for one in table:
         for law in {t.model.law for t in one.terms}:
             same = [t for t in one.terms if t.model.law == law]
             kinds = " and ".join(sorted({str(t.model.kind) for t in same}))
-            words = " ".join(t.model.statement(t.shape, t.amplitude) for t in same)
+            words = " ".join(t.model.statement(told.get(id(t), t.shape), t.amplitude) for t in same)
             of = frozenset((t.model.kind, cause_of(t.model, t.shape)) for t in same)
             share = one.probability * one.names[law]
             found.setdefault(law, {}).setdefault(of, []).append((share, CourseShare(kinds, 1.0, words)))
