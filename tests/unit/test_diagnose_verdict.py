@@ -283,3 +283,18 @@ def test_what_has_no_name_is_fixed_to_a_place_only_if_effects_and_pattern_agree(
     assert bool(shown.undecided_place(seen, Verdict.UNEXPLAINED)) is (told is None)
     assert answer.location(seen, Verdict.NAMED) == where
     assert shown.undecided_place(seen, Verdict.NAMED) == ()
+
+
+@pytest.mark.parametrize(
+    ("members", "told"),
+    [
+        (("laser_cone", "focal_scale", "pupil_shift"), (None, 0, None)),
+        (("laser_cone",), ("laser", 0, (1.92, 0.12))),
+    ],
+)
+def test_of_a_class_only_what_all_members_share_is_told(monkeypatch, members, told):
+    """A focal length off by .3 % was a class of laser and lens, "fixed to the laser", as r^1.92 ± .12."""
+    monkeypatch.setattr(answer, "members", lambda examined: members)
+    where = Location("ring", "laser", "static", 0, (1.92, 0.12))
+    found = answer.location(cast(Any, SimpleNamespace(location=where)), Verdict.CLASS)
+    assert (found.fixed_to, found.harmonic, found.radial_exponent) == told

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -222,10 +223,30 @@ def places(examined: Examined, verdict: Verdict) -> tuple[str, ...]:
 
 
 def location(examined: Examined, verdict: Verdict) -> Location | None:
-    """Return where rings and fiducials show the mismatch, and what it is fixed to where that can be told."""
-    if examined.location is None or len(places(examined, verdict)) < 2:
-        return examined.location
-    return replace(examined.location, fixed_to=None, harmonic=None, radial_exponent=None)
+    """Return where rings and fiducials show the mismatch, and what it is fixed to where that can be told.
+
+    Place, order and growth are measured under one law: of a class, those are told that all members share.
+    """
+    known = examined.location
+    if known is None or verdict is Verdict.CLASS:
+        return _shared(known, members(examined)) if known is not None else None
+    if len(places(examined, verdict)) < 2:
+        return known
+    return replace(known, fixed_to=None, harmonic=None, radial_exponent=None)
+
+
+def _shared(measured: Location, names: Sequence[str]) -> Location:
+    """Return a location without what effects differ in."""
+    each = [effect(name) for name in names]
+    places, orders, growths = (
+        {getattr(e, what) for e in each} for what in ("fixed_to", "harmonic", "radial_exponent")
+    )
+    return replace(
+        measured,
+        fixed_to=measured.fixed_to if len(places) < 2 else None,
+        harmonic=measured.harmonic if len(orders) < 2 else None,
+        radial_exponent=measured.radial_exponent if len(growths) < 2 else None,
+    )
 
 
 def explains(examined: Examined) -> bool:
