@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
+
 import numpy as np
 from scipy.stats import t
 
-from pipeline.arrays import Float
+from pipeline.arrays import Bool, Float
 from pipeline.artefacts.twin import Mismatch, NamedFigure
 from stages.twin.cells import SECTORS, Cells, sector_azimuth_rad, sigmas
 from stages.twin.locate import FALSE_ALARM
@@ -18,6 +20,8 @@ _LEAST = 0.01
 _ORDERS = 2
 """Harmonics around the line that a displaced or tilted probe, or an oval bore, makes; taken out of each
 frame."""
+_BESIDE = SECTORS // 8
+"""Sectors about the most varied one that bands must do without; a quarter of the picture, chosen."""
 _MIRRORED = (np.arange(SECTORS)[:, None] - 1 - np.arange(SECTORS)) % SECTORS
 """(A, S) the sector at the same place of the other half of the picture, for halves along each axis."""
 _OPPOSITE = _MIRRORED[SECTORS // 2]
@@ -49,29 +53,75 @@ def banding_of_line(cells: Cells, ring: Ring) -> tuple[Mismatch, ...]:
 
     One side of each frame predicts the other one. Wall is not alike on both sides, and no other effect of the
     library makes it so beyond the second harmonic. What lasts for several frames may be alike by chance: no
-    two halves of the picture along another axis may be more alike.
+    two halves of the picture along another axis may be more alike. Bands cross the whole picture: they must
+    also show away from where the line varies most, as at a hole of the wall below or above.
     """
-    rest = _beside_harmonics(cells)
-    both = np.isfinite(rest * rest[:, _OPPOSITE])
-    both[both.sum(1) < SECTORS / 2] = False
-    frames = both.any(1)
-    if frames.sum() < FEWEST_FRAMES:
+    bands, aside = _bands(cells), _bands(_away_from_worst(cells))
+    if bands is None or aside is None or not _most_alike(bands.rest):
         return ()
-    one, other = (np.where(both, a, 0.0) for a in (rest, rest[:, _OPPOSITE]))
-    alike = (one * other).sum(1)[frames] / np.maximum((one**2).sum(1)[frames], 1e-12)
-    chance = significance_over_frames(alike)[1]
-    size = _rms((one * other).sum(1)[frames] / both.sum(1)[frames])
-    if chance > FALSE_ALARM or size.value < _LEAST or not _most_alike(rest):
-        return ()
+    size, alike = bands.size, bands.alike
     said = (
         f"Along rows of single frames, the line is brighter or darker by at least {100 * size.value:.1f} % "
         "(1 σ), alike on both sides of the picture: banding, as by a laser whose power changes within the "
         "exposure of a rolling shutter."
     )
     return (Mismatch(
-        "banding", "line", "rows", (), (size,), chance, *_chi2(cells, rest, alike.mean() * other), said,
-        ring.whole(int(cells.frame[frames.argmax()])),
+        "banding", "line", "rows", (), (size,), bands.chance,
+        *_chi2(cells, bands.rest, alike.mean() * bands.other), said,
+        ring.whole(int(cells.frame[bands.frames.argmax()])),
     ),)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class _Bands:
+    """Brightness that both sides of a row share.
+
+    Attributes
+    ----------
+    rest, other : (F, S)
+        Brightness beside the low harmonics, and that of the sector in the same row; the latter is 0 where
+        only one side is known.
+    frames : (F,) bool
+        Frames in which enough is known of both sides.
+    alike : (N,)
+        Share of one side's brightness that the other one predicts, in those frames.
+    size : NamedFigure
+    chance : float
+    """
+
+    rest: Float
+    other: Float
+    frames: Bool
+    alike: Float
+    size: NamedFigure
+    chance: float
+
+
+def _bands(cells: Cells) -> _Bands | None:
+    """Return what both sides of rows have in common; None where it may be chance or is too small."""
+    rest = _beside_harmonics(cells)
+    both = np.isfinite(rest * rest[:, _OPPOSITE])
+    both[both.sum(1) < SECTORS / 2] = False
+    frames = np.asarray(both.any(1))
+    if frames.sum() < FEWEST_FRAMES:
+        return None
+    one, other = (np.where(both, a, 0.0) for a in (rest, rest[:, _OPPOSITE]))
+    alike = (one * other).sum(1)[frames] / np.maximum((one**2).sum(1)[frames], 1e-12)
+    chance = significance_over_frames(alike)[1]
+    size = _rms((one * other).sum(1)[frames] / both.sum(1)[frames])
+    if chance > FALSE_ALARM or size.value < _LEAST:
+        return None
+    return _Bands(rest, other, frames, alike, size, chance)
+
+
+def _away_from_worst(cells: Cells) -> Cells:
+    """Return sectors beyond an eighth of the picture from where brightness varies most, on either side."""
+    worst = int(np.argmax(np.nansum(_beside_harmonics(cells) ** 2, 0)))
+    sector, keep = np.arange(SECTORS), np.ones(SECTORS, bool)
+    for at in (worst, _OPPOSITE[worst]):
+        away = np.abs(sector - at)
+        keep &= np.minimum(away, SECTORS - away) > _BESIDE
+    return replace(cells, pixels=cells.pixels * keep)
 
 
 def _most_alike(rest: Float) -> bool:

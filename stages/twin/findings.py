@@ -15,6 +15,7 @@ from stages.twin.colours import beside_colour, few_lit
 from stages.twin.dark_side import beside_dark_side
 from stages.twin.fine_noise import beside_coding
 from stages.twin.fixed_line import beside_absent_light, on_line
+from stages.twin.flicker import beside_spots
 from stages.twin.glints import window_and_glints
 from stages.twin.name import clipped
 from stages.twin.on_wall import ring_step_mm, unnamed
@@ -66,6 +67,7 @@ class Compared:
         over_time, slow = changes_over_time(self.sums, self.samples, self.scene, self.state, colour)
         whole, not_whole = self._of_whole_pictures(over_time)
         on_window, glints, of_photo, not_there = self._on_window(whole, over_time)
+        over_time = beside_spots(over_time, glints)
         clear = (*on_window, *glints, *of_photo)
         placed = (*on_window, *self._on_wall(clear), *glints)
         placed, beside = beside_sectors(placed, (*over_time, *slow), self.scene.ring, self.samples)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -11,6 +12,7 @@ from pipeline.adjustment.robust import robust_spread
 from pipeline.arrays import Float, Int
 from pipeline.artefacts.twin import Mismatch, NamedFigure
 from stages.twin.cells import SECTORS, Cells, Law, best_column, drift, fitted
+from stages.twin.glints import MOST_OF_VIEW
 from stages.twin.laws import ends_apart, ramps_of
 from stages.twin.locate import FALSE_ALARM
 from stages.twin.scene import Ring
@@ -64,6 +66,19 @@ def flicker(cells: Cells, base: Float, light: str, ring: Ring) -> list[Mismatch]
         f"Frames lit by the {light} vary in brightness by {100 * spread:.1f} % (1 σ) from frame to frame.",
         ring.whole(cells.frame[int(np.argmax(np.abs(parts.mean(0))))]),
     )]  # fmt: skip
+
+
+def beside_spots(found: Sequence[Mismatch], spots: Sequence[Mismatch]) -> tuple[Mismatch, ...]:
+    """Return what is found, with LEDs' flicker unnamed if spots that come and go may make as much of it."""
+    come_and_go = any(m.fixed_to == "time" and m.channel == "intensity" and not m.name for m in spots)
+    return tuple(_or_spots(m) if come_and_go and m.name == "flicker" else m for m in found)
+
+
+def _or_spots(flickers: Mismatch) -> Mismatch:
+    if flickers.parameters[0].value > MOST_OF_VIEW:
+        return flickers
+    said = f"{flickers.statement} Spots that come and go in these frames change their brightness, too."
+    return replace(flickers, name="", statement=said)
 
 
 def slowly(flickers: Mismatch, cells: Cells, base: Float, light: str, ring: Ring) -> Mismatch:

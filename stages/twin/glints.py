@@ -30,7 +30,7 @@ makes a tenth of that."""
 _PIXELS = (20, 12_000)
 """Fewest and most pixels of a spot: noise makes no smaller one as bright, and anything larger is not a
 spot."""
-_MOST_OF_VIEW = 0.05
+MOST_OF_VIEW = 0.05
 """Share of too bright pixels in a frame above which they are not spots: then light or response differ."""
 _REACH_PX, _MORE, _FEWEST, _SURE = 16.0, 2, 3, 3.0
 """Spots closer than this, px, are at one place: a glint wanders by some pixels as the probe swings. By how
@@ -103,7 +103,7 @@ class SpotsOfFrames:
         shape, middle = self.excess[-1].shape, (slice(BLOCK_PX // 2, None, BLOCK_PX),) * 2
         wall = [a[middle][: shape[0], : shape[1]] for a in (twin.distance_mm, twin.azimuth_rad)]
         self.wall.append(np.stack(self._on_wall(*wall)))
-        if beyond.any() and beyond.sum() < _MOST_OF_VIEW * known.sum():
+        if beyond.any() and beyond.sum() < MOST_OF_VIEW * known.sum():
             self.spots += self._spots(frame, beyond, more, known, twin)
 
     def _on_wall(self, distance_mm: Float32, azimuth_rad: Float32) -> tuple[Float32, Float32]:

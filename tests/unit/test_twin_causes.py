@@ -4,15 +4,19 @@ They are named where they act, and nothing else is.
 """
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter1d
 
+from pipeline.artefacts.twin import Mismatch, NamedFigure
 from pipeline.instrument.probe import Lighting
 from stages.twin.causes import _may_be, causes
 from stages.twin.cells import SECTORS, Cells, Fitted, Law
+from stages.twin.flicker import beside_spots
 from stages.twin.laws import led_share, ramps_of
+from stages.twin.over_time import beside_reducer
 from tests.unit.frame_cells import AZIMUTH_DEG, FRAMES, NUMBER, RING, cells_with, found_in_cells, step_from
 
 
@@ -206,3 +210,34 @@ def test_bands_of_laser_frames_are_named_and_at_most_as_strong_as_drawn():
     ] == []
     turned = np.roll(_bands(0.11), SECTORS // 4, 1)  # along columns
     assert not any(m.fixed_to == "rows" for m in found_in_cells(line=turned))
+
+
+@pytest.mark.parametrize("at_deg", [90, -90])
+def test_a_hole_below_or_above_is_no_banding(at_deg):
+    """It is alike on both sides of the picture: 37 % of banding was told of a hole in the wall."""
+    away = np.abs((AZIMUTH_DEG - at_deg + 180) % 360 - 180)
+    hole = -2.0 * (away < 28) * (np.arange(FRAMES) % 3 == 0)[:, None]
+    assert not [m for m in found_in_cells(line=hole) if m.fixed_to == "rows"]
+
+
+def _told(name, **place):
+    at = tuple(NamedFigure(n, v, 1.0) for n, v in place.items())
+    size = (NamedFigure("exposure", 0.01, 0.001, "relative"),)
+    return Mismatch(name, "intensity", "time", at, size, 0.0, 2.0, 1.0, "Light changes.")
+
+
+@pytest.mark.parametrize(("narrow_mm", "kept"), [(50.0, 2), (38.0, 1)])
+def test_light_that_changes_with_the_bore_is_withdrawn(narrow_mm, kept):
+    """In a reducer the laser flickered by 33 %: line and photo fall differently with the distance."""
+    found = _told("laser_flicker", frame_from=30.0), _told("led_dead", azimuth_deg=40.0)
+    bore = np.repeat(np.linspace(50, narrow_mm, 90)[:, None], 12, 1)
+    told, withdrawn = beside_reducer(found, SimpleNamespace(radius_mm=bore))
+    assert (len(told), len(withdrawn)) == (kept, 2 - kept)
+    assert all("bore varies" in m.statement for m in withdrawn)
+
+
+@pytest.mark.parametrize(("fixed_to", "name"), [("time", ""), ("image", "flicker")])
+def test_flicker_beside_spots_that_come_and_go_has_no_name(fixed_to, name):
+    """Particles adrift were flicker of 1.0 %."""
+    spots = replace(_told(""), fixed_to=fixed_to)
+    assert [m.name for m in beside_spots((_told("flicker"),), (spots,))] == [name]
