@@ -35,6 +35,10 @@ class RingValidity(IntEnum):
     FRAME_REJECTED = 9
 
 
+NOT_THE_LINE = (RingValidity.GLINT, RingValidity.GHOST, RingValidity.OUTLIER, RingValidity.WIDTH)
+"""Reasons that say that light was found which is not the line: a glint, its rim, a second line, a splash."""
+
+
 @dataclass(frozen=True)
 class RingSamples:
     """Laser line positions in every laser frame, in polar coordinates about ``centre_px``.

@@ -1,8 +1,9 @@
 """Leave out rings in which a finding may be what a rejected glint has left over.
 
-A glint on the line is rejected where its samples leave the ring, but not where it runs into the line: samples
-at its rim stay, and depart from the wall. Where many glints lie on the line, two rings show such rims in the
-same place by chance.
+A glint on the line is rejected where its samples leave the ring, as a glint, as a second line, as outliers or
+by their width, but not where it runs into the line: samples at its rim stay, and depart from the wall. Where
+many glints lie on the line, two rings show such rims in the same place by chance, and the parts of two glints
+at one place confirm each other.
 """
 
 from __future__ import annotations
@@ -10,43 +11,46 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.arrays import Float, Int
-from pipeline.artefacts.measured import RingSamples, RingValidity
+from pipeline.artefacts.measured import NOT_THE_LINE, RingSamples, RingValidity
 from stages.defects.relief import Relief
 from stages.defects.segment import Region
 from stages.defects.surface import Surface, cells_of
 
 # A fifth of a ring's samples suffices for it to show a finding (`stages.defects.corroborate`): where a fifth
-# was rejected as a glint, the rim of the glint may be all that the others show.
-_GLINT_SHARE = 0.2
+# was rejected as light that is not the line, its rim may be all that the others show.
+_OTHER_SHARE = 0.2
 # A few of a ring's samples have no point on the wall. As points are counted, places are then known to 2°.
 # With more than one in 200, a part of the ring lies beyond the surface's rows.
 _LOST_SHARE = 0.005
 
 
 def without_glints(frames: Int, region: Region, surface: Surface, rings: RingSamples | None) -> Int:
-    """Return those of ``frames`` (n,) whose rings had no or few samples rejected as a glint in a region.
+    """Return those of ``frames`` (n,) whose rings had no or few samples of other light in a region.
 
     All are returned without ``rings``; a ring that extends beyond the surface's rows is always returned.
     """
     if rings is None:
         return frames
-    clear = [_glint_share(int(frame), region, surface, rings) < _GLINT_SHARE for frame in frames]
+    clear = [_other_share(int(frame), region, surface, rings) < _OTHER_SHARE for frame in frames]
     return np.asarray(frames[np.array(clear, bool)])
 
 
-def _glint_share(frame: int, region: Region, surface: Surface, rings: RingSamples) -> float:
-    """Return how many of a ring's samples in a region are rejected glints, over these and the valid ones."""
+def _other_share(frame: int, region: Region, surface: Surface, rings: RingSamples) -> float:
+    """Return how many of a ring's samples in a region are not of the line, over these and the valid ones."""
     points, its = surface.near, surface.near.frame == frame
     validity = rings.validity[np.searchsorted(rings.frame, frame)]
-    used, glints = (np.flatnonzero(validity == v) for v in (RingValidity.VALID, RingValidity.GLINT))
-    if not len(glints) or its.sum() < (1 - _LOST_SHARE) * len(used):
+    used, other = (
+        np.flatnonzero(validity == RingValidity.VALID),
+        np.flatnonzero(np.isin(validity, NOT_THE_LINE)),
+    )
+    if not len(other) or its.sum() < (1 - _LOST_SHARE) * len(used):
         return 0.0
     # points are in the order of their ring's samples
     used = used[np.linspace(0, len(used) - 1, int(its.sum())).round().astype(int)]
     turn = points.azimuth_rad[its].astype(float) - rings.azimuth_rad[used]
     beyond = np.angle(np.exp(1j * (turn - turn[0])))
-    there = turn[0] + np.interp(glints, used, beyond, period=len(validity))
-    rejected = _in_columns(rings.azimuth_rad[glints] + there, region, surface.relief)
+    there = turn[0] + np.interp(other, used, beyond, period=len(validity))
+    rejected = _in_columns(rings.azimuth_rad[other] + there, region, surface.relief)
     kept = int(cells_of(points, surface.relief, region)[2][its].sum())
     return rejected / max(rejected + kept, 1)
 

@@ -7,11 +7,10 @@ import numpy as np
 from pipeline.adjustment.robust import basis_of, ring_harmonics, row_median
 from pipeline.arrays import Bool, Byte, Float, Int, runs_of
 from pipeline.artefacts.findings import clock_of_azimuth
-from pipeline.artefacts.measured import RingSamples, RingValidity
+from pipeline.artefacts.measured import NOT_THE_LINE, RingSamples, RingValidity
 from pipeline.machine.stage import Context
 from pipeline.pages import notation
 
-_NOT_THE_LINE = (RingValidity.GLINT, RingValidity.GHOST, RingValidity.OUTLIER, RingValidity.WIDTH)
 # Share of such samples. Good recordings (the three open ones) have 0.06 % at most, seven glints a frame make
 # 2.2 %: the geometric middle.
 _MOST_NOT_THE_LINE = 0.004
@@ -93,7 +92,7 @@ def _warn_of_coarse_pictures(width_px: float, lost: float, context: Context) -> 
 def _warn_of_shares(validity: Byte, context: Context) -> None:
     """Warn of the shares of samples (F, A) that show no line, or other light."""
     unseen = np.isin(validity, (RingValidity.NO_LINE, RingValidity.LOW_CONTRAST, RingValidity.SATURATED))
-    other = np.isin(validity, _NOT_THE_LINE)
+    other = np.isin(validity, NOT_THE_LINE)
     if validity.size and unseen.mean() > _MOST_UNSEEN:
         context.warn(
             f"{100 * unseen.mean():.1f} % of the ring samples show no measurable line: it is too "
