@@ -18,14 +18,7 @@ from stages.diagnose.gauge.doubts import sure
 from stages.diagnose.gauge.examine import Examined
 from stages.diagnose.inference import SURE
 from stages.diagnose.record_next import AGAIN, record_next
-from stages.diagnose.result import (
-    Diagnosis,
-    EffectFound,
-    Location,
-    Remainder,
-    Verdict,
-    classes_of,
-)
+from stages.diagnose.result import Diagnosis, EffectFound, Location, Remainder, Verdict, classes_of
 from stages.diagnose.travel.events import SLIP
 
 _SAME_FREQUENCY_HZ = 0.15

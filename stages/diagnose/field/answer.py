@@ -19,15 +19,7 @@ from stages.diagnose.field.unexplained import why_unexplained
 from stages.diagnose.gauge.scan import Scored
 from stages.diagnose.inference import DETECTED, INSTRUMENT, Around, Evidence, Stated, places_of, stated_belief
 from stages.diagnose.record_next import AGAIN, record_next
-from stages.diagnose.result import (
-    Confirmation,
-    Diagnosis,
-    EffectFound,
-    Location,
-    Value,
-    Verdict,
-    classes_of,
-)
+from stages.diagnose.result import Confirmation, Diagnosis, EffectFound, Location, Value, Verdict, classes_of
 
 # Effects that explain almost as much as the best one are in its class: laws err by a few per cent, and the
 # recording's own unknowns absorb nearly the same part of each. Debt: data/debts.md.

@@ -15,6 +15,8 @@ from pipeline.instrument.probe import Probe
 from stages.diagnose.profile.measure import LineProfiles
 
 BLOCK_FRAMES, LEAST_FRAMES = 12, 6
+# 30° of the ring: several of the codec's blocks of 16 px, within which its errors are correlated.
+_SECTORS_A_PART = 6
 CORE_REACH = 3.5
 _LEAST_HEIGHT = 600.0
 _SECOND_LINE = 3.0
@@ -156,6 +158,11 @@ class Cells:
         own = {f.name: getattr(self, f.name)[k] for f in fields(self) if f.name not in shared}
         own["block"] = own["block"] - first
         return replace(self, **own, frames=self.frames[first:end])
+
+    @property
+    def part(self) -> Int:
+        """(N,) part of the ring that each cell is in; errors of different parts are independent."""
+        return self.sector // _SECTORS_A_PART
 
     def block_of_frames(self, count: int) -> Int:
         """Return the block (F,) of each of ``count`` frames; −1 for frames in no block."""

@@ -26,8 +26,6 @@ _LARGEST_MM, _COPY_STEP_MM = 5.0, 0.04
 CLEAR_WIDTHS = 2.5
 # Seen through a filter as wide as the line, a copy of it is 10 % high this many widths from its middle.
 _OWN_WIDTHS = 3.0
-# 30° of the ring: several of the codec's blocks of 16 px, within which its errors are correlated.
-_SECTORS_A_GROUP = 6
 # A part of the ring is used to compare the line's sides if it has this share of the best part's information.
 _LEAST_SHARE = 0.1
 _SHRINK, _HALVINGS = 0.5, 9
@@ -105,7 +103,7 @@ def _best(
     found: Responses, design: Float, grid: Float, steps: Float, cells: Cells, floor: float
 ) -> SecondLine:
     """Search the grid of parameters, then refine with decreasing steps; σ by leaving out blocks."""
-    block, sector = cells.block[cells.whole], cells.sector[cells.whole]
+    block, part = cells.block[cells.whole], cells.part[cells.whole]
     width_px = float(np.median(cells.width_px[cells.whole])) if len(block) else 0.0
     clear = CLEAR_WIDTHS * width_px
 
@@ -123,8 +121,8 @@ def _best(
         around = _around(best, steps)
         best = around[int(np.argmax(rated(around)))]
         steps = steps * _SHRINK
-    line = _sized(found, design, best, block, sector, floor)
-    left = _skirt(found, line, width_px, sector)
+    line = _sized(found, design, best, block, part, floor)
+    left = _skirt(found, line, width_px, part)
     return replace(line, floor=float(np.hypot(floor, left)), tries=_TRIES_A_STEP ** len(steps) * len(grid))
 
 
@@ -168,15 +166,14 @@ def _rate(score, information, design, parameters, block, clear):  # type: ignore
     return out
 
 
-def _sized(found: Responses, design: Float, best: Float, block: Int, sector: Int, floor: float) -> SecondLine:
+def _sized(found: Responses, design: Float, best: Float, block: Int, part: Int, floor: float) -> SecondLine:
     """Return height, σ and the parameters' covariance at the best place.
 
     A second line has the same height in all frames and all round: differences between parts give the σ.
     """
     at = design @ best
     score, information = _at(found.score, found, at), _at(found.information, found, at)
-    of_blocks = _jackknife(score, information, [block == b for b in np.unique(block)])
-    of_parts = _jackknife(score, information, _parts(sector))
+    of_blocks, of_parts = (_jackknife(score, information, group) for group in (block, part))
     groups, height = min(of_blocks[1], of_parts[1]), float(score.sum() / information.sum())
     return SecondLine(
         best, height, float(np.hypot(of_blocks[0], of_parts[0])), floor, float(information.sum()), groups,
@@ -184,18 +181,18 @@ def _sized(found: Responses, design: Float, best: Float, block: Int, sector: Int
     )  # fmt: skip
 
 
-def _jackknife(score: Float, information: Float, groups: list[Bool]) -> tuple[float, int]:
+def _jackknife(score: Float, information: Float, group: Int) -> tuple[float, int]:
     """Return the σ of Σ score / Σ information by leaving out groups, and the number of groups."""
-    parts = np.array([(score[g].sum(), information[g].sum()) for g in groups])
+    parts = np.array([(score[g].sum(), information[g].sum()) for g in _each(group)])
     total = parts.sum(0)
     left = total - parts
     others = left[:, 0] / np.maximum(left[:, 1], 1e-12)
-    count = len(groups)
+    count = len(parts)
     sigma = np.sqrt((count - 1) / count * np.sum((others - total[0] / total[1]) ** 2))
     return float(sigma), int(np.sum(parts[:, 1] > _LEAST_SHARE * parts[:, 1].max()))
 
 
-def _skirt(found: Responses, line: SecondLine, width_px: float, sector: Int) -> float:
+def _skirt(found: Responses, line: SecondLine, width_px: float, part: Int) -> float:
     """Return the relative height, as 1 σ, of a second line that the line's own skirt may imitate.
 
     Compression and the lens leave a skirt around a bright line, higher on one side than on the other by up to
@@ -213,8 +210,8 @@ def _skirt(found: Responses, line: SecondLine, width_px: float, sector: Int) -> 
     total = np.maximum(found.information.sum(0), 1e-12)
     height = (found.skirt - copy * found.information).sum(0) / total
     own = np.abs(off) < _OWN_WIDTHS * width_px
-    parts = np.array([np.where(own, 0.0, found.score)[g].sum(0) for g in _parts(sector)])
-    known = np.array([np.where(own, 0.0, found.information)[g].sum(0) for g in _parts(sector)])
+    beside = (np.where(own, 0.0, values) for values in (found.score, found.information))
+    parts, known = (np.array([values[g].sum(0) for g in _each(part)]) for values in beside)
     measured = known > _LEAST_SHARE * known.max()
     uneven = np.where(measured, parts / np.maximum(known, 1e-12), 0.0)
     square = height**2 + (uneven**2).sum(0) / np.maximum(measured.sum(0), 1)
@@ -223,10 +220,9 @@ def _skirt(found: Responses, line: SecondLine, width_px: float, sector: Int) -> 
     return float((weight * level).sum() / max(weight.sum(), 1e-12))
 
 
-def _parts(sector: Int) -> list[Bool]:
-    """Return, for each part of the ring, which cells (N,) are in it."""
-    part = sector // _SECTORS_A_GROUP
-    return [part == p for p in np.unique(part)]
+def _each(group: Int) -> list[Bool]:
+    """Return, for each group, which cells (N,) are in it."""
+    return [group == g for g in np.unique(group)]
 
 
 def _at(values: Float, found: Responses, distance_px: Float) -> Float:
@@ -248,7 +244,7 @@ def _place_covariance(found: Responses, design: Float, at: Float, height: float,
     up, here, down = gain(at + STEP_PX), gain(at), gain(at - STEP_PX)
     slope, curvature = (up - down) / (2 * STEP_PX), (up - 2 * here + down) / STEP_PX**2
     bread = -design.T @ (curvature[:, None] * design)
-    each = np.array([design[block == b].T @ slope[block == b] for b in np.unique(block)])
+    each = np.array([design[b].T @ slope[b] for b in _each(block)])
     spread = each - each.mean(0)
     inverse = np.linalg.pinv(bread)
     return np.asarray(inverse @ (spread.T @ spread) @ inverse)

@@ -20,8 +20,6 @@ from stages.diagnose.profile.cells import Cells, fit_gaussians
 
 # Each contains a third of the blocks: near, middle and far wall.
 _DISTANCES = 3
-# 30° of the ring: several of the codec's blocks of 16 px, within which its errors are correlated.
-SECTORS_A_PART = 6
 _REACH_PX, _STEP_PX = 24.0, 0.5
 # What codec and lens leave in the mean profile of a line without any effect, relative to its height; the
 # skirt is fitted and not included. Debt: data/debts.md.
@@ -104,7 +102,7 @@ class Fitted:
 def line_spread(cells: Cells) -> LineSpread:
     """Return the free estimate from the cells whose middle is unclipped."""
     offset = np.arange(-_REACH_PX, _REACH_PX + _STEP_PX / 2, _STEP_PX)
-    rows = [r for r in _by_distance(cells) if len(np.unique(cells.sector[r] // SECTORS_A_PART)) > 2]
+    rows = [r for r in _by_distance(cells) if len(np.unique(cells.part[r])) > 2]
     each = [_mean_profile(cells, r, offset) for r in rows]
     return LineSpread(
         offset, np.array([np.median(cells.px_per_mm[r]) for r in rows]),
@@ -132,7 +130,7 @@ def _mean_profile(cells: Cells, rows: Bool, offset: Float) -> tuple[Float, Float
     """Return the mean profile (B,) about the line's middle, and its 1 σ from parts of the ring."""
     place = cells.offset_px - cells.centre_px[rows, None]
     value = np.array([np.interp(offset, p, v) for p, v in zip(place, cells.profile[rows], strict=True)])
-    part = cells.sector[rows] // SECTORS_A_PART
+    part = cells.part[rows]
     means = np.array([value[part == p].mean(0) for p in np.unique(part)])
     spread = means.std(0, ddof=1) / np.sqrt(len(means))
     return means.mean(0), np.hypot(spread, SHAPE_FLOOR)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numba
 import numpy as np
@@ -173,22 +174,13 @@ def measure_profiles(recording: Recording, rings: RingSamples) -> LineProfiles:
     beside, tiles = np.full(count, np.nan), []
     gain = np.zeros((2, 2, recording.source.image_size[0] * recording.source.image_size[1]))
     trusted = _TRUSTED * _clip_level(recording, rings, rows, sectors)
-    step = rings.azimuth_rad[1] - rings.azimuth_rad[0]
     for k, (_, image) in enumerate(recording.read(rings.frame[rows], "grey")):
-        if image is None:
-            continue
-        tiles.append(tile_means(image))
-        line, width = _line(rings, rows[k])
-        slope = (np.roll(line, -_SLOPE_SECTORS) - np.roll(line, _SLOPE_SECTORS)) / (2 * _SLOPE_SECTORS * step)
-        beside[k] = mean_beside(
-            image.ravel(), sectors.start, sectors.pixel, sectors.radius_px, line, _BESIDE_PX, REACH_PX
-        )
-        stack_frame(
-            image.ravel(), sectors.start, sectors.pixel, sectors.radius_px, sectors.offset_rad, line, slope,
-            width, rings.valid[rows[k]], beside[k], trusted, FIT_WIDTHS, CORE_WIDTHS, REACH_PX, STEP_PX,
-            light[k], height[k], share[k], gain[k // _TURNS % 2],
-        )  # fmt: skip
+        if image is not None:
+            tiles.append(tile_means(image))
+            sums = light[k], height[k], share[k], gain[k // _TURNS % 2]
+            beside[k] = _stacked(image, sectors, rings, rows[k], trusted, sums)
     dark, dark_sigma = _dark_level(tiles)
+    step = rings.azimuth_rad[1] - rings.azimuth_rad[0]
     offset: Float = -REACH_PX + STEP_PX * (np.arange(bins, dtype=np.float64) + 0.5)
     middle: Float = -np.pi - step / 2 + 2 * np.pi / SECTORS * (np.arange(SECTORS, dtype=np.float64) + 0.5)
     return LineProfiles(
@@ -196,6 +188,21 @@ def measure_profiles(recording: Recording, rings: RingSamples) -> LineProfiles:
         light, height, share[..., 0], share[..., 1] / np.maximum(share[..., 0], 1),
         beside - dark, dark_sigma, gain,
     )  # fmt: skip
+
+
+def _stacked(
+    image: Image, sectors: Sectors, rings: RingSamples, row: int, trusted: float, sums: tuple[Any, ...]
+) -> float:
+    """Add a frame to the ``sums`` of `stack_frame`; return the mean grey level beside its line."""
+    at, (line, width) = (sectors.start, sectors.pixel, sectors.radius_px), _line(rings, row)
+    apart = 2 * _SLOPE_SECTORS * (rings.azimuth_rad[1] - rings.azimuth_rad[0])
+    slope = (np.roll(line, -_SLOPE_SECTORS) - np.roll(line, _SLOPE_SECTORS)) / apart
+    beside = float(mean_beside(image.ravel(), *at, line, _BESIDE_PX, REACH_PX))
+    stack_frame(
+        image.ravel(), *at, sectors.offset_rad, line, slope, width, rings.valid[row], beside, trusted,
+        FIT_WIDTHS, CORE_WIDTHS, REACH_PX, STEP_PX, *sums,
+    )  # fmt: skip
+    return beside
 
 
 def _line(rings: RingSamples, row: int) -> tuple[Float, Float]:
