@@ -10,7 +10,7 @@ from threadpoolctl import threadpool_limits
 from pipeline.adjustment.bordered import BorderedSystem, Factor
 from pipeline.adjustment.normal_equations import marginalised
 from pipeline.adjustment.robust import cluster_variance
-from pipeline.adjustment.rows import Rows
+from pipeline.adjustment.rows import LandmarkRows, Rows
 from pipeline.arrays import Float, Int
 from stages.diagnose.field.system import FieldSystem
 from stages.diagnose.inference import Evidence
@@ -107,21 +107,11 @@ def _texture_scores(system: FieldSystem, found: Reduced) -> tuple[Float, Float, 
     poses = found.factor.frames_follow(found.follow)
     step = found.factor.frames_after(found.step)
     weight, relief_weight = rows.weight, rows.surface_weight
-    first = system.border - rows.by_instrument.shape[2]
-    landmarks = len(rows.start) - 1
-    scores, squares, misfit = np.zeros((landmarks, size)), np.zeros(size), 0.0
-    for k in range(landmarks):
-        own = slice(rows.start[k], rows.start[k + 1])
-        frame, w = rows.frame[own], weight[own][:, None]
-        change = np.einsum("mij,mjk->mik", rows.by_pose[own], poses[frame, :6])
-        change += rows.by_instrument[own] @ found.follow[first:]
-        residual = rows.residual[own] + np.einsum("mij,mj->mi", rows.by_pose[own], step[frame, :6])
-        residual += rows.by_instrument[own] @ found.step[first:]
-        relief_change = rows.surface_by_border[k] @ found.follow
-        relief = rows.surface_residual[k] + rows.surface_by_border[k] @ found.step
-        by_point = rows.by_point[own].reshape(-1, 3)
-        both = np.repeat(w, 2)
-        flat, wide = residual.reshape(-1), change.reshape(-1, size)
+    scores, squares, misfit = np.zeros((len(rows.start) - 1, size)), np.zeros(size), 0.0
+    for k in range(len(scores)):
+        flat, wide, relief, relief_change = _followed(rows, found, poses, step, k)
+        by_point = rows.by_point[rows.start[k] : rows.start[k + 1]].reshape(-1, 3)
+        both = np.repeat(weight[rows.start[k] : rows.start[k + 1]][:, None], 2)
         normal, ws = rows.surface_by_point[k], relief_weight[k]
         pull = by_point.T @ (both * flat) + ws * relief * normal
         pulls = by_point.T @ (both[:, None] * wide) + ws * np.outer(normal, relief_change)
@@ -132,3 +122,21 @@ def _texture_scores(system: FieldSystem, found: Reduced) -> tuple[Float, Float, 
         squares += both @ wide**2 + ws * relief_change**2
         misfit += float(both @ flat**2 + ws * relief**2)
     return scores, squares, misfit
+
+
+def _followed(
+    rows: LandmarkRows, found: Reduced, poses: Float, step: Float, k: int
+) -> tuple[Float, Float, Float, Float]:
+    """Return residuals (2 M,) of a landmark, their derivatives (2 M, K), its relief, and that one's (K,).
+
+    The derivatives are by the named columns; poses and own columns follow, the landmark does not.
+    """
+    own = slice(rows.start[k], rows.start[k + 1])
+    first, frame = len(found.step) - rows.by_instrument.shape[2], rows.frame[own]
+    change = np.einsum("mij,mjk->mik", rows.by_pose[own], poses[frame, :6])
+    change += rows.by_instrument[own] @ found.follow[first:]
+    residual = rows.residual[own] + np.einsum("mij,mj->mi", rows.by_pose[own], step[frame, :6])
+    residual += rows.by_instrument[own] @ found.step[first:]
+    relief = rows.surface_residual[k] + rows.surface_by_border[k] @ found.step
+    relief_change = rows.surface_by_border[k] @ found.follow
+    return residual.reshape(-1), change.reshape(-1, change.shape[-1]), relief, relief_change
