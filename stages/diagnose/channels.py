@@ -258,7 +258,7 @@ FREE_MOTION = Stage(
     "free_motion", "6", MotionParameters, adjust_freely, "an inspection's motion without encoder", "motion"
 )
 GAUGE_EVIDENCE = Stage(
-    "evidence", "67", DiagnosisParameters, examine_gauge, "what a gauge run shows of effects", "diagnosis"
+    "evidence", "68", DiagnosisParameters, examine_gauge, "what a gauge run shows of effects", "diagnosis"
 )
 FIELD_EVIDENCE = Stage(
     "evidence", "31", DiagnosisParameters, examine_field, "what an inspection shows of effects", "diagnosis"

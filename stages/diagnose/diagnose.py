@@ -96,7 +96,7 @@ def diagnose(
     context.report("verdict", str(found.verdict))
     found = replace(found, shortcomings=(*noticed.sentences, *found.shortcomings))
     image = image_of(seen, field, gauge) if found.ring_picture is not None else None
-    of_rings = of_field.field if of_field is not None else None
+    of_rings = of_field.field.with_encoder(share / (1 - share)) if of_field and of_field.field else None
     asked = correction is not None and correction.found
     decision = decided(found, of_rings, correction, probe) if correction and asked else Decision(True)
     corrected_probe = correction.probe if correction is not None and decision.written else probe
@@ -150,7 +150,7 @@ def _without_scale(seen: Seen, beyond_probe: str) -> Seen:
 
 
 DIAGNOSIS = Stage(
-    "diagnosis", "61", DiagnosisParameters, diagnose,
+    "diagnosis", "62", DiagnosisParameters, diagnose,
     "what physics was left out, where it shows, and what confirms it",
 )  # fmt: skip
 _OF_FIELD = (PREMISES, RINGS, TRIANGULATE, LINE_PROFILE, FREE_MOTION, FIELD_EVIDENCE)

@@ -3,6 +3,8 @@
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -77,6 +79,15 @@ def test_a_tilt_is_named_with_its_size():
     assert found.best is not None
     assert describes_effects(run, formula_fit, found.best.fit)
     assert not describes_effects(run, formula_fit, other)
+    # Beside it, one that grows like a focal length describes that: a formula of both is no rival of a tilt.
+    (outward,) = [term for term in GENERIC if term.name == "generic_outward_0_1"]
+    each = [Term(p, STEADY, np.full(len(p.amplitudes), 0.1)) for p in (pattern, outward)]
+    both = replace(formula_fit, terms=tuple(each))
+    focal, lens = (
+        cast(Any, [SimpleNamespace(model=LIBRARY[n], shape=())]) for n in ("focal_scale", "radial_distortion")
+    )
+    assert describes_effects(run, both, found.best.fit, focal)
+    assert not describes_effects(run, both, found.best.fit, lens)
 
 
 class ShorterExposure(MotionBlur):

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 from scipy import stats
 
-from pipeline.arrays import Int
+from pipeline.arrays import Float, Int
 from stages.diagnose.effects.base import EffectModel, Shape
 from stages.diagnose.effects.nameless import Nameless
 from stages.diagnose.effects.vocabulary import SWINGS, VOCABULARY
@@ -80,18 +80,30 @@ def patterns_by_chance(nothing: Fit, stated: Stated, swung: Sequence[Scored]) ->
     return 2 * min(_by_chance(nothing.of_patterns, nothing.terms, stated), swinging)
 
 
-def describes_effects(run: GaugeRun, formula: Fit, named: Fit) -> bool:
+def describes_effects(run: GaugeRun, formula: Fit, named: Fit, scores: Sequence[Scored] = ()) -> bool:
     """Return whether a formula's pattern equals, within the laws' accuracy, one that named effects make.
 
-    Such a pattern describes those effects and is not a rival, even if it also fits some of the noise.
+    Such a pattern describes those effects and is not a rival, even if it also fits some of the noise. Nor is
+    a formula each of whose patterns equals one of these effects, or one with a score: under their names they
+    are another hypothesis.
     """
+    known = [(s.model, s.shape) for s in scores]
     terms = freed(run, named).terms
     patterns = [(t.model, t.shape) for t in formula.terms]
-    equations = asking(run, named.state, linearise(run, named.state, terms), patterns)
-    size = [len(t.amplitude) for t in terms], [len(t.amplitude) for t in formula.terms]
-    weighted = np.sqrt(equations.weight)[:, None] * equations.by_global[:, -sum(size[0]) - sum(size[1]) :]
-    pattern = weighted[:, sum(size[0]) :] @ np.concatenate([t.amplitude for t in formula.terms])
-    effects = weighted[:, : sum(size[0])]
+    equations = asking(run, named.state, linearise(run, named.state, terms), [*patterns, *known])
+    size = [len(t.amplitude) for t in (*terms, *formula.terms)] + [len(m.amplitudes) for m, _ in known]
+    weighted = np.sqrt(equations.weight)[:, None] * equations.by_global[:, -sum(size) :]
+    columns = np.split(weighted, np.cumsum(size)[:-1], axis=1)
+    effects, rest = columns[: len(terms)], columns[len(terms) :]
+    each = [c @ t.amplitude for c, t in zip(rest, formula.terms, strict=False)]
+    if effects and _is_made_by(np.sum(each, axis=0), np.concatenate(effects, axis=1)):
+        return True
+    single = (*effects, *rest[len(each) :])
+    return all(any(_is_made_by(pattern, effect) for effect in single) for pattern in each)
+
+
+def _is_made_by(pattern: Float, effects: Float) -> bool:
+    """Return whether columns (M, Q) of effects make a pattern (M,) within the laws' accuracy."""
     scale = np.maximum(np.linalg.norm(effects, axis=0), 1e-300)
     left = pattern - effects @ (np.linalg.lstsq(effects / scale, pattern, rcond=1e-10)[0] / scale)
     return bool(np.linalg.norm(left) < SAME * np.linalg.norm(pattern))

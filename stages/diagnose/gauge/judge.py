@@ -174,7 +174,7 @@ def judge(
     former: Judged | None = None
     patterned: Judged | None = None
     for rounds_left in reversed(range(_ROUNDS)):
-        ranked, allowed = _ranked(run, judged, formula)
+        ranked, allowed = _ranked(searched, judged, formula)
         best, is_new = ranked[0], ranked[0] is not former
         former = best
         if is_new:
@@ -209,7 +209,7 @@ def _of(judged: Sequence[Judged], formula: Fit) -> Judged:
     return next((j for j in judged if [t.model.name for t in j.fit.terms] == names), judged[0])
 
 
-def _ranked(run: GaugeRun, judged: Sequence[Judged], formula: Fit) -> tuple[tuple[Judged, ...], Bool]:
+def _ranked(searched: Search, judged: Sequence[Judged], formula: Fit) -> tuple[tuple[Judged, ...], Bool]:
     """Return the hypotheses, the likeliest first, and which (H,) are allowed at all.
 
     Those that predict held-out regimes worse than the stated instrument, or have impossible sizes, are not.
@@ -217,7 +217,7 @@ def _ranked(run: GaugeRun, judged: Sequence[Judged], formula: Fit) -> tuple[tupl
     nothing = next(j for j in judged if not j.fit.terms)
     allowed = np.array([j.heldout <= nothing.heldout and j.possible for j in judged])
     deviance = np.array([j.deviance + j.prior_deviance for j in judged])
-    allowed &= ~_redundant(run, judged, _of(judged, formula), deviance)
+    allowed &= ~_redundant(searched, judged, _of(judged, formula), deviance)
     order = np.lexsort((deviance, ~allowed))
     return tuple(judged[k] for k in order), np.asarray(allowed[order])
 
@@ -276,14 +276,13 @@ def _with_patterns(run: GaugeRun, best: Judged, left: float, stated: Stated) -> 
     return both if max(sizes[own:], default=0.0) >= LEAST_SHARE * max(sizes[:own]) else None
 
 
-def _redundant(run: GaugeRun, judged: Sequence[Judged], formula: Judged, total_deviance: Float) -> Bool:
-    """Return (H,) True for the formula, where the likeliest named effects make the same pattern."""
-    out = np.zeros(len(judged), bool)
-    named = [k for k, j in enumerate(judged) if j.named]
+def _redundant(searched: Search, judged: Sequence[Judged], formula: Judged, total_deviance: Float) -> Bool:
+    """Return (H,) True for the formula, where the likeliest named effects or other ones make its patterns."""
+    named, same = [k for k, j in enumerate(judged) if j.named], False
     if named and formula.fit.terms:
         best = judged[min(named, key=lambda k: float(total_deviance[k]))]
-        out[[j is formula for j in judged]] = describes_effects(run, formula.fit, best.fit)
-    return out
+        same = describes_effects(searched.run, formula.fit, best.fit, searched.scores)
+    return np.array([same and j is formula for j in judged])
 
 
 def _beforehand(run: GaugeRun, found: Fit, laws: int) -> float:
