@@ -123,6 +123,26 @@ def test_a_view_that_fits_no_camera_is_left_out_and_named():
     assert views[4].name not in report.calibration.names
 
 
+def test_wrong_corners_are_left_out_and_the_rest_of_their_picture_is_used():
+    """Of a 190° lens, a third of the pictures were refused for corners found beyond the image circle."""
+    views = _good_views(12)
+    for view, wrong in ((2, [0]), (4, [0, 1, 2]), (7, [5, 30])):
+        views[view].uv[wrong] += [25.0, -18.0]
+    report = _calibrate(views)
+    assert not report.rejected
+    assert len(report.calibration.uv) == sum(len(v.uv) for v in views) - 6
+    assert np.hypot(*report.calibration.residual_px.T).max() < 1.0
+
+
+def test_the_same_picture_twice_counts_once():
+    """Copies of all pictures made σ smaller, and held-out pictures were no longer held out."""
+    views = _good_views(12)
+    again = [replace(v, name=f"copy of {v.name}", uv=v.uv + 0.01) for v in views]
+    report = _calibrate([*views, *again])
+    assert report.calibration.names == tuple(v.name for v in views)
+    assert [name for name, _ in report.rejected] == [v.name for v in again]
+
+
 @pytest.mark.parametrize("name", ["kannala_brandt", "scaramuzza", "unified, xi above 1"])
 @pytest.mark.parametrize("theta", [0.0, 0.8, 1.5])
 def test_pose_of_a_board_beyond_a_pinhole_view(name, theta):

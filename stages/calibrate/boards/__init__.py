@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from pipeline.errors import UnusableError
 from pipeline.instrument.camera import Camera
-from pipeline.instrument.camera.calibration import BoardView, CalibrationReport, ModelScore
+from pipeline.instrument.camera.calibration import BoardView, CalibrationReport, CameraCalibration, ModelScore
 from pipeline.machine.stage import Context, Parameters, Stage
 from stages.calibrate.boards.bundle import Estimate
 from stages.calibrate.boards.compare import (
@@ -19,7 +19,9 @@ from stages.calibrate.boards.compare import (
     ranked,
     score,
     uncertainty_map,
+    without_outlier_corners,
     without_outlier_views,
+    without_repeated,
 )
 from stages.calibrate.boards.fit import (
     MODEL_NAMES,
@@ -34,6 +36,9 @@ from stages.calibrate.boards.pictures import FoundBoards, Pictures, Target, find
 from stages.calibrate.boards.start import start
 
 __all__ = ["BOARDS", "CAMERA", "CameraFile", "FoundBoards", "Pictures", "Target", "list_pictures"]
+
+
+_CONTRADICTS = "its corners contradict the camera that the other images agree on"
 
 
 @dataclass(frozen=True)
@@ -83,8 +88,12 @@ def calibrate_boards(
     refuse_too_few(views, parameters)
     first = start(views, image_size)
     refuse_one_plane(views, first, parameters)
-    trial = adjust(views, first, "kannala_brandt", with_shape(parameters, "bent"))
-    used, first, outliers = without_outlier_views(views, first, trial, parameters.outlier_view_factor)
+    views, first, repeated = without_repeated(views, first)
+    refuse_too_few(views, parameters)
+    sound, trial = _sound_corners(views, first, with_shape(parameters, "bent"))
+    lost = sum(len(v.uv) for v in views) - sum(len(v.uv) for v in sound)
+    context.report("not used: corners that contradict the others of their picture", lost, "corners")
+    used, first, outliers = without_outlier_views(sound, first, trial, parameters.outlier_view_factor)
     refuse_too_few(used, parameters)
     parameters, whole, parts = board_as_it_is(used, first, parameters)
     scores = _scores(whole, parts, models, parameters, context)
@@ -97,14 +106,29 @@ def calibrate_boards(
         chosen,
         scores,
         uncertainty_map(chosen),
-        tuple(
-            (name, "its corners contradict the camera that the other images agree on") for name in outliers
-        ),
+        (*repeated, *((name, _CONTRADICTS) for name in outliers)),
         other,
         None if other is None else displacement_map(chosen.camera, other),
         parameters.board_shape,
         whole.survey,
     )
+
+
+def _sound_corners(
+    views: Sequence[BoardView], first: Estimate, parameters: BoardCalibrationParameters
+) -> tuple[list[BoardView], CameraCalibration]:
+    """Return the views without wrong corners, and a camera fitted to them.
+
+    A board that reaches beyond the image circle, or is seen very obliquely, has single corners that are found
+    elsewhere. They are removed until none is left, since they pulled the pose away from the others.
+    """
+    sound, trial = list(views), adjust(views, first, "kannala_brandt", parameters)
+    while True:
+        kept = without_outlier_corners(sound, trial, parameters.outlier_corner_factor)
+        if sum(len(v.uv) for v in kept) == len(trial.uv):
+            return sound, trial
+        sound = kept
+        trial = adjust(sound, replace(first, T_cb=trial.T_cb), "kannala_brandt", parameters)
 
 
 def board_as_it_is(
@@ -156,5 +180,5 @@ def _no_model(scores: Sequence[ModelScore]) -> UnusableError:
 
 BOARDS = Stage("boards", "1", Parameters, find_boards, "pictures to the corners of the board in them")
 CAMERA = Stage(
-    "camera", "1", BoardCalibrationParameters, calibrate_camera, "corners of boards to a judged camera"
+    "camera", "2", BoardCalibrationParameters, calibrate_camera, "corners of boards to a judged camera"
 )

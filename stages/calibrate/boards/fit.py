@@ -50,6 +50,11 @@ class BoardCalibrationParameters(Parameters):
     least_tilt_deg: float = Field(
         default=8.0, ge=0, le=90, description="boards whose directions differ by less are refused, deg"
     )
+    outlier_corner_factor: float = Field(
+        default=5.0, gt=1, le=100,
+        description="corners whose residual is this many times the median of their picture are left out; "
+        "of Gaussian errors, 3 in 1e8 are",
+    )  # fmt: skip
     outlier_view_factor: float = Field(
         default=4.0, gt=1, le=100, description="views whose rms is this many times the median are left out"
     )
