@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.ndimage import map_coordinates
+from scipy.stats import norm, t
 
 from pipeline.adjustment.robust import left_out_sd, robust_spread
 from pipeline.arrays import Float, Float32, Int
@@ -26,6 +27,8 @@ _WEAK = 1e-3
 """Weight that draws unknowns without samples to zero."""
 _SAMPLES, _LEFT_OUT = 2500, 6
 """Samples of each frame. Parts of consecutive frames that are left out once for the pattern's σ."""
+_INTERVAL = 0.975
+"""Normal errors are within 1.96 σ in 95 %: that interval few parts must hold, too."""
 
 
 @dataclass(frozen=True)
@@ -150,7 +153,7 @@ class LampSamples:
             return replace(light, pattern_sd=np.full(2 * _HARMONICS, np.inf))
         parts = np.array_split(frames, min(_LEFT_OUT, len(frames)))
         without = [self._fitted(np.setdiff1d(frames, p), knots).pattern for p in parts]
-        return replace(light, pattern_sd=np.hypot(light.pattern_sd, left_out_sd(np.array(without))))
+        return replace(light, pattern_sd=np.hypot(light.pattern_sd, sd_from_parts(np.array(without))))
 
     def _fitted(self, frames: Int, knots: Float) -> LampLight:
         """Return the light that fits the samples of some frames, with σ as if all were independent."""
@@ -169,6 +172,15 @@ class LampSamples:
         return LampLight(
             float(np.exp(mean)), knots, solution[:a] - at_ring, sd[:a], solution[a:b], sd[a:b], gain
         )
+
+
+def sd_from_parts(without: Float) -> Float:
+    """Return the 1 σ (...) of a figure from its values (N, ...) without each of N parts of the frames.
+
+    It is widened so that 1.96 σ are 95 %: N parts show their own scatter with N − 1 degrees of freedom
+    (Student, 1908), by which the σ from two is too small by 6.5.
+    """
+    return float(t.ppf(_INTERVAL, len(without) - 1) / norm.ppf(_INTERVAL)) * left_out_sd(without)
 
 
 def _hats(value: Float, knots: Float) -> Float:

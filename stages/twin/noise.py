@@ -13,9 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import nnls
 
-from pipeline.adjustment.robust import left_out_sd
 from pipeline.arrays import Bool, Float, Float32, Image, Int
-from stages.twin.lamp_light import Figure
+from stages.twin.lamp_light import Figure, sd_from_parts
 
 _WINDOW_PX = 12
 """Side of a window, px: the variance of 144 pixels is known to some 12 %, also with correlated neighbours."""
@@ -176,7 +175,7 @@ def photon_transfer(windows: list[NoiseWindows], black: Figure, white: float) ->
     parted = [c.free for c in each if c is not None and c.part_the_noise]
     if len(parted) < len(each):
         return _camera_noise(value, np.full(4, np.inf), black, white)
-    sd = np.nan_to_num(left_out_sd(np.array(parted[1:])), nan=np.inf)
+    sd = np.nan_to_num(sd_from_parts(np.array(parted[1:])), nan=np.inf)
     apart = each[0].free - each[0].even if each[0] is not None else np.zeros(4)
     read, per_level, square, gamma = np.hypot(sd, apart / np.sqrt(3))
     uneven = _of_root(float(value[2]), float(square))

@@ -25,7 +25,10 @@ from stages.twin.switched import share_at
 
 RING = Ring((160.0, 120.0), 90.0, 50.0, 25.0)
 LIGHTING = Lighting(leds=8, radius_mm=11.0)
-SCENE = SimpleNamespace(probe=SimpleNamespace(lighting=LIGHTING), ring=RING)
+SCENE = SimpleNamespace(
+    probe=SimpleNamespace(lighting=LIGHTING), ring=RING,
+    surface=SimpleNamespace(radius_mm=np.full((9, 12), 50.0)),
+)  # fmt: skip
 
 
 def _lamp(change):
