@@ -1,4 +1,4 @@
-"""Estimates the pipe's width along its axis from the rings: steps of the bore, and reducers between bores."""
+"""Estimates the pipe's width along its axis from the rings: steps of the bore, reducers between bores, ribs."""
 
 from __future__ import annotations
 
@@ -150,14 +150,14 @@ def _between_rings(radius_mm: Float, at_mm: Float) -> Bore:
         return ONE_BORE
     n = min(rings_of_length(radius_mm, at_mm), len(radius_mm) // 2 - 1)
     place = _steps(radius_mm, n)
-    if not len(place):
-        return ONE_BORE
     usual = np.array([np.median(part) for part in np.split(radius_mm, place)])
     of_length = np.repeat(usual, np.diff(place, prepend=0, append=len(radius_mm)))
     smooth, middle = median_filter(radius_mm, 3), float(np.median(radius_mm))
     reducer = _in_reducers(smooth - of_length, place)
+    if _ribbed(smooth - of_length):
+        reducer[:] = True
     if not reducer.any():
-        return Bore(at_mm[place], usual - middle)
+        return Bore(at_mm[place], usual - middle) if len(place) else ONE_BORE
     wider = np.where(reducer, smooth, of_length) - middle
     return replace(ONE_BORE, rings_mm=at_mm, rings_wider_mm=wider)
 
@@ -197,6 +197,14 @@ def _stepped_at(radius_mm: Float, near: int, n: int) -> int:
     part = radius_mm[near - n : near + n + 1]
     before, behind = np.abs(part - np.median(part[:n])), np.abs(part - np.median(part[n + 1 :]))
     return near - n + int(np.argmin([before[:k].sum() + behind[k:].sum() for k in range(len(part))]))
+
+
+def _ribbed(off_mm: Float) -> bool:
+    """Whether most rings (F,) are off the bore of their length, ``off_mm``, so that no part is a cylinder.
+
+    Ribs of .5 mm, 11 mm apart: landmarks held to a cylinder turned the camera by 5°, and no defect was found.
+    """
+    return float(np.median(np.abs(off_mm))) > _STEP_MM / 2
 
 
 def _in_reducers(off_mm: Float, place: Int) -> np.ndarray:

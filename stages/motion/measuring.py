@@ -212,11 +212,11 @@ def _warn_of_reducer(bore: Bore, encoder: EncoderReadings | None, context: Conte
     by = "errors as in other reducers and the σ of the stated probe"
     by = by if encoder is None else "the difference of texture and encoder"
     context.warn(
-        f"the pipe's width changes by {2 * np.ptp(bore.rings_wider_mm):.1f} mm over a length (a reducer or "
-        "taper): texture is matched less well there, so that it is not used to check or refine the stated "
+        f"the pipe's width changes by {2 * np.ptp(bore.rings_wider_mm):.1f} mm along it (a reducer, a taper "
+        "or ribs): texture is matched less well there, so that it is not used to check or refine the stated "
         f"probe. The σ of distances includes {by}; radii may err by more than their σ, most of all on the "
         "slope. What to do: compare distance and diameters with known ones, or process the pipe before and "
-        "after the reducer as separate recordings"
+        "after a reducer as separate recordings"
     )
 
 

@@ -20,5 +20,5 @@ def _rings_of_run(
 
 
 RINGS = Stage(
-    "rings", "31", RingParameters, _rings_of_run, "laser frames to sub-pixel ring samples with their σ"
+    "rings", "32", RingParameters, _rings_of_run, "laser frames to sub-pixel ring samples with their σ"
 )

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 from pydantic import Field
 
-from pipeline.arrays import Byte, Float, Image, Int
+from pipeline.arrays import Bool, Byte, Float, Image, Int
 from pipeline.artefacts.measured import RingSamples, RingValidity
 from pipeline.errors import UnusableError
 from pipeline.geometry.image_places import ImagePlaces
@@ -28,7 +28,7 @@ from stages.rings.picture import Mixture
 from stages.rings.seam import seam_of, warn_of_seam
 from stages.rings.sectors import Sectors, sectors_of
 from stages.rings.trace import LOST, RingTrace, fitted_in, trace_ring
-from stages.rings.validity import contradicted
+from stages.rings.validity import contradicted, off_laser_alone
 from stages.rings.wander import Wander, wander_of
 
 Images = Iterator[tuple[int, Image | None]]
@@ -83,7 +83,7 @@ def extract_rings(
     samples = _measured(recording, probe, frames, parameters, context)
     if parameters.left_out:
         samples = set_right(samples, parameters.left_out, context)
-    _compare_rings(samples)
+    _compare_rings(samples, np.isin(frames, recording.frames.of(Illumination.LASER)))
     lattices = lattices_of(samples)
     samples = take_out(lattices, samples)
     warn_of_lattices(lattices, context)
@@ -252,10 +252,11 @@ def _put(samples: RingSamples, row: int, trace: RingTrace) -> None:
         getattr(samples, name)[row] = getattr(trace.fit, name)
 
 
-def _compare_rings(samples: RingSamples) -> None:
+def _compare_rings(samples: RingSamples, alone: Bool) -> None:
     """Reject samples that their neighbours contradict, in place, some rings at a time.
 
     Each block is compared with the rings around it as they were found in the images, before any rejection.
+    ``alone`` (F,) are the rings of pictures that the laser alone lights.
     """
     count = len(samples.frame)
     validity, sigma_px = samples.validity[:0], samples.sigma_px[:0]
@@ -268,6 +269,7 @@ def _compare_rings(samples: RingSamples) -> None:
             validity=np.concatenate([validity, samples.validity[wide.start + len(validity) : wide.stop]]),
             sigma_px=np.concatenate([sigma_px, samples.sigma_px[wide.start + len(sigma_px) : wide.stop]]),
         )
+        found.validity[off_laser_alone(found, alone[wide])] = RingValidity.GHOST
         validity = found.validity[: own.stop][-SAYING_RINGS:]
         sigma_px = found.sigma_px[: own.stop][-SAYING_RINGS:]
         revised = contradicted(found)

@@ -11,8 +11,9 @@ from scipy.ndimage import uniform_filter1d
 from pipeline.adjustment.robust import MAD_TO_SIGMA, robust_spreads
 from pipeline.arrays import Bool, Byte, Float32, Int
 from pipeline.artefacts.measured import RingSamples, RingValidity
-from stages.rings.glints import lone_runs
+from stages.rings.glints import WALL_RINGS, lone_runs
 from stages.rings.kernels import median, take_finite
+from stages.rings.search import BAND_WIDTHS
 from stages.rings.turning import turned, turns
 
 _NEIGHBOURS = 9
@@ -34,6 +35,26 @@ def contradicted(rings: RingSamples) -> tuple[Byte, Float32]:
     other, its = turned(aligned[0], by), turned(aligned[1], by)
     own = (validity == RingValidity.VALID) & ((other != RingValidity.VALID) | (sigma <= its))
     return np.where(own, validity, other), np.where(own, sigma, its)
+
+
+def off_laser_alone(rings: RingSamples, alone: Bool) -> Bool:
+    """Return which samples (F, A) of pictures with lit wall lie off the ring that the laser alone shows.
+
+    ``alone`` (F,) are the rings of pictures that the laser alone lights. A ring lies within the band in which
+    the next picture is searched; where the wall is lit and clips, the edge of another light is found instead,
+    and as these are half of the rings, no comparison of neighbours rejects it.
+    """
+    off = np.zeros(rings.radius_px.shape, bool)
+    seen = np.flatnonzero(alone & (rings.valid.mean(1) > _MAJORITY))
+    if not len(seen) or alone.all():
+        return off
+    course = _running_median(_bridged(rings.radius_px[seen], rings.valid[seen]), _NEIGHBOURS)
+    band_px = BAND_WIDTHS * float(np.median(rings.width_px[seen][rings.valid[seen]]))
+    for row in np.flatnonzero(~alone):
+        near = np.abs(seen - row) <= WALL_RINGS
+        if near.any():
+            off[row] = (np.abs(rings.radius_px[row] - course[near]) > band_px).all(0) & rings.valid[row]
+    return off
 
 
 def _compared(rings: RingSamples) -> tuple[Byte, Float32]:

@@ -47,6 +47,17 @@ def test_a_pipe_of_one_bore_or_with_a_step_has_no_reducer(step_mm: float) -> Non
     assert step_mm == 0 or "steps by -6.0 mm at 41 mm" in said[0]
 
 
+@pytest.mark.parametrize(("height_mm", "follows"), [(0.5, True), (0.2, False)])
+def test_the_radius_between_ribs_is_that_of_the_rings(height_mm: float, follows: bool) -> None:
+    """A ribbed pipe was taken for a cylinder, and the poses were turned until it was one."""
+    ribs = height_mm * np.sin(2 * np.pi * AT_MM / 11)
+    bore = Bore.of(50.0 + RELIEF_MM + ribs, AT_MM)
+    assert bore.reduces == follows
+    assert not len(bore.at_mm)
+    if follows:
+        assert bore.wider_at(AT_MM) == pytest.approx(ribs, abs=0.15)
+
+
 def test_a_reducer_is_reported_as_such_and_not_as_a_step() -> None:
     said: list[str] = []
     warn_of_steps(REDUCER, replace(quiet_context(), warn=said.append))

@@ -7,7 +7,7 @@ from pipeline.artefacts.measured import RingSamples, RingValidity
 from stages.rings.chain import choose_line
 from stages.rings.glints import lone_runs
 from stages.rings.search import Candidates
-from stages.rings.validity import contradicted
+from stages.rings.validity import contradicted, off_laser_alone
 
 RINGS, SECTORS, NOISE = 12, 720, 0.1
 AZIMUTH = 2 * np.pi / SECTORS * np.arange(SECTORS)
@@ -190,3 +190,14 @@ def test_a_run_past_a_place_without_wall_to_compare_has_no_unknown_sigma(drawn):
     radius[5, RUN] += 3.0
     radius[:5, 208:210] = radius[6:, 208:210] = np.nan
     assert np.isfinite(lone_runs(*drawn)[1]).all()
+
+
+@pytest.mark.parametrize(("lit_px", "kept"), [(60.0, False), (330.0, False), (301.0, True)])
+def test_a_lit_picture_that_shows_another_edge_is_refuted_by_the_laser_alone(drawn, lit_px, kept):
+    """The wall was lit and clipped in every other picture, and the dark end of the pipe became its ring."""
+    rings, alone = rings_of(drawn), np.arange(RINGS) % 2 == 0
+    rings.radius_px[~alone] += np.float32(lit_px - 300)
+    rings.validity[~alone, ::3] = RingValidity.NO_LINE
+    assert off_laser_alone(rings, alone)[~alone, 1].any() != kept
+    assert off_laser_alone(rings, alone).sum() == (0 if kept else rings.valid[~alone].sum())
+    assert not off_laser_alone(rings, np.zeros(RINGS, bool)).any(), "no picture tells which ring is right"
