@@ -1,4 +1,4 @@
-"""Estimates the pipe's width along its axis from the rings: steps of the bore, reducers between bores, ribs."""
+"""Estimates the pipe's width along its axis from the rings: steps of the bore, reducers and ribs."""
 
 from __future__ import annotations
 
