@@ -163,16 +163,16 @@ def warn_of_lost_texture(tracked: TrackedPoses, observations: int, encoder: bool
     lost = tracked.frames[1:][tracked.lost[1:]]
     known = "rings, encoder and smoothness" if encoder else "rings and smoothness"
     distance = "distance depends on the encoder alone" if encoder else "distance is not measured"
-    if len(lost) > _MOST_LOST * len(tracked.frames):
+    if not observations:
+        context.warn(
+            f"no place of the wall was seen again from picture to picture: {distance}, and roll is not "
+            "measured. What to do: pull more slowly, record lit frames more often, or light the wall better"
+        )
+    elif len(lost) > _MOST_LOST * len(tracked.frames):
         context.warn(
             f"in {len(lost)} of {len(tracked.frames)} lit frames too little texture was found, first in "
             f"frame {lost[0]}: there {known} give the motion. What to do: look at these pictures; more "
             "light, a sharper lens or a slower pull show more texture"
-        )
-    elif not observations:
-        context.warn(
-            f"no place of the wall was seen again from picture to picture: {distance}, and roll is not "
-            "measured. What to do: pull more slowly, record lit frames more often, or light the wall better"
         )
 
 

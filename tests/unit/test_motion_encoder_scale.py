@@ -12,13 +12,14 @@ import pytest
 from pipeline.arrays import Bool, Float
 from pipeline.instrument.probe import Probe
 from stages.motion.bore import ONE_BORE, Bore
-from stages.motion.bundle_adjustment.encoder_scale import EncoderScale, uneven_scale
+from stages.motion.bundle_adjustment.encoder_scale import EncoderScale, scale_of_encoder, uneven_scale
+from stages.motion.bundle_adjustment.solver import estimate_state
 from stages.motion.encoder import EncoderReadings
 from stages.motion.parameters import MotionParameters
 from stages.motion.tracking.landmarks import TrackedPoses
 from stages.motion.windows import first_window
 from stages.motion.windows.submaps import Window
-from tests.motion_scene import probe
+from tests.motion_scene import probe, scene
 from tests.quiet import quiet_context
 
 RATE = 30.0
@@ -71,6 +72,7 @@ class Held:
     bore: Bore = ONE_BORE
     probe: Probe = field(default_factory=probe)
     held_sigma: float = 0.0
+    encoder: EncoderReadings | None = None
 
 
 @dataclass(frozen=True)
@@ -185,6 +187,17 @@ def test_sigma_of_distances_from_lost_texture_alone_covers_their_error(
     monkeypatch.setattr(first_window, "scale_of_encoder", lambda *_: None)
     unsure = first_window.with_scale(window_that_lost(np.arange(20, 0, -1) <= lost), 0.001)[2]
     assert unsure == pytest.approx(sigma, rel=0.1)
+
+
+def test_without_a_landmark_nothing_speaks_against_an_encoder() -> None:
+    """Before the end of a pipe no landmark remained, and the encoder was told to be off by 35 274 %."""
+    made = scene(9, 25, seed=2)
+    for landmarks in (25, 0):
+        tracks = made.measured.tracks
+        measured = replace(made.measured, tracks=tracks.some(tracks.landmark < landmarks)[0])
+        start = replace(made.truth, xyz_p=made.truth.xyz_p[:landmarks])
+        estimate = estimate_state(start, measured, MotionParameters(), lambda: None)
+        assert (scale_of_encoder(estimate, measured, 0.0, 0.002) is not None) == (landmarks > 0)
 
 
 BY_TEXTURE, STATED = 0.0024, 0.002

@@ -178,12 +178,14 @@ class EncoderScale:
 def scale_of_encoder(
     estimate: Estimate, measured: Measurements, unsure: float, creep_mm: float
 ) -> EncoderScale | None:
-    """Return the encoder's scale from the other measurements of an estimate; None without encoder.
+    """Return the encoder's scale from the other measurements of an estimate; None without encoder or texture.
 
+    Rings of an even pipe do not show distance: without a landmark, priors of the motion gave a scale of .003
+    ± .18, so that distances beside a right encoder had a σ as large as themselves.
     ``unsure`` is the relative 1 σ of distances by texture that its residuals do not show; ``creep_mm`` is the
     1 σ of the encoder's creep from frame to frame.
     """
-    if measured.encoder is None:
+    if measured.encoder is None or not len(measured.tracks.landmark):
         return None
     stated = measured.probe.encoder_scale_sigma
     variance = float(estimate.factor.border_covariance()[ENCODER_SCALE, ENCODER_SCALE])

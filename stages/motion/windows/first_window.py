@@ -250,7 +250,12 @@ def _probe_does_not_fit(first: _Adjusted) -> bool:
 
 
 def _unseen_error(run: MeasuredRun) -> float:
-    """Return the relative 1 σ of distances from texture alone, for errors that its residuals do not show."""
+    """Return the relative 1 σ of distances from texture alone, for errors that its residuals do not show.
+
+    It is 0 beside an encoder: then there is no texture, and the encoder alone gives distances.
+    """
+    if run.encoder is not None:
+        return 0.0
     lost = _IN_LOST * run.texture.poses.much_lost
     return float(np.hypot(lost, _IN_REDUCER * run.bore.reduces))
 
