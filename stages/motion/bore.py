@@ -154,7 +154,7 @@ def _between_rings(radius_mm: Float, at_mm: Float) -> Bore:
     of_length = np.repeat(usual, np.diff(place, prepend=0, append=len(radius_mm)))
     smooth, middle = median_filter(radius_mm, 3), float(np.median(radius_mm))
     reducer = _in_reducers(smooth - of_length, place)
-    if _ribbed(smooth - of_length):
+    if _ribbed(smooth, n):
         reducer[:] = True
     if not reducer.any():
         return Bore(at_mm[place], usual - middle) if len(place) else ONE_BORE
@@ -199,12 +199,12 @@ def _stepped_at(radius_mm: Float, near: int, n: int) -> int:
     return near - n + int(np.argmin([before[:k].sum() + behind[k:].sum() for k in range(len(part))]))
 
 
-def _ribbed(off_mm: Float) -> bool:
-    """Whether most rings (F,) are off the bore of their length, ``off_mm``, so that no part is a cylinder.
+def _ribbed(radius_mm: Float, n: int) -> bool:
+    """Whether most rings (F,) are off the bore of the ``n`` rings around them, so that no part is a cylinder.
 
     Ribs of .5 mm, 11 mm apart: landmarks held to a cylinder turned the camera by 5°, and no defect was found.
     """
-    return float(np.median(np.abs(off_mm))) > _STEP_MM / 2
+    return float(np.median(np.abs(radius_mm - median_filter(radius_mm, n)))) > _STEP_MM / 2
 
 
 def _in_reducers(off_mm: Float, place: Int) -> np.ndarray:
