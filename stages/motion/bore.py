@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from numpy.polynomial import Polynomial
 from scipy.ndimage import maximum_filter1d, median_filter
 
 from pipeline.adjustment.robust import spread_about_median
@@ -21,6 +22,8 @@ _LENGTH_RADII, _FEWEST_RINGS_OF_LENGTH = 0.5, 5
 _MOST_RINGS_IN_STEP = 2
 """Rings in a row that may lie between the two bores of a step; with more it is a reducer. The chamfer of a
 gauge holds one ring. A choice."""
+_SLOW = 4
+"""Degree of a polynomial that follows a slow change of width: that of `image_scale`."""
 _PLACE_MM = 0.5
 """1 σ of the position of a reducer relative to landmarks on it: half the distance from ring to ring. Without
 it, four of five drawn reducers came out .03 to .4 mm too far along the pipe, the fifth .1 mm too near."""
@@ -154,7 +157,7 @@ def _between_rings(radius_mm: Float, at_mm: Float) -> Bore:
     of_length = np.repeat(usual, np.diff(place, prepend=0, append=len(radius_mm)))
     smooth, middle = median_filter(radius_mm, 3), float(np.median(radius_mm))
     reducer = _in_reducers(smooth - of_length, place)
-    if _ribbed(smooth, n):
+    if _ribbed(smooth - of_length):
         reducer[:] = True
     if not reducer.any():
         return Bore(at_mm[place], usual - middle) if len(place) else ONE_BORE
@@ -199,12 +202,15 @@ def _stepped_at(radius_mm: Float, near: int, n: int) -> int:
     return near - n + int(np.argmin([before[:k].sum() + behind[k:].sum() for k in range(len(part))]))
 
 
-def _ribbed(radius_mm: Float, n: int) -> bool:
-    """Whether most rings (F,) are off the bore of the ``n`` rings around them, so that no part is a cylinder.
+def _ribbed(off_mm: Float) -> bool:
+    """Whether most rings (F,) are off the bore of their length, ``off_mm``, so that no part is a cylinder.
 
-    Ribs of .5 mm, 11 mm apart: landmarks held to a cylinder turned the camera by 5°, and no defect was found.
+    A slow course over the run, of a pipe that widens or a lens that warms up, does not count. Ribs of .5 mm,
+    11 mm apart: landmarks held to a cylinder turned the camera by 5°, and no defect was found.
     """
-    return float(np.median(np.abs(radius_mm - median_filter(radius_mm, n)))) > _STEP_MM / 2
+    ring = np.arange(len(off_mm))
+    slow = Polynomial.fit(ring, off_mm, _SLOW)(ring)
+    return float(np.median(np.abs(off_mm - slow))) > _STEP_MM / 2
 
 
 def _in_reducers(off_mm: Float, place: Int) -> np.ndarray:

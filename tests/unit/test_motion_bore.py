@@ -48,7 +48,7 @@ def test_a_pipe_of_one_bore_or_with_a_step_has_no_reducer(step_mm: float) -> Non
 
 
 @pytest.mark.parametrize(
-    ("height_mm", "apart_mm", "follows"), [(0.5, 11, True), (0.2, 11, False), (0.55, 160, False)]
+    ("height_mm", "apart_mm", "follows"), [(0.5, 11, True), (0.2, 11, False), (0.9, 400, False)]
 )
 def test_the_radius_between_ribs_is_that_of_the_rings(
     height_mm: float, apart_mm: float, follows: bool
