@@ -176,6 +176,15 @@ def test_a_plain_wall_seen_off_the_axis_is_uniform_except_for_errors_of_the_lamp
     assert np.abs(uneven.contrast[uneven.usable]).max() > 2 * np.abs(even.contrast[even.usable]).max()
 
 
+@pytest.mark.parametrize(("exposure", "seen"), [(0.0, False), (0.15, True)])
+def test_a_picture_with_the_lamps_dead_shows_no_wall(exposure: float, seen: bool) -> None:
+    """Black is 16 in limited range; divided by the light it was followed as texture that stands still."""
+    probe, wall = small_probe(), grid()
+    image = 17 + draw(probe, pose(), exposure=exposure)[..., 1] + (np.indices((300, 400)).sum(0) % 7 == 0)
+    strip = unroll(softened(image.astype(np.uint8)), probe, pose(), wall, Hidden())
+    assert bool(strip.usable.any()) == seen
+
+
 def test_the_search_range_of_patches_is_that_of_possible_errors_within_the_view() -> None:
     probe, wall = small_probe(), grid()
     strip = unroll(softened(draw(probe, pose())[..., 1]), probe, pose(), wall, Hidden((20.0, 24.0)))

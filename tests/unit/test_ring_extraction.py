@@ -233,7 +233,7 @@ def test_outliers_in_batches_equal_those_of_all_rings_at_once(monkeypatch: pytes
     azimuth, centre = np.linspace(-3, 3, 60), np.zeros(2)
     samples = RingSamples(np.arange(23), azimuth, centre, radius, full.copy(), full, full, validity.copy())
     wanted, sigma = contradicted(replace(samples, sigma_px=full))
-    extract._compare_rings(samples)
+    extract._compare_rings(samples, np.ones(len(radius), bool))
     np.testing.assert_array_equal(samples.validity, wanted)
     np.testing.assert_array_equal(samples.sigma_px, sigma)
     assert np.sum(wanted == RingValidity.OUTLIER) > 3, "control: the batches differ"
