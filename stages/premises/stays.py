@@ -78,9 +78,9 @@ def find_static_places(
     if share > _WORTH_A_WORD:
         context.warn(
             f"{100 * share:.1f} % of the picture of the wall stays in place while the wall moves: burnt-in "
-            "text or a logo, dirt, scratches or reflections on the window, a part of the probe, or the rim of "
-            "the lens's picture. Motion does not use it, but it hides the wall. What to do: switch the text "
-            "off, clean the window"
+            "text or a logo, dirt, scratches or reflections on the window, a part of the probe, or the rim "
+            "of the lens's picture. Motion does not use it, but it hides the wall. What to do: switch the "
+            "text off, clean the window"
         )
     return places if places.any() else None
 
