@@ -95,10 +95,13 @@ def rings_on_columns(parts: Iterable[WallSamples], rings: int, grid: MapGrid) ->
         mine = slice(done, done + len(samples.valid))
         turn = np.nan_to_num(samples.azimuth_rad + np.pi) / (2 * np.pi)
         bin_of = np.rint(turn * columns).astype(np.int64) % columns
-        _bin(
-            samples.valid, bin_of, samples.distance_mm, samples.radius_mm, samples.misalignment_mm,
-            samples.sigma_mm, sums[:, :, mine], count[:, mine],
-        )  # fmt: skip
+        valid, shape = samples.valid, (columns, len(samples.valid))
+        cell = (bin_of * shape[1] + np.arange(shape[1])[:, None])[valid]
+        weight = 1 / (samples.sigma_mm[valid] ** 2 + 1e-12)
+        measured = (np.ones(valid.shape), samples.distance_mm, samples.radius_mm, samples.misalignment_mm)
+        for out, value in zip(sums, measured, strict=True):
+            out[:, mine] = np.bincount(cell, weight * value[valid], columns * shape[1]).reshape(shape)
+        count[:, mine] = np.bincount(cell, minlength=columns * shape[1]).reshape(shape)
         done = mine.stop
     weight = np.where(count > 0, sums[0], np.nan)
     distance, radius, misalignment = (part / weight for part in sums[1:])
@@ -216,20 +219,6 @@ def _usual_spacing(columns: RingColumns) -> float:
     step = np.diff(columns.distance_mm[:: max(len(columns.distance_mm) // 16, 1)], axis=1)
     step = step[np.isfinite(step)]
     return float(np.median(step)) if step.size else 0.0
-
-
-@numba.njit(cache=True, nogil=True)
-def _bin(valid, bin_of, distance, radius, misalignment, sigma, sums, count):  # type: ignore[no-untyped-def]
-    for f in range(valid.shape[0]):
-        for a in range(valid.shape[1]):
-            if valid[f, a]:
-                j = bin_of[f, a]
-                w = 1.0 / (sigma[f, a] * sigma[f, a] + 1e-12)
-                sums[0, j, f] += w
-                sums[1, j, f] += w * distance[f, a]
-                sums[2, j, f] += w * radius[f, a]
-                sums[3, j, f] += w * misalignment[f, a]
-                count[j, f] += 1
 
 
 @numba.njit(cache=True, nogil=True)

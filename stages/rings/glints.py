@@ -14,7 +14,7 @@ import numpy as np
 
 from pipeline.adjustment.robust import robust_spread, robust_spreads
 from pipeline.arrays import Bool, Float, Float32, Int
-from stages.rings.kernels import median, slow_around
+from stages.rings.kernels import slow_around
 
 # Rings on either side that are compared: two of five may be wrong, and a run is confirmed by a neighbour,
 # which itself is measured against two more; clutter is counted over two rings on either side.
@@ -89,28 +89,18 @@ def _spread_of(away: Float) -> Float:
     return out
 
 
-@numba.njit(cache=True, nogil=True)
-def _away_from_wall(radius):  # type: ignore[no-untyped-def]
-    """Distance (F, A) of rings to the median of themselves and two on either side; NaN where unknown."""
-    rings, sectors = radius.shape
-    move = np.zeros((rings, sectors))
-    for k in range(1, rings):
-        step = slow_around(radius[k] - radius[k - 1])
-        for a in range(sectors):
-            move[k, a] = move[k - 1, a] + step[a]
-    out = np.full((rings, sectors), np.nan)
-    window = np.empty(2 * WALL_RINGS + 1)
-    for k in range(rings):
-        for a in range(sectors):
-            count = 0
-            for n in range(max(0, k - WALL_RINGS), min(rings, k + WALL_RINGS + 1)):
-                value = radius[n, a] - move[n, a]
-                if np.isfinite(value):
-                    window[count] = value
-                    count += 1
-            if count > 2:
-                out[k, a] = radius[k, a] - move[k, a] - median(window[:count])
-    return out
+def _away_from_wall(radius: Float) -> Float:
+    """Return the distance (F, A) of rings to the median of themselves and two on either side, or NaN."""
+    step = np.zeros_like(radius)
+    for own, apart in zip(step[1:], np.diff(radius, axis=0), strict=True):
+        own[:] = slow_around(apart)
+    level = radius - np.cumsum(step, axis=0)
+    beside = np.full((WALL_RINGS, radius.shape[1]), np.nan)
+    padded = np.concatenate([beside, level, beside])
+    near = np.sort([padded[k : k + len(level)] for k in range(2 * WALL_RINGS + 1)], axis=0)
+    known = np.isfinite(near).sum(0, keepdims=True)
+    low, high = (np.take_along_axis(near, np.maximum(known - k, 0) // 2, 0)[0] for k in (1, 0))
+    return np.where(known[0] > 2, level - 0.5 * (low + high), np.nan)
 
 
 @numba.njit(cache=True, nogil=True)
@@ -163,20 +153,11 @@ def _confirmed(away, sigma, k, a, sign):  # type: ignore[no-untyped-def]
     return False
 
 
-@numba.njit(cache=True, nogil=True)
-def _mean_over_runs(runs, value):  # type: ignore[no-untyped-def]
-    """Mean of the finite ``value`` (F, A) over each run of neighbours in ``runs`` (F, A), 0 elsewhere."""
-    rings, sectors = value.shape
-    out = np.zeros((rings, sectors))
-    for k in range(rings):
-        for first in range(sectors):
-            if not runs[k, first] or (first > 0 and runs[k, first - 1]):
-                continue
-            last, total, count = first, 0.0, 0
-            while last < sectors and runs[k, last]:
-                if np.isfinite(value[k, last]):
-                    total += value[k, last]
-                    count += 1
-                last += 1
-            out[k, first:last] = total / max(count, 1)
-    return out
+def _mean_over_runs(runs: Bool, value: Float) -> Float:
+    """Return the mean of the finite ``value`` (F, A) over each run of neighbours in ``runs``, 0 elsewhere."""
+    begins = runs.copy()
+    begins[:, 1:] &= ~runs[:, :-1]
+    run = np.cumsum(begins).reshape(runs.shape)
+    known = runs & np.isfinite(value)
+    total, count = (np.bincount(run[known], of, begins.sum() + 1) for of in (value[known], None))
+    return np.where(runs, (total / np.maximum(count, 1))[run], 0.0)

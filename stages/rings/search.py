@@ -59,9 +59,9 @@ def search_band(
 ) -> Candidates:
     """Find the matched filter's peaks of every sector between ``low_px`` and ``high_px`` (A,)."""
     radius, score = np.full((len(low_px), _CANDIDATES), np.nan), np.zeros((len(low_px), _CANDIDATES))
-    template = matched_template(width_px)
+    template, widest = matched_template(width_px), int(np.nanmax(high_px - low_px, initial=0))
     _search_sectors(
-        *channels(image), sectors.start, sectors.pixel, sectors.radius_px, low_px, high_px, template,
+        *channels(image), sectors.start, sectors.pixel, sectors.radius_px, low_px, high_px, widest, template,
         radius, score,
     )  # fmt: skip
     return Candidates(radius, score / noise)
@@ -130,10 +130,10 @@ def _keep_peaks(response, low, high, first, radius, score):  # type: ignore[no-u
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
 def _search_sectors(  # type: ignore[no-untyped-def]
-    image, weights, start, pixel, radius, low_px, high_px, template, found_px, score
+    image, weights, start, pixel, radius, low_px, high_px, widest, template, found_px, score
 ):
     reach = template.size // 2
-    size = int(np.nanmax(high_px - low_px)) + 2 * reach + 4
+    size = widest + 2 * reach + 4
     total, count, response = np.empty(size), np.empty(size, np.int64), np.empty(size)
     for a in range(low_px.size):
         if not np.isfinite(low_px[a]):
