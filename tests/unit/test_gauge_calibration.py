@@ -12,7 +12,7 @@ from pipeline.geometry.rigid import transform
 from pipeline.recording.base import BoreSection, Illumination
 from stages.calibrate.gauge import premises
 from stages.calibrate.gauge.geometry import BoreRings, gauge_of
-from stages.calibrate.gauge.result import warn_of_misfit
+from stages.calibrate.gauge.result import warn_of_bores, warn_of_misfit
 from stages.calibrate.gauge.solve import RingSource
 from stages.calibrate.gauge.state import SheetModel, Unknowns
 from stages.calibrate.gauge.terms import Equations, edge_equations, expected_ring, ring_equations
@@ -173,10 +173,21 @@ def test_pictures_that_no_such_probe_can_take_are_reported_and_sound_ones_are_no
     """Pixels 2 % too wide gave a cone 125 σ off with its usual σ, and no message."""
     said: list[str] = []
     context = replace(quiet_context(), warn=said.append)
-    warn_of_misfit(calibrated(run), context)
+    sound = calibrated(run)
+    warn_of_misfit(sound, context)
+    warn_of_bores(sound, run.gauge, context)
     assert said == []
     uv, (cx, _) = run.edges.uv.copy(), run.stated.camera.centre_px
     uv[:, 0] = cx + 1.02 * (uv[:, 0] - cx)
     warn_of_misfit(calibrated(replace(run, edges=replace(run.edges, uv=uv))), context)
     assert "the edges of the fiducials lie" in said[0]
     assert "scales, stretches, cuts or stabilises" in said[0]
+
+
+def test_a_bore_that_is_not_as_stated_is_reported(run: GaugeRun) -> None:
+    """A bore stated .1 mm too narrow moved the baseline by 2.7 σ, without a message."""
+    said: list[str] = []
+    context = replace(quiet_context(), warn=said.append)
+    wrong = replace(run.gauge, radius_mm=run.gauge.radius_mm - np.array([0.0, 0.05, 0.0]))
+    warn_of_bores(calibrated(replace(run, gauge=wrong)), wrong, context)
+    assert "Farthest off is section 2" in said[0]

@@ -36,7 +36,7 @@ from stages.calibrate.gauge.poses import (
     poses_of_all_frames,
 )
 from stages.calibrate.gauge.premises import require_gauge
-from stages.calibrate.gauge.result import GaugeCalibration, calibration_of, warn_of_misfit
+from stages.calibrate.gauge.result import GaugeCalibration, calibration_of, warn_of_bores, warn_of_misfit
 from stages.calibrate.gauge.solve import Finding, RingSource, first_unknowns, solve
 from stages.calibrate.gauge.state import GaugeParameters, Unknowns
 from stages.calibrate.gauge.white import brightest_grey
@@ -94,6 +94,7 @@ def calibrate_gauge(
     result = calibration_of(recording.name, recording.frames.frame, gauge, finding)
     _require_determined(result, parameters)
     warn_of_misfit(result, context)
+    warn_of_bores(result, gauge, context)
     return result
 
 

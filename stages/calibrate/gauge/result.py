@@ -23,6 +23,8 @@ _AZIMUTHS = 72
 # paint and compression. A baseline that drifts by .3 mm makes it 7.5, a seam of 2 px 7 and 9, pixels 2 % too
 # wide 35.
 _MOST_SPREAD = 5.0
+# σ beyond its tolerance from which a bore is told; of Gaussian errors, 1 in 700 are.
+_SURE = 3.0
 
 
 @dataclass(frozen=True)
@@ -153,6 +155,22 @@ def warn_of_misfit(result: GaugeCalibration, context: Context) -> None:
                 "stretches, cuts or stabilises the pictures, whether the camera is tight, and whether "
                 "gauge and fiducials are as described; boresight diagnose may name the cause"
             )
+
+
+def warn_of_bores(result: GaugeCalibration, gauge: Gauge, context: Context) -> None:
+    """Warn if a bore differs from its stated diameter by more than the tolerance and `_SURE` of its σ."""
+    tolerance_mm = np.sqrt(3) * gauge.radius_sigma_mm
+    beyond = np.abs(result.bore_mm) - tolerance_mm > _SURE * result.bore_sigma_mm
+    if not beyond.any():
+        return
+    most = int(np.argmax(np.abs(result.bore_mm)))
+    found = ", ".join(f"{2 * (r + c):.3f} mm" for r, c in zip(gauge.radius_mm, result.bore_mm, strict=True))
+    context.warn(
+        f"the bores contradict each other by more than their tolerance: they fit best as {found}. Farthest "
+        f"off is section {most + 1} from {gauge.start_mm[most]:g} mm on, stated as "
+        f"{2 * gauge.radius_mm[most]:g} mm. Baseline and cone may be wrong by more than their σ. What to do: "
+        "measure the bores, that one first, correct recording.yaml, and calibrate again"
+    )
 
 
 def ring_pixels(probe: Probe, radius_mm: float, azimuth_rad: Float) -> Float:
