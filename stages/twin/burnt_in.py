@@ -12,8 +12,8 @@ from pipeline.arrays import Bool, Float32
 from pipeline.recording.base import Illumination
 from stages.twin.scene import Scene
 
-_LEAST_GREY, _ALIKE, _LEAST_PX, _RIM_PX = 40.0, 10.0, 20, 8
-"""Least brightness above black, and most difference between lights, grey levels; fewest connected pixels:
+_LEAST_GREY, _ALIKE, _FEWEST, _LEAST_PX, _RIM_PX = 40.0, 10.0, 4, 20, 8
+"""Least brightness above black, and most difference, grey levels; fewest lit frames, and connected pixels:
 hot ones are alike, too; px about letters that a codec blurs, those of its blocks. Chosen."""
 
 
@@ -34,17 +34,17 @@ class _Picture(Protocol):
 
 
 def burnt_in(scene: Scene, sampled: Sequence[_Picture], black: float) -> Bool:
-    """Return pixels (H, W) as bright with the laser alone as with lamps, and what is beside them.
+    """Return pixels (H, W) that are bright and alike in all frames of both lights, and what is beside them.
 
-    No wall is: apart from the line, it is dark without lamps. Of each light the brightest of several frames
-    counts, so that digits that change are found, too.
+    No wall is: apart from the line, it is dark without lamps, and passes by in their light. What a drop shows
+    of line and wall may have one brightness in some frames, not in all.
     """
     alone = [s for s in sampled if s.light == Illumination.LASER]
     lit = [s for s in sampled if s.light == Illumination.LED]
-    if not alone or not lit:
+    if not alone or len(lit) < _FEWEST:
         return np.zeros(sampled[0].image.shape, bool)
-    one, other = (np.max([s.image for s in some], 0) - black for some in (alone, lit))
-    alike = (np.minimum(one, other) > _LEAST_GREY) & (np.abs(one - other) < _ALIKE)
+    least, most = (of([s.image for s in (*alone, *lit)], 0) for of in (np.min, np.max))
+    alike = (least > black + _LEAST_GREY) & (most - least < _ALIKE)
     for s in alone:
         line = scene.line(scene.pose(s.frame))
         alike[line.row, line.column] = False
