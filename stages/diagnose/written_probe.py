@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.special import logit
 
 from pipeline.instrument.probe import Probe
 from stages.diagnose.correct import Correction
@@ -13,12 +14,14 @@ from stages.diagnose.field.system import ENCODER_SCALE
 from stages.diagnose.inference import INSTRUMENT, eliminated, stated_belief
 from stages.diagnose.result import Diagnosis
 
-# Probability of a correction without a name: as likely right as wrong before the inspection is asked.
-_NAMELESS = 0.5
+# Probability of a correction without a name: as likely right as wrong before the inspection is asked. The
+# least probability has finite odds.
+_NAMELESS, _LEAST = 0.5, 1e-12
 _BY_FIELD = (
     "The probe file is written as it was stated: rings and texture of the inspection are {:.2g} times as "
-    "likely with it as with the likeliest explanation of the gauge run, which outweighs what that run says "
-    "for it. Unknown poses and wall, and errors that neighbours share, are taken into account."
+    "likely with the corrected probe as with the stated one, and the least certain effect of the correction "
+    "has a probability of {:.2g}; together, this speaks against it. Unknown poses and wall, and errors that "
+    "neighbours share, are taken into account."
 )
 _ALTHOUGH = (
     "The probe file is corrected although rings of the inspection lie {:.3g} {} from their places by texture "
@@ -44,8 +47,8 @@ class Decision:
 def decided(found: Diagnosis, field: FieldEvidence | None, correction: Correction, probe: Probe) -> Decision:
     """Return whether the probe is corrected.
 
-    An inspection decides by the odds of both probes, beginning with the gauge run's own probability. Without
-    one, held-out parts of the gauge run must not fit worse.
+    An inspection decides by the odds of both probes, beginning with the probability of what the gauge run
+    found. Without one, held-out parts of the gauge run must not fit worse.
     """
     ratio = log_ratio(field, correction, probe) if field is not None else None
     fit = found.fit
@@ -54,8 +57,8 @@ def decided(found: Diagnosis, field: FieldEvidence | None, correction: Correctio
         worse_by = (fit.heldout_after, fit.unit, fit.heldout_before) if fit is not None else ()
         return Decision(not worse, (_BY_GAUGE.format(*worse_by),) if worse else ())
     chance, likelier = _chance(found, correction), float(np.exp(np.clip(ratio, -50, 50)))
-    if ratio + np.log(chance / max(1 - chance, 1e-12)) < 0:
-        return Decision(False, (_BY_FIELD.format(1 / likelier),))
+    if ratio + logit(chance) < 0:
+        return Decision(False, (_BY_FIELD.format(likelier, chance),))
     if fit is None or not worse:
         return Decision(True)
     return Decision(True, (_ALTHOUGH.format(fit.heldout_after, fit.unit, fit.heldout_before, likelier),))
@@ -88,7 +91,9 @@ def log_ratio(field: FieldEvidence, correction: Correction, probe: Probe) -> flo
 
 
 def _chance(found: Diagnosis, correction: Correction) -> float:
-    """Return the gauge run's probability of the least certain effect that the probe file would contain."""
-    told = {e.name: e.probability for e in found.effects}
-    each = (told.get(name.partition(",")[0], _NAMELESS) for name in correction.applied)
-    return min(each, default=_NAMELESS)
+    """Return the probability of the least certain effect that the probe file would contain."""
+    names = set(correction.applied)
+    told = [e for e in found.effects if e.name in names]
+    all_told = names and names == {e.name for e in told}
+    least = min([e.probability for e in told] + [_NAMELESS] * (not all_told))
+    return float(np.clip(least, _LEAST, 1 - _LEAST))

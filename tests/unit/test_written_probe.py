@@ -33,11 +33,9 @@ def correction(step: Any) -> Any:
     return SimpleNamespace(probe=SimpleNamespace(parameters=np.asarray(step)), applied=("laser_tilt",))
 
 
-def answer(probability: float) -> Any:
-    return cast(
-        Any,
-        SimpleNamespace(fit=WORSE, effects=(SimpleNamespace(name="laser_tilt", probability=probability),)),
-    )
+def answer(*probability: float) -> Any:
+    effects = tuple(SimpleNamespace(name="laser_tilt", probability=p) for p in probability)
+    return cast(Any, SimpleNamespace(fit=WORSE, effects=effects))
 
 
 def test_the_likelihoods_of_both_probes_are_those_of_the_scores() -> None:
@@ -72,6 +70,21 @@ def test_what_the_inspection_hardly_shows_is_decided_by_the_gauge_run() -> None:
     seen = inspection([0.0, 0.0], 32.0)
     assert not decided(answer(0.5), seen, correction(TILT), cast(Any, PROBE)).written
     assert decided(answer(0.997), seen, correction(TILT), cast(Any, PROBE)).written
+
+
+def test_a_correction_withheld_although_the_inspection_is_for_it_says_how_unlikely_it_is() -> None:
+    """A cone of .35: the stated probe was "0.84 times as likely, which outweighs" the gauge run."""
+    seen = inspection(TILT, 4.0)
+    (note,) = decided(answer(0.35), seen, correction(TILT), cast(Any, PROBE)).notes
+    assert "1.2 times as likely with the corrected probe as with the stated one" in note
+    assert "a probability of 0.35" in note
+
+
+def test_the_least_certain_of_two_effects_of_a_name_counts() -> None:
+    """Of waves of two orders, the last one counted; and of probability 0, the odds were the log of 0."""
+    seen = inspection(TILT, 4.0)
+    for each in ((0.2, 0.997), (0.997, 0.2), (0.0,)):
+        assert not decided(answer(*each), seen, correction(TILT), cast(Any, PROBE)).written
 
 
 def test_without_an_inspection_held_out_parts_of_the_gauge_run_decide() -> None:
