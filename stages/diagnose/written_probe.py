@@ -9,6 +9,7 @@ from scipy.special import logit
 
 from pipeline.instrument.probe import Probe
 from stages.diagnose.correct import Correction
+from stages.diagnose.effects.library import LIBRARY
 from stages.diagnose.field.evidence import FieldEvidence
 from stages.diagnose.field.system import ENCODER_SCALE
 from stages.diagnose.inference import INSTRUMENT, eliminated, stated_belief
@@ -17,6 +18,7 @@ from stages.diagnose.result import Diagnosis
 # Probability of a correction without a name: as likely right as wrong before the inspection is asked. The
 # least probability has finite odds.
 _NAMELESS, _LEAST = 0.5, 1e-12
+_OF_READINGS = ("time_offset", "encoder_backlash")
 _BY_FIELD = (
     "The probe file is written as it was stated: rings and texture of the inspection are {:.2g} times as "
     "likely with the corrected probe as with the stated one, and the least certain effect of the correction "
@@ -24,9 +26,9 @@ _BY_FIELD = (
     "neighbours share, are taken into account."
 )
 _ALTHOUGH = (
-    "The probe file is corrected although rings of the inspection lie {:.3g} {} from their places by texture "
-    "with it, and {:.3g} without: these places have errors that many frames share. With poses and wall "
-    "unknown, rings and texture of the inspection are {:.2g} times as likely with the corrected probe."
+    "The probe file is corrected although held-out measurements lie {:.3g} {} from their expected values "
+    "with it, and {:.3g} without: both contain errors of the poses, which many frames share. With poses and "
+    "wall unknown, rings and texture of the inspection are {:.2g} times as likely with the corrected probe."
 )
 _BY_GAUGE = (
     "The probe file is written as it was stated: held-out measurements would lie {:.3g} {} from their "
@@ -68,19 +70,23 @@ def log_ratio(field: FieldEvidence, correction: Correction, probe: Probe) -> flo
     """Return ln of the likelihood of an inspection with the corrected probe, over that with the stated one.
 
     Scores have the expected value 0 with the stated one, and information times correction with the other, and
-    with both the same covariance, with correlated errors of neighbours. Poses, wall, matching errors and the
-    encoder's scale are unknown. None where the inspection shows nothing of what changes.
+    with both the same covariance, with correlated errors of neighbours. Poses, wall, matching errors, and the
+    encoder's scale, clock and play are unknown: a clock that is late seems an error of the probe. None where
+    the inspection shows nothing of what changes.
     """
-    whole, moved = (
-        field.whole,
-        dict(zip(probe.parameter_names, correction.probe.parameters - probe.parameters, strict=True)),
-    )
+    try:
+        whole = field.about([(LIBRARY[name], ()) for name in _OF_READINGS])
+    except np.linalg.LinAlgError:
+        return None
+    if whole is None:
+        return None
+    moved = dict(zip(probe.parameter_names, correction.probe.parameters - probe.parameters, strict=True))
     changed = [k for k, c in enumerate(whole.columns) if c.effect == INSTRUMENT and c.amplitude in moved]
-    scale = [k for k, c in enumerate(whole.columns) if c == ENCODER_SCALE]
+    free = [k for k, c in enumerate(whole.columns) if c == ENCODER_SCALE or c.effect in _OF_READINGS]
     if not changed:
         return None
     at = np.array(changed)
-    own, right, _ = eliminated(whole, stated_belief(probe), at, np.array(scale, np.int64))
+    own, right, _ = eliminated(whole, stated_belief(probe), at, np.array(free, np.int64))
     before = np.maximum(np.diag(whole.information)[at], 1e-300)
     inflation = np.sqrt(np.diag(whole.score_covariance)[at] / before)
     step = np.array([moved[whole.columns[k].amplitude] for k in changed])
