@@ -177,10 +177,17 @@ def test_a_plain_wall_seen_off_the_axis_is_uniform_except_for_errors_of_the_lamp
 
 
 @pytest.mark.parametrize(("exposure", "seen"), [(0.0, False), (0.15, True)])
-def test_a_picture_with_the_lamps_dead_shows_no_wall(exposure: float, seen: bool) -> None:
-    """Black is 16 in limited range; divided by the light it was followed as texture that stands still."""
+@pytest.mark.parametrize("also", [0, 235])
+def test_a_picture_with_the_lamps_dead_shows_no_wall(exposure: float, seen: bool, also: int) -> None:
+    """Black is 16 in limited range; divided by the light it was followed as texture that stands still.
+
+    A time of day burnt into the picture, and noise, are no light on the wall.
+    """
     probe, wall = small_probe(), grid()
+    noise = np.random.default_rng(0).normal(0, 3 if also else 0, (300, 400))
     image = 17 + draw(probe, pose(), exposure=exposure)[..., 1] + (np.indices((300, 400)).sum(0) % 7 == 0)
+    image = np.clip(image + noise, 0, 255)
+    image[5:15, 5:100] = np.maximum(image[5:15, 5:100], also)
     strip = unroll(softened(image.astype(np.uint8)), probe, pose(), wall, Hidden())
     assert bool(strip.usable.any()) == seen
 

@@ -36,9 +36,8 @@ positions have no error from it."""
 _LEAST_LIGHT = 0.05
 """Predicted light below this share of the largest is not used: the division would amplify noise."""
 _DARKEST, _BRIGHTEST = 5.0, 250.0
-"""Grey values of 8 bits between which a sample is usable: beyond them, the sensor may clip. A picture that
-spans no more than the lower one shows no wall: black may be 16, and over the predicted light it is a pattern
-that stands still (LEDs dead for a second: a drift of the image scale of 1.2 % was told)."""
+"""Grey values of 8 bits between which a sample is usable: beyond them, the sensor may clip. A wall that spans
+no more than 5 is not lit: black may be 16; over the predicted light it was texture that stands still."""
 _LINE_HALF_WIDTH_SIGMA = 12
 """Half width, in σ of the laser line, of the wall hidden under it: the line is below 1e-4 of its peak beyond
 4.3 σ; its glow reaches farther, a gradient that `without_illumination` removes. Not measured."""
@@ -225,7 +224,9 @@ def unroll(image: Image, probe: Probe, T_pc: Float, grid: StripGrid, hidden: Hid
     seen[(ahead > hidden.line_mm[0]) & (ahead < hidden.line_mm[1])] = False
     if hidden.stays is not None:
         seen &= sample(hidden.stays, coarse_uv, _COARSE)[0] == 0
-    usable = seen & (grey < _BRIGHTEST) & (grey > _DARKEST) & bool(np.ptp(image) > _DARKEST)
+    some = grey[:: _COARSE[0]][seen[:: _COARSE[0]]]
+    lit = len(some) and np.ptp(np.percentile(some, (1, 99))) > _DARKEST  # beyond noise, hot pixels, letters
+    usable = seen & (grey < _BRIGHTEST) & (grey > _DARKEST) & bool(lit)
     contrast = without_illumination(grey / _refined(light, _COARSE), usable)
     contrast = equally_sharp(contrast, coarse_uv, _COARSE)
     return Strip(first_row, contrast, usable, coarse_uv, noise_of_rows(contrast, usable))
