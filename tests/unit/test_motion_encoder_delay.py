@@ -59,6 +59,14 @@ def test_the_delay_is_found_in_a_short_run(late_s: float) -> None:
     assert found.matters == (late_s != 0)
 
 
+def test_times_of_which_most_are_nearly_equal_cost_no_more() -> None:
+    """Of frames whose times came in threes, 1 µs apart, a million delays were tried: minutes, and 4 GiB."""
+    together = np.repeat(TIME_S[::3], 3) + 1e-6 * np.tile(np.arange(3), len(TIME_S) // 3)
+    found = find_delay(together, way(together), readings(0.2))
+    assert found is not None
+    assert abs(found.delay_s - 0.2) < 0.1  # the time from one bunch to the next
+
+
 @pytest.mark.parametrize("seed", range(20))
 def test_constant_speed_shows_no_delay(seed: int) -> None:
     """The minimum is then anywhere, and as sharp as rounding makes it: .93 ± .03 s was reported."""

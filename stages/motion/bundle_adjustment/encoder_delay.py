@@ -31,6 +31,9 @@ _OF_RUN = 0.2
 """Longest delay tried as a share of the run: three fifths of it are then compared. Chosen."""
 _WALKS_MM = np.geomspace(0.002, 0.064, 6)
 """Strengths of the walk tried, mm per frame: motion from texture walks by .002 in open-1, slips by more."""
+_SHORTER = 4.0
+"""Delays are tried by no less than a fourth of the mean time between frames: where most come at once, by the
+median of these times (1 µs) a million delays were tried. Chosen: pauses make the mean so much longer."""
 _FRAMES = 400
 """Frames compared at most: a matrix of that size takes a hundredth of a second."""
 _FEWEST = 30
@@ -122,7 +125,7 @@ def delay_of_encoder(estimate: Estimate, measured: Measurements) -> EncoderDelay
     found = find_delay(measured.time_s, distance_along(state.axis, state.T_pc), measured.encoder)
     if found is None or not found.matters:
         return found
-    frame_s = float(np.median(np.diff(measured.time_s)))
+    frame_s = _frame_time(measured.time_s)
     whole = replace(found, delay_s=frame_s * round(found.delay_s / frame_s))
     corrected = whole.corrected(measured.encoder, measured.time_s)
     return replace(found, better=min(found.better, _gained(estimate, measured.encoder, corrected)))
@@ -155,7 +158,7 @@ def find_delay(time_s: Float, distance_mm: Float, encoder: EncoderReadings) -> E
     if len(used) < _FEWEST:
         return None
     used = used[:: -(-len(used) // _FRAMES)]
-    step = float(np.median(np.diff(time_s)))
+    step = _frame_time(time_s)
     delays = step * np.arange(-int(longest / step), int(longest / step) + 1)
     reading = np.interp(time_s[used] + delays[:, None], time_s, encoder.distance_mm).T
     costs = [_costs(distance_mm[used], reading, encoder.sigma_mm, walk) for walk in _WALKS_MM]
@@ -168,6 +171,12 @@ def find_delay(time_s: Float, distance_mm: Float, encoder: EncoderReadings) -> E
     sigma_s = step / float(np.sqrt(bend))
     moves = _moved_mm(reading[:, len(cost) // 2], reading[:, best]) / encoder.sigma_mm
     return EncoderDelay(float(delays[best] - step * slope / bend), sigma_s, better, moves)
+
+
+def _frame_time(time_s: Float) -> float:
+    """Return the usual time from one frame to the next, s; where most come at once, a part of their mean."""
+    mean = float(time_s[-1] - time_s[0]) / (len(time_s) - 1)
+    return max(float(np.median(np.diff(time_s))), mean / _SHORTER)
 
 
 def _moved_mm(before: Float, after: Float) -> float:
