@@ -24,7 +24,10 @@ AT_EDGE = (
     "It is deepest where the wall ceases to be seen: the line ends there, and what hides the wall may have "
     "drawn it aside"
 )
-ALONE = "No second, independent ring shows it, nor do one ring and the photo together"
+ALONE = (
+    "No second, independent ring shows it, nor do one ring and the photo together. A ring does not count "
+    "where a glint, a second line or a splash was rejected beside it"
+)
 LIKE_GLINT = (
     "The line is brighter there than at nine of ten places of its ring, as of a glint or a reflection, and "
     "more findings of this recording are that bright than chance explains"

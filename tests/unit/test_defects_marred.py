@@ -88,3 +88,14 @@ def test_glints_of_chance_on_two_rings_do_not_confirm_a_finding(glints, rings):
     witnesses = Witnesses(grey_texture(wall), samples)
     told = evidence_for(here, depth, surface, witnesses, np.zeros((3, 12)), 20.0)
     assert told.rings == rings
+
+
+def test_that_rings_with_other_light_do_not_count_is_told():
+    """A second line over a quarter of a pit left none of its three rings, which "no second ring" showed."""
+    here, surface, samples, wall = scene(
+        {k: slice(100, 103) for k in (30, 31, 32)}, reason=RingValidity.GHOST
+    )
+    witnesses = Witnesses(grey_texture(wall), samples)
+    told = evidence_for(here, Depth(1.0, 0.1, 0.0, (1, 6)), surface, witnesses, np.zeros((3, 12)), 20.0)
+    assert told.rings == 0
+    assert "a second line or a splash was rejected beside it" in told.doubt
