@@ -280,7 +280,7 @@ PHOTOMETRY = Stage(
 )
 TWIN = Stage(
     "twin",
-    "89",
+    "90",
     TwinParameters,
     compare_with_twin,
     "recorded frames beside the same frames, re-rendered from what the run has measured",

@@ -56,7 +56,8 @@ def banding_of_line(cells: Cells, ring: Ring) -> tuple[Mismatch, ...]:
     two halves of the picture along another axis may be more alike. Bands cross the whole picture: they must
     also show away from where the line varies most, as at a hole of the wall below or above.
     """
-    bands, aside = _bands(cells), _bands(_away_from_worst(cells))
+    away = _away_from_worst(cells)
+    bands, aside = _bands(cells, SECTORS / 2), _bands(away, (away.pixels > 0).any(0).sum() / 2)
     if bands is None or aside is None or not _most_alike(bands.rest):
         return ()
     size, alike = bands.size, bands.alike
@@ -97,11 +98,14 @@ class _Bands:
     chance: float
 
 
-def _bands(cells: Cells) -> _Bands | None:
-    """Return what both sides of rows have in common; None where it may be chance or is too small."""
+def _bands(cells: Cells, fewest: float) -> _Bands | None:
+    """Return what both sides of rows have in common; None where it may be chance or is too small.
+
+    Frames count with ``fewest`` sectors of which both sides are known.
+    """
     rest = _beside_harmonics(cells)
     both = np.isfinite(rest * rest[:, _OPPOSITE])
-    both[both.sum(1) < SECTORS / 2] = False
+    both[both.sum(1) < fewest] = False
     frames = np.asarray(both.any(1))
     if frames.sum() < FEWEST_FRAMES:
         return None

@@ -12,6 +12,7 @@ from scipy.ndimage import gaussian_filter1d
 
 from pipeline.artefacts.twin import Mismatch, NamedFigure
 from pipeline.instrument.probe import Lighting
+from stages.twin.banding import banding_of_line
 from stages.twin.causes import _may_be, causes
 from stages.twin.cells import SECTORS, Cells, Fitted, Law
 from stages.twin.flicker import beside_spots
@@ -218,6 +219,16 @@ def test_a_hole_below_or_above_is_no_banding(at_deg):
     away = np.abs((AZIMUTH_DEG - at_deg + 180) % 360 - 180)
     hole = -2.0 * (away < 28) * (np.arange(FRAMES) % 3 == 0)[:, None]
     assert not [m for m in found_in_cells(line=hole) if m.fixed_to == "rows"]
+
+
+def test_bands_beside_a_strut_are_named():
+    """About the sector that varies most and its mirror image half of the picture is left out; with a strut,
+    too few sectors were left of any frame, and bands of .11 were never named."""
+    line = _bands(0.11)
+    line[:, 0] += 0.25 * np.random.default_rng(2).standard_normal(FRAMES)
+    cells = cells_with(line, 1002, of_photo=0.05)
+    beside = replace(cells, pixels=cells.pixels * (np.arange(SECTORS) != 12))
+    assert [m.name for m in banding_of_line(beside, RING)] == ["banding"]
 
 
 def _told(name, **place):
