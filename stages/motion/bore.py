@@ -157,7 +157,7 @@ def _between_rings(radius_mm: Float, at_mm: Float) -> Bore:
     of_length = np.repeat(usual, np.diff(place, prepend=0, append=len(radius_mm)))
     smooth, middle = median_filter(radius_mm, 3), float(np.median(radius_mm))
     reducer = _in_reducers(smooth - of_length, place)
-    if _ribbed(smooth - of_length):
+    if _ribbed(smooth - of_length, at_mm):
         reducer[:] = True
     if not reducer.any():
         return Bore(at_mm[place], usual - middle) if len(place) else ONE_BORE
@@ -202,15 +202,17 @@ def _stepped_at(radius_mm: Float, near: int, n: int) -> int:
     return near - n + int(np.argmin([before[:k].sum() + behind[k:].sum() for k in range(len(part))]))
 
 
-def _ribbed(off_mm: Float) -> bool:
-    """Whether most rings (F,) are off the bore of their length, ``off_mm``, so that no part is a cylinder.
+def _ribbed(off_mm: Float, at_mm: Float) -> bool:
+    """Whether most of the pipe is off the bore of its length, so that no part is a cylinder.
 
-    A slow course over the run, of a pipe that widens or a lens that warms up, does not count. Ribs of .5 mm,
-    11 mm apart: landmarks held to a cylinder turned the camera by 5°, and no defect was found.
+    ``off_mm`` (F,) is how far rings at distances ``at_mm`` (F,) are off; where the probe stood, many rings
+    show one place. A slow course over the run, of a pipe that widens or a lens that warms up, does not count.
+    Ribs of .5 mm, 11 mm apart: landmarks held to a cylinder turned the camera by 5°, and no defect was found.
     """
-    ring = np.arange(len(off_mm))
-    slow = Polynomial.fit(ring, off_mm, _SLOW)(ring)
-    return float(np.median(np.abs(off_mm - slow))) > _STEP_MM / 2
+    even_mm = np.linspace(at_mm[0], at_mm[-1], len(at_mm))
+    evenly_mm, place = np.interp(even_mm, at_mm, off_mm), np.arange(len(at_mm))
+    slow_mm = Polynomial.fit(place, evenly_mm, _SLOW)(place)
+    return float(np.median(np.abs(evenly_mm - slow_mm))) > _STEP_MM / 2
 
 
 def _in_reducers(off_mm: Float, place: Int) -> np.ndarray:

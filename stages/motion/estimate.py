@@ -267,7 +267,7 @@ def _motion_of_run(
 
 MOTION = Stage(
     "motion",
-    "82",
+    "83",
     MotionParameters,
     _motion_of_run,
     "camera pose in every frame and the pipe's axis, from texture, rings and encoder together",
