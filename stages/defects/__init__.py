@@ -270,5 +270,5 @@ def _defects_of_run(
 
 
 DEFECTS = Stage(
-    "defects", "79", DefectParameters, _defects_of_run, "defects as instances with depth, clock and kind"
+    "defects", "80", DefectParameters, _defects_of_run, "defects as instances with depth, clock and kind"
 )

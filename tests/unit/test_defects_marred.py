@@ -70,6 +70,14 @@ def test_all_light_beside_the_line_counts_as_a_glint_but_a_missing_or_clipped_li
     assert list(without_glints(FRAMES, here, surface, rings)) == ([30, 32] if beside else [30, 31, 32])
 
 
+@pytest.mark.parametrize(("rings_with_it", "clear"), [(20, False), (40, True)])
+def test_a_second_line_that_stays_in_the_picture_hides_no_defect(rings_with_it, clear):
+    """Of the three rings that show a pit, none counted where the second line lay over a quarter of it."""
+    ghost = {frame: slice(108, 112) for frame in range(20, 20 + rings_with_it)}
+    here, surface, rings, _ = scene(ghost, reason=RingValidity.GHOST)
+    assert list(without_glints(FRAMES, here, surface, rings)) == (list(FRAMES) if clear else [])
+
+
 def test_samples_without_a_point_do_not_hide_a_glint():
     here, surface, rings, _ = scene({31: slice(102, 110)}, lost=1)
     assert list(without_glints(FRAMES, here, surface, rings)) == [30, 32]
