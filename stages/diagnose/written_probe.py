@@ -18,6 +18,9 @@ from stages.diagnose.result import Diagnosis
 # Probability of a correction without a name: as likely right as wrong before the inspection is asked. The
 # least probability has finite odds.
 _NAMELESS, _LEAST = 0.5, 1e-12
+# Odds of less than 3.2 to one are "not worth more than a bare mention" (H. Jeffreys, Theory of Probability,
+# 1961, app. B): held-out measurements then decide.
+_BARE = float(np.log(10) / 2)
 _OF_READINGS = ("time_offset", "encoder_backlash")
 _BY_FIELD = (
     "The probe file is written as it was stated: rings and texture of the inspection are {:.2g} times as "
@@ -29,6 +32,9 @@ _ALTHOUGH = (
     "The probe file is corrected although held-out measurements lie {:.3g} {} from their expected values "
     "with it, and {:.3g} without: both contain errors of the poses, which many frames share. With poses and "
     "wall unknown, rings and texture of the inspection are {:.2g} times as likely with the corrected probe."
+)
+_LACKS = (
+    "The probe file cannot express {}: what is measured with it still contains the error that this makes."
 )
 _BY_GAUGE = (
     "The probe file is written as it was stated: held-out measurements would lie {:.3g} {} from their "
@@ -50,20 +56,24 @@ def decided(found: Diagnosis, field: FieldEvidence | None, correction: Correctio
     """Return whether the probe is corrected.
 
     An inspection decides by the odds of both probes, beginning with the probability of what the gauge run
-    found. Without one, held-out parts of the gauge run must not fit worse.
+    found. Without one, and where these odds are nearly even, held-out measurements must not fit worse.
     """
     ratio = log_ratio(field, correction, probe) if field is not None else None
+    lacks = (_LACKS.format(correction.beyond_probe),) if correction.inexpressible else ()
     fit = found.fit
     worse = fit is not None and fit.heldout_after > fit.heldout_before
-    if ratio is None:
+    chance = _chance(found, correction)
+    odds = ratio + logit(chance) if ratio is not None else 0.0
+    if ratio is None or abs(odds) < _BARE:
         worse_by = (fit.heldout_after, fit.unit, fit.heldout_before) if fit is not None else ()
-        return Decision(not worse, (_BY_GAUGE.format(*worse_by),) if worse else ())
-    chance, likelier = _chance(found, correction), float(np.exp(np.clip(ratio, -50, 50)))
-    if ratio + logit(chance) < 0:
+        return Decision(not worse, (_BY_GAUGE.format(*worse_by),) if worse else lacks)
+    likelier = float(np.exp(np.clip(ratio, -50, 50)))
+    if odds < 0:
         return Decision(False, (_BY_FIELD.format(likelier, chance),))
     if fit is None or not worse:
-        return Decision(True)
-    return Decision(True, (_ALTHOUGH.format(fit.heldout_after, fit.unit, fit.heldout_before, likelier),))
+        return Decision(True, lacks)
+    although = _ALTHOUGH.format(fit.heldout_after, fit.unit, fit.heldout_before, likelier)
+    return Decision(True, (although, *lacks))
 
 
 def log_ratio(field: FieldEvidence, correction: Correction, probe: Probe) -> float | None:

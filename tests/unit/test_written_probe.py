@@ -18,6 +18,7 @@ PROBE = SimpleNamespace(
 )
 TILT = np.array([0.3, 0.0])
 WORSE = FitQuality("px", 0.364, 0.064, 2.776, 2.862, 0.83)
+BETTER = FitQuality("px", 0.364, 0.064, 0.143, 0.081, 0.83)
 
 
 def inspection(true: Any, information: float, alike: float = 1.0, noise: float = 0.0) -> Any:
@@ -29,13 +30,16 @@ def inspection(true: Any, information: float, alike: float = 1.0, noise: float =
     return SimpleNamespace(about=lambda asked: whole)
 
 
-def correction(step: Any) -> Any:
-    return SimpleNamespace(probe=SimpleNamespace(parameters=np.asarray(step)), applied=("laser_tilt",))
+def correction(step: Any, inexpressible: str = "") -> Any:
+    return SimpleNamespace(
+        probe=SimpleNamespace(parameters=np.asarray(step)), applied=("laser_tilt",),
+        inexpressible=(inexpressible,) if inexpressible else (), beyond_probe=inexpressible,
+    )  # fmt: skip
 
 
-def answer(*probability: float) -> Any:
+def answer(*probability: float, fit: FitQuality = WORSE) -> Any:
     effects = tuple(SimpleNamespace(name="laser_tilt", probability=p) for p in probability)
-    return cast(Any, SimpleNamespace(fit=WORSE, effects=effects))
+    return cast(Any, SimpleNamespace(fit=fit, effects=effects))
 
 
 def test_the_likelihoods_of_both_probes_are_those_of_the_scores() -> None:
@@ -88,9 +92,9 @@ def test_a_clock_that_is_late_in_the_inspection_does_not_speak_about_the_probe(d
 def test_a_correction_withheld_although_the_inspection_is_for_it_says_how_unlikely_it_is() -> None:
     """A cone of .35: the stated probe was "0.84 times as likely, which outweighs" the gauge run."""
     seen = inspection(TILT, 4.0)
-    (note,) = decided(answer(0.35), seen, correction(TILT), cast(Any, PROBE)).notes
+    (note,) = decided(answer(0.15), seen, correction(TILT), cast(Any, PROBE)).notes
     assert "1.2 times as likely with the corrected probe as with the stated one" in note
-    assert "a probability of 0.35" in note
+    assert "a probability of 0.15" in note
 
 
 def test_the_least_certain_of_two_effects_of_a_name_counts() -> None:
@@ -98,6 +102,23 @@ def test_the_least_certain_of_two_effects_of_a_name_counts() -> None:
     seen = inspection(TILT, 4.0)
     for each in ((0.2, 0.997), (0.997, 0.2), (0.0,)):
         assert not decided(answer(*each), seen, correction(TILT), cast(Any, PROBE)).written
+
+
+@pytest.mark.parametrize("toward", [-1e-9, 1e-9])
+@pytest.mark.parametrize(("fit", "written"), [(WORSE, False), (BETTER, True)])
+def test_where_the_odds_are_even_held_out_measurements_decide(toward: float, fit: Any, written: bool) -> None:
+    """A correction without a name was written or not by the sign of 1e-9."""
+    seen = inspection(TILT * (0.5 + toward), 32.0)
+    assert decided(answer(fit=fit), seen, correction(TILT), cast(Any, PROBE)).written == written
+
+
+@pytest.mark.parametrize("seen", [None, inspection(TILT, 400.0)])
+def test_a_written_probe_that_cannot_express_an_effect_says_so(seen: Any) -> None:
+    """A window of glass was named, and the probe file without it was called corrected."""
+    made = correction(TILT, "housing_glass")
+    told = decided(answer(0.9, fit=BETTER), seen, made, cast(Any, PROBE))
+    assert told.written
+    assert "cannot express housing_glass" in told.notes[-1]
 
 
 def test_an_inspection_that_determines_nothing_leaves_the_decision_to_the_gauge_run() -> None:
