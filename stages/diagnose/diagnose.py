@@ -150,7 +150,7 @@ def _without_scale(seen: Seen, beyond_probe: str) -> Seen:
 
 
 DIAGNOSIS = Stage(
-    "diagnosis", "65", DiagnosisParameters, diagnose,
+    "diagnosis", "66", DiagnosisParameters, diagnose,
     "what physics was left out, where it shows, and what confirms it",
 )  # fmt: skip
 _OF_FIELD = (PREMISES, RINGS, TRIANGULATE, LINE_PROFILE, FREE_MOTION, FIELD_EVIDENCE)

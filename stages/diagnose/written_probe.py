@@ -9,7 +9,7 @@ from scipy.special import logit
 
 from pipeline.instrument.probe import Probe
 from stages.diagnose.correct import Correction
-from stages.diagnose.effects.library import LIBRARY
+from stages.diagnose.effects.library import LIBRARY, OF_READINGS
 from stages.diagnose.field.evidence import FieldEvidence
 from stages.diagnose.field.system import ENCODER_SCALE
 from stages.diagnose.inference import INSTRUMENT, eliminated, stated_belief
@@ -21,7 +21,6 @@ _NAMELESS, _LEAST = 0.5, 1e-12
 # Odds of less than 3.2 to one are "not worth more than a bare mention" (H. Jeffreys, Theory of Probability,
 # 1961, app. B): held-out measurements then decide.
 _BARE = float(np.log(10) / 2)
-_OF_READINGS = ("time_offset", "encoder_backlash")
 _BY_FIELD = (
     "The probe file is written as it was stated: rings and texture of the inspection are {:.2g} times as "
     "likely with the corrected probe as with the stated one, and the least certain effect of the correction "
@@ -85,14 +84,14 @@ def log_ratio(field: FieldEvidence, correction: Correction, probe: Probe) -> flo
     the inspection shows nothing of what changes.
     """
     try:
-        whole = field.about([(LIBRARY[name], ()) for name in _OF_READINGS])
+        whole = field.about([(LIBRARY[name], ()) for name in OF_READINGS])
     except np.linalg.LinAlgError:
         return None
     if whole is None:
         return None
     moved = dict(zip(probe.parameter_names, correction.probe.parameters - probe.parameters, strict=True))
     changed = [k for k, c in enumerate(whole.columns) if c.effect == INSTRUMENT and c.amplitude in moved]
-    free = [k for k, c in enumerate(whole.columns) if c == ENCODER_SCALE or c.effect in _OF_READINGS]
+    free = [k for k, c in enumerate(whole.columns) if c == ENCODER_SCALE or c.effect in OF_READINGS]
     if not changed:
         return None
     at = np.array(changed)

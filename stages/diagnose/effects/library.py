@@ -21,6 +21,10 @@ from stages.diagnose.effects.window import WINDOW_MODELS
 _MODELS = (*LASER_MODELS, *CAMERA_MODELS, *WINDOW_MODELS, *POSE_MODELS, *PHOTOMETRIC_MODELS)
 LIBRARY: Mapping[str, EffectModel] = MappingProxyType({model.name: model for model in _MODELS})
 
+# Unknown in every inspection that is asked about the instrument: in texture and readings, a clock that is
+# late seems an error of the instrument.
+OF_READINGS = ("time_offset", "encoder_backlash")
+
 # Effects of the catalogue whose influence on positions cannot be predicted, with the reason.
 NOT_PREDICTED: Mapping[str, str] = MappingProxyType({
     "slope_bias": "needs the wall's slope and gloss everywhere: seen in the profile's skewness and in glints",

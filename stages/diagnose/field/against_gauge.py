@@ -12,13 +12,14 @@ from pipeline.physics.effect import CourseKind
 from stages.diagnose.agreement import same, sized
 from stages.diagnose.effects.base import EffectModel, Shape
 from stages.diagnose.effects.courses import of_own_clock
+from stages.diagnose.effects.library import LIBRARY, OF_READINGS
 from stages.diagnose.field.evidence import FieldEvidence
 from stages.diagnose.gauge.confirm import partial_of
 from stages.diagnose.gauge.examine import Examined
 from stages.diagnose.gauge.fit import evidence
 from stages.diagnose.gauge.run import Term
 from stages.diagnose.gauge.scan import Scored
-from stages.diagnose.inference import Around, Evidence, Score, Stated, places_of
+from stages.diagnose.inference import Around, Score, Stated, places_of, places_of_all
 from stages.diagnose.result import Confirmation
 
 # Inspection and gauge run confirm or refute each other only where the 1 σ of one is below this share of the
@@ -90,8 +91,9 @@ def _met(term: Term, covariance: Float, found: FieldEvidence, stated: Stated) ->
     """Return whether the inspection alone agrees with the gauge run on an effect; None if too uncertain.
 
     The inspection's estimate uses nothing of the gauge run except the encoder's scale, where that is named:
-    poses come from texture, in a pipe of unknown size, with the stated instrument within its uncertainty. A
-    step is sought at all times of the inspection; it need not happen there, so that nothing contradicts it.
+    poses come from texture, in a pipe of unknown size, with the stated instrument within its uncertainty and
+    an encoder of unknown clock and play. A step is sought at all times of the inspection; it need not happen
+    there, so that nothing contradicts it.
     ``covariance`` (Q, Q) is that of the term's amplitudes.
     """
     seen = _own_score(term, found, stated) if is_asked(term.model) else None
@@ -116,17 +118,14 @@ def _own_score(term: Term, found: FieldEvidence, stated: Stated) -> tuple[Shape,
     if found.run is None:
         return None
     shapes: tuple[Shape, ...] = (term.shape,)
-    whole: Evidence | None = None
     if term.model.kind is CourseKind.STEP:
         duration = float(np.ptp(found.run.measured.time_s))
         shapes = term.model.shapes(duration, found.run.recording.frame_rate)
-    elif len(places_of(found.whole, term.model, term.shape)):
-        whole = found.whole
-    if whole is None:
-        whole = found.about([(term.model, shape) for shape in shapes])
+    readings = [(LIBRARY[name], ()) for name in OF_READINGS if name != term.model.name]
+    whole = found.about([*((term.model, shape) for shape in shapes), *readings])
     if whole is None:
         return None
-    around = Around.of(whole, stated)
+    around = Around.of(whole, stated, places_of_all(whole, readings))
     each = ((shape, around.score(places_of(whole, term.model, shape))) for shape in shapes)
     seen = [(shape, own) for shape, own in each if own is not None]
     return max(seen, key=lambda pair: pair[1].statistic, default=None)
