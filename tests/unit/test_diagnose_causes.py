@@ -155,6 +155,15 @@ def test_what_rings_were_not_asked_about_is_as_likely_as_what_looks_like_it():
     assert class_shown(replace(unlikely, causes=least)).rest == (others,)
 
 
+def test_what_remains_by_the_encoder_is_not_weighed_by_the_gauge_run():
+    """Of a clock that was late by .204 s, the page said "time offset, less than 1 %"."""
+    left = Remainder(Verdict.CLASS, None, ("encoder_backlash", "time_offset"))
+    laws = (Cause("laser_cone", 0.91), Cause("dome_axial", 0.09), Cause("time_offset", 1e-9))
+    found = Diagnosis("f", "g", Verdict.PARTLY, 1e-9, remainder=left, causes=Causes(laws))
+    assert [c.name for c in class_shown(found).causes] == ["encoder backlash", "time offset"]
+    assert class_shown(found).rest == ()
+
+
 def test_a_name_that_the_inspection_contradicts_loses_its_probability_by_the_gauge_run():
     """The page said "laser tilt, more than 99 %", and what looks like a tilt stood nowhere on it."""
     tilt = EffectFound("laser_tilt", 0.995, {}, "The sheet is tilted.", "")

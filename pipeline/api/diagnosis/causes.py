@@ -44,11 +44,15 @@ def class_shown(found: Diagnosis) -> ClassShown:
     """Return the class, or the class that remains beside what is certain, for the page.
 
     Names of which rings and fiducials of a gauge run say nothing stand with the likeliest that looks like
-    them, or else without a probability. Unlikely names are summed up, unless all are unlikely.
+    them, or else without a probability. Unlikely names are summed up, unless all are unlikely. If those of a
+    remaining class are, they come from other measurements, as the encoder's: the gauge run does not weigh
+    them.
     """
     left = found.remainder
     members = found.members if left is None else left.members
     each = {name: found.causes.of(name) for name in members}
+    if left is not None and all(cause is None or cause.probability < _SHOWN for cause in each.values()):
+        return ClassShown(tuple(CauseShown(_in_words(name)) for name in members))
     asked = sorted((c for c in each.values() if c is not None), key=lambda c: -c.probability)
     unasked = [name for name, cause in each.items() if cause is None]
     mate = {name: found.causes.like(name, members) for name in unasked}
