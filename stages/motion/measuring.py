@@ -226,7 +226,8 @@ def _require_distance(tracked: TrackedPoses, encoder: EncoderReadings | None) ->
         raise UnusableError(
             "motion",
             f"the wall's texture could be followed in only {100 * share:.0f} % of the lit frames and "
-            "there is no encoder, so that distance is not determined",
+            "no encoder is used, so that distance is not determined",
             limit="half of the lit frames",
-            hint="add the encoder file, light the wall better, or record lit frames more often",
+            hint="add the encoder file, or correct it if a warning says why it is not used; light the wall "
+            "better, or record lit frames more often",
         )
