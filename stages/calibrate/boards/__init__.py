@@ -19,9 +19,6 @@ from stages.calibrate.boards.compare import (
     ranked,
     score,
     uncertainty_map,
-    without_outlier_corners,
-    without_outlier_views,
-    without_repeated,
 )
 from stages.calibrate.boards.fit import (
     MODEL_NAMES,
@@ -33,6 +30,7 @@ from stages.calibrate.boards.fit import (
     refuse_too_few,
 )
 from stages.calibrate.boards.pictures import FoundBoards, Pictures, Target, find_boards, list_pictures
+from stages.calibrate.boards.selection import without_outlier_corners, without_outlier_views, without_repeated
 from stages.calibrate.boards.start import start
 
 __all__ = ["BOARDS", "CAMERA", "CameraFile", "FoundBoards", "Pictures", "Target", "list_pictures"]
